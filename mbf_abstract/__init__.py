@@ -1,0 +1,1 @@
+"""The core of map-independent navigation: actions, executions, plugin interfaces. It knows no map."""

@@ -1,0 +1,64 @@
+"""Typed parameters: one declaration gives the default, the unit, the range, the error text and the docs page.
+
+Example
+-------
+>>> class Parameters(PluginParameters):
+...     look_ahead: float = parameter(0.6, "Distance of the carrot along the path.", unit="m", gt=0.0, le=10.0)
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class ParameterModel(BaseModel):
+    """Base of every parameter block: unknown keys and non-finite numbers are refused, values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
+
+
+class PluginParameters(ParameterModel):
+    """Parameters of one plugin instance; derive it in the plugin's module. Without parameters use it as it is."""
+
+
+def parameter(
+    default: Any,
+    description: str,
+    *,
+    unit: str = "",
+    dynamic: bool = True,
+    ge: float | None = None,
+    gt: float | None = None,
+    le: float | None = None,
+    lt: float | None = None,
+    allow_inf: bool = False,
+) -> Any:
+    """Declare one parameter of a ``ParameterModel``.
+
+    Parameters
+    ----------
+    default : object
+        The default; ``...`` makes the parameter required.
+    description : str
+        One sentence for the docs page.
+    unit : str
+        SI unit, empty for a pure number or a text.
+    dynamic : bool
+        Whether a change at run time takes effect on running goals; otherwise it is read when a goal starts.
+    ge, gt, le, lt : float, optional
+        Bounds of the legal range.
+    allow_inf : bool
+        Accept ``.inf`` (e.g. an unlimited range).
+    """
+    return Field(
+        default,
+        description=description,
+        ge=ge,
+        gt=gt,
+        le=le,
+        lt=lt,
+        allow_inf_nan=True if allow_inf else None,
+        json_schema_extra={"unit": unit, "dynamic": dynamic},
+    )

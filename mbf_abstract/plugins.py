@@ -1,0 +1,263 @@
+"""The plugin interfaces: planner, controller, recovery, refiner, and the results they return.
+
+Who calls what, from which thread:
+
+- A plugin is constructed once, by the server, with a *context* (its name, its validated parameters, clock, random
+  generator, robot information, and the map of the derived server).
+- Its main method (``make_plan``, ``compute_velocity_commands``, ``run_behavior``, ``apply_refinement``) runs on a
+  worker thread of a slot. It may take time; it must poll the cancel token at least every 50 ms of work. The same
+  instance never runs twice at once.
+- ``cancel`` is called from other threads, any number of times, also when nothing runs. It must only set a flag.
+
+Failure of navigation is a value: return a result with an outcome of the action's range and a message. An exception
+that leaves a plugin ends the goal with INTERNAL_ERROR and stops the robot.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING, ClassVar, Protocol
+
+from mbf_abstract.cancel import CancelToken
+from mbf_abstract.geometry import Command, Path, Pose, Twist
+from mbf_abstract.outcomes import is_success
+from mbf_abstract.parameters import PluginParameters
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from mbf_abstract.clock import Clock
+    from mbf_abstract.robot import RobotInformation
+
+
+class PluginKind(Enum):
+    """The four kinds of plugins a server loads; the value is the entry-point group's last word."""
+
+    PLANNER = "planners"
+    CONTROLLER = "controllers"
+    RECOVERY = "recoveries"
+    REFINER = "refiners"
+
+
+@dataclass(frozen=True)
+class PluginContext:
+    """What every plugin is constructed with; a map's server derives it and adds its map.
+
+    Attributes
+    ----------
+    name : str
+        Name of the instance in the configuration.
+    parameters : PluginParameters
+        Validated instance of the plugin class's ``Parameters``.
+    clock : Clock
+        The only source of time.
+    rng : numpy.random.Generator
+        The plugin's own generator, seeded by the server from its seed and the plugin's name.
+    robot : RobotInformation
+        Fresh robot pose and velocity.
+    """
+
+    name: str
+    parameters: PluginParameters
+    clock: Clock
+    rng: np.random.Generator
+    robot: RobotInformation
+
+
+class Plugin(ABC):
+    """Common base of the four interfaces."""
+
+    Parameters: ClassVar[type[PluginParameters]] = PluginParameters
+    parameters: PluginParameters
+    modelled_compute_time: float = 0.0
+    """Seconds of virtual time one call of the main method is made to take on a SimClock."""
+
+    def __init__(self, context: PluginContext) -> None:
+        self.name = context.name
+        self.parameters = context.parameters
+        self.clock = context.clock
+        self.rng = context.rng
+        self.robot = context.robot
+
+    def cancel(self) -> bool:
+        """Ask the running call to end; return whether the plugin supports this beside its cancel token."""
+        return False
+
+    def parameters_changed(self) -> None:
+        """React to new ``self.parameters``, set at run time; called while no main method runs."""
+
+
+# ---------------------------------------------------------------------------------------------------- planner
+@dataclass(frozen=True)
+class PlanRequest:
+    """One question to a planner. All poses are in the server's global frame.
+
+    Attributes
+    ----------
+    start, goal : Pose
+    dist_tolerance : float
+        How far [m] from the goal a path may end if the goal itself cannot be reached; 0 = exactly there.
+    angle_tolerance : float
+        The same for the final heading [rad].
+    via : tuple of Pose
+        Poses to pass on the way, in order.
+    """
+
+    start: Pose
+    goal: Pose
+    dist_tolerance: float = 0.0
+    angle_tolerance: float = 0.0
+    via: tuple[Pose, ...] = ()
+    cancel_token: CancelToken = field(default_factory=CancelToken)
+
+
+@dataclass(frozen=True)
+class PlanResult:
+    """Answer of a planner: an outcome of ``GetPathOutcome`` (or a plugin's own), a text, the path and its cost.
+
+    A cost of exactly 0 is replaced by the path's length.
+    """
+
+    outcome: int
+    message: str = ""
+    path: Path | None = None
+    cost: float = 0.0
+
+    @property
+    def success(self) -> bool:
+        """Whether the outcome is below 10."""
+        return is_success(self.outcome)
+
+
+class AbstractPlanner(Plugin):
+    """Finds a path from a start to a goal pose."""
+
+    @abstractmethod
+    def make_plan(self, request: PlanRequest) -> PlanResult:
+        """Find a path; must poll ``request.cancel_token`` and return CANCELED (51) soon after it is set."""
+
+
+# ------------------------------------------------------------------------------------------------- controller
+@dataclass(frozen=True)
+class ControlRequest:
+    """One control cycle: the robot's pose in the global frame and its velocity in the base frame."""
+
+    pose: Pose
+    velocity: Twist
+    cancel_token: CancelToken = field(default_factory=CancelToken)
+
+
+@dataclass(frozen=True)
+class ControlResult:
+    """Answer of a controller: an outcome of ``ExePathOutcome`` (or a plugin's own), a text and the command.
+
+    The command is sent only if the outcome is a success; ``None`` then counts as NO_VALID_CMD.
+    """
+
+    outcome: int
+    message: str = ""
+    command: Command | None = None
+
+    @property
+    def success(self) -> bool:
+        """Whether the outcome is below 10."""
+        return is_success(self.outcome)
+
+
+class AbstractController(Plugin):
+    """Follows a path: one velocity command a cycle."""
+
+    @abstractmethod
+    def set_plan(self, path: Path) -> bool:
+        """Take over a path in the global frame; False = refused (INVALID_PATH). Also called while driving."""
+
+    @abstractmethod
+    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+        """Compute the command of this cycle; one call should take less than a control period."""
+
+    @abstractmethod
+    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """Whether ``pose`` is at the end of the plan within the tolerances [m, rad]."""
+
+    def cancel(self) -> bool:
+        """Return True to slow down by yourself and answer CANCELED (101) when stopped; False = stop me now."""
+        return False
+
+
+# --------------------------------------------------------------------------------------------------- recovery
+class Motion(Protocol):
+    """How a recovery moves the robot: through the velocity gate, with fresh state, and cancelable."""
+
+    def pose(self) -> Pose:
+        """Fresh robot pose in the global frame; raises RobotStateError."""
+
+    def velocity(self) -> Twist:
+        """Measured velocity in the base frame; raises RobotStateError."""
+
+    def send(self, command: Command) -> bool:
+        """Send one command; False when the gate refused it (lease lost, paused)."""
+
+    def sleep(self, seconds: float) -> bool:
+        """Wait; False as soon as the behaviour shall end."""
+
+
+@dataclass(frozen=True)
+class RecoveryRequest:
+    """One run of a recovery behaviour."""
+
+    motion: Motion
+    cancel_token: CancelToken = field(default_factory=CancelToken)
+
+
+@dataclass(frozen=True)
+class RecoveryResult:
+    """Answer of a recovery: an outcome of ``RecoveryOutcome`` (or a plugin's own) and a text."""
+
+    outcome: int
+    message: str = ""
+
+    @property
+    def success(self) -> bool:
+        """Whether the outcome is below 10."""
+        return is_success(self.outcome)
+
+
+class AbstractRecovery(Plugin):
+    """Gets the robot out of trouble: clears a map, backs up, turns, waits."""
+
+    @abstractmethod
+    def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
+        """Run the behaviour to its end; must poll the cancel token (or use ``motion.sleep``) and stop the robot."""
+
+
+# ---------------------------------------------------------------------------------------------------- refiner
+@dataclass(frozen=True)
+class RefineResult:
+    """Answer of a refiner: outcome of ``RefinePathOutcome``, text, and the refined path."""
+
+    outcome: int
+    message: str = ""
+    path: Path | None = None
+
+    @property
+    def success(self) -> bool:
+        """Whether the outcome is below 10."""
+        return is_success(self.outcome)
+
+
+class AbstractRefiner(Plugin):
+    """Improves a path between planning and following, e.g. smooths it."""
+
+    @abstractmethod
+    def apply_refinement(self, path: Path, cancel_token: CancelToken) -> RefineResult:
+        """Return a better path from the same start to the same goal; never modify the given one."""
+
+
+PLUGIN_BASES: dict[PluginKind, type[Plugin]] = {
+    PluginKind.PLANNER: AbstractPlanner,
+    PluginKind.CONTROLLER: AbstractController,
+    PluginKind.RECOVERY: AbstractRecovery,
+    PluginKind.REFINER: AbstractRefiner,
+}
