@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Union, overload
+from typing import Any, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -252,7 +252,7 @@ class AckermannCommand:
         return abs(self.speed) <= translation
 
 
-Command = Union[Twist, AckermannCommand]
+Command: TypeAlias = Twist | AckermannCommand
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,9 +296,7 @@ class Path:
         bad = np.flatnonzero(~(np.isfinite(positions).all(axis=1) & np.isfinite(orientations).all(axis=1)))
         if bad.size:
             i = int(bad[0])
-            raise ValueError(
-                f"pose {i} of the path is not finite: {positions[i].tolist()} {orientations[i].tolist()}"
-            )
+            raise ValueError(f"pose {i} of the path is not finite: {positions[i].tolist()} {orientations[i].tolist()}")
         norms = np.sum(orientations**2, axis=1)
         bad = np.flatnonzero(np.abs(norms - 1.0) > QUATERNION_NORM_TOLERANCE)
         if bad.size:
@@ -350,11 +348,7 @@ class Path:
                     ahead[i] = ahead[i + 1]
             ahead[-1] = ahead[-2]
         ahead[~ahead.any(axis=1)] = (1.0, 0.0, 0.0)
-        up = (
-            np.tile([0.0, 0.0, 1.0], (len(points), 1))
-            if normals is None
-            else np.asarray(normals, dtype=float)
-        )
+        up = np.tile([0.0, 0.0, 1.0], (len(points), 1)) if normals is None else np.asarray(normals, dtype=float)
         orientations = quaternions_from_axes(ahead, up) if len(points) else np.zeros((0, 4))
         if final_orientation is not None and len(points):
             orientations[-1] = final_orientation

@@ -85,7 +85,7 @@ class Plugin(ABC):
         """Ask the running call to end; return whether the plugin supports this beside its cancel token."""
         return False
 
-    def parameters_changed(self) -> None:
+    def parameters_changed(self) -> None:  # noqa: B027 - an optional hook
         """React to new ``self.parameters``, set at run time; called while no main method runs."""
 
 
