@@ -1,0 +1,1 @@
+"""Navigation on triangle meshes: server, map, layers, planners, controllers and recoveries."""

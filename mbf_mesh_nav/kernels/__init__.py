@@ -1,0 +1,1 @@
+"""Compiled inner loops: pure functions, arrays in, arrays out. Importing them compiles nothing."""

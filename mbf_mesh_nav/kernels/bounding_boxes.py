@@ -1,0 +1,184 @@
+"""A box tree over the faces of a mesh, with nearest-point and ray queries.
+
+Faces come sorted along a Morton curve, so the tree needs no building beyond boxes: leaf i covers faces 4i to 4i+3,
+and node i of a level covers nodes 4i to 4i+3 of the level below. ``levels`` holds where each level starts in ``boxes``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+IntArray = NDArray[np.int32]
+FloatArray = NDArray[np.float64]
+
+BRANCHES = 4
+STACK_SIZE = 128
+
+
+@njit(cache=True, nogil=True)
+def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Boxes (N, 6) as min x y z, max x y z, leaves first, and the start of every level (levels + 1,)."""
+    counts = np.zeros(32, dtype=np.int64)
+    levels = 0
+    size = faces.shape[0]
+    while True:
+        size = (size + BRANCHES - 1) // BRANCHES
+        counts[levels] = size
+        levels += 1
+        if size <= 1:
+            break
+    starts = np.zeros(levels + 1, dtype=np.int64)
+    for level in range(levels):
+        starts[level + 1] = starts[level] + counts[level]
+    boxes = np.zeros((starts[levels], 6))
+    boxes[:, :3] = np.inf
+    boxes[:, 3:] = -np.inf
+    for face in range(faces.shape[0]):
+        leaf = face // BRANCHES
+        for corner in range(3):
+            for axis in range(3):
+                value = vertices[faces[face, corner], axis]
+                boxes[leaf, axis] = min(boxes[leaf, axis], value)
+                boxes[leaf, axis + 3] = max(boxes[leaf, axis + 3], value)
+    for level in range(1, levels):
+        for child in range(counts[level - 1]):
+            parent = starts[level] + child // BRANCHES
+            for axis in range(3):
+                boxes[parent, axis] = min(boxes[parent, axis], boxes[starts[level - 1] + child, axis])
+                boxes[parent, axis + 3] = max(boxes[parent, axis + 3], boxes[starts[level - 1] + child, axis + 3])
+    return boxes, starts
+
+
+@njit(cache=True, nogil=True)
+def squared_distance_to_box(boxes: FloatArray, node: int, x: float, y: float, z: float) -> float:
+    """Squared distance [m^2] from a point to a box, 0 inside."""
+    dx = max(boxes[node, 0] - x, 0.0, x - boxes[node, 3])
+    dy = max(boxes[node, 1] - y, 0.0, y - boxes[node, 4])
+    dz = max(boxes[node, 2] - z, 0.0, z - boxes[node, 5])
+    return dx * dx + dy * dy + dz * dz
+
+
+@njit(cache=True, nogil=True)
+def closest_on_face(
+    vertices: FloatArray, faces: IntArray, face: int, x: float, y: float, z: float
+) -> tuple[float, float, float]:
+    """Squared distance to the nearest point of a triangle and its barycentric weights of corners 1 and 2.
+
+    Region by region after Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+    """
+    a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
+    ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
+    wx, wy, wz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
+    px, py, pz = x - vertices[a, 0], y - vertices[a, 1], z - vertices[a, 2]
+    d1, d2 = ux * px + uy * py + uz * pz, wx * px + wy * py + wz * pz
+    uu, uw, ww = ux * ux + uy * uy + uz * uz, ux * wx + uy * wy + uz * wz, wx * wx + wy * wy + wz * wz
+    d3, d4 = d1 - uu, d2 - uw
+    d5, d6 = d1 - uw, d2 - ww
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    v, w = 0.0, 0.0
+    if d1 <= 0.0 and d2 <= 0.0:  # corner 0
+        pass
+    elif d3 >= 0.0 and d4 <= d3:  # corner 1
+        v = 1.0
+    elif d6 >= 0.0 and d5 <= d6:  # corner 2
+        w = 1.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:  # edge 0-1
+        v = d1 / (d1 - d3)
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:  # edge 0-2
+        w = d2 / (d2 - d6)
+    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:  # edge 1-2
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:  # inside
+        v, w = vb / (va + vb + vc), vc / (va + vb + vc)
+    rx, ry, rz = px - v * ux - w * wx, py - v * uy - w * wy, pz - v * uz - w * wz
+    return rx * rx + ry * ry + rz * rz, v, w
+
+
+@njit(cache=True, nogil=True)
+def closest_face(
+    vertices: FloatArray,
+    faces: IntArray,
+    boxes: FloatArray,
+    levels: NDArray[np.int64],
+    x: float,
+    y: float,
+    z: float,
+    max_distance: float,
+    hint_face: int,
+) -> tuple[int, float, float, float]:
+    """Nearest face of a point within ``max_distance``: (face or -1, distance, weight of corner 1, of corner 2).
+
+    ``hint_face`` (or -1) is looked at first, so that a good guess prunes nearly the whole tree.
+    """
+    best_face, best, best_v, best_w = -1, max_distance * max_distance, 0.0, 0.0
+    if hint_face >= 0:
+        squared, v, w = closest_on_face(vertices, faces, hint_face, x, y, z)
+        if squared <= best:
+            best_face, best, best_v, best_w = hint_face, squared, v, w
+    nodes = np.empty(STACK_SIZE, dtype=np.int64)
+    depths = np.empty(STACK_SIZE, dtype=np.int64)
+    bounds = np.empty(STACK_SIZE)
+    nodes[0], depths[0] = levels[-1] - 1, levels.shape[0] - 2
+    bounds[0] = squared_distance_to_box(boxes, nodes[0], x, y, z)
+    top = 1
+    while top > 0:
+        top -= 1
+        if bounds[top] > best:
+            continue
+        node, depth = nodes[top], depths[top]
+        first = BRANCHES * (node - levels[depth])
+        if depth == 0:
+            for face in range(first, min(first + BRANCHES, faces.shape[0])):
+                squared, v, w = closest_on_face(vertices, faces, face, x, y, z)
+                if squared < best or (best_face < 0 and squared <= best):
+                    best_face, best, best_v, best_w = face, squared, v, w
+            continue
+        # Push the children so that the nearest is on top: insertion into the short run above ``base``.
+        base = top
+        for child in range(levels[depth - 1] + first, min(levels[depth - 1] + first + BRANCHES, levels[depth])):
+            bound = squared_distance_to_box(boxes, child, x, y, z)
+            if bound > best:
+                continue
+            place = top
+            while place > base and bounds[place - 1] < bound:
+                nodes[place], depths[place], bounds[place] = nodes[place - 1], depths[place - 1], bounds[place - 1]
+                place -= 1
+            nodes[place], depths[place], bounds[place] = child, depth - 1, bound
+            top += 1
+    return best_face, np.sqrt(best), best_v, best_w
+
+
+@njit(cache=True, nogil=True)
+def closest_faces(
+    vertices: FloatArray,
+    faces: IntArray,
+    boxes: FloatArray,
+    levels: NDArray[np.int64],
+    points: FloatArray,
+    max_distance: float,
+) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+    """``closest_face`` of many points: faces (n,), barycentric (n, 3), surface points (n, 3), distances (n,)."""
+    count = points.shape[0]
+    found = np.full(count, -1, dtype=np.int32)
+    weights = np.full((count, 3), np.nan)
+    surface = np.full((count, 3), np.nan)
+    distances = np.full(count, np.inf)
+    hint = -1
+    for index in range(count):
+        x, y, z = points[index, 0], points[index, 1], points[index, 2]
+        face, distance, v, w = closest_face(vertices, faces, boxes, levels, x, y, z, max_distance, hint)
+        hint = face
+        if face < 0:
+            continue
+        found[index], distances[index] = face, distance
+        weights[index, 0], weights[index, 1], weights[index, 2] = 1.0 - v - w, v, w
+        for axis in range(3):
+            surface[index, axis] = (
+                weights[index, 0] * vertices[faces[face, 0], axis]
+                + v * vertices[faces[face, 1], axis]
+                + w * vertices[faces[face, 2], axis]
+            )
+    return found, weights, surface, distances

@@ -1,0 +1,47 @@
+"""Weights of the mesh edges from lengths and vertex costs, the numbers graph planners search on."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+IntArray = NDArray[np.int32]
+CostArray = NDArray[np.float32]
+
+
+@njit(cache=True, nogil=True)
+def set_edge_weights(
+    offsets: IntArray,
+    neighbours: IntArray,
+    lengths: CostArray,
+    costs: CostArray,
+    lethal: NDArray[np.bool_],
+    edge_cost_factor: float,
+    changed: IntArray,
+    weights: CostArray,
+) -> None:
+    """Write the weights of all edges at the ``changed`` vertices, in both directions.
+
+    ``w = L + factor * L * (c_i + c_j) / 2``, infinite if an end is lethal or has an infinite or NaN cost
+    (mesh_navigation's rule; adding keeps ``w >= L``, so a straight-line bound stays admissible).
+    """
+    for index in range(changed.shape[0]):
+        vertex = changed[index]
+        blocked = lethal[vertex] or not np.isfinite(costs[vertex])
+        for entry in range(offsets[vertex], offsets[vertex + 1]):
+            other = neighbours[entry]
+            weight = np.float32(np.inf)
+            if not blocked and not lethal[other] and np.isfinite(costs[other]):
+                mean_cost = 0.5 * (costs[vertex] + costs[other])
+                weight = np.float32(lengths[entry] * (1.0 + edge_cost_factor * mean_cost))
+            weights[entry] = weight
+            # The twin entry of the other end: a binary search in its ascending list.
+            low, high = offsets[other], offsets[other + 1]
+            while low < high:
+                middle = (low + high) // 2
+                if neighbours[middle] < vertex:
+                    low = middle + 1
+                else:
+                    high = middle
+            weights[low] = weight

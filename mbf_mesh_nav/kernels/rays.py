@@ -1,0 +1,115 @@
+"""First hits of rays with a mesh, over the box tree of ``bounding_boxes``."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.bounding_boxes import BRANCHES, STACK_SIZE
+
+IntArray = NDArray[np.int32]
+FloatArray = NDArray[np.float64]
+
+
+@njit(cache=True, nogil=True)
+def distance_to_triangle(
+    vertices: FloatArray, faces: IntArray, face: int, origin: FloatArray, direction: FloatArray
+) -> float:
+    """Distance along a ray to a triangle, both sides count, inf without a hit (Moeller and Trumbore 1997)."""
+    a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
+    ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
+    wx, wy, wz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
+    px = direction[1] * wz - direction[2] * wy
+    py = direction[2] * wx - direction[0] * wz
+    pz = direction[0] * wy - direction[1] * wx
+    determinant = ux * px + uy * py + uz * pz
+    if determinant == 0.0:
+        return np.inf
+    tx, ty, tz = (origin[0] - vertices[a, 0], origin[1] - vertices[a, 1], origin[2] - vertices[a, 2])
+    v = (tx * px + ty * py + tz * pz) / determinant
+    qx, qy, qz = ty * uz - tz * uy, tz * ux - tx * uz, tx * uy - ty * ux
+    w = (direction[0] * qx + direction[1] * qy + direction[2] * qz) / determinant
+    # A hair of tolerance, so that no ray slips through the edge between two faces.
+    if v < -1e-12 or w < -1e-12 or v + w > 1.0 + 1e-12:
+        return np.inf
+    distance = (wx * qx + wy * qy + wz * qz) / determinant
+    return distance if distance >= 0.0 else np.inf
+
+
+@njit(cache=True, nogil=True)
+def distance_to_box(boxes: FloatArray, node: int, origin: FloatArray, inverse: FloatArray, limit: float) -> float:
+    """Distance along a ray at which it enters a box, inf if it misses it or enters beyond ``limit``."""
+    enter, leave = 0.0, limit
+    for axis in range(3):
+        if np.isinf(inverse[axis]):
+            if origin[axis] < boxes[node, axis] or origin[axis] > boxes[node, axis + 3]:
+                return np.inf
+            continue
+        near = (boxes[node, axis] - origin[axis]) * inverse[axis]
+        far = (boxes[node, axis + 3] - origin[axis]) * inverse[axis]
+        enter = max(enter, min(near, far))
+        leave = min(leave, max(near, far))
+    # Rounding must not lose a flat box that the ray crosses exactly.
+    return enter if enter <= leave * (1.0 + 1e-12) + 1e-12 else np.inf
+
+
+@njit(cache=True, nogil=True)
+def first_hits(
+    vertices: FloatArray,
+    faces: IntArray,
+    boxes: FloatArray,
+    levels: NDArray[np.int64],
+    origins: FloatArray,
+    directions: FloatArray,
+    max_distance: float,
+) -> tuple[IntArray, FloatArray]:
+    """First face (n,) hit by each ray within ``max_distance`` (-1 = none) and the distance (n,), inf = none.
+
+    Parameters
+    ----------
+    origins, directions : (n, 3) float64
+        Directions of unit length.
+    """
+    count = origins.shape[0]
+    hit_faces = np.full(count, -1, dtype=np.int32)
+    hit_distances = np.full(count, np.inf)
+    nodes = np.empty(STACK_SIZE, dtype=np.int64)
+    depths = np.empty(STACK_SIZE, dtype=np.int64)
+    enters = np.empty(STACK_SIZE)
+    inverse = np.empty(3)
+    for index in range(count):
+        origin, direction = origins[index], directions[index]
+        for axis in range(3):
+            inverse[axis] = 1.0 / direction[axis] if direction[axis] != 0.0 else np.inf
+        best_face, best = -1, max_distance
+        nodes[0], depths[0] = levels[-1] - 1, levels.shape[0] - 2
+        enters[0] = distance_to_box(boxes, nodes[0], origin, inverse, best)
+        top = 1 if enters[0] < np.inf else 0
+        while top > 0:
+            top -= 1
+            if enters[top] > best:
+                continue
+            node, depth = nodes[top], depths[top]
+            first = BRANCHES * (node - levels[depth])
+            if depth == 0:
+                for face in range(first, min(first + BRANCHES, faces.shape[0])):
+                    distance = distance_to_triangle(vertices, faces, face, origin, direction)
+                    if distance <= best and (distance < best or best_face < 0):
+                        best_face, best = face, distance
+                continue
+            # Children on the stack with the one entered first on top.
+            base = top
+            for child in range(levels[depth - 1] + first, min(levels[depth - 1] + first + BRANCHES, levels[depth])):
+                enter = distance_to_box(boxes, child, origin, inverse, best)
+                if enter == np.inf:
+                    continue
+                place = top
+                while place > base and enters[place - 1] < enter:
+                    nodes[place], depths[place], enters[place] = nodes[place - 1], depths[place - 1], enters[place - 1]
+                    place -= 1
+                nodes[place], depths[place], enters[place] = child, depth - 1, enter
+                top += 1
+        if best_face >= 0:
+            hit_faces[index], hit_distances[index] = best_face, best
+    return hit_faces, hit_distances

@@ -1,0 +1,197 @@
+"""Building the flat neighbour arrays of a triangle mesh by counting sorts, in time linear in the faces."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+IntArray = NDArray[np.int32]
+FloatArray = NDArray[np.float64]
+
+
+@njit(cache=True, nogil=True)
+def faces_of_vertices(faces: IntArray, vertex_count: int) -> tuple[IntArray, IntArray]:
+    """Incident faces of every vertex as CSR: offsets (V+1,), faces (3F,), ascending within a vertex."""
+    offsets = np.zeros(vertex_count + 1, dtype=np.int32)
+    for face in range(faces.shape[0]):
+        for corner in range(3):
+            offsets[faces[face, corner] + 1] += 1
+    for vertex in range(vertex_count):
+        offsets[vertex + 1] += offsets[vertex]
+    cursor = offsets[:-1].copy()
+    incident = np.zeros(3 * faces.shape[0], dtype=np.int32)
+    for face in range(faces.shape[0]):
+        for corner in range(3):
+            vertex = faces[face, corner]
+            incident[cursor[vertex]] = face
+            cursor[vertex] += 1
+    return offsets, incident
+
+
+@njit(cache=True, nogil=True)
+def neighbours_of_vertices(faces: IntArray, face_offsets: IntArray, incident: IntArray) -> tuple[IntArray, IntArray]:
+    """Neighbours of every vertex over mesh edges as CSR, ascending and without repetition."""
+    vertex_count = face_offsets.shape[0] - 1
+    offsets = np.zeros(vertex_count + 1, dtype=np.int32)
+    neighbours = np.zeros(2 * incident.shape[0], dtype=np.int32)
+    filled = 0
+    for vertex in range(vertex_count):
+        first = filled
+        for position in range(face_offsets[vertex], face_offsets[vertex + 1]):
+            face = incident[position]
+            for corner in range(3):
+                other = faces[face, corner]
+                if other == vertex:
+                    continue
+                # Insertion into the short sorted list of this vertex, dropping what is there already.
+                place = filled
+                while place > first and neighbours[place - 1] > other:
+                    place -= 1
+                if place > first and neighbours[place - 1] == other:
+                    continue
+                for moved in range(filled, place, -1):
+                    neighbours[moved] = neighbours[moved - 1]
+                neighbours[place] = other
+                filled += 1
+        offsets[vertex + 1] = filled
+    return offsets, neighbours[:filled].copy()
+
+
+@njit(cache=True, nogil=True)
+def edges_of_neighbours(
+    vertices: FloatArray, offsets: IntArray, neighbours: IntArray
+) -> tuple[IntArray, IntArray, NDArray[np.float32]]:
+    """Number the undirected edges: edges (E, 2) with i < j, and edge id and length per CSR entry.
+
+    Vertices are visited in ascending order and every list is ascending, so the entries of ``u`` that point to larger
+    vertices are reached exactly in list order: one cursor per vertex replaces a search.
+    """
+    vertex_count = offsets.shape[0] - 1
+    edges = np.zeros((neighbours.shape[0] // 2, 2), dtype=np.int32)
+    edge_ids = np.zeros(neighbours.shape[0], dtype=np.int32)
+    lengths = np.zeros(neighbours.shape[0], dtype=np.float32)
+    cursor = np.zeros(vertex_count, dtype=np.int32)
+    edge_count = 0
+    for vertex in range(vertex_count):
+        cursor[vertex] = offsets[vertex + 1]
+        for entry in range(offsets[vertex], offsets[vertex + 1]):
+            other = neighbours[entry]
+            if other < vertex:
+                twin = cursor[other]
+                cursor[other] += 1
+                edge_ids[entry] = edge_ids[twin]
+                lengths[entry] = lengths[twin]
+                continue
+            if cursor[vertex] == offsets[vertex + 1]:
+                cursor[vertex] = entry
+            squared = 0.0
+            for axis in range(3):
+                difference = vertices[vertex, axis] - vertices[other, axis]
+                squared += difference * difference
+            lengths[entry] = np.float32(np.sqrt(squared))
+            edge_ids[entry] = edge_count
+            edges[edge_count, 0] = vertex
+            edges[edge_count, 1] = other
+            edge_count += 1
+    return edges, edge_ids, lengths
+
+
+@njit(cache=True, nogil=True)
+def faces_across_edges(faces: IntArray, face_offsets: IntArray, incident: IntArray) -> IntArray:
+    """Face across the edge corner k -> corner k+1 of every face, (F, 3); -1 at a border.
+
+    Of several faces at a non-manifold edge the first one is taken.
+    """
+    across = np.full(faces.shape, -1, dtype=np.int32)
+    for face in range(faces.shape[0]):
+        for corner in range(3):
+            start = faces[face, corner]
+            end = faces[face, (corner + 1) % 3]
+            for position in range(face_offsets[start], face_offsets[start + 1]):
+                other = incident[position]
+                if other != face and (faces[other, 0] == end or faces[other, 1] == end or faces[other, 2] == end):
+                    across[face, corner] = other
+                    break
+    return across
+
+
+@njit(cache=True, nogil=True)
+def unit_face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Unit normals (F, 3), right-handed about the winding; (0, 0, 1) for a face without area."""
+    normals = np.zeros((faces.shape[0], 3))
+    for face in range(faces.shape[0]):
+        a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
+        ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
+        wx, wy, wz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        if length > 0.0:
+            normals[face, 0], normals[face, 1], normals[face, 2] = nx / length, ny / length, nz / length
+        else:
+            normals[face, 2] = 1.0
+    return normals
+
+
+@njit(cache=True, nogil=True)
+def unit_vertex_normals(face_normals: FloatArray, face_offsets: IntArray, incident: IntArray) -> FloatArray:
+    """Unweighted mean of the incident unit face normals, renormalised; (0, 0, 1) where it vanishes."""
+    vertex_count = face_offsets.shape[0] - 1
+    normals = np.zeros((vertex_count, 3))
+    for vertex in range(vertex_count):
+        x = y = z = 0.0
+        for position in range(face_offsets[vertex], face_offsets[vertex + 1]):
+            face = incident[position]
+            x += face_normals[face, 0]
+            y += face_normals[face, 1]
+            z += face_normals[face, 2]
+        length = np.sqrt(x * x + y * y + z * z)
+        if length > 1e-9:
+            normals[vertex, 0], normals[vertex, 1], normals[vertex, 2] = x / length, y / length, z / length
+        else:
+            normals[vertex, 2] = 1.0
+    return normals
+
+
+@njit(cache=True, nogil=True)
+def connected_components(offsets: IntArray, neighbours: IntArray) -> IntArray:
+    """Component of every vertex (V,), numbered from 0 in the order of their first vertex."""
+    vertex_count = offsets.shape[0] - 1
+    components = np.full(vertex_count, -1, dtype=np.int32)
+    stack = np.zeros(vertex_count, dtype=np.int32)
+    count = 0
+    for start in range(vertex_count):
+        if components[start] >= 0:
+            continue
+        components[start] = count
+        stack[0] = start
+        top = 1
+        while top > 0:
+            top -= 1
+            vertex = stack[top]
+            for entry in range(offsets[vertex], offsets[vertex + 1]):
+                other = neighbours[entry]
+                if components[other] < 0:
+                    components[other] = count
+                    stack[top] = other
+                    top += 1
+        count += 1
+    return components
+
+
+@njit(cache=True, nogil=True)
+def morton_codes(points: FloatArray, lower: FloatArray, cell: float) -> NDArray[np.uint64]:
+    """Interleaved 21-bit cell indices of points (n, 3): close codes mean close points."""
+    codes = np.zeros(points.shape[0], dtype=np.uint64)
+    for index in range(points.shape[0]):
+        code = np.uint64(0)
+        for axis in range(3):
+            bits = np.uint64((points[index, axis] - lower[axis]) / cell) & np.uint64(0x1FFFFF)
+            bits = (bits | (bits << np.uint64(32))) & np.uint64(0x1F00000000FFFF)
+            bits = (bits | (bits << np.uint64(16))) & np.uint64(0x1F0000FF0000FF)
+            bits = (bits | (bits << np.uint64(8))) & np.uint64(0x100F00F00F00F00F)
+            bits = (bits | (bits << np.uint64(4))) & np.uint64(0x10C30C30C30C30C3)
+            bits = (bits | (bits << np.uint64(2))) & np.uint64(0x1249249249249249)
+            code |= bits << np.uint64(axis)
+        codes[index] = code
+    return codes

@@ -1,0 +1,126 @@
+"""The layers of a mesh map in the order of their dependencies, and one pass through them per event.
+
+An event (a point cloud, an expiry, a changed parameter) changes some vertices of one or more layers. The graph then
+visits every layer once, inputs first, and hands it the union of what its inputs changed; a layer below a diamond is
+therefore computed once, not once per path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from mbf_mesh_nav.layer import NOTHING_CHANGED, IntArray, LayerParameters, MeshLayer
+
+
+class LayerGraphError(ValueError):
+    """The layers cannot be ordered: an unknown input, a duplicate name or a cycle. The text names them all."""
+
+
+def dependency_order(inputs: Mapping[str, Sequence[str]]) -> list[str]:
+    """Order layer names so that inputs come first, keeping the configured order where it is free.
+
+    Parameters
+    ----------
+    inputs : mapping
+        For every layer the names of the layers it reads.
+
+    Raises
+    ------
+    LayerGraphError
+        An input is not the name of a layer, or layers wait for each other; every finding is named.
+    """
+    unknown = [f"{name} reads unknown layer '{read}'" for name in inputs for read in inputs[name] if read not in inputs]
+    if unknown:
+        raise LayerGraphError(f"{'; '.join(unknown)}; the layers are: {', '.join(inputs)}")
+    order: list[str] = []
+    waiting = list(inputs)
+    while waiting:
+        ready = [name for name in waiting if all(read in order for read in inputs[name])]
+        if not ready:
+            raise LayerGraphError(f"layers read each other in a circle: {' -> '.join(_cycle(inputs, waiting[0]))}")
+        order += ready
+        waiting = [name for name in waiting if name not in ready]
+    return order
+
+
+def _cycle(inputs: Mapping[str, Sequence[str]], start: str) -> list[str]:
+    """Follow inputs that are part of or lead to a cycle until a name repeats."""
+    ordered: set[str] = set()
+    while grown := {name for name in inputs if name not in ordered and ordered.issuperset(inputs[name])}:
+        ordered |= grown
+    trail = [start]
+    while True:
+        following = next(read for read in inputs[trail[-1]] if read not in ordered)
+        if following in trail:
+            return [*trail[trail.index(following) :], following]
+        trail.append(following)
+
+
+class LayerGraph(Mapping[str, MeshLayer]):
+    """The layers by name, ``graph["inflation"].costs``; see the module's text for how changes travel.
+
+    Parameters
+    ----------
+    layers : sequence of MeshLayer
+        Inputs before the layers that read them, computed or not.
+    """
+
+    def __init__(self, layers: Sequence[MeshLayer] = ()) -> None:
+        self._layers = {layer.name: layer for layer in layers}
+
+    def __getitem__(self, name: str) -> MeshLayer:
+        return self._layers[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._layers)
+
+    def __len__(self) -> int:
+        return len(self._layers)
+
+    def apply(self, event: Callable[[MeshLayer], IntArray]) -> dict[str, IntArray]:
+        """Give an event to every layer, then let the changes run down once.
+
+        Parameters
+        ----------
+        event : callable
+            Called once with every layer, inputs first; returns the vertices it changed by itself.
+
+        Returns
+        -------
+        dict
+            Changed vertices, ascending int32, for every layer that changed.
+        """
+        changed: dict[str, IntArray] = {}
+        for name, layer in self._layers.items():
+            from_inputs = _union([changed[read.name] for read in layer.inputs if read.name in changed])
+            own = _union([layer.update_from_inputs(from_inputs) if len(from_inputs) else NOTHING_CHANGED, event(layer)])
+            if len(own):
+                changed[name] = own
+        return changed
+
+    def set_parameters(self, name: str, parameters: LayerParameters) -> dict[str, IntArray]:
+        """Change a layer's parameters at run time and recompute what depends on them; returns what changed.
+
+        A combination reads the weights of its inputs, so a new ``combination_weight`` counts as a change of every
+        vertex of the layer.
+        """
+        layer = self._layers[name]
+        weight_changed = layer.parameters.combination_weight != parameters.combination_weight
+        layer.parameters = parameters
+
+        def event(visited: MeshLayer) -> IntArray:
+            if visited is not layer:
+                return NOTHING_CHANGED
+            changed = visited.recompute()
+            return np.arange(len(visited.costs), dtype=np.int32) if weight_changed else changed
+
+        return self.apply(event)
+
+
+def _union(sets: Sequence[IntArray]) -> IntArray:
+    filled = [changed for changed in sets if len(changed)]
+    if not filled:
+        return NOTHING_CHANGED
+    return filled[0] if len(filled) == 1 else np.unique(np.concatenate(filled))

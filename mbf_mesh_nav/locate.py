@@ -1,0 +1,115 @@
+"""Which face am I on, and what do rays hit: exact queries over a box tree of the faces.
+
+The nearest surface point is found over all faces, not only those around the nearest vertex, so long thin triangles
+and stacked storeys give the right face, and a point within the distance limit always gets one. Where two faces are
+equally near (on their edge) either may come back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbf_mesh_nav.kernels.bounding_boxes import build_boxes, closest_face, closest_faces
+from mbf_mesh_nav.kernels.rays import first_hits
+from mbf_mesh_nav.topology import MeshTopology
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Location:
+    """Nearest surface points of n points.
+
+    Attributes
+    ----------
+    faces : (n,) int32
+        The face, -1 where the surface is farther than the limit.
+    barycentric : (n, 3) float64
+        Weights of the face's corners, NaN without a face.
+    points : (n, 3) float64
+        The surface points [m], NaN without a face.
+    distances : (n,) float64
+        Distances to them [m], inf without a face.
+    """
+
+    faces: IntArray
+    barycentric: FloatArray
+    points: FloatArray
+    distances: FloatArray
+
+
+class SurfacePoint(NamedTuple):
+    """A point on the surface: face, barycentric weights of its corners, position [m], distance to the query [m]."""
+
+    face: int
+    barycentric: FloatArray
+    point: FloatArray
+    distance: float
+
+
+class SurfaceLocator:
+    """Nearest-point and ray queries on one mesh; building it is linear in the faces."""
+
+    def __init__(self, topology: MeshTopology) -> None:
+        self._vertices = topology.vertices
+        self._faces = topology.faces
+        boxes, levels = build_boxes(topology.vertices, topology.faces)
+        self._tree = (topology.vertices, topology.faces, boxes, levels)
+
+    def locate(self, points: ArrayLike, max_distance: float = np.inf) -> Location:
+        """Nearest surface points of many points.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            Positions [m]; neighbours in the list should be neighbours in space, that is faster.
+        max_distance : float
+            Limit [m]; farther away there is no face.
+        """
+        queries = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+        return Location(*closest_faces(*self._tree, queries, float(max_distance)))
+
+    def locate_one(self, point: ArrayLike, max_distance: float = np.inf, hint_face: int = -1) -> SurfacePoint | None:
+        """Nearest surface point of one point, or None beyond ``max_distance``.
+
+        Parameters
+        ----------
+        point : (3,) float
+            Position [m].
+        hint_face : int
+            A face likely to be near, e.g. the last answer of a moving robot; the answer does not depend on it.
+        """
+        x, y, z = point  # type: ignore[misc]  # any sequence of three numbers
+        face, distance, v, w = closest_face(
+            *self._tree, float(x), float(y), float(z), float(max_distance), int(hint_face)
+        )
+        if face < 0:
+            return None
+        barycentric = np.array([1.0 - v - w, v, w])
+        return SurfacePoint(face, barycentric, barycentric @ self._vertices[self._faces[face]], distance)
+
+    def cast_rays(
+        self, origins: ArrayLike, directions: ArrayLike, max_distance: float = np.inf
+    ) -> tuple[IntArray, FloatArray]:
+        """First hits of rays, from either side of a face.
+
+        Parameters
+        ----------
+        origins, directions : (n, 3) float
+            Start points [m] and unit directions.
+
+        Returns
+        -------
+        faces : (n,) int32
+            -1 = no hit within ``max_distance``.
+        distances : (n,) float64
+            Along the ray [m], inf without a hit.
+        """
+        starts = np.ascontiguousarray(origins, dtype=np.float64).reshape(-1, 3)
+        headings = np.ascontiguousarray(np.broadcast_to(np.asarray(directions, dtype=np.float64), starts.shape))
+        return first_hits(*self._tree, starts, headings, float(max_distance))

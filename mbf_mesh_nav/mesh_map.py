@@ -1,0 +1,248 @@
+"""The map of the mesh server: a surface, the layers on it, and frozen snapshots for planners and controllers.
+
+Everything a plugin needs is an attribute here, as flat read-only arrays (``topology.MeshTopology`` says what is in
+them), in internal numbering. The surface never changes; costs do. A plugin takes one ``snapshot()`` at the start of a
+call and works on that.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.kernels.edge_weights import set_edge_weights
+from mbf_mesh_nav.layer import CostArray, IntArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.layer_graph import LayerGraph
+from mbf_mesh_nav.locate import Location, SurfaceLocator, SurfacePoint
+from mbf_mesh_nav.repair import MeshReport, checked_mesh
+from mbf_mesh_nav.topology import MeshTopology, build_topology
+
+if TYPE_CHECKING:
+    import networkx
+
+
+@dataclass(frozen=True, eq=False)
+class MeshSnapshot:
+    """The state of the map at one version, never changed afterwards.
+
+    Attributes
+    ----------
+    version : int
+        Grows by one with every change of a cost, a flag or a weight.
+    costs : (V,) float32
+        Costs of the default layer; may be +inf.
+    lethal : (V,) bool
+        Vertices no plan may touch.
+    edge_weights : (2E,) float32
+        Aligned with ``MeshMap.neighbours``: length plus collected cost, +inf at lethal vertices.
+    """
+
+    version: int
+    costs: CostArray
+    lethal: LethalArray
+    edge_weights: CostArray
+
+    def __post_init__(self) -> None:
+        for array in (self.costs, self.lethal, self.edge_weights):
+            array.flags.writeable = False
+
+
+class MeshMap:
+    """A triangle mesh with layers. Construct it with ``from_arrays``, ``from_heights`` or ``map_builder``.
+
+    Attributes
+    ----------
+    topology : MeshTopology
+        All arrays in one value; each of them is an attribute of the map, too.
+    locator : SurfaceLocator
+        Nearest-point and ray queries.
+    layers : LayerGraph
+        The layers by name: ``mesh_map.layers["inflation"].costs``.
+    report : MeshReport
+        What was found in, and done to, the mesh when it was loaded.
+    frame_id : str
+        Frame of all coordinates.
+    """
+
+    def __init__(self, topology: MeshTopology, frame_id: str = "map", report: MeshReport | None = None) -> None:
+        self.topology = topology
+        self.frame_id = frame_id
+        self.report = report if report is not None else MeshReport()
+        self.locator = SurfaceLocator(topology)
+        self.vertices = topology.vertices
+        self.faces = topology.faces
+        self.vertex_normals = topology.vertex_normals
+        self.face_normals = topology.face_normals
+        self.edges = topology.edges
+        self.neighbour_offsets = topology.neighbour_offsets
+        self.neighbours = topology.neighbours
+        self.neighbour_lengths = topology.neighbour_lengths
+        self.neighbour_edges = topology.neighbour_edges
+        self.vertex_face_offsets = topology.vertex_face_offsets
+        self.vertex_faces = topology.vertex_faces
+        self.face_neighbours = topology.face_neighbours
+        self.components = topology.components
+        self.input_to_internal = topology.input_to_internal
+        self.internal_to_input = topology.internal_to_input
+        self._lock = threading.RLock()
+        self.set_layers(LayerGraph(), None)
+
+    @classmethod
+    def from_arrays(
+        cls, vertices: ArrayLike, faces: ArrayLike, frame_id: str = "map", repair: Sequence[str] = ()
+    ) -> MeshMap:
+        """Check a mesh and build its map, without layers (all costs 0).
+
+        Parameters
+        ----------
+        vertices : (V, 3) float
+            Positions [m].
+        faces : (F, 3) int
+            Corners, counter-clockwise seen from above.
+        repair : sequence of str
+            Names of the repairs that may be applied, see ``repair.REPAIRS``.
+
+        Raises
+        ------
+        MeshError
+            The mesh has defects no listed repair removes; lists all of them.
+        """
+        mesh, report = checked_mesh(vertices, faces, repair)
+        topology = build_topology(mesh.vertices, mesh.faces, mesh.vertex_source, mesh.face_source, mesh.input_to_vertex)
+        return cls(topology, frame_id, report)
+
+    @classmethod
+    def from_heights(
+        cls, heights: ArrayLike, dx: float, dy: float, x0: float = 0.0, y0: float = 0.0, frame_id: str = "map"
+    ) -> MeshMap:
+        """Build the map of a heightfield; the surface equals that of Bullet's heightfield shape.
+
+        Parameters
+        ----------
+        heights : (ny, nx) float
+            z [m] at ``(x0 + ix * dx, y0 + iy * dy)``; NaN leaves a hole.
+        dx, dy : float
+            Spacing [m].
+        x0, y0 : float
+            Position of ``heights[0, 0]`` [m].
+        """
+        return cls.from_arrays(*heightfield_mesh(heights, dx, dy, x0, y0), frame_id)
+
+    # ------------------------------------------------------------------------------------------------- queries
+    def locate(self, points: ArrayLike, max_distance: float = np.inf) -> Location:
+        """Nearest surface points of many points, see ``SurfaceLocator.locate``."""
+        return self.locator.locate(points, max_distance)
+
+    def locate_one(self, point: ArrayLike, max_distance: float = np.inf, hint_face: int = -1) -> SurfacePoint | None:
+        """Nearest surface point of one point or None, see ``SurfaceLocator.locate_one``."""
+        return self.locator.locate_one(point, max_distance, hint_face)
+
+    def snapshot(self) -> MeshSnapshot:
+        """The current state; cheap, call it once per plan or control cycle."""
+        return self._snapshot
+
+    def to_input_order(self, values: NDArray[Any], missing: float = np.nan) -> NDArray[Any]:
+        """Bring per-vertex values (V, ...) into the caller's numbering; dropped vertices get ``missing``."""
+        result = np.full((len(self.input_to_internal), *values.shape[1:]), missing, dtype=np.float64)
+        kept = self.input_to_internal >= 0
+        result[kept] = values[self.input_to_internal[kept]]
+        return result
+
+    def vertex_graph(self) -> networkx.Graph:
+        """The vertex graph for algorithms of your own, see ``vertex_graph.build_vertex_graph``."""
+        from mbf_mesh_nav.vertex_graph import build_vertex_graph  # networkx takes 0.3 s to import
+
+        return build_vertex_graph(self.topology, self._snapshot.costs, self._snapshot.edge_weights)
+
+    # -------------------------------------------------------------------------------------------------- layers
+    def set_layers(self, layers: LayerGraph, default_layer: str | None, edge_cost_factor: float = 0.0) -> None:
+        """Put computed layers on the map.
+
+        Parameters
+        ----------
+        default_layer : str or None
+            The layer whose costs and flags planners see; None = free everywhere.
+        edge_cost_factor : float
+            How much a cost of 1 lengthens an edge, in lengths.
+
+        Raises
+        ------
+        KeyError
+            There is no such layer.
+        """
+        count = self.topology.vertex_count
+        with self._lock:
+            costs = np.zeros(count, np.float32) if default_layer is None else layers[default_layer].costs
+            self.layers = layers
+            self.default_layer = default_layer
+            self.edge_cost_factor = edge_cost_factor
+            version = self._snapshot.version + 1 if hasattr(self, "_snapshot") else 0
+            lethal = np.zeros(count, np.bool_) if default_layer is None else layers[default_layer].lethal
+            weights = np.zeros(len(self.neighbours), np.float32)
+            self._snapshot = self._weighted(version, costs, lethal, weights, np.arange(count, dtype=np.int32))
+
+    def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
+        """Change how much costs lengthen edges, at run time."""
+        self.set_layers(self.layers, self.default_layer, edge_cost_factor)
+
+    def set_layer_parameters(self, name: str, parameters: LayerParameters) -> None:
+        """Change the parameters of one layer at run time; everything that depends on them follows."""
+        with self._lock:
+            self._publish(self.layers.set_parameters(name, parameters))
+
+    def insert_points(self, points: ArrayLike, sensor_origin: ArrayLike, stamp: float) -> None:
+        """Feed a point cloud to the obstacle layers.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            Hits [m] in the map's frame; rows with NaN or inf are ignored.
+        sensor_origin : (3,) float
+            Where the sensor was [m], for range limits and clearing.
+        stamp : float
+            Time of the measurement [s].
+        """
+        cloud = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+        cloud = cloud[np.isfinite(cloud).all(axis=1)]
+        origin = np.asarray(sensor_origin, dtype=np.float64).reshape(3)
+        self._apply(lambda layer: layer.insert_points(cloud, origin, stamp))
+
+    def update(self, now: float) -> None:
+        """Forget obstacles that are too old at ``now`` [s]."""
+        self._apply(lambda layer: layer.expire(now))
+
+    def clear(self) -> None:
+        """Forget all sensed obstacles."""
+        self._apply(lambda layer: layer.clear())
+
+    def is_current(self, now: float) -> bool:
+        """Whether every obstacle layer got data within its expected update rate at ``now`` [s]."""
+        return all(layer.is_current(now) for layer in self.layers.values())
+
+    def _apply(self, event: Callable[[MeshLayer], IntArray]) -> None:
+        with self._lock:
+            self._publish(self.layers.apply(event))
+
+    def _publish(self, changed: dict[str, IntArray]) -> None:
+        """Make the snapshot that follows a change of the default layer; only edges at changed vertices are touched."""
+        if self.default_layer not in changed:
+            return
+        layer = self.layers[self.default_layer]
+        old = self._snapshot
+        self._snapshot = self._weighted(
+            old.version + 1, layer.costs, layer.lethal, old.edge_weights.copy(), changed[self.default_layer]
+        )
+
+    def _weighted(
+        self, version: int, costs: CostArray, lethal: LethalArray, weights: CostArray, changed: IntArray
+    ) -> MeshSnapshot:
+        costs, lethal = costs.copy(), lethal.copy()
+        graph = (self.neighbour_offsets, self.neighbours, self.neighbour_lengths)
+        set_edge_weights(*graph, costs, lethal, float(self.edge_cost_factor), changed, weights)
+        return MeshSnapshot(version, costs, lethal, weights)

@@ -1,0 +1,58 @@
+"""The plugin interfaces of the mesh server: the abstract ones plus the mesh map.
+
+A planner for meshes derives ``MeshPlanner`` and finds its map in ``self.mesh_map``; nothing else differs from
+``mbf_abstract.plugins``. Work on one ``self.mesh_map.snapshot()`` per call: it never changes while you use it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mbf_abstract.plugins import (
+    AbstractController,
+    AbstractPlanner,
+    AbstractRecovery,
+    AbstractRefiner,
+    Plugin,
+    PluginContext,
+)
+from mbf_mesh_nav.mesh_map import MeshMap
+
+
+@dataclass(frozen=True)
+class MeshContext(PluginContext):
+    """What every plugin of the mesh server is constructed with.
+
+    Attributes
+    ----------
+    mesh_map : MeshMap
+        The one map of the server, shared by all its plugins.
+    """
+
+    mesh_map: MeshMap
+
+
+class MeshPlugin(Plugin):
+    """Common part of the mesh interfaces: keeps the map of the context."""
+
+    mesh_map: MeshMap
+
+    def __init__(self, context: MeshContext) -> None:
+        super().__init__(context)
+        self.mesh_map = context.mesh_map
+
+
+class MeshPlanner(MeshPlugin, AbstractPlanner):
+    """Finds a path over the surface of a triangle mesh."""
+
+
+class MeshController(MeshPlugin, AbstractController):
+    """Follows a path over the surface of a triangle mesh."""
+
+
+class MeshRecovery(MeshPlugin, AbstractRecovery):
+    """Gets a robot on a triangle mesh out of trouble."""
+
+
+class MeshRefiner(MeshPlugin, AbstractRefiner):
+    """Improves a path on a triangle mesh."""
