@@ -1,0 +1,1 @@
+"""Controller plugins for meshes."""

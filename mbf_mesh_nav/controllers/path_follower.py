@@ -1,0 +1,126 @@
+"""Pure pursuit in the robot's tangent plane: steers along the arc through a point ahead on the path.
+
+Strengths: needs only poses (any planner's path), a dozen lines of law, forgiving: a skid-steered robot that turns
+slower than told converges all the same, since the arc is computed anew every cycle. Slows down on slopes, in bends and
+towards the goal, and turns on the spot when the path leads elsewhere. Known failure: cuts corners by about
+``lookahead``² / (8 x bend radius), does not avoid what the plan did not know; use ``mesh.mppi`` for that.
+Cost: below 0.2 ms a cycle. Law: Coulter, "Implementation of the pure pursuit path tracking algorithm", CMU, 1992.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_mesh_nav.goal_approach import braking_speed, clamp, heading_error, in_robot_frame, is_at_goal
+from mbf_mesh_nav.path_progress import PathProgress, PathProjection
+from mbf_mesh_nav.plugins import MeshController
+
+
+class PathFollowerParameters(PluginParameters):
+    """Parameters of ``mesh.path_follower``."""
+
+    lookahead: float = parameter(0.6, "Distance of the pursued point along the path.", unit="m", gt=0.0, le=10.0)
+    max_lin_velocity: float = parameter(0.8, "Forward speed on flat, straight ground.", unit="m/s", gt=0.0, le=5.0)
+    min_lin_velocity: float = parameter(0.08, "Lowest forward speed while driving.", unit="m/s", gt=0.0, le=1.0)
+    max_ang_velocity: float = parameter(1.0, "Yaw rate limit, both ways.", unit="rad/s", gt=0.0, le=5.0)
+    max_deceleration: float = parameter(0.4, "Deceleration planned before the goal.", unit="m/s^2", gt=0.0)
+    max_lateral_acceleration: float = parameter(0.6, "Limits the speed in bends.", unit="m/s^2", gt=0.0)
+    turn_in_place_angle: float = parameter(
+        0.9, "Beyond this heading error the robot turns on the spot.", unit="rad", gt=0.0, le=math.pi
+    )
+    turn_gain: float = parameter(2.0, "Yaw rate per heading error when turning on the spot.", unit="1/s", gt=0.0)
+    slow_slope: float = parameter(
+        0.5, "Slope of the ground at which the speed is down to slope_speed_factor.", unit="rad", gt=0.0, le=1.5
+    )
+    slope_speed_factor: float = parameter(0.5, "Share of the speed left on slow_slope and beyond.", gt=0.0, le=1.0)
+    goal_distance: float = parameter(
+        0.08, "Nearer to the goal than this the robot only turns to the final heading.", unit="m", gt=0.0
+    )
+    max_path_distance: float = parameter(
+        1.0, "Farther from the path than this the path is missed.", unit="m", gt=0.0, allow_inf=True
+    )
+    max_surface_distance: float = parameter(
+        1.0, "Farther from the surface than this the robot is out of the map.", unit="m", gt=0.0
+    )
+
+
+class PathFollower(MeshController):
+    """Pure pursuit on the surface."""
+
+    Parameters = PathFollowerParameters
+    parameters: PathFollowerParameters
+
+    _goal: Pose | None = None
+    _turning_to_goal = False
+
+    def set_plan(self, path: Path) -> bool:
+        """Take over a path of at least one pose in the map's frame."""
+        if len(path) == 0 or path.frame_id != self.mesh_map.frame_id:
+            return False
+        self._goal = path[-1]
+        self._progress = PathProgress(path, window=3.0 * self.parameters.lookahead)
+        self._turning_to_goal = False
+        return True
+
+    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+        """One cycle: locate, project onto the path, pursue the point ahead."""
+        if self._goal is None:
+            return ControlResult(ExePathOutcome.INVALID_PATH, "there is no plan to follow")
+        pose = request.pose
+        surface = self.mesh_map.locate_one(pose.position, self.parameters.max_surface_distance)
+        if surface is None:
+            reach = self.parameters.max_surface_distance
+            return ControlResult(ExePathOutcome.OUT_OF_MAP, f"the robot is more than {reach:g} m from the surface")
+        projection = self._progress.update(np.asarray(pose.position))
+        if projection.deviation > self.parameters.max_path_distance:
+            message = (
+                f"the robot is {projection.deviation:.2f} m from the path, "
+                f"allowed are {self.parameters.max_path_distance:g} m"
+            )
+            return ControlResult(ExePathOutcome.MISSED_PATH, message)
+        if self._arrived(pose):
+            turn = self.parameters.turn_gain * heading_error(pose, self._goal)
+            return self._command(0.0, turn)
+        slope = math.acos(clamp(float(self.mesh_map.face_normals[surface.face, 2]), 1.0))
+        return self._pursue(pose, projection, slope)
+
+    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """Whether the last pose of the plan is reached."""
+        return self._goal is not None and is_at_goal(pose, self._goal, dist_tolerance, angle_tolerance)
+
+    def _arrived(self, pose: Pose) -> bool:
+        """Whether only the heading is left; once there, the robot may drift twice as far before it drives again."""
+        assert self._goal is not None
+        reach = self.parameters.goal_distance * (2.0 if self._turning_to_goal else 1.0)
+        self._turning_to_goal = pose.distance_to(self._goal) <= reach
+        return self._turning_to_goal
+
+    def _pursue(self, pose: Pose, projection: PathProjection, slope: float) -> ControlResult:
+        """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""
+        p = self.parameters
+        target = in_robot_frame(pose, self._progress.point_at(projection.travelled + p.lookahead))
+        bearing = math.atan2(target[1], target[0])
+        if abs(bearing) > p.turn_in_place_angle:
+            return self._command(0.0, p.turn_gain * bearing)
+        distance = math.hypot(target[0], target[1])
+        curvature = 2.0 * target[1] / max(distance**2, 1e-6)
+        slope_factor = 1.0 - (1.0 - p.slope_speed_factor) * min(slope / p.slow_slope, 1.0)
+        left = max(projection.remaining, distance if projection.remaining < p.lookahead else 0.0)
+        speed = min(
+            p.max_lin_velocity * slope_factor,
+            math.sqrt(p.max_lateral_acceleration / max(abs(curvature), 1e-6)),
+            p.max_ang_velocity / max(abs(curvature), 1e-6),
+            braking_speed(left, p.max_deceleration),
+        )
+        speed = max(speed, min(p.min_lin_velocity, p.max_ang_velocity / max(abs(curvature), 1e-6)))
+        return self._command(speed, speed * curvature)
+
+    def _command(self, speed: float, turn: float) -> ControlResult:
+        turn = clamp(turn, self.parameters.max_ang_velocity)
+        return ControlResult(ExePathOutcome.SUCCESS, "", Twist.planar(vx=speed, wz=turn))

@@ -1,0 +1,147 @@
+"""One leg of a plan, and the searches over the vertex graph that find it.
+
+The arrays of a search are made here and relaxed in place by the kernels; a way found is turned into positions and
+surface normals here as well, so a planner is only the choice of a kernel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.dijkstra import propagate_distances
+from mbf_mesh_nav.locate import SurfacePoint
+from mbf_mesh_nav.mesh_map import MeshMap, MeshSnapshot
+from mbf_mesh_nav.surface_point import corner_distances
+
+NO_TARGETS = np.zeros(0, dtype=np.int32)
+NO_OFFSETS = np.zeros(0, dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class LegQuery:
+    """One search: from ``start`` to ``goal`` over the vertices that are not ``blocked`` (V,) bool."""
+
+    start: SurfacePoint
+    goal: SurfacePoint
+    snapshot: MeshSnapshot
+    blocked: NDArray[np.bool_]
+    cancel_flag: NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A found leg: positions and surface normals (n, 3) from start to goal, its cost, what a controller may use."""
+
+    positions: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    cost: float
+    guidance: Any = None
+
+
+def spread_from(
+    mesh_map: MeshMap,
+    snapshot: MeshSnapshot,
+    blocked: NDArray[np.bool_],
+    source: SurfacePoint,
+    cancel_flag: NDArray[np.uint8],
+    target: SurfacePoint | None = None,
+) -> tuple[NDArray[np.float32], NDArray[np.int32], bool]:
+    """Shortest distances over the vertex graph from a surface point.
+
+    Parameters
+    ----------
+    target : SurfacePoint, optional
+        Stop as soon as the way to it is known; without it the whole field is computed.
+
+    Returns
+    -------
+    distances : (V,) float32
+        Weighted length [m], inf where not reached.
+    predecessors : (V,) int32
+        Previous vertex on the way from the source, -1 at its seeds and where not reached.
+    finished : bool
+        False if cancelled.
+    """
+    distances, predecessors, seeds = seeded_arrays(mesh_map, blocked, source)
+    targets, offsets = (NO_TARGETS, NO_OFFSETS) if target is None else corner_distances(mesh_map, blocked, target)
+    finished = propagate_distances(
+        mesh_map.neighbour_offsets,
+        mesh_map.neighbours,
+        snapshot.edge_weights,
+        blocked,
+        distances,
+        predecessors,
+        seeds,
+        mean_edge_length(mesh_map),
+        targets,
+        offsets,
+        cancel_flag,
+    )
+    return distances, predecessors, finished
+
+
+def seeded_arrays(
+    mesh_map: MeshMap, blocked: NDArray[np.bool_], source: SurfacePoint
+) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
+    """Start state of a search from a surface point: distances (V,), predecessors (V,), seed vertices."""
+    vertex_count = len(mesh_map.vertices)
+    distances = np.full(vertex_count, np.inf, dtype=np.float32)
+    predecessors = np.full(vertex_count, -1, dtype=np.int32)
+    seeds, offsets = corner_distances(mesh_map, blocked, source)
+    distances[seeds] = offsets
+    return distances, predecessors, seeds
+
+
+def mean_edge_length(mesh_map: MeshMap) -> float:
+    """Mean edge length [m] of a sample of the edges: the natural step of a wave."""
+    return float(np.mean(mesh_map.neighbour_lengths[:65536])) if len(mesh_map.neighbour_lengths) else 1.0
+
+
+def vertex_path_leg(
+    mesh_map: MeshMap, query: LegQuery, distances: NDArray[np.float32], predecessors: NDArray[np.int32]
+) -> Leg | None:
+    """Leg along the predecessors of a search from ``query.start``; None if the goal was not reached.
+
+    Start and goal in one face are joined by the straight line within it.
+    """
+    start, goal = query.start, query.goal
+    if start.face == goal.face:
+        return straight_leg(mesh_map, query)
+    corners, offsets = corner_distances(mesh_map, query.blocked, goal)
+    totals = distances[corners] + offsets
+    if not np.isfinite(totals).any():
+        return None
+    best = int(np.argmin(totals))
+    chain = follow_predecessors(predecessors, int(corners[best]))[::-1]
+    positions = np.concatenate([[start.point], mesh_map.vertices[chain], [goal.point]])
+    normals = np.concatenate(
+        [mesh_map.face_normals[[start.face]], mesh_map.vertex_normals[chain], mesh_map.face_normals[[goal.face]]]
+    )
+    return drop_repeated_points(Leg(positions, normals, float(totals[best])))
+
+
+def straight_leg(mesh_map: MeshMap, query: LegQuery) -> Leg:
+    """Join start and goal by a line; they lie in one face."""
+    positions = np.array([query.start.point, query.goal.point])
+    cost = float(np.linalg.norm(positions[1] - positions[0]))
+    return Leg(positions, mesh_map.face_normals[[query.start.face, query.goal.face]], cost)
+
+
+def follow_predecessors(predecessors: NDArray[np.int32], vertex: int) -> list[int]:
+    """Vertices from ``vertex`` back to the seed it was reached from."""
+    chain = [vertex]
+    while predecessors[chain[-1]] >= 0:
+        chain.append(int(predecessors[chain[-1]]))
+    return chain
+
+
+def drop_repeated_points(leg: Leg, tolerance: float = 1e-6) -> Leg:
+    """Remove inner points closer than ``tolerance`` [m] to the point before or to the last; both ends stay."""
+    steps = np.linalg.norm(np.diff(leg.positions, axis=0), axis=1) > tolerance
+    to_end = np.linalg.norm(leg.positions[1:-1] - leg.positions[-1], axis=1) > tolerance
+    keep = np.concatenate([[True], steps[:-1] & to_end, [True]])
+    return replace(leg, positions=leg.positions[keep], normals=leg.normals[keep])

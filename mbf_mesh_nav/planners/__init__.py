@@ -1,0 +1,1 @@
+"""Planner plugins for meshes."""

@@ -1,0 +1,143 @@
+"""What every planner on meshes promises: outcomes, exact ends, tolerance, via points, cancel."""
+
+import numpy as np
+import pytest
+
+from mbf_abstract.cancel import CancelToken
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PlanRequest
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.planners.astar import AStarPlanner
+from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
+
+PLANNERS = [DijkstraPlanner, AStarPlanner]
+
+
+@pytest.fixture(params=PLANNERS, ids=lambda planner: planner.__name__)
+def planner_class(request):
+    return request.param
+
+
+def wall(vertices, x_from=2.9, x_to=3.1, open_above=np.inf):
+    inside = (vertices[:, 0] > x_from) & (vertices[:, 0] < x_to) & (vertices[:, 1] < open_above)
+    return np.where(inside, np.inf, 0.0)
+
+
+def test_the_path_starts_on_the_surface_and_ends_with_the_goal_pose(planner_class, make_plugin, hills):
+    goal = Pose.planar(5.03, 4.11, 2.0, 0.1)
+    result = make_plugin(planner_class, hills).make_plan(PlanRequest(Pose.planar(0.57, 0.33, 0.0, 0.3), goal))
+    assert result.outcome == GetPathOutcome.SUCCESS, result.message
+    first = result.path.positions[0]
+    assert hills.locate([first]).distances[0] < 1e-6
+    assert np.linalg.norm(first - [0.57, 0.33, 0.3]) < 0.3
+    assert result.path.positions[-1].tolist() == list(goal.position)
+    assert result.path[-1].angle_to(goal) < 1e-6
+    straight = np.linalg.norm(result.path.positions[-1] - first)
+    assert straight <= result.path.length <= 1.5 * straight
+
+
+def test_start_and_goal_in_one_face_give_two_poses(planner_class, make_plugin, plain):
+    request = PlanRequest(Pose.planar(1.02, 1.02), Pose.planar(1.05, 1.03, 1.0))
+    result = make_plugin(planner_class, plain()).make_plan(request)
+    assert len(result.path) == 2
+    assert result.path[-1].yaw == pytest.approx(1.0)
+
+
+def test_a_start_off_the_surface_is_out_of_map_and_names_the_distance(planner_class, make_plugin, plain):
+    request = PlanRequest(Pose.planar(1.0, 1.0, z=2.5), Pose.planar(4.0, 4.0))
+    result = make_plugin(planner_class, plain()).make_plan(request)
+    assert result.outcome == GetPathOutcome.OUT_OF_MAP
+    assert "start" in result.message and "2.50 m" in result.message
+
+
+def test_a_goal_in_a_lethal_spot_is_blocked_goal_and_names_the_layer(planner_class, make_plugin, plain, paint):
+    mesh_map = paint(plain(), wall)
+    planner = make_plugin(planner_class, mesh_map)
+    result = planner.make_plan(PlanRequest(Pose.planar(1.0, 1.0), Pose.planar(3.0, 3.0)))
+    assert result.outcome == GetPathOutcome.BLOCKED_GOAL
+    assert "painted" in result.message and "limit 1" in result.message
+    result = planner.make_plan(PlanRequest(Pose.planar(3.0, 1.0), Pose.planar(1.0, 3.0)))
+    assert result.outcome == GetPathOutcome.BLOCKED_START
+
+
+def test_a_goal_above_the_cost_limit_is_blocked(planner_class, make_plugin, plain, paint):
+    mesh_map = paint(plain(), lambda v: np.where(v[:, 0] > 4.0, 0.8, 0.1))
+    request = PlanRequest(Pose.planar(1.0, 1.0), Pose.planar(5.0, 3.0))
+    assert make_plugin(planner_class, mesh_map).make_plan(request).success
+    result = make_plugin(planner_class, mesh_map, cost_limit=0.8).make_plan(request)
+    assert result.outcome == GetPathOutcome.BLOCKED_GOAL
+
+
+def test_a_wall_across_the_map_is_no_path_found(planner_class, make_plugin, plain, paint):
+    planner = make_plugin(planner_class, paint(plain(), wall))
+    result = planner.make_plan(PlanRequest(Pose.planar(1.0, 1.0), Pose.planar(5.0, 3.0)))
+    assert result.outcome == GetPathOutcome.NO_PATH_FOUND
+
+
+def test_a_gap_in_the_wall_is_used_and_the_wall_is_not_touched(planner_class, make_plugin, plain, paint):
+    mesh_map = paint(plain(), lambda v: wall(v, open_above=5.0))
+    result = make_plugin(planner_class, mesh_map).make_plan(PlanRequest(Pose.planar(1.0, 1.0), Pose.planar(5.0, 1.0)))
+    assert result.success, result.message
+    crossing = np.abs(result.path.positions[:, 0] - 3.0) < 0.15
+    assert crossing.any() and (result.path.positions[crossing, 1] > 4.8).all()
+
+
+def test_goals_on_another_component_are_refused_at_once_with_both_sizes(planner_class, make_plugin):
+    patch = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    vertices = np.concatenate([patch, np.add(patch, [5, 0, 0]), [[6, 1, 0]]])
+    mesh_map = MeshMap.from_arrays(vertices, [[0, 1, 2], [3, 4, 5], [4, 6, 5]])
+    request = PlanRequest(Pose.planar(0.2, 0.2), Pose.planar(5.2, 0.2))
+    result = make_plugin(planner_class, mesh_map).make_plan(request)
+    assert result.outcome == GetPathOutcome.NO_PATH_FOUND
+    assert "component" in result.message and "3 vertices" in result.message and "4 vertices" in result.message
+
+
+@pytest.mark.parametrize("goal", [Pose.planar(3.0, 3.0, 0.7), Pose.planar(6.3, 3.0, 0.7), Pose.planar(5.0, 3.0, 0.7)])
+def test_a_tolerance_ends_at_the_nearest_free_reachable_vertex(planner_class, make_plugin, plain, paint, goal):
+    # blocked goal in the wall; goal off the map; goal behind the closed wall
+    mesh_map = paint(plain(), wall)
+    request = PlanRequest(Pose.planar(1.0, 1.0), goal, dist_tolerance=3.8)
+    result = make_plugin(planner_class, mesh_map, max_surface_distance=0.1).make_plan(request)
+    assert result.success, result.message
+    free = mesh_map.vertices[mesh_map.vertices[:, 0] < 2.9]
+    nearest = np.linalg.norm(free - goal.position, axis=1).min()
+    assert result.path[-1].distance_to(goal) == pytest.approx(nearest)
+    assert result.path[-1].yaw == pytest.approx(0.7)
+
+
+def test_a_tolerance_too_small_keeps_the_reason(planner_class, make_plugin, plain, paint):
+    request = PlanRequest(Pose.planar(1.0, 1.0), Pose.planar(5.0, 3.0), dist_tolerance=0.5)
+    result = make_plugin(planner_class, paint(plain(), wall)).make_plan(request)
+    assert result.outcome == GetPathOutcome.NO_PATH_FOUND
+
+
+def test_via_points_are_passed_in_order(planner_class, make_plugin, hills):
+    via = (Pose.planar(5.0, 0.52), Pose.planar(0.48, 5.0))
+    request = PlanRequest(Pose.planar(0.5, 0.5), Pose.planar(5.0, 5.0), via=via)
+    path = make_plugin(planner_class, hills).make_plan(request).path
+    visits = [int(np.argmin(np.linalg.norm(path.positions[:, :2] - pose.position[:2], axis=1))) for pose in via]
+    assert visits == sorted(visits)
+    for index, pose in zip(visits, via, strict=True):
+        assert np.linalg.norm(path.positions[index, :2] - pose.position[:2]) < 0.05
+
+
+def test_a_token_set_before_planning_gives_canceled(planner_class, make_plugin, hills):
+    token = CancelToken()
+    token.cancel("changed my mind")
+    request = PlanRequest(Pose.planar(0.5, 0.5), Pose.planar(5.0, 5.0), cancel_token=token)
+    result = make_plugin(planner_class, hills).make_plan(request)
+    assert (result.outcome, result.message) == (GetPathOutcome.CANCELED, "changed my mind")
+
+
+def test_costs_move_the_path_aside(planner_class, make_plugin, plain, paint):
+    def hill_of_cost(v):
+        return 0.9 * np.exp(-((v[:, 0] - 3) ** 2 + (v[:, 1] - 3) ** 2))
+
+    request = PlanRequest(Pose.planar(1.0, 3.0), Pose.planar(5.0, 3.0))
+    mesh_map = plain()
+    direct = make_plugin(planner_class, paint(mesh_map, hill_of_cost)).make_plan(request)
+    aside = make_plugin(planner_class, paint(mesh_map, hill_of_cost, edge_cost_factor=5.0)).make_plan(request)
+    assert np.abs(direct.path.positions[:, 1] - 3).max() < 0.3
+    assert np.abs(aside.path.positions[:, 1] - 3).max() > 0.5
+    assert aside.cost > direct.cost

@@ -1,0 +1,130 @@
+"""The wave kernels on vertex graphs against ten-line twins on random weighted grids."""
+
+import heapq
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbf_mesh_nav.kernels.astar import search_towards
+from mbf_mesh_nav.kernels.dijkstra import propagate_distances
+from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top
+
+NO_INTS = np.zeros(0, np.int32)
+CALM = np.zeros(1, np.uint8)
+CANCELLED = np.ones(1, np.uint8)
+
+
+def random_grid_graph(seed, side=9):
+    """A side x side grid with bumps and random extra costs: vertices, CSR arrays, blocked mask."""
+    rng = np.random.default_rng(seed)
+    x, y = np.meshgrid(np.arange(side), np.arange(side))
+    vertices = np.column_stack([x.ravel(), y.ravel(), rng.uniform(0, 1, side * side)]).astype(float)
+    ids = np.arange(side * side).reshape(side, side)
+    rows = (ids[:, :-1].ravel(), ids[:, 1:].ravel())
+    columns = (ids[:-1].ravel(), ids[1:].ravel())
+    diagonals = (ids[:-1, 1:].ravel(), ids[1:, :-1].ravel())
+    pairs = np.concatenate([np.column_stack(pair) for pair in (rows, columns, diagonals)])
+    lengths = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
+    weights = lengths * (1 + rng.uniform(0, 2, len(pairs)))
+    sources = np.concatenate([pairs[:, 0], pairs[:, 1]])
+    order = np.argsort(sources, kind="stable")
+    neighbours = np.concatenate([pairs[:, 1], pairs[:, 0]])[order].astype(np.int32)
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(sources, minlength=side * side))]).astype(np.int32)
+    blocked = rng.random(side * side) < 0.2
+    blocked[[0, -1]] = False
+    return vertices, offsets, neighbours, np.tile(weights, 2)[order].astype(np.float32), blocked
+
+
+def heap_dijkstra(offsets, neighbours, weights, blocked, source):
+    """The naive twin: float32 Dijkstra with heapq."""
+    distances = np.full(len(blocked), np.inf, np.float32)
+    distances[source] = 0
+    queue = [(np.float32(0), source)]
+    while queue:
+        _, vertex = heapq.heappop(queue)
+        for slot in range(offsets[vertex], offsets[vertex + 1]):
+            candidate, other = distances[vertex] + weights[slot], neighbours[slot]
+            if not blocked[other] and candidate < distances[other]:
+                distances[other] = candidate
+                heapq.heappush(queue, (candidate, other))
+    return distances
+
+
+def run_dijkstra(graph, source, step=0.7, targets=NO_INTS, flag=CALM):
+    _, offsets, neighbours, weights, blocked = graph
+    distances = np.full(len(blocked), np.inf, np.float32)
+    distances[source] = 0
+    predecessors = np.full(len(blocked), -1, np.int32)
+    seeds = np.array([source], np.int32)
+    offsets_of_targets = np.zeros(len(targets), np.float32)
+    finished = propagate_distances(
+        offsets, neighbours, weights, blocked, distances, predecessors, seeds, step, targets, offsets_of_targets, flag
+    )
+    return distances, predecessors, finished
+
+
+@given(seed=st.integers(0, 10**6), step=st.floats(0.01, 50.0))
+@settings(max_examples=40, deadline=None)
+def test_near_far_distances_equal_dijkstra_bit_for_bit(seed, step):
+    graph = random_grid_graph(seed)
+    distances, predecessors, finished = run_dijkstra(graph, 0, step)
+    np.testing.assert_array_equal(distances, heap_dijkstra(*graph[1:], 0))
+    assert finished
+    for vertex in np.flatnonzero(np.isfinite(distances))[1:]:
+        assert distances[predecessors[vertex]] < distances[vertex]
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=40, deadline=None)
+def test_astar_finds_the_same_cost_and_settles_no_more_vertices(seed):
+    vertices, offsets, neighbours, weights, blocked = random_grid_graph(seed)
+    expected = heap_dijkstra(offsets, neighbours, weights, blocked, 0)
+    distances = np.full(len(blocked), np.inf, np.float32)
+    distances[0] = 0
+    predecessors = np.full(len(blocked), -1, np.int32)
+    goal = len(blocked) - 1
+    target, offset = np.array([goal], np.int32), np.full(1, 1e-6, np.float32)
+    settled = search_towards(
+        vertices, offsets, neighbours, weights, blocked, distances, predecessors,
+        np.array([0], np.int32), target, offset, vertices[goal], CALM,
+    )  # fmt: skip
+    assert distances[goal] == expected[goal]
+    assert 0 < settled <= np.count_nonzero(np.isfinite(expected))
+
+
+def test_a_target_stops_the_wave_early_with_its_exact_distance():
+    graph = random_grid_graph(3, side=40)
+    full, _, _ = run_dijkstra(graph, 0)
+    target = int(np.argsort(np.where(np.isfinite(full), full, np.inf))[60])
+    distances, _, _ = run_dijkstra(graph, 0, targets=np.array([target], np.int32))
+    assert distances[target] == full[target]
+    assert np.isfinite(distances).sum() < np.isfinite(full).sum() / 2
+
+
+def test_a_flag_set_before_the_call_cancels_both_kernels():
+    graph = random_grid_graph(1)
+    assert not run_dijkstra(graph, 0, flag=CANCELLED)[2]
+    vertices, offsets, neighbours, weights, blocked = graph
+    settled = search_towards(
+        vertices, offsets, neighbours, weights, blocked, np.zeros(81, np.float32), np.full(81, -1, np.int32),
+        np.array([0], np.int32), np.array([80], np.int32), np.zeros(1, np.float32), vertices[80], CANCELLED,
+    )  # fmt: skip
+    assert settled == -1
+
+
+@given(st.lists(st.tuples(st.integers(0, 19), st.integers(0, 1000)), min_size=1, max_size=80))
+@settings(max_examples=60, deadline=None)
+def test_the_indexed_heap_returns_items_by_their_lowest_key(pushes):
+    keys, ids, positions = np.empty(20, np.float32), np.empty(20, np.int32), np.full(20, -1, np.int32)
+    size, lowest = 0, {}
+    for item, key in pushes:
+        if key < lowest.get(item, 10**9):  # the contract: a queued key is only ever lowered
+            size = push_or_decrease(keys, ids, positions, size, item, np.float32(key))
+            lowest[item] = key
+    popped = []
+    while size:
+        popped.append(float(keys[0]))
+        size = remove_top(keys, ids, positions, size)
+    assert popped == sorted(lowest.values())
+    assert (positions == -1).all()
