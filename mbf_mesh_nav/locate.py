@@ -84,7 +84,7 @@ class SurfaceLocator:
         hint_face : int
             A face likely to be near, e.g. the last answer of a moving robot; the answer does not depend on it.
         """
-        x, y, z = point  # type: ignore[misc]  # any sequence of three numbers
+        x, y, z = np.asarray(point, dtype=np.float64)
         face, distance, v, w = closest_face(
             *self._tree, float(x), float(y), float(z), float(max_distance), int(hint_face)
         )

@@ -90,6 +90,7 @@ class MeshMap:
         self.components = topology.components
         self.input_to_internal = topology.input_to_internal
         self.internal_to_input = topology.internal_to_input
+        self._version = -1
         self._lock = threading.RLock()
         self.set_layers(LayerGraph(), None)
 
@@ -144,7 +145,7 @@ class MeshMap:
         return self.locator.locate_one(point, max_distance, hint_face)
 
     def snapshot(self) -> MeshSnapshot:
-        """The current state; cheap, call it once per plan or control cycle."""
+        """Return the current state; cheap, call it once per plan or control cycle."""
         return self._snapshot
 
     def to_input_order(self, values: NDArray[Any], missing: float = np.nan) -> NDArray[Any]:
@@ -154,8 +155,8 @@ class MeshMap:
         result[kept] = values[self.input_to_internal[kept]]
         return result
 
-    def vertex_graph(self) -> networkx.Graph:
-        """The vertex graph for algorithms of your own, see ``vertex_graph.build_vertex_graph``."""
+    def vertex_graph(self) -> networkx.Graph[int]:
+        """Build the vertex graph for algorithms of your own, see ``vertex_graph.build_vertex_graph``."""
         from mbf_mesh_nav.vertex_graph import build_vertex_graph  # networkx takes 0.3 s to import
 
         return build_vertex_graph(self.topology, self._snapshot.costs, self._snapshot.edge_weights)
@@ -182,10 +183,9 @@ class MeshMap:
             self.layers = layers
             self.default_layer = default_layer
             self.edge_cost_factor = edge_cost_factor
-            version = self._snapshot.version + 1 if hasattr(self, "_snapshot") else 0
             lethal = np.zeros(count, np.bool_) if default_layer is None else layers[default_layer].lethal
             weights = np.zeros(len(self.neighbours), np.float32)
-            self._snapshot = self._weighted(version, costs, lethal, weights, np.arange(count, dtype=np.int32))
+            self._snapshot = self._weighted(costs, lethal, weights, np.arange(count, dtype=np.int32))
 
     def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
         """Change how much costs lengthen edges, at run time."""
@@ -234,15 +234,12 @@ class MeshMap:
         if self.default_layer not in changed:
             return
         layer = self.layers[self.default_layer]
-        old = self._snapshot
-        self._snapshot = self._weighted(
-            old.version + 1, layer.costs, layer.lethal, old.edge_weights.copy(), changed[self.default_layer]
-        )
+        weights = self._snapshot.edge_weights.copy()
+        self._snapshot = self._weighted(layer.costs, layer.lethal, weights, changed[self.default_layer])
 
-    def _weighted(
-        self, version: int, costs: CostArray, lethal: LethalArray, weights: CostArray, changed: IntArray
-    ) -> MeshSnapshot:
+    def _weighted(self, costs: CostArray, lethal: LethalArray, weights: CostArray, changed: IntArray) -> MeshSnapshot:
         costs, lethal = costs.copy(), lethal.copy()
         graph = (self.neighbour_offsets, self.neighbours, self.neighbour_lengths)
         set_edge_weights(*graph, costs, lethal, float(self.edge_cost_factor), changed, weights)
-        return MeshSnapshot(version, costs, lethal, weights)
+        self._version += 1
+        return MeshSnapshot(self._version, costs, lethal, weights)

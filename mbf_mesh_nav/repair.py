@@ -211,16 +211,16 @@ class _Check:
         outside = ((corners < 0) | (corners >= len(points))).any(axis=1)
         text = f"{{count}} faces name vertices outside 0..{len(points) - 1}"
         self.found("index_out_of_range", text, np.flatnonzero(outside))
-        broken = ~np.isfinite(points).all(axis=1)
+        broken = np.asarray(~np.isfinite(points).all(axis=1))
         self.found("non_finite", "{count} vertices have a NaN or inf coordinate", np.flatnonzero(broken))
         kept = np.flatnonzero(~outside)
         mesh = CheckedMesh(points, corners[kept].astype(np.int32), identity, kept.astype(np.int32), identity)
         if not broken.any():
             return mesh
-        return mesh.without_faces(broken[mesh.faces].any(axis=1)).without_vertices(broken)
+        return mesh.without_faces(np.asarray(broken[mesh.faces].any(axis=1))).without_vertices(broken)
 
     def duplicate_vertices(self, mesh: CheckedMesh) -> CheckedMesh:
-        """Merging is an offer, not a duty: two walls may touch without being joined."""
+        # Merging is an offer, not a duty: two walls may touch without being joined.
         if "duplicate_vertices" not in self.repair:
             return mesh
         _, first, merged = np.unique(mesh.vertices, axis=0, return_index=True, return_inverse=True)

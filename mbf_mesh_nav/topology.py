@@ -76,8 +76,8 @@ class MeshTopology:
 
     def digest(self) -> str:
         """Hexadecimal SHA-256 of vertices and faces: the identity of the mesh in caches."""
-        digest = hashlib.sha256(np.ascontiguousarray(self.vertices))
-        digest.update(np.ascontiguousarray(self.faces))
+        digest = hashlib.sha256(self.vertices.tobytes())
+        digest.update(self.faces.tobytes())
         return digest.hexdigest()
 
 

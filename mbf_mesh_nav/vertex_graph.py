@@ -15,7 +15,7 @@ from mbf_mesh_nav.topology import MeshTopology
 
 def build_vertex_graph(
     topology: MeshTopology, costs: NDArray[np.float32], edge_weights: NDArray[np.float32]
-) -> networkx.Graph:
+) -> networkx.Graph[int]:
     """Graph whose nodes are the caller's vertex numbers.
 
     Parameters
@@ -32,7 +32,7 @@ def build_vertex_graph(
     """
     internal = np.arange(topology.vertex_count)
     names = np.where(topology.internal_to_input >= 0, topology.internal_to_input, -1 - internal).tolist()
-    graph = networkx.Graph()
+    graph: networkx.Graph[int] = networkx.Graph()
     positions = topology.vertices.tolist()
     graph.add_nodes_from(
         (name, {"position": tuple(position), "cost": cost})

@@ -7,8 +7,9 @@ and node i of a level covers nodes 4i to 4i+3 of the level below. ``levels`` hol
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.compiled import kernel
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -17,7 +18,7 @@ BRANCHES = 4
 STACK_SIZE = 128
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, NDArray[np.int64]]:
     """Boxes (N, 6) as min x y z, max x y z, leaves first, and the start of every level (levels + 1,)."""
     counts = np.zeros(32, dtype=np.int64)
@@ -51,16 +52,17 @@ def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, NDAr
     return boxes, starts
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def squared_distance_to_box(boxes: FloatArray, node: int, x: float, y: float, z: float) -> float:
     """Squared distance [m^2] from a point to a box, 0 inside."""
     dx = max(boxes[node, 0] - x, 0.0, x - boxes[node, 3])
     dy = max(boxes[node, 1] - y, 0.0, y - boxes[node, 4])
     dz = max(boxes[node, 2] - z, 0.0, z - boxes[node, 5])
-    return dx * dx + dy * dy + dz * dz
+    squared: float = dx * dx + dy * dy + dz * dz
+    return squared
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def closest_on_face(
     vertices: FloatArray, faces: IntArray, face: int, x: float, y: float, z: float
 ) -> tuple[float, float, float]:
@@ -97,7 +99,7 @@ def closest_on_face(
     return rx * rx + ry * ry + rz * rz, v, w
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def closest_face(
     vertices: FloatArray,
     faces: IntArray,
@@ -151,7 +153,7 @@ def closest_face(
     return best_face, np.sqrt(best), best_v, best_w
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def closest_faces(
     vertices: FloatArray,
     faces: IntArray,

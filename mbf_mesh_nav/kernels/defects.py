@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.compiled import kernel
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def faces_without_area(vertices: FloatArray, faces: IntArray, tolerance: float) -> BoolArray:
     """Mask (F,) of faces whose doubled area is at most ``tolerance`` times their longest edge squared."""
     flat = np.zeros(faces.shape[0], dtype=np.bool_)
@@ -29,7 +30,7 @@ def faces_without_area(vertices: FloatArray, faces: IntArray, tolerance: float) 
     return flat
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def repeated_faces(faces: IntArray, face_offsets: IntArray, incident: IntArray) -> BoolArray:
     """Mask (F,) of faces with the same three corners, in any order, as a face of smaller number."""
     repeated = np.zeros(faces.shape[0], dtype=np.bool_)
@@ -50,7 +51,7 @@ def repeated_faces(faces: IntArray, face_offsets: IntArray, incident: IntArray) 
     return repeated
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def surplus_faces(faces: IntArray, face_offsets: IntArray, incident: IntArray) -> BoolArray:
     """Mask (F,) of faces that would be the third at one of their edges when faces are added in order."""
     surplus = np.zeros(faces.shape[0], dtype=np.bool_)
@@ -71,7 +72,7 @@ def surplus_faces(faces: IntArray, face_offsets: IntArray, incident: IntArray) -
     return surplus
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def runs_along(faces: IntArray, face: int, start: int, end: int) -> bool:
     """Whether the winding of ``face`` passes from ``start`` directly to ``end``."""
     for corner in range(3):
@@ -80,7 +81,7 @@ def runs_along(faces: IntArray, face: int, start: int, end: int) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def winding_flips(faces: IntArray, face_neighbours: IntArray, areas: FloatArray) -> tuple[BoolArray, int]:
     """Faces (F,) to turn round so that neighbours agree, and the number of edges where none can (Moebius strips).
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.compiled import kernel
 
 IntArray = NDArray[np.int32]
 CostArray = NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def set_edge_weights(
     offsets: IntArray,
     neighbours: IntArray,

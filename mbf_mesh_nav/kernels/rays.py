@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.bounding_boxes import BRANCHES, STACK_SIZE
+from mbf_mesh_nav.kernels.compiled import kernel
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def distance_to_triangle(
     vertices: FloatArray, faces: IntArray, face: int, origin: FloatArray, direction: FloatArray
 ) -> float:
@@ -37,7 +37,7 @@ def distance_to_triangle(
     return distance if distance >= 0.0 else np.inf
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def distance_to_box(boxes: FloatArray, node: int, origin: FloatArray, inverse: FloatArray, limit: float) -> float:
     """Distance along a ray at which it enters a box, inf if it misses it or enters beyond ``limit``."""
     enter, leave = 0.0, limit
@@ -54,7 +54,7 @@ def distance_to_box(boxes: FloatArray, node: int, origin: FloatArray, inverse: F
     return enter if enter <= leave * (1.0 + 1e-12) + 1e-12 else np.inf
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def first_hits(
     vertices: FloatArray,
     faces: IntArray,

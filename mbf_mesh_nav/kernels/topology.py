@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.compiled import kernel
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def faces_of_vertices(faces: IntArray, vertex_count: int) -> tuple[IntArray, IntArray]:
     """Incident faces of every vertex as CSR: offsets (V+1,), faces (3F,), ascending within a vertex."""
     offsets = np.zeros(vertex_count + 1, dtype=np.int32)
@@ -29,7 +30,7 @@ def faces_of_vertices(faces: IntArray, vertex_count: int) -> tuple[IntArray, Int
     return offsets, incident
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def neighbours_of_vertices(faces: IntArray, face_offsets: IntArray, incident: IntArray) -> tuple[IntArray, IntArray]:
     """Neighbours of every vertex over mesh edges as CSR, ascending and without repetition."""
     vertex_count = face_offsets.shape[0] - 1
@@ -58,11 +59,11 @@ def neighbours_of_vertices(faces: IntArray, face_offsets: IntArray, incident: In
     return offsets, neighbours[:filled].copy()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def edges_of_neighbours(
     vertices: FloatArray, offsets: IntArray, neighbours: IntArray
 ) -> tuple[IntArray, IntArray, NDArray[np.float32]]:
-    """Number the undirected edges: edges (E, 2) with i < j, and edge id and length per CSR entry.
+    """Enumerate the undirected edges: edges (E, 2) with i < j, and edge id and length per CSR entry.
 
     Vertices are visited in ascending order and every list is ascending, so the entries of ``u`` that point to larger
     vertices are reached exactly in list order: one cursor per vertex replaces a search.
@@ -97,7 +98,7 @@ def edges_of_neighbours(
     return edges, edge_ids, lengths
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def faces_across_edges(faces: IntArray, face_offsets: IntArray, incident: IntArray) -> IntArray:
     """Face across the edge corner k -> corner k+1 of every face, (F, 3); -1 at a border.
 
@@ -116,9 +117,9 @@ def faces_across_edges(faces: IntArray, face_offsets: IntArray, incident: IntArr
     return across
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def unit_face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Unit normals (F, 3), right-handed about the winding; (0, 0, 1) for a face without area."""
+    """Compute unit normals (F, 3), right-handed about the winding; (0, 0, 1) for a face without area."""
     normals = np.zeros((faces.shape[0], 3))
     for face in range(faces.shape[0]):
         a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
@@ -133,7 +134,7 @@ def unit_face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return normals
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def unit_vertex_normals(face_normals: FloatArray, face_offsets: IntArray, incident: IntArray) -> FloatArray:
     """Unweighted mean of the incident unit face normals, renormalised; (0, 0, 1) where it vanishes."""
     vertex_count = face_offsets.shape[0] - 1
@@ -153,7 +154,7 @@ def unit_vertex_normals(face_normals: FloatArray, face_offsets: IntArray, incide
     return normals
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def connected_components(offsets: IntArray, neighbours: IntArray) -> IntArray:
     """Component of every vertex (V,), numbered from 0 in the order of their first vertex."""
     vertex_count = offsets.shape[0] - 1
@@ -179,7 +180,7 @@ def connected_components(offsets: IntArray, neighbours: IntArray) -> IntArray:
     return components
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def morton_codes(points: FloatArray, lower: FloatArray, cell: float) -> NDArray[np.uint64]:
     """Interleaved 21-bit cell indices of points (n, 3): close codes mean close points."""
     codes = np.zeros(points.shape[0], dtype=np.uint64)
