@@ -1,0 +1,1 @@
+"""Two-dimensional layered costmaps and the planners, controllers and recoveries that drive on them."""

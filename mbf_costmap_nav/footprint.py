@@ -1,0 +1,167 @@
+"""The robot's outline on the ground: parsing, radii, padding and true offset.
+
+Two ways to make an outline larger live here, because two callers need different ones:
+
+- ``padded`` is costmap_2d's ``footprint_padding``: every vertex moves by the padding along x and along y, away from
+  the base's axes. It keeps the number of vertices and is what users' configurations mean. It is not an offset: the
+  sides of a slanted outline move by another distance than asked.
+- ``offset`` keeps at least the given distance from the outline everywhere. Safety distances use it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull
+
+FloatArray = NDArray[np.float64]
+
+CIRCLE_POINTS = 16
+MITRE_LIMIT = 2.0
+"""A corner of an offset outline may stick out by this factor of the distance; sharper ones are cut off flat."""
+
+
+class Footprint:
+    """A simple polygon around the base's origin, in the base frame.
+
+    Attributes
+    ----------
+    vertices : (n, 2) float64, read-only
+        Corners [m] in order (either sense), x forward, y left. Fewer than three points stand for a robot that is a
+        point: only the cell of its centre counts.
+    inscribed_radius : float
+        Distance [m] from the base to the nearest side; the largest float for fewer than three points (costmap_2d).
+    circumscribed_radius : float
+        Distance [m] from the base to the farthest corner; 0 for fewer than three points (costmap_2d).
+
+    Raises
+    ------
+    ValueError
+        The vertices are not an (n, 2) array of finite numbers.
+    """
+
+    __slots__ = ("circumscribed_radius", "inscribed_radius", "vertices")
+
+    def __init__(self, vertices: ArrayLike) -> None:
+        points = np.array(vertices, dtype=np.float64)
+        if points.size == 0:
+            points = points.reshape(0, 2)
+        if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+            raise ValueError(f"a footprint is a list of finite [x, y] points, got shape {points.shape}")
+        points.flags.writeable = False
+        self.vertices: FloatArray = points
+        self.inscribed_radius, self.circumscribed_radius = _radii(points)
+
+    @classmethod
+    def circle(cls, radius: float) -> Footprint:
+        """Footprint of a round robot: 16 points on the circle of ``radius`` [m], the first at (radius, 0)."""
+        angles = np.arange(CIRCLE_POINTS) * (2.0 * math.pi / CIRCLE_POINTS)
+        return cls(radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+
+    @classmethod
+    def parse(cls, value: str | Sequence[Sequence[float]]) -> Footprint:
+        """Read ``"[[x, y], ...]"`` or a list of pairs.
+
+        Raises
+        ------
+        ValueError
+            The text is no list of pairs of numbers, or has fewer than three points.
+        """
+        points = parse_number_lists(value) if isinstance(value, str) else value
+        for i, point in enumerate(points):
+            if len(point) != 2:
+                raise ValueError(f"point {i} of the footprint needs two numbers, got {list(point)}")
+        if len(points) < 3:
+            raise ValueError(f"a footprint needs at least 3 points, got {len(points)}")
+        return cls(points)
+
+    def at(self, x: float, y: float, yaw: float) -> FloatArray:
+        """Vertices (n, 2) [m] with the base at (x, y) [m], turned by ``yaw`` [rad]."""
+        c, s = math.cos(yaw), math.sin(yaw)
+        turned = self.vertices @ np.array([[c, s], [-s, c]])
+        return np.asarray(np.add(turned, (x, y)))
+
+    def padded(self, padding: float) -> Footprint:
+        """Move each vertex by ``padding`` [m] along x and y, by the sign of its coordinate (costmap_2d)."""
+        return Footprint(self.vertices + padding * np.sign(self.vertices))
+
+    def offset(self, distance: float) -> Footprint:
+        """Outline that keeps ``distance`` [m] from this one; negative shrinks.
+
+        The sides move outwards by exactly ``distance`` and meet in corners; a corner sharper than ``MITRE_LIMIT`` is
+        cut flat, still outside the rounded offset. A footprint that is not convex is replaced by its convex hull,
+        which is larger and therefore safe. A point robot becomes a circle.
+        """
+        if distance == 0.0:
+            return self
+        if len(self.vertices) < 3:
+            return Footprint.circle(distance / math.cos(math.pi / CIRCLE_POINTS))
+        hull = self.vertices[ConvexHull(self.vertices).vertices]
+        return Footprint(_mitred_offset(hull, distance))
+
+
+def parse_number_lists(text: str) -> list[list[float]]:
+    """Parse ``"[[1, 2.2], [.3, -4e4]]"``, a list of lists of numbers.
+
+    Raises
+    ------
+    ValueError
+        Unbalanced brackets, another depth than two, or something that is not a finite number.
+    """
+    try:
+        rows = json.loads(_with_leading_zeros(text))
+    except json.JSONDecodeError as error:
+        raise ValueError(f"expected a list like [[x, y], ...], got {text!r}: {error.msg}") from None
+    if not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
+        raise ValueError(f"expected a list of lists of numbers, got {text!r}")
+    for row in rows:
+        for number in row:
+            if isinstance(number, bool) or not isinstance(number, int | float) or not math.isfinite(number):
+                raise ValueError(f"expected finite numbers only, got {number!r} in {text!r}")
+    return [[float(number) for number in row] for row in rows]
+
+
+def _with_leading_zeros(text: str) -> str:
+    """Write ``.3`` and ``-.3`` as JSON wants them, 0.3 and -0.3."""
+    out = []
+    for i, character in enumerate(text):
+        if character == "." and (i == 0 or not text[i - 1].isdigit()):
+            out.append("0")
+        out.append(character)
+    return "".join(out)
+
+
+def _radii(points: FloatArray) -> tuple[float, float]:
+    """Nearest side and farthest corner seen from the origin (costmap_2d's calculateMinAndMaxDistances)."""
+    if len(points) < 3:
+        return sys.float_info.max, 0.0
+    ends = np.roll(points, -1, axis=0)
+    sides = ends - points
+    lengths_squared = np.maximum(np.sum(sides**2, axis=1), 1e-30)
+    along = np.clip(-np.sum(points * sides, axis=1) / lengths_squared, 0.0, 1.0)
+    nearest = points + along[:, None] * sides
+    return float(np.linalg.norm(nearest, axis=1).min()), float(np.linalg.norm(points, axis=1).max())
+
+
+def _mitred_offset(hull: FloatArray, distance: float) -> FloatArray:
+    """Offset a counter-clockwise convex polygon by moving its sides."""
+    sides = np.roll(hull, -1, axis=0) - hull
+    normals = np.column_stack([sides[:, 1], -sides[:, 0]]) / np.linalg.norm(sides, axis=1)[:, None]
+    corners: list[FloatArray] = []
+    for vertex, before, after in zip(hull, np.roll(normals, 1, axis=0), normals, strict=True):
+        bisector = (before + after) / np.linalg.norm(before + after)
+        half_turn_cosine = float(bisector @ before)
+        if distance < 0.0 or half_turn_cosine * MITRE_LIMIT >= 1.0:
+            corners.append(vertex + bisector * (distance / half_turn_cosine))
+            continue
+        # Cut the corner by the line across the bisector that still touches the circle of the distance.
+        tangent = np.array([-bisector[1], bisector[0]])
+        half_cut = distance * (1.0 - half_turn_cosine) / math.sqrt(1.0 - half_turn_cosine**2)
+        corners.append(vertex + bisector * distance - tangent * half_cut)
+        corners.append(vertex + bisector * distance + tangent * half_cut)
+    return np.array(corners)

@@ -1,0 +1,1 @@
+"""Compiled loops over cells: pure functions, arrays in, arrays out."""

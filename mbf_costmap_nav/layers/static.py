@@ -1,0 +1,103 @@
+"""Static layer: the map of a file (or one handed over by the program) under everything else.
+
+When to use: first in the list of a global map; also in a rolling local map, where it is sampled at the window's cells.
+When not: for areas a robot must not enter although they are free, use a keep-out layer, which stays when the map is
+replaced. Cost: nothing after the first update, as its cells never change by themselves; in a rolling map one copy of
+the window for each move by a cell. Known failure: furniture moves; combine it with a layer that sees.
+
+The map's frame must be the costmap's. The interpretation of values is costmap_2d's static layer with
+``trinary_costmap`` off; map files in trinary mode give the same result as with it on.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.parameters import parameter
+from mbf_costmap_nav.costmap import EMPTY_BOX, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.layer import CombinationMethod, GridLayer, LayerContext, LayerParameters, combine
+from mbf_costmap_nav.map_io import load_costmap
+
+
+class StaticLayerParameters(LayerParameters):
+    """Parameters of the static layer."""
+
+    map_file: str = parameter("", "map_server YAML file, relative to the configuration's folder.", dynamic=False)
+    use_maximum: bool = parameter(False, "Combine by the larger cost instead of replacing what is below.")
+
+
+class StaticLayer(GridLayer):
+    """A fixed map. See the module's text for when to use it."""
+
+    Parameters = StaticLayerParameters
+    parameters: StaticLayerParameters
+
+    def __init__(self, context: LayerContext) -> None:
+        super().__init__(context)
+        if self.parameters.map_file:
+            self._map = load_costmap(
+                Path(context.base_folder) / self.parameters.map_file, context.frame_id, context.track_unknown_space
+            )
+        elif context.static_map is not None:
+            self._map = context.static_map
+        else:
+            raise ValueError(f"static layer {context.name!r} needs map_file, or a map handed over by the program")
+        self._changed = EMPTY_BOX
+
+    @property
+    def default_value(self) -> int:
+        """Cells out of the map hold no information, whatever unknown means inside of it."""
+        return UNKNOWN
+
+    def preferred_geometry(self) -> GridGeometry:
+        """Grid of the map."""
+        return self._map.geometry
+
+    def set_map(self, new_map: Costmap) -> None:
+        """Replace the map, e.g. on another floor; call it through ``LayeredCostmap.replace_static_map``."""
+        self._map = new_map
+        self.match_geometry(self.geometry)
+
+    def match_geometry(self, geometry: GridGeometry) -> None:
+        """Sample the map at the costmap's cells."""
+        super().match_geometry(geometry)
+        self._sample(geometry.box)
+        self._changed = geometry.box
+
+    def shift(self, geometry: GridGeometry, dx: int, dy: int) -> None:
+        """Move the window over the map and sample what came into view."""
+        super().shift(geometry, dx, dy)
+        box = geometry.box
+        self._sample(CellBox(box.x1 - dx, 0, box.x1, box.y1) if dx > 0 else CellBox(0, 0, -dx, box.y1))
+        self._sample(CellBox(0, box.y1 - dy, box.x1, box.y1) if dy > 0 else CellBox(0, 0, box.x1, -dy))
+
+    def _sample(self, box: CellBox) -> None:
+        """Take each cell's value from the map cell at its centre."""
+        box = box.clipped(self.geometry.box)
+        if box.empty:
+            return
+        source = self._map
+        x = self.geometry.origin_x + (np.arange(box.x0, box.x1) + 0.5) * self.geometry.resolution
+        y = self.geometry.origin_y + (np.arange(box.y0, box.y1) + 0.5) * self.geometry.resolution
+        ix = np.floor((x - source.origin_x) / source.resolution).astype(np.int64)
+        iy = np.floor((y - source.origin_y) / source.resolution).astype(np.int64)
+        columns, rows = (ix >= 0) & (ix < source.width), (iy >= 0) & (iy < source.height)
+        window = self.cells[box.slices]
+        window[np.ix_(rows, columns)] = source.cells[np.ix_(iy[rows], ix[columns])]
+
+    def reset(self) -> None:
+        """Return to the map as loaded, undoing cleared areas."""
+        self.match_geometry(self.geometry)
+
+    def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
+        """Report the cells that came from a new map."""
+        changed, self._changed = self._changed, EMPTY_BOX
+        return box.union(changed)
+
+    def update_costs(self, cells: CellArray, box: CellBox) -> None:
+        """Write the map; unknown cells of it leave what is below."""
+        method = CombinationMethod.MAXIMUM if self.parameters.use_maximum else CombinationMethod.OVERWRITE
+        combine(cells, self.cells, box, method)

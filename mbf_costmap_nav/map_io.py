@@ -1,0 +1,342 @@
+"""Maps on disk in map_server's format: a YAML file that describes a grey image (pgm, png or bmp).
+
+Reading turns every grey value into an occupancy: 0 free, 100 occupied, 1..99 between (mode ``scale``), 255 unknown, or
+the grey value itself (mode ``raw``). Image rows run from top to bottom, map rows from bottom to top. The rules are
+map_server's: occupancy = (255 - grey) / 255, or grey / 255 with ``negate``; occupied above ``occupied_thresh``, free
+below ``free_thresh``; in between unknown (trinary) or ``1 + 98 * ratio`` (scale). Channels of a colour image are
+averaged, then rounded. In mode scale a pixel that is not opaque is unknown; elsewhere opacity is ignored.
+
+Origins with a yaw are kept in ``OccupancyMap``. A ``Costmap`` has axes parallel to its frame, so ``to_costmap``
+resamples such a map onto the smallest upright grid around it: nothing that was occupied gets lost, what lies outside
+the turned image is unknown.
+
+A bad file raises one ``MapError`` that names the file and the reason. The number of cells is checked against a limit
+before the pixels are read.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, Costmap
+
+OccupancyArray = NDArray[np.uint8]
+
+OCCUPIED = 100
+UNKNOWN_OCCUPANCY = 255
+MAX_CELLS = 64_000_000
+MAX_DESCRIPTION_BYTES = 1 << 20
+GREY_MODES = {"1", "L", "LA", "P", "RGB", "RGBA"}
+"""Pillow's names of the 8-bit pixel layouts we read."""
+
+
+class MapError(Exception):
+    """A map file that cannot be used.
+
+    Attributes
+    ----------
+    file : pathlib.Path
+    reason : str
+    """
+
+    def __init__(self, file: Path, reason: str) -> None:
+        super().__init__(f"{file}: {reason}")
+        self.file = file
+        self.reason = reason
+
+
+class MapMode(str, Enum):
+    """How grey values between the two thresholds are read."""
+
+    TRINARY = "trinary"
+    SCALE = "scale"
+    RAW = "raw"
+
+
+class MapDescription(BaseModel):
+    """The YAML file of a map; keys we do not know are ignored, as map_server does."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+    image: str = Field(min_length=1)
+    resolution: float = Field(ge=1e-4, le=1e3)
+    origin: tuple[float, float, float]
+    negate: bool = False
+    occupied_thresh: float = Field(0.65, ge=0.0, le=1.0)
+    free_thresh: float = Field(0.196, ge=0.0, le=1.0)
+    mode: MapMode = MapMode.TRINARY
+
+    @field_validator("origin", mode="before")
+    @classmethod
+    def _origin_is_a_list(cls, value: object) -> object:
+        if isinstance(value, list | tuple) and len(value) == 3:
+            return tuple(value)
+        raise ValueError("expected a list [x, y, yaw]")
+
+    @model_validator(mode="after")
+    def _thresholds_are_ordered(self) -> MapDescription:
+        if self.free_thresh >= self.occupied_thresh:
+            raise ValueError(f"free_thresh {self.free_thresh} must be below occupied_thresh {self.occupied_thresh}")
+        return self
+
+    def occupancy_of_grey(self) -> OccupancyArray:
+        """(256,) uint8: occupancy of each grey value of an opaque pixel."""
+        grey = np.arange(256, dtype=np.float64)
+        if self.negate:
+            grey = 255.0 - grey
+        if self.mode is MapMode.RAW:
+            return grey.astype(np.uint8)
+        occupancy = (255.0 - grey) / 255.0
+        ratio = np.clip((occupancy - self.free_thresh) / (self.occupied_thresh - self.free_thresh), 0.0, 1.0)
+        table = (1.0 + 98.0 * ratio).astype(np.uint8)
+        if self.mode is MapMode.TRINARY:
+            table[:] = UNKNOWN_OCCUPANCY
+        table[occupancy > self.occupied_thresh] = OCCUPIED
+        table[occupancy < self.free_thresh] = FREE
+        return table
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyMap:
+    """A map file's content, bottom row first.
+
+    Attributes
+    ----------
+    occupancy : (height, width) uint8
+        0 free .. 100 occupied, 255 unknown; any value in mode raw.
+    resolution : float
+        Side of a cell [m].
+    origin : (x, y, yaw)
+        Pose [m, m, rad] of the lower-left corner of cell (0, 0).
+    """
+
+    occupancy: OccupancyArray
+    resolution: float
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def upright(self) -> OccupancyMap:
+        """Return the same map with yaw 0, resampled if it has a yaw."""
+        x, y, yaw = self.origin
+        return self if math.remainder(yaw, 2.0 * math.pi) == 0.0 else _resampled(self, x, y, yaw)
+
+    def to_costmap(self, frame_id: str = "map", track_unknown_space: bool = True) -> Costmap:
+        """Costs of the map: occupied is lethal, free is free, anything between is scaled to 1..253.
+
+        Parameters
+        ----------
+        frame_id : str
+            Frame the map's origin is given in.
+        track_unknown_space : bool
+            Keep unknown cells unknown; otherwise they become free.
+        """
+        table = np.full(256, UNKNOWN if track_unknown_space else FREE, dtype=np.uint8)
+        table[: OCCUPIED + 1] = np.arange(OCCUPIED + 1) * LETHAL // OCCUPIED
+        flat = self.upright()
+        return Costmap(table[flat.occupancy], flat.resolution, flat.origin[0], flat.origin[1], frame_id)
+
+
+def load_map(file: Path | str, max_cells: int = MAX_CELLS) -> OccupancyMap:
+    """Read a map_server YAML file and the image it names.
+
+    Raises
+    ------
+    MapError
+        Anything wrong with either file, or more than ``max_cells`` cells.
+    """
+    file = Path(file)
+    description = read_description(file)
+    return _decode(_read_pixels(file.parent / description.image, max_cells), description)
+
+
+def load_costmap(file: Path | str, frame_id: str = "map", track_unknown_space: bool = True) -> Costmap:
+    """Read a map_server YAML file as a costmap; see ``load_map`` and ``OccupancyMap.to_costmap``."""
+    return load_map(file).to_costmap(frame_id, track_unknown_space)
+
+
+def load_image(
+    file: Path | str,
+    resolution: float,
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    *,
+    negate: bool = False,
+    occupied_thresh: float = 0.65,
+    free_thresh: float = 0.196,
+    mode: MapMode = MapMode.TRINARY,
+    max_cells: int = MAX_CELLS,
+) -> OccupancyMap:
+    """Read a bare image that has no YAML file; the arguments are the keys of one.
+
+    Raises
+    ------
+    MapError
+        The image is unusable, or an argument is.
+    """
+    file = Path(file)
+    keys = {
+        "image": file.name,
+        "resolution": resolution,
+        "origin": origin,
+        "negate": negate,
+        "occupied_thresh": occupied_thresh,
+        "free_thresh": free_thresh,
+        "mode": mode,
+    }
+    return _decode(_read_pixels(file, max_cells), _validated(file, keys))
+
+
+def read_description(file: Path) -> MapDescription:
+    """Read and check the YAML file alone.
+
+    Raises
+    ------
+    MapError
+        The file is missing, too large, no YAML mapping, or holds a bad value (all of them are named).
+    """
+    try:
+        if file.stat().st_size > MAX_DESCRIPTION_BYTES:
+            raise MapError(file, f"is larger than {MAX_DESCRIPTION_BYTES} bytes, which no map description is")
+        content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise MapError(file, error.strerror or str(error)) from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise MapError(file, f"is no readable YAML: {error}") from error
+    if not isinstance(content, dict):
+        raise MapError(
+            file, f"expected a mapping with the keys image, resolution, origin; got {type(content).__name__}"
+        )
+    return _validated(file, content)
+
+
+def _validated(file: Path, keys: dict[str, object]) -> MapDescription:
+    try:
+        return MapDescription.model_validate(keys)
+    except ValidationError as error:
+        findings = (f"{'.'.join(map(str, e['loc'])) or 'map'}: {e['msg']}, got {e['input']!r}" for e in error.errors())
+        raise MapError(file, "; ".join(findings)) from error
+
+
+def _read_pixels(file: Path, max_cells: int) -> NDArray[np.uint8]:
+    """Grey and opacity (height, width, 2) uint8 of an image, top row first."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            image = Image.open(file)
+        with image:
+            width, height = image.size
+            if width * height > max_cells:
+                raise MapError(file, f"{width} x {height} pixels are more than the limit of {max_cells} cells")
+            if image.mode not in GREY_MODES:
+                raise MapError(file, f"has pixels of type {image.mode!r}; expected 8-bit grey or colour")
+            pixels = np.asarray(image.convert("RGBA"), dtype=np.uint8)
+    except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
+        raise MapError(file, f"has too many pixels: {error}") from error
+    except UnidentifiedImageError as error:
+        raise MapError(file, "is no image that can be read (pgm, png, bmp)") from error
+    except (OSError, ValueError, SyntaxError) as error:  # Pillow reports damaged files by any of these
+        raise MapError(file, getattr(error, "strerror", None) or f"damaged image: {error}") from error
+    colour_sum = pixels[..., :3].sum(axis=2, dtype=np.uint16)
+    return np.stack([((colour_sum + 1) // 3).astype(np.uint8), pixels[..., 3]], axis=2)
+
+
+def _decode(pixels: NDArray[np.uint8], description: MapDescription) -> OccupancyMap:
+    occupancy = description.occupancy_of_grey()[pixels[..., 0]]
+    if description.mode is MapMode.SCALE:
+        occupancy[pixels[..., 1] < 255] = UNKNOWN_OCCUPANCY
+    return OccupancyMap(np.ascontiguousarray(occupancy[::-1]), description.resolution, description.origin)
+
+
+def _resampled(turned: OccupancyMap, x: float, y: float, yaw: float) -> OccupancyMap:
+    """Nearest cell at each centre of an upright grid; occupied cells are written once more at their own centres."""
+    height, width = turned.occupancy.shape
+    resolution = turned.resolution
+    rotation = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+    corners = np.array([[0, 0], [width, 0], [width, height], [0, height]]) * resolution @ rotation.T
+    lower = corners.min(axis=0)
+    new_width, new_height = np.ceil((corners.max(axis=0) - lower) / resolution - 1e-9).astype(int)
+
+    centres = np.stack(np.meshgrid(np.arange(new_width), np.arange(new_height)), axis=-1) + 0.5
+    source = np.floor((centres * resolution + lower) @ rotation / resolution).astype(np.int64)
+    inside = np.all((source >= 0) & (source < (width, height)), axis=-1)
+    occupancy = np.full((new_height, new_width), UNKNOWN_OCCUPANCY, dtype=np.uint8)
+    occupancy[inside] = turned.occupancy[source[inside][:, 1], source[inside][:, 0]]
+
+    rows, columns = np.nonzero(turned.occupancy == OCCUPIED)
+    points = (np.column_stack([columns, rows]) + 0.5) * resolution @ rotation.T - lower
+    cells = np.minimum((points / resolution).astype(np.int64), (new_width - 1, new_height - 1))
+    occupancy[cells[:, 1], cells[:, 0]] = OCCUPIED
+    return OccupancyMap(occupancy, resolution, (x + float(lower[0]), y + float(lower[1]), 0.0))
+
+
+def save_map(
+    file: Path | str,
+    content: OccupancyMap,
+    *,
+    image_format: str = "pgm",
+    mode: MapMode = MapMode.TRINARY,
+    negate: bool = False,
+    occupied_thresh: float = 0.65,
+    free_thresh: float = 0.196,
+) -> None:
+    """Write ``file`` (YAML) and an image of the same name beside it, so that ``load_map`` gives the same map.
+
+    Parameters
+    ----------
+    image_format : {"pgm", "png", "bmp"}
+    mode : MapMode
+        Trinary keeps 0, 100 and unknown; scale keeps 0..100, and unknown only in a png; raw keeps every value.
+
+    Raises
+    ------
+    MapError
+        The map holds an occupancy that this mode and these thresholds cannot express, or the file cannot be written.
+    """
+    file = Path(file)
+    image_file = file.with_suffix(f".{image_format}")
+    keys: dict[str, object] = {
+        "image": image_file.name,
+        "mode": mode.value,
+        "resolution": content.resolution,
+        "origin": list(content.origin),
+        "negate": int(negate),
+        "occupied_thresh": occupied_thresh,
+        "free_thresh": free_thresh,
+    }
+    if image_format not in ("pgm", "png", "bmp"):
+        raise MapError(image_file, f"image_format must be pgm, png or bmp, got {image_format!r}")
+    description = _validated(file, keys)
+    grey, opaque = _encode(image_file, content.occupancy[::-1], description)
+    try:
+        image = Image.fromarray(grey)
+        if not opaque.all():
+            image.putalpha(Image.fromarray(np.where(opaque, np.uint8(255), np.uint8(0))))
+        image.save(image_file, format="PPM" if image_format == "pgm" else image_format.upper())
+        file.write_text(yaml.safe_dump(keys, sort_keys=False), encoding="utf-8")
+    except OSError as error:
+        raise MapError(file, error.strerror or str(error)) from error
+
+
+def _encode(
+    file: Path, occupancy: OccupancyArray, description: MapDescription
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Grey values that decode to ``occupancy``, and which pixels are opaque."""
+    occupancy_of_grey = description.occupancy_of_grey()
+    grey_of_occupancy = np.zeros(256, dtype=np.uint8)
+    grey_of_occupancy[occupancy_of_grey] = np.arange(256)  # of several grey values the brightest wins
+    expressible = np.isin(np.arange(256), occupancy_of_grey)
+    opaque = np.ones(occupancy.shape, dtype=bool)
+    if description.mode is MapMode.SCALE and file.suffix == ".png":
+        opaque = occupancy != UNKNOWN_OCCUPANCY
+    lost = np.setdiff1d(np.unique(occupancy[opaque]), np.flatnonzero(expressible))
+    if lost.size:
+        raise MapError(file, f"mode {description.mode.value} cannot express the occupancies {lost.tolist()}")
+    return grey_of_occupancy[occupancy], opaque

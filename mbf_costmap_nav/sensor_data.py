@@ -1,0 +1,153 @@
+"""What a sensor saw, kept until the costmap's next update, and the age limits of its source.
+
+A source that has fallen silent is the classic reason for a robot driving into something it can no longer see, so
+``expected_update_rate`` is on by default: a layer whose source is late makes the whole map not current.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_costmap_nav.layer import CostmapLayer
+
+
+class SourceParameters(ParameterModel):
+    """One observation source of a layer."""
+
+    marking: bool = parameter(True, "Whether hits of this source put obstacles on the map.")
+    clearing: bool = parameter(True, "Whether rays of this source remove obstacles along their way.")
+    obstacle_max_range: float = parameter(2.5, "Hits farther than this are not marked.", unit="m", gt=0.0)
+    obstacle_min_range: float = parameter(0.0, "Hits nearer than this are not marked.", unit="m", ge=0.0)
+    raytrace_max_range: float = parameter(3.0, "Rays clear up to this distance.", unit="m", gt=0.0)
+    raytrace_min_range: float = parameter(0.0, "Rays clear from this distance on.", unit="m", ge=0.0)
+    min_obstacle_height: float = parameter(0.0, "Points below this height (map frame) are ignored.", unit="m")
+    max_obstacle_height: float = parameter(2.0, "Points above this height (map frame) are ignored.", unit="m")
+    observation_persistence: float = parameter(
+        0.0, "How long an observation is used; 0 = only the newest one.", unit="s", ge=0.0
+    )
+    expected_update_rate: float = parameter(
+        1.0, "Longest allowed time between two observations; 0 switches the check off.", unit="s", ge=0.0
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """One measurement in the costmap's frame.
+
+    Attributes
+    ----------
+    origin : (3,) float64
+        Where the sensor was [m].
+    ends : (n, 3) float64
+        Ends of the rays [m], all finite.
+    hits : (n,) bool
+        Whether there is something at the end.
+    stamp : float
+        Time of the measurement [s].
+    """
+
+    origin: NDArray[np.float64]
+    ends: NDArray[np.float64]
+    hits: NDArray[np.bool_]
+    stamp: float
+
+    @classmethod
+    def of_points(cls, points: ArrayLike, origin: ArrayLike, stamp: float) -> Observation:
+        """Take a cloud in which every point (n, 3) is a hit."""
+        return cls.of_scan(origin, points, np.ones(len(np.asarray(points)), dtype=bool), stamp)
+
+    @classmethod
+    def of_scan(cls, origin: ArrayLike, ends: ArrayLike, hits: ArrayLike, stamp: float) -> Observation:
+        """Take a scan; rays with an end that is not finite are dropped. The arrays are copied.
+
+        Raises
+        ------
+        ValueError
+            Wrong shapes, or the origin is not finite.
+        """
+        start = np.array(origin, dtype=np.float64).reshape(-1)
+        points = np.array(ends, dtype=np.float64).reshape(-1, 3)
+        mask = np.array(hits, dtype=bool).reshape(-1)
+        if start.shape != (3,) or not np.isfinite(start).all():
+            raise ValueError(f"sensor_origin must be three finite numbers, got {start.tolist()}")
+        if len(points) != len(mask):
+            raise ValueError(f"{len(points)} ray ends but {len(mask)} hit flags")
+        finite = np.isfinite(points).all(axis=1)
+        if not finite.all():
+            points, mask = points[finite], mask[finite]
+        return cls(start, points, mask, float(stamp))
+
+    def between_heights(self, lowest: float, highest: float) -> Observation:
+        """Return the observation without the rays that end below ``lowest`` or above ``highest`` [m]."""
+        z = self.ends[:, 2]
+        inside = (z >= lowest) & (z <= highest)
+        if inside.all():
+            return self
+        return Observation(self.origin, self.ends[inside], self.hits[inside], self.stamp)
+
+
+class ObservationBuffer:
+    """The observations of one source that are still in use.
+
+    Parameters
+    ----------
+    name : str
+        Name of the source, for messages.
+    parameters : SourceParameters
+    """
+
+    def __init__(self, name: str, parameters: SourceParameters) -> None:
+        self.name = name
+        self.parameters = parameters
+        self._observations: list[Observation] = []
+        self._newest: float | None = None
+
+    def insert(self, observation: Observation) -> None:
+        """Keep an observation; without persistence it replaces the one before."""
+        limits = self.parameters
+        kept = observation.between_heights(limits.min_obstacle_height, limits.max_obstacle_height)
+        if limits.observation_persistence == 0.0:
+            self._observations.clear()
+        self._observations.append(kept)
+        self._newest = observation.stamp if self._newest is None else max(self._newest, observation.stamp)
+
+    def current(self, now: float) -> list[Observation]:
+        """Observations in use at ``now`` [s], oldest first; older ones are forgotten."""
+        persistence = self.parameters.observation_persistence
+        if persistence > 0.0:
+            self._observations = [seen for seen in self._observations if seen.stamp >= now - persistence]
+        return list(self._observations)
+
+    def forget(self) -> None:
+        """Drop the kept observations, e.g. because the map is cleared."""
+        self._observations.clear()
+
+    def currency_problem(self, now: float) -> str:
+        """Say how late the source is at ``now`` [s]; empty while it is in time."""
+        limit = self.parameters.expected_update_rate
+        if limit == 0.0:
+            return ""
+        if self._newest is None:
+            return f"observation source {self.name!r} has not sent anything yet"
+        age = now - self._newest
+        if age <= limit:
+            return ""
+        return f"observation source {self.name!r} is silent for {age:.2f} s, expected every {limit:.2f} s"
+
+
+class SensorLayer(CostmapLayer):
+    """A layer that takes observations."""
+
+    @property
+    @abstractmethod
+    def source_names(self) -> tuple[str, ...]:
+        """Names of the sources it listens to."""
+
+    @abstractmethod
+    def insert(self, source: str, observation: Observation) -> None:
+        """Keep an observation of one of its sources for the next update."""
