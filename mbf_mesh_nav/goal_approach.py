@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 
+_SAME_STOREY = 0.5  # [m]
+
 
 def in_robot_frame(pose: Pose, point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Coordinates (3,) of a global point in the robot's frame: x ahead, y left, both in its tangent plane."""
@@ -21,13 +23,23 @@ def heading_error(pose: Pose, other: Pose) -> float:
     return math.atan2(ahead[1], ahead[0])
 
 
+def ground_distance(pose: Pose, goal: Pose) -> float:
+    """Distance [m] to the goal in the robot's tangent plane.
+
+    A goal given a little above or below the ground, and a robot frame above it, do not count; a goal more than
+    ``_SAME_STOREY`` off the plane is on other ground, then the distance is the straight one.
+    """
+    x, y, z = in_robot_frame(pose, np.asarray(goal.position))
+    return math.hypot(x, y) if abs(z) <= _SAME_STOREY else math.hypot(x, y, z)
+
+
 def is_at_goal(pose: Pose, goal: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
     """Whether ``pose`` is within ``dist_tolerance`` [m] and its heading within ``angle_tolerance`` [rad] of the goal.
 
-    Headings are compared in the robot's tangent plane, so a goal orientation given without the slope of the ground
-    can be reached.
+    Distances and headings are those in the robot's tangent plane, so a goal given without the height and slope of
+    the ground can be reached.
     """
-    return pose.distance_to(goal) <= dist_tolerance and abs(heading_error(pose, goal)) <= angle_tolerance
+    return ground_distance(pose, goal) <= dist_tolerance and abs(heading_error(pose, goal)) <= angle_tolerance
 
 
 def clamp(value: float, limit: float) -> float:

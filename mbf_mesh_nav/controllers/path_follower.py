@@ -17,7 +17,7 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_mesh_nav.goal_approach import braking_speed, clamp, heading_error, in_robot_frame, is_at_goal
+from mbf_mesh_nav.goal_approach import braking_speed, clamp, ground_distance, heading_error, in_robot_frame, is_at_goal
 from mbf_mesh_nav.path_progress import PathProgress, PathProjection
 from mbf_mesh_nav.plugins import MeshController
 
@@ -98,7 +98,7 @@ class PathFollower(MeshController):
         """Whether only the heading is left; once there, the robot may drift twice as far before it drives again."""
         assert self._goal is not None
         reach = self.parameters.goal_distance * (2.0 if self._turning_to_goal else 1.0)
-        self._turning_to_goal = pose.distance_to(self._goal) <= reach
+        self._turning_to_goal = ground_distance(pose, self._goal) <= reach
         return self._turning_to_goal
 
     def _pursue(self, pose: Pose, projection: PathProjection, slope: float) -> ControlResult:

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from mbf_abstract.geometry import Pose, Twist, quaternions_from_axes
+from mbf_abstract.plugins import ControlRequest
 from mbf_mesh_nav.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.layer_graph import LayerGraph
 from mbf_mesh_nav.mesh_map import MeshMap
@@ -67,3 +69,37 @@ def plain():
         return MeshMap.from_heights(np.zeros(shape), spacing, spacing)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def pose_on():
+    """Factory: the pose of a robot standing on a surface at x, y (found below height z), heading by a direction."""
+
+    def make(mesh_map, position, heading):
+        spot = mesh_map.locate_one(position)
+        normal = mesh_map.face_normals[spot.face]
+        orientation = quaternions_from_axes([heading], [normal])[0]
+        return Pose(tuple(spot.point), tuple(orientation))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def drive(pose_on):
+    """Factory: a kinematic robot on the surface under a controller; returns the poses it went through."""
+
+    def run(controller, mesh_map, pose, seconds, yaw_response=0.8, dist_tolerance=0.1, angle_tolerance=0.2):
+        period, poses, velocity = 0.05, [pose], Twist()
+        for _ in range(round(seconds / period)):
+            if controller.is_goal_reached(poses[-1], dist_tolerance, angle_tolerance):
+                break
+            result = controller.compute_velocity_commands(ControlRequest(poses[-1], velocity))
+            assert result.success, f"{result.outcome} {result.message} after {len(poses)} cycles"
+            velocity = Twist.planar(vx=result.command.vx, wz=yaw_response * result.command.wz)
+            x_axis, y_axis, _ = poses[-1].rotation.T
+            turned = np.cos(velocity.wz * period) * x_axis + np.sin(velocity.wz * period) * y_axis
+            ahead = np.asarray(poses[-1].position) + velocity.vx * period * (x_axis + turned) / 2
+            poses.append(pose_on(mesh_map, ahead, turned))
+        return poses
+
+    return run

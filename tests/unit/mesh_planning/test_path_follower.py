@@ -1,0 +1,100 @@
+"""Pure pursuit on the surface: the law cycle by cycle, and closed loops on hills with a robot that turns too slowly."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.plugins import ControlRequest, PlanRequest
+from mbf_mesh_nav.controllers.path_follower import PathFollower
+from mbf_mesh_nav.planners.astar import AStarPlanner
+
+
+def line(x_from, x_to, y=3.0, count=30):
+    return Path.from_points([(x, y, 0.0) for x in np.linspace(x_from, x_to, count)])
+
+
+def command_at(follower, pose):
+    return follower.compute_velocity_commands(ControlRequest(pose, Twist()))
+
+
+def test_on_a_straight_line_it_drives_straight_at_full_speed(make_plugin, plain):
+    follower = make_plugin(PathFollower, plain(), max_lin_velocity=0.8)
+    assert follower.set_plan(line(0.5, 5.5))
+    command = command_at(follower, Pose.planar(1.0, 3.0)).command
+    assert command.vx == pytest.approx(0.8) and command.wz == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_beside_the_line_it_steers_back_equally_from_both_sides(make_plugin, plain, side):
+    follower = make_plugin(PathFollower, plain())
+    follower.set_plan(line(0.5, 5.5))
+    command = command_at(follower, Pose.planar(2.0, 3.0 + 0.2 * side)).command
+    assert command.vx > 0.3 and command.wz * side < -0.1
+
+
+@pytest.mark.parametrize("yaw", [-2.5, 2.5])
+def test_looking_elsewhere_it_turns_on_the_spot_within_the_symmetric_limit(make_plugin, plain, yaw):
+    follower = make_plugin(PathFollower, plain(), max_ang_velocity=0.9)
+    follower.set_plan(line(0.5, 5.5))
+    command = command_at(follower, Pose.planar(2.0, 3.0, yaw)).command
+    assert command.vx == 0.0 and command.wz == pytest.approx(-math.copysign(0.9, yaw))
+
+
+def test_it_slows_down_towards_the_goal(make_plugin, plain):
+    follower = make_plugin(PathFollower, plain())
+    follower.set_plan(line(0.5, 5.5))
+    speeds = [command_at(follower, Pose.planar(x, 3.0)).command.vx for x in (4.0, 5.0, 5.3, 5.4)]
+    assert speeds == sorted(speeds, reverse=True) and speeds[-1] < 0.4 * speeds[0]
+
+
+def test_at_the_goal_it_turns_to_the_final_heading(make_plugin, plain):
+    follower = make_plugin(PathFollower, plain())
+    follower.set_plan(Path.from_points([(1, 3, 0), (2, 3, 0)], Pose.planar(0, 0, 1.5).orientation))
+    pose = Pose.planar(1.97, 3.0)
+    assert command_at(follower, pose).command.wz > 0.5
+    assert not follower.is_goal_reached(pose, 0.1, 0.2)
+    assert follower.is_goal_reached(Pose.planar(1.97, 3.0, 1.4), 0.1, 0.2)
+
+
+def test_far_from_the_path_is_missed_path_and_off_the_surface_is_out_of_map(make_plugin, plain):
+    follower = make_plugin(PathFollower, plain(), max_path_distance=0.5, max_surface_distance=0.5)
+    assert command_at(follower, Pose.planar(1.0, 3.0)).outcome == ExePathOutcome.INVALID_PATH
+    follower.set_plan(line(0.5, 5.5))
+    assert command_at(follower, Pose.planar(2.0, 4.0)).outcome == ExePathOutcome.MISSED_PATH
+    assert command_at(follower, Pose.planar(2.0, 3.0, z=2.0)).outcome == ExePathOutcome.OUT_OF_MAP
+
+
+def test_an_empty_path_and_a_path_in_another_frame_are_refused(make_plugin, plain):
+    follower = make_plugin(PathFollower, plain())
+    assert not follower.set_plan(Path(np.zeros((0, 3))))
+    assert not follower.set_plan(Path.from_points([(1, 1, 0)], frame_id="odom"))
+
+
+def test_steep_ground_is_driven_more_slowly(make_plugin, pose_on):
+    from mbf_mesh_nav.mesh_map import MeshMap
+
+    ramp = MeshMap.from_heights(np.tile(0.4 * np.arange(41) * 0.2, (21, 1)), 0.2, 0.2)
+    follower = make_plugin(PathFollower, ramp)
+    follower.set_plan(Path.from_points([(x, 2.0, 0.4 * x) for x in np.linspace(1, 7, 30)]))
+    pose = pose_on(ramp, (2.0, 2.0, 0.8), (1, 0, 0.4))
+    assert command_at(follower, pose).command.vx < 0.7 * follower.parameters.max_lin_velocity
+
+
+@pytest.mark.parametrize("yaw_response", [0.6, 0.8, 1.0])
+def test_a_robot_that_turns_too_slowly_still_follows_a_plan_over_hills(
+    make_plugin, hills, drive, pose_on, yaw_response
+):
+    goal = Pose.planar(0.8, 5.0, 2.0, 0.1)
+    plan = make_plugin(AStarPlanner, hills).make_plan(
+        PlanRequest(Pose.planar(0.6, 0.5), goal, via=(Pose.planar(5.0, 3.0),))
+    )
+    follower = make_plugin(PathFollower, hills)
+    assert follower.set_plan(plan.path)
+    poses = drive(follower, hills, pose_on(hills, (0.6, 0.5, 0), (-1, 0.5, 0)), 60.0, yaw_response)
+    assert follower.is_goal_reached(poses[-1], 0.15, 0.2), poses[-1]
+    path = plan.path.positions
+    deviation = [np.linalg.norm(path - pose.position, axis=1).min() for pose in poses]
+    assert max(deviation) < 0.35
