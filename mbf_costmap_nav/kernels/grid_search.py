@@ -1,0 +1,170 @@
+"""Shortest paths on an 8-connected grid: A* and the full distance field, with a bucketed open list.
+
+When to use: any single-source question on a costmap. With a goal and a heuristic scale above 0 it is A*, with
+``goal = -1`` it is Dijkstra's field over everything reachable. When not: any-angle paths (``theta_star``), turning
+circles (``hybrid_astar``).
+
+The grid is handed over flat and padded by one blocked cell on every side, so the inner loop needs no border test.
+Entering or leaving a cell costs half its *traversal* ``table[cost]`` per cell of length, so a step between cells a
+and b of length L weighs ``L * (table[a] + table[b]) / 2``: symmetric, and infinite where one of them is blocked.
+
+The open list is a ring of buckets of equal width in f = g + h (Dial 1969, Denardo and Fox 1979) whose entries are
+chained through one recycled pool. Inside a bucket the order is free; a cell whose g drops later is pushed again, so
+the result is the exact optimum as soon as the current bucket's lower end reaches g(goal) (label correcting, as in
+delta stepping; Meyer and Sanders 2003).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_costmap_nav.kernels.compiled import kernel
+
+FOUND, EXHAUSTED, CANCELED = 0, 1, 2
+"""States of a finished search: goal settled; everything reachable settled; the cancel flag was seen."""
+
+BUCKET_WIDTH = np.float32(0.5)
+POLL_INTERVAL = 4096
+SQRT2 = np.float32(np.sqrt(2.0))
+
+
+@kernel
+def pad_cells(cells: NDArray[np.uint8], border: int) -> NDArray[np.uint8]:
+    """Copy (height, width) cells into a flat ((height + 2) * (width + 2),) array framed by ``border``."""
+    height, width = cells.shape
+    padded = np.full((height + 2, width + 2), np.uint8(border), dtype=np.uint8)
+    padded[1:-1, 1:-1] = cells
+    return padded.reshape(-1)
+
+
+@kernel
+def octile_distance(dx: int, dy: int) -> np.float32:
+    """Length of the shortest 8-connected way over ``dx``, ``dy`` >= 0 free cells."""
+    if dx < dy:
+        dx, dy = dy, dx
+    return np.float32(dx) + (SQRT2 - np.float32(1.0)) * np.float32(dy)
+
+
+@kernel
+def search(
+    cells: NDArray[np.uint8],
+    stride: int,
+    table: NDArray[np.float32],
+    start: int,
+    goal: int,
+    heuristic_scale: float,
+    cut_corners: bool,
+    cancel_flag: NDArray[np.uint8],
+) -> tuple[int, NDArray[np.float32]]:
+    """Settle cells around ``start`` until ``goal`` (or everything, if ``goal`` is -1) is settled.
+
+    Parameters
+    ----------
+    cells : (n,) uint8
+        Flat padded costs, see ``pad_cells``.
+    stride : int
+        Row length of the padded grid.
+    table : (256,) float32
+        Traversal of each cost, at least ``heuristic_scale``; inf = blocked.
+    start, goal : int
+        Flat padded indices.
+    heuristic_scale : float
+        Least finite traversal (A*), or 0 for a field.
+    cut_corners : bool
+        Whether a diagonal step may pass a blocked cell at its side.
+    cancel_flag : (1,) uint8
+        Polled every few thousand cells.
+
+    Returns
+    -------
+    status : int
+        FOUND, EXHAUSTED or CANCELED.
+    g : (n,) float32
+        Cost from the start in traversal times cells, inf where not reached. Exact for settled cells, an upper bound
+        at the rim of the search.
+    """
+    g = np.full(cells.size, np.float32(np.inf), dtype=np.float32)
+    steps = np.array([1, -1, stride, -stride, stride + 1, stride - 1, 1 - stride, -stride - 1], dtype=np.int64)
+    goal_y, goal_x = max(goal, 0) // stride, max(goal, 0) % stride
+    scale = np.float32(heuristic_scale)
+    inverse_width = np.float32(1.0) / BUCKET_WIDTH
+
+    # 1. The ring must hold the largest growth of f in one step: twice the heaviest step.
+    heaviest = np.float32(0.0)
+    for traversal in table:
+        if traversal < np.inf:
+            heaviest = max(heaviest, traversal)
+    ring = 4
+    while ring < 2.0 * SQRT2 * heaviest / BUCKET_WIDTH + 4.0:
+        ring *= 2
+    heads = np.full(ring, -1, dtype=np.int32)
+    mask = ring - 1
+
+    # 2. The pool of open entries: cell, its g when pushed, next entry of the bucket; freed entries are reused.
+    pool_cell = np.empty(1024, dtype=np.int32)
+    pool_g = np.empty(1024, dtype=np.float32)
+    pool_next = np.empty(1024, dtype=np.int32)
+    used, free, waiting = 1, -1, 1
+    g[start] = 0.0
+    h = scale * octile_distance(abs(start % stride - goal_x), abs(start // stride - goal_y))
+    bucket = int(h * inverse_width)
+    pool_cell[0], pool_g[0], pool_next[0] = start, 0.0, -1
+    heads[bucket & mask] = 0
+
+    open_straight = np.zeros(4, dtype=np.bool_)
+    polls = 0
+    while waiting > 0:
+        entry = heads[bucket & mask]
+        if entry < 0:
+            bucket += 1
+            if goal >= 0 and np.float32(bucket) * BUCKET_WIDTH >= g[goal]:
+                return FOUND, g
+            continue
+        # 3. Take an entry out; it is stale if its cell has been improved since.
+        cell, g_cell = pool_cell[entry], pool_g[entry]
+        heads[bucket & mask] = pool_next[entry]
+        pool_next[entry] = free
+        free = entry
+        waiting -= 1
+        if g_cell != g[cell]:
+            continue
+        if polls % POLL_INTERVAL == 0 and cancel_flag[0] != 0:
+            return CANCELED, g
+        polls += 1
+        y = cell // stride
+        x = cell - y * stride
+        here = np.float32(0.5) * table[cells[cell]]
+
+        # 4. Relax the four straight and then the four diagonal neighbours.
+        for k in range(8):
+            neighbour = cell + steps[k]
+            half = np.float32(0.5) * table[cells[neighbour]]
+            if k < 4:
+                open_straight[k] = half < np.inf
+                g_new = g_cell + here + half
+            else:
+                if not cut_corners and not (open_straight[(k & 1)] and open_straight[2 + ((k - 4) >> 1)]):
+                    continue
+                g_new = g_cell + SQRT2 * (here + half)
+            if g_new >= g[neighbour]:
+                continue
+            g[neighbour] = g_new
+            dx = 1 - 2 * (k & 1) if k < 2 or k >= 4 else 0
+            dy = 0 if k < 2 else 1 - 2 * (((k - 2) if k < 4 else (k - 4) >> 1) & 1)
+            f = g_new + scale * octile_distance(abs(x + dx - goal_x), abs(y + dy - goal_y))
+            slot = max(int(f * inverse_width), bucket) & mask
+            if free >= 0:
+                new = free
+                free = pool_next[free]
+            else:
+                if used == pool_cell.size:
+                    pool_cell = np.concatenate((pool_cell, np.empty_like(pool_cell)))
+                    pool_g = np.concatenate((pool_g, np.empty_like(pool_g)))
+                    pool_next = np.concatenate((pool_next, np.empty_like(pool_next)))
+                new = used
+                used += 1
+            pool_cell[new], pool_g[new], pool_next[new] = neighbour, g_new, heads[slot]
+            heads[slot] = new
+            waiting += 1
+    return (FOUND if goal >= 0 and g[goal] < np.inf else EXHAUSTED), g

@@ -1,0 +1,59 @@
+"""A* over the eight neighbours of a cell: the exact cheapest grid path, fast.
+
+When to use: the default. It settles only the cells that could lie on a better path and finds the same cost as
+``costmap.dijkstra``. When not: the path turns in steps of 45 degrees (``theta_star`` or a smoother give straight
+lines), and it does not know the robot's turning circle (``hybrid_astar``).
+
+Cost: 30 to 60 ns per settled cell; 1000 x 1000 cells in some 30 ms.
+
+Formula: Hart, Nilsson, Raphael 1968 with the octile distance as heuristic; the open list is a ring of buckets, see
+``kernels.grid_search``.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mbf_abstract.cancel import CancelToken
+from mbf_abstract.geometry import Pose
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_costmap_nav.grid_planning import (
+    CANCELED_LEG,
+    NO_LEG,
+    Cell,
+    GridPlanner,
+    GridPlannerParameters,
+    Leg,
+    SearchGrid,
+)
+from mbf_costmap_nav.kernels.grid_path import trace_cells
+from mbf_costmap_nav.kernels.grid_search import CANCELED, search
+
+
+class AStarParameters(GridPlannerParameters):
+    """Parameters of ``costmap.astar``."""
+
+    cut_corners: bool = parameter(False, "Allow a diagonal step that touches a blocked cell at its side.")
+
+
+class AStarPlanner(GridPlanner):
+    """Exact 8-connected A* with goal tolerance and via poses."""
+
+    Parameters: ClassVar[type[PluginParameters]] = AStarParameters
+    parameters: AStarParameters
+
+    def search(self, grid: SearchGrid, start: Cell, goal: Pose, tolerance: float, token: CancelToken) -> Leg:
+        """Search from the start; a goal that is not reached leaves the whole reachable field to choose from."""
+        cut = self.parameters.cut_corners
+        goal_cell = grid.costmap.world_to_cell_clamped(goal.x, goal.y)
+        status, g = search(
+            grid.cells, grid.stride, grid.table, grid.index(start), grid.index(goal_cell), 1.0, cut, token.flag
+        )
+        if status == CANCELED:
+            return CANCELED_LEG
+        end = goal_cell if g[grid.index(goal_cell)] < float("inf") else grid.nearest_reached(g, goal, tolerance)
+        if end is None:
+            return NO_LEG
+        trace = trace_cells(grid.cells, grid.stride, grid.table, g, grid.index(end), cut)
+        cost = float(g[grid.index(end)]) * grid.costmap.resolution
+        return Leg(grid.points(trace[::-1]), cost, end == goal_cell)

@@ -1,0 +1,158 @@
+"""The grid planners as a client sees them: outcomes, messages, exact ends, tolerance, via poses."""
+
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+
+from mbf_abstract.cancel import CancelToken
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PlanRequest
+from mbf_costmap_nav.planners.astar import AStarPlanner
+from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
+
+PLANNERS = [AStarPlanner, DijkstraPlanner]
+CODES = {"o": 0, "u": 127, "i": 253, "x": 254, "n": 255}
+# shortest octile length without | with corner cutting, from (1, 1) to (8, 8)
+F171_LENGTHS = {
+    "open_space": (9.8995, 9.8995),
+    "bounded": (9.8995, 9.8995),
+    "bottom_left_obstacle": (10.4853, 9.8995),
+    "top_left_obstacle": (12.2426, 11.6569),
+    "maze1": (14.0, 12.8284),
+    "maze2": (14.0, 12.2426),
+}
+
+
+def grid(*rows):
+    """Map drawn with the top row first: '.' free, '#' lethal, '?' unknown."""
+    return np.array([[{".": 0, "#": 254, "?": 255}[c] for c in row] for row in reversed(rows)], dtype=np.uint8)
+
+
+WALLED = grid(
+    ".....#...",
+    ".....#...",
+    ".....#...",
+)
+
+
+def plan(planner, start, goal, **request):
+    return planner.make_plan(PlanRequest(Pose.planar(*start), Pose.planar(*goal), **request))
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+def test_start_and_goal_poses_are_kept_exactly(make_plugin, planner_class):
+    result = plan(make_plugin(planner_class, np.zeros((10, 10))), (1.2, 1.7, 0.5), (8.9, 8.1, -2.0))
+    assert result.outcome == GetPathOutcome.SUCCESS
+    assert (result.path[0].x, result.path[0].y) == (1.2, 1.7)
+    assert result.path[0].yaw == pytest.approx(0.5)
+    assert (result.path[-1].x, result.path[-1].y) == (8.9, 8.1)
+    assert result.path[-1].yaw == pytest.approx(-2.0)
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+def test_start_and_goal_in_one_cell_give_two_poses(make_plugin, planner_class):
+    result = plan(make_plugin(planner_class, np.zeros((4, 4))), (1.2, 1.2), (1.8, 1.3))
+    assert result.success and len(result.path) == 2
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+@pytest.mark.parametrize(
+    ("start", "goal", "outcome", "text"),
+    [
+        (
+            (5.5, 1.5),
+            (1.5, 1.5),
+            GetPathOutcome.BLOCKED_START,
+            r"start \(5.50, 1.50\) lies in cell \(5, 1\) of cost 254",
+        ),
+        ((1.5, 1.5), (5.5, 1.5), GetPathOutcome.BLOCKED_GOAL, r"goal \(5.50, 1.50\) lies in cell \(5, 1\) of cost 254"),
+        ((1.5, 1.5), (7.5, 1.5), GetPathOutcome.NO_PATH_FOUND, "6.00 m away"),
+        ((-1.0, 1.5), (7.5, 1.5), GetPathOutcome.OUT_OF_MAP, "start .* is outside"),
+        ((1.5, 1.5), (7.5, 9.5), GetPathOutcome.OUT_OF_MAP, "goal .* is outside"),
+    ],
+)
+def test_failures_say_what_and_where(make_plugin, planner_class, start, goal, outcome, text):
+    result = plan(make_plugin(planner_class, WALLED), start, goal)
+    assert result.outcome == outcome
+    assert re.search(text, result.message), result.message
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+def test_goal_in_a_wall_is_replaced_by_the_nearest_reachable_cell(make_plugin, planner_class):
+    result = plan(make_plugin(planner_class, WALLED), (1.5, 1.5), (5.6, 1.5), dist_tolerance=1.5)
+    assert result.success
+    assert (result.path[-1].x, result.path[-1].y) == (4.5, 1.5)
+    assert "1.10 m from the goal" in result.message
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+def test_unreachable_free_goal_uses_the_tolerance_too(make_plugin, planner_class):
+    result = plan(make_plugin(planner_class, WALLED), (1.5, 1.5), (6.5, 1.5), dist_tolerance=2.1)
+    assert result.success and (result.path[-1].x, result.path[-1].y) == (4.5, 1.5)
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+def test_no_reachable_cell_within_the_tolerance_is_a_blocked_goal(make_plugin, planner_class):
+    result = plan(make_plugin(planner_class, WALLED), (1.5, 1.5), (5.6, 1.5), dist_tolerance=0.5)
+    assert result.outcome == GetPathOutcome.BLOCKED_GOAL
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+def test_via_poses_are_passed_in_order(make_plugin, planner_class):
+    via = (Pose.planar(1.3, 8.2), Pose.planar(8.6, 8.7))
+    result = plan(make_plugin(planner_class, np.zeros((10, 10))), (1.5, 1.5), (8.5, 1.5), via=via)
+    points = [tuple(p) for p in result.path.positions[:, :2].tolist()]
+    assert points.index((1.3, 8.2)) < points.index((8.6, 8.7))
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+def test_a_token_set_before_is_honoured(make_plugin, planner_class):
+    token = CancelToken()
+    token.cancel()
+    result = plan(make_plugin(planner_class, np.zeros((10, 10))), (1.5, 1.5), (8.5, 1.5), cancel_token=token)
+    assert result.outcome == GetPathOutcome.CANCELED
+
+
+def test_unknown_cells_block_only_if_told_so(make_plugin):
+    cells = grid(".?.")
+    assert plan(make_plugin(AStarPlanner, cells), (0.5, 0.5), (2.5, 0.5)).success
+    strict = make_plugin(AStarPlanner, cells, allow_unknown=False)
+    assert plan(strict, (0.5, 0.5), (2.5, 0.5)).outcome == GetPathOutcome.NO_PATH_FOUND
+
+
+def test_costs_push_the_path_away(make_plugin):
+    cells = np.zeros((9, 9), dtype=np.uint8)
+    cells[4, 3:6] = 252
+    result = plan(make_plugin(AStarPlanner, cells), (0.5, 4.5), (8.5, 4.5))
+    assert abs(result.path.positions[:, 1] - 4.5).max() >= 1.0
+
+
+@pytest.mark.parametrize("name", F171_LENGTHS)
+@pytest.mark.parametrize("cut_corners", [False, True], ids=["no-cutting", "cutting"])
+def test_f171_nav2_system_test_maps(make_plugin, shared_data, name, cut_corners):
+    maps = json.loads((shared_data / "maps" / "nav2_test_costmaps.json").read_text())["maps"]
+    cells = np.array([[CODES[c] for c in row] for row in maps[name]], dtype=np.uint8)
+    planner = make_plugin(AStarPlanner, cells, cost_factor=0.0, allow_unknown=False, cut_corners=cut_corners)
+    result = plan(planner, (1.5, 1.5), (8.5, 8.5))
+    assert result.path.length == pytest.approx(F171_LENGTHS[name][cut_corners], abs=1e-4)
+
+
+def test_f165_blocked_goal_ends_at_the_nearest_free_cell(make_plugin):
+    cells = np.zeros((100, 100), dtype=np.uint8)
+    cells[40:61, 40:61] = 254
+    result = plan(make_plugin(AStarPlanner, cells, cut_corners=True), (20.5, 20.5), (50.5, 50.5), dist_tolerance=20.0)
+    end = result.path.positions[-1]
+    assert math.dist(end[:2], (50.5, 50.5)) == pytest.approx(11.0)
+
+
+def test_dijkstra_can_give_the_exact_cell_path(make_plugin):
+    cells = np.zeros((20, 20), dtype=np.uint8)
+    cells[5:15, 10] = 254
+    exact = plan(make_plugin(DijkstraPlanner, cells, gradient_path=False), (2.5, 9.5), (17.5, 9.5))
+    astar = plan(make_plugin(AStarPlanner, cells), (2.5, 9.5), (17.5, 9.5))
+    assert exact.cost == pytest.approx(astar.cost, rel=1e-5)
+    assert exact.path.length == pytest.approx(astar.path.length)

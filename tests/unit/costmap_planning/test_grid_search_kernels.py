@@ -1,0 +1,140 @@
+"""The bucketed search against a heapq twin, and the paths traced out of its field."""
+
+import heapq
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from mbf_costmap_nav.grid_planning import traversal_table
+from mbf_costmap_nav.kernels.grid_path import trace_cells, trace_gradient
+from mbf_costmap_nav.kernels.grid_search import CANCELED, EXHAUSTED, FOUND, pad_cells, search
+
+NO_CANCEL = np.zeros(1, dtype=np.uint8)
+small_maps = hnp.arrays(
+    np.uint8, st.tuples(st.integers(1, 12), st.integers(1, 12)), elements=st.sampled_from([0, 0, 0, 50, 252, 254, 255])
+)
+
+
+def naive_field(cells, table, start, cut_corners):
+    """Textbook Dijkstra over (iy, ix)."""
+    height, width = cells.shape
+    cost = {start: 0.0}
+    queue = [(0.0, start)]
+    while queue:
+        g, (y, x) = heapq.heappop(queue)
+        if g > cost[(y, x)]:
+            continue
+        for dy, dx in [(0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]:
+            v, u = y + dy, x + dx
+            if not (0 <= v < height and 0 <= u < width) or math.isinf(table[cells[v, u]]):
+                continue
+            if dx and dy and not cut_corners and (math.isinf(table[cells[y, u]]) or math.isinf(table[cells[v, x]])):
+                continue
+            g_new = g + math.hypot(dx, dy) * 0.5 * float(table[cells[y, x]] + table[cells[v, u]])
+            if g_new < cost.get((v, u), math.inf):
+                cost[(v, u)] = g_new
+                heapq.heappush(queue, (g_new, (v, u)))
+    return cost
+
+
+def run(cells, start, goal, *, cost_factor=3.0, allow_unknown=False, cut_corners=False, flag=NO_CANCEL):
+    """Search on a grid; start and goal are (iy, ix), goal None = field. Returns status, g, and what tracing needs."""
+    table = traversal_table(cost_factor, 253, allow_unknown)
+    stride = cells.shape[1] + 2
+    padded = pad_cells(cells, 254)
+
+    def index(cell):
+        return (cell[0] + 1) * stride + cell[1] + 1
+
+    scale = 0.0 if goal is None else 1.0
+    target = -1 if goal is None else index(goal)
+    status, g = search(padded, stride, table, index(start), target, scale, cut_corners, flag)
+    return status, g.reshape(-1, stride)[1:-1, 1:-1], (padded, stride, table, g), index
+
+
+@settings(max_examples=60, deadline=None)
+@given(cells=small_maps, cut_corners=st.booleans(), allow_unknown=st.booleans())
+def test_field_equals_the_naive_dijkstra(cells, cut_corners, allow_unknown):
+    cells[0, 0] = 0
+    _, field, _, _ = run(cells, (0, 0), None, cut_corners=cut_corners, allow_unknown=allow_unknown)
+    expected = np.full(cells.shape, np.inf)
+    for cell, g in naive_field(cells, traversal_table(3.0, 253, allow_unknown), (0, 0), cut_corners).items():
+        expected[cell] = g
+    np.testing.assert_allclose(field, expected, rtol=1e-5)
+
+
+@settings(max_examples=60, deadline=None)
+@given(cells=small_maps, cut_corners=st.booleans(), data=st.data())
+def test_a_star_reaches_the_goal_at_the_cost_of_the_field(cells, cut_corners, data):
+    goal = (data.draw(st.integers(0, cells.shape[0] - 1)), data.draw(st.integers(0, cells.shape[1] - 1)))
+    cells[0, 0] = 0
+    _, field, _, _ = run(cells, (0, 0), None, cut_corners=cut_corners)
+    status, g, _, _ = run(cells, (0, 0), goal, cut_corners=cut_corners)
+    assert g[goal] == pytest.approx(field[goal], rel=1e-5)
+    assert status == (FOUND if np.isfinite(field[goal]) else EXHAUSTED)
+
+
+@settings(max_examples=60, deadline=None)
+@given(cells=small_maps, cut_corners=st.booleans())
+def test_traced_cell_path_sums_up_to_its_cost(cells, cut_corners):
+    cells[0, 0] = 0
+    _, field, grid, index = run(cells, (0, 0), None, cut_corners=cut_corners)
+    reached = np.argwhere(np.isfinite(field))
+    end = tuple(reached[-1])
+    path = trace_cells(*grid, index(end), cut_corners)
+    padded, stride, table, _ = grid
+    weights = table[padded[path]].astype(float)
+    lengths = np.hypot(np.diff(path % stride), np.diff(path // stride))
+    assert path[0] == index(end) and path[-1] == index((0, 0))
+    assert (lengths < 1.5).all()
+    assert (lengths * (weights[1:] + weights[:-1]) / 2).sum() == pytest.approx(field[end], rel=1e-5)
+
+
+@settings(max_examples=60, deadline=None)
+@given(cells=small_maps)
+def test_gradient_path_arrives_through_reached_cells(cells):
+    cells[0, 0] = 0
+    _, field, grid, index = run(cells, (0, 0), None)
+    end = tuple(np.argwhere(np.isfinite(field))[-1])
+    points = trace_gradient(*grid, index(end))
+    visited = np.floor(points + 0.5).astype(int)
+    assert np.isfinite(grid[3][visited[:, 1] * grid[1] + visited[:, 0]]).all()
+    assert visited[-1].tolist() == [1, 1]
+
+
+def test_gradient_path_in_the_open_is_nearly_straight():
+    cells = np.zeros((60, 100), dtype=np.uint8)
+    _, _, grid, index = run(cells, (10, 10), None)
+    points = trace_gradient(*grid, index((30, 90)))
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+    assert length <= 1.03 * math.hypot(80, 20)
+
+
+def test_a_set_cancel_flag_ends_the_search():
+    flag = np.ones(1, dtype=np.uint8)
+    status, _, _, _ = run(np.zeros((300, 300), dtype=np.uint8), (0, 0), (299, 299), flag=flag)
+    assert status == CANCELED
+
+
+@pytest.mark.parametrize(
+    ("start", "goal", "length", "steps"),
+    [pytest.param((20, 20), (80, 80), 97.1543, 81, id="F164-corner-cutting")],
+)
+def test_smac_block_map_with_corner_cutting(start, goal, length, steps):
+    cells = np.zeros((100, 100), dtype=np.uint8)
+    cells[40:61, 40:61] = 254
+    _, g, grid, index = run(cells, start, goal, cut_corners=True)
+    assert g[goal] == pytest.approx(length, abs=1e-3)
+    assert len(trace_cells(*grid, index(goal), True)) - 1 == steps
+
+
+def test_smac_block_map_without_corner_cutting_f164():
+    cells = np.zeros((100, 100), dtype=np.uint8)
+    cells[40:61, 40:61] = 254
+    _, g, grid, index = run(cells, (20, 20), (80, 80))
+    assert g[80, 80] == pytest.approx(97.7401, abs=1e-3)
+    assert len(trace_cells(*grid, index((80, 80)), False)) - 1 == 82
