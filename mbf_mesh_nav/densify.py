@@ -1,0 +1,81 @@
+"""Splitting the faces of a coarse mesh until no edge is longer than a limit.
+
+Layers and planners sample the surface at its vertices, so a wall of two large triangles needs vertices in between
+before costs on it mean anything. Every split edge gets one midpoint shared by both of its faces, hence the mesh stays
+closed where it was closed; the surface itself does not change. The number of faces grows with the square of the
+refinement: a limit on it stops a mistyped length.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.repair import CheckedMesh, MeshError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+
+def densify(mesh: CheckedMesh, max_edge_length: float, max_faces: int = 20_000_000) -> CheckedMesh:
+    """Split all edges longer than ``max_edge_length`` [m] at their middle, until there is none.
+
+    New vertices come after the old ones and have source -1; new faces keep the source of the face they split.
+
+    Raises
+    ------
+    MeshError
+        The length is not positive or the result would have more than ``max_faces`` faces.
+    """
+    if max_edge_length <= 0.0:
+        raise MeshError("densify", [f"the maximal edge length must be positive, got {max_edge_length}"])
+    vertices, faces = mesh.vertices, mesh.faces
+    face_source = mesh.face_source
+    while True:
+        edges, edge_of_corner = np.unique(_corner_edges(faces).reshape(-1, 2), axis=0, return_inverse=True)
+        edge_of_corner = edge_of_corner.reshape(-1, 3)
+        long = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1) > max_edge_length
+        if not long.any():
+            break
+        if len(faces) + int(long[edge_of_corner].sum()) > max_faces:
+            text = f"edges of at most {max_edge_length} m need more than {max_faces} faces"
+            raise MeshError("densify", [text])
+        middle = np.where(long, len(vertices) + np.cumsum(long) - 1, -1).astype(np.int32)
+        vertices = np.vstack([vertices, vertices[edges[long]].mean(axis=1)])
+        faces, parents = _split(faces, middle[edge_of_corner])
+        face_source = face_source[parents]
+    added = np.full(len(vertices) - len(mesh.vertices), -1, dtype=np.int32)
+    vertex_source = np.concatenate([mesh.vertex_source, added])
+    return CheckedMesh(vertices, faces, vertex_source, face_source, mesh.input_to_vertex)
+
+
+def _corner_edges(faces: IntArray) -> NDArray[np.int32]:
+    """Edges (F, 3, 2) from corner k to corner k+1, smaller vertex first."""
+    return np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2)
+
+
+def _split(faces: IntArray, middles: IntArray) -> tuple[IntArray, NDArray[np.intp]]:
+    """Replace every face by one to four, and tell the parent of each.
+
+    ``middles`` (F, 3) holds the new vertex on the edge corner k -> k+1, or -1. Faces are turned until the pattern of
+    split edges is (no, no, no), (yes, no, no), (yes, yes, no) or (yes, yes, yes).
+    """
+    split = middles >= 0
+    count = split.sum(axis=1)
+    turn = np.where(count == 2, (np.argmin(split, axis=1) + 1) % 3, np.argmax(split, axis=1))
+    order = (turn[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(faces, order, axis=1).T
+    ab, bc, ca = np.take_along_axis(middles, order, axis=1).T
+    patterns = {
+        0: [(a, b, c)],
+        1: [(a, ab, c), (ab, b, c)],
+        2: [(ab, b, bc), (a, ab, bc), (a, bc, c)],
+        3: [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)],
+    }
+    new_faces, parents = [], []
+    for pieces, triangles in patterns.items():
+        chosen = np.flatnonzero(count == pieces)
+        for triangle in triangles:
+            new_faces.append(np.column_stack([corner[chosen] for corner in triangle]))
+            parents.append(chosen)
+    return np.ascontiguousarray(np.vstack(new_faces), dtype=np.int32), np.concatenate(parents)

@@ -1,0 +1,115 @@
+"""Reading meshes from files: PLY, OBJ, STL, OFF, DAE, glTF through trimesh, and the HDF5 layouts of lvr2.
+
+Whatever is wrong with a file comes out as one ``MeshError`` that names it. A file is only read, never changed.
+Coordinates are taken as they stand: an up-axis tag of COLLADA is ignored, as mesh_navigation does.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.repair import MeshError
+
+TRIMESH_FORMATS = frozenset({".ply", ".obj", ".stl", ".off", ".dae", ".gltf", ".glb"})
+HDF5_FORMATS = frozenset({".h5", ".hdf5"})
+MAX_FILE_BYTES = 4 * 2**30
+MAX_FACES = 30_000_000
+
+MeshArrays = tuple[NDArray[np.float64], NDArray[np.int64]]
+
+
+def read_mesh(file: str | Path, part: str = "", max_faces: int = MAX_FACES) -> MeshArrays:
+    """Read one mesh.
+
+    Parameters
+    ----------
+    file : path
+        The ending decides the format.
+    part : str
+        Which part of the file: a path of node names through a scene graph ("building/floor_2"), or the group of an
+        HDF5 file. "" and "/" mean everything, joined (HDF5: the only mesh in the file).
+    max_faces : int
+        Larger meshes are refused before anything is built from them.
+
+    Returns
+    -------
+    vertices : (V, 3) float64
+        In the coordinates of the scene [m].
+    faces : (F, 3) int64
+
+    Raises
+    ------
+    MeshError
+        Missing, unreadable, too large, no such part, or no triangle in it.
+    """
+    path = Path(file)
+    ending = path.suffix.lower()
+    if ending not in TRIMESH_FORMATS | HDF5_FORMATS:
+        known = ", ".join(sorted(TRIMESH_FORMATS | HDF5_FORMATS))
+        raise MeshError(str(path), [f"unknown ending '{ending}', known are: {known}"])
+    if not path.is_file():
+        raise MeshError(str(path), ["there is no such file"])
+    if path.stat().st_size > MAX_FILE_BYTES:
+        raise MeshError(str(path), [f"{path.stat().st_size} bytes, the limit is {MAX_FILE_BYTES}"])
+    if ending in HDF5_FORMATS:
+        from mbf_mesh_nav.lvr2_io import read_lvr2_mesh  # h5py only for those who use it
+
+        return read_lvr2_mesh(path, part, max_faces)
+    try:
+        vertices, faces = _read_scene(path, part.strip("/"))
+    except MeshError:
+        raise
+    except Exception as error:  # any parser error of any format; MemoryError of a lying header included
+        raise MeshError(str(path), [f"cannot be read as {ending[1:]}: {type(error).__name__}: {error}"]) from error
+    if len(faces) == 0:
+        raise MeshError(str(path), ["there is no face in it"])
+    if len(faces) > max_faces:
+        raise MeshError(str(path), [f"{len(faces)} faces, the limit is {max_faces}"])
+    return vertices, faces
+
+
+def _read_scene(path: Path, part: str) -> MeshArrays:
+    import trimesh
+
+    scene = trimesh.load_scene(str(path), process=False)
+    nodes = [node for node in scene.graph.nodes_geometry if _node_path(scene, node, part)]
+    if not nodes:
+        parts = sorted("/".join(_names_above(scene, node)) for node in scene.graph.nodes_geometry)
+        raise MeshError(str(path), [f"no part '{part}', the parts are: {', '.join(parts) or 'none'}"])
+    vertices: list[NDArray[np.float64]] = []
+    faces: list[NDArray[np.int64]] = []
+    offset = 0
+    for node in nodes:
+        transform, name = scene.graph[node]
+        geometry = scene.geometry[name]
+        if not hasattr(geometry, "faces"):
+            continue
+        points = np.asarray(geometry.vertices, dtype=np.float64)
+        vertices.append(points @ transform[:3, :3].T + transform[:3, 3])
+        faces.append(np.asarray(geometry.faces, dtype=np.int64) + offset)
+        offset += len(points)
+    if not faces:
+        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
+    return np.vstack(vertices), np.vstack(faces)
+
+
+def _node_path(scene: Any, node: str, part: str) -> bool:
+    """Whether a node is the part, lies below it, or everything is wanted."""
+    if not part:
+        return True
+    names = "/".join(_names_above(scene, node))
+    geometry = scene.graph[node][1]
+    return names == part or names.startswith(part + "/") or part in (node, geometry)
+
+
+def _names_above(scene: Any, node: str) -> list[str]:
+    """Node names from below the root down to ``node``."""
+    parents = scene.graph.transforms.parents
+    names = [str(node)]
+    while (node := parents.get(node, scene.graph.base_frame)) != scene.graph.base_frame:
+        names.insert(0, str(node))
+    return names
