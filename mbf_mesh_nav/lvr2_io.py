@@ -55,7 +55,8 @@ def read_lvr2_vertex_attributes(path: Path, part: str = "") -> dict[str, NDArray
     with h5py.File(path, "r") as file:
         geometry = _geometry(file, path, part.strip("/"))
         count = geometry["vertices"].shape[0]
-        attributes = next((geometry.parent[name] for name in VERTEX_ATTRIBUTES if name in geometry.parent), {})
+        groups = [geometry.parent[name] for name in VERTEX_ATTRIBUTES if name in geometry.parent]
+        attributes: dict[str, Any] = dict(groups[0]) if groups else {}
         return {
             name: np.squeeze(values[()]).astype(np.float32)
             for name, values in attributes.items()

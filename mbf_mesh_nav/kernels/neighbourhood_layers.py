@@ -1,0 +1,148 @@
+"""Vertex values over the connected neighbourhood of a radius: height difference, roughness, ridge.
+
+The connected neighbourhood N_r(v) holds the vertices reached from v over mesh edges without leaving the distance r
+of v; a vertex on the storey above is near but not connected, hence not in it. v itself is not counted as a member.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.compiled import kernel
+
+IntArray = NDArray[np.int32]
+FloatArray = NDArray[np.float64]
+CostArray = NDArray[np.float32]
+
+
+@kernel
+def collect_neighbourhood(
+    vertices: FloatArray,
+    offsets: IntArray,
+    neighbours: IntArray,
+    centre: int,
+    radius: float,
+    normal: FloatArray,
+    along_limit: float,
+    seen: IntArray,
+    members: IntArray,
+) -> int:
+    """Write N_r(centre) into ``members`` and return its size; ``seen`` (V,) holds the last centre that saw a vertex.
+
+    The distance is measured across ``normal`` (a cylinder, half as high as ``along_limit``); a zero normal and an
+    infinite limit make it a sphere.
+    """
+    seen[centre] = centre
+    size = 0
+    head = -1
+    while head < size:
+        vertex = centre if head < 0 else members[head]
+        head += 1
+        for entry in range(offsets[vertex], offsets[vertex + 1]):
+            other = neighbours[entry]
+            if seen[other] == centre:
+                continue
+            seen[other] = centre
+            dx = vertices[other, 0] - vertices[centre, 0]
+            dy = vertices[other, 1] - vertices[centre, 1]
+            dz = vertices[other, 2] - vertices[centre, 2]
+            along = dx * normal[0] + dy * normal[1] + dz * normal[2]
+            squared = dx * dx + dy * dy + dz * dz - along * along
+            if squared < radius * radius and abs(along) <= along_limit:
+                members[size] = other
+                size += 1
+    return size
+
+
+@kernel
+def height_differences(
+    vertices: FloatArray,
+    normals: FloatArray,
+    offsets: IntArray,
+    neighbours: IntArray,
+    radius: float,
+    along_limit: float,
+) -> CostArray:
+    """Greatest minus least height along the own normal over v and N_r(v), metric across the normal, (V,) [m]."""
+    count = vertices.shape[0]
+    differences = np.zeros(count, dtype=np.float32)
+    seen = np.full(count, -1, dtype=np.int32)
+    members = np.zeros(count, dtype=np.int32)
+    for vertex in range(count):
+        normal = normals[vertex]
+        size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, normal, along_limit, seen, members)
+        lowest = highest = 0.0
+        for index in range(size):
+            height = 0.0
+            for axis in range(3):
+                height += normal[axis] * (vertices[members[index], axis] - vertices[vertex, axis])
+            lowest, highest = min(lowest, height), max(highest, height)
+        differences[vertex] = highest - lowest
+    return differences
+
+
+@kernel
+def mean_edge_angles(normals: FloatArray, offsets: IntArray, neighbours: IntArray) -> FloatArray:
+    """Mean angle [rad] between the normal of each vertex and those of its neighbours, (V,); 0 without neighbours."""
+    angles = np.zeros(offsets.shape[0] - 1)
+    for vertex in range(offsets.shape[0] - 1):
+        total = 0.0
+        for entry in range(offsets[vertex], offsets[vertex + 1]):
+            other = neighbours[entry]
+            cosine = 0.0
+            for axis in range(3):
+                cosine += normals[vertex, axis] * normals[other, axis]
+            total += np.arccos(min(max(cosine, -1.0), 1.0))
+        if offsets[vertex + 1] > offsets[vertex]:
+            angles[vertex] = total / (offsets[vertex + 1] - offsets[vertex])
+    return angles
+
+
+@kernel
+def neighbourhood_means(
+    values: FloatArray, vertices: FloatArray, offsets: IntArray, neighbours: IntArray, radius: float
+) -> CostArray:
+    """Mean of ``values`` over v and N_r(v), metric of the sphere, (V,)."""
+    count = vertices.shape[0]
+    means = np.zeros(count, dtype=np.float32)
+    seen = np.full(count, -1, dtype=np.int32)
+    members = np.zeros(count, dtype=np.int32)
+    sphere = np.zeros(3)
+    for vertex in range(count):
+        size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, sphere, np.inf, seen, members)
+        total = values[vertex]
+        for index in range(size):
+            total += values[members[index]]
+        means[vertex] = total / (size + 1)
+    return means
+
+
+@kernel
+def normal_tip_distances(
+    vertices: FloatArray,
+    normals: FloatArray,
+    offsets: IntArray,
+    neighbours: IntArray,
+    radius: float,
+    without_neighbours: float,
+) -> CostArray:
+    """Mean distance [m] of the tips of unit normals planted on v and on the members of N_r(v), (V,)."""
+    count = vertices.shape[0]
+    distances = np.zeros(count, dtype=np.float32)
+    seen = np.full(count, -1, dtype=np.int32)
+    members = np.zeros(count, dtype=np.int32)
+    sphere = np.zeros(3)
+    for vertex in range(count):
+        size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, sphere, np.inf, seen, members)
+        total = 0.0
+        for index in range(size):
+            other = members[index]
+            squared = 0.0
+            for axis in range(3):
+                tip = vertices[vertex, axis] + normals[vertex, axis]
+                difference = vertices[other, axis] + normals[other, axis] - tip
+                squared += difference * difference
+            total += np.sqrt(squared)
+        distances[vertex] = total / size if size > 0 else without_neighbours
+    return distances

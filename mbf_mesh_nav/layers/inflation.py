@@ -1,0 +1,115 @@
+"""Inflation: costs that fall off with the distance, over the surface, from lethal vertices.
+
+When to use: below every planner; it keeps the robot's body off what its centre must not touch. When not: to model a
+long narrow robot (the inscribed radius is a circle; use ``tilt`` or a footprint check besides).
+Rule of mesh_navigation: ``lethal_value`` at the lethal vertices, ``inscribed_value`` up to the inscribed radius, then
+``inscribed_value * exp(-cost_scaling_factor (d - inscribed_radius))`` up to the inflation radius, 0 beyond. Deviations:
+isolated lethal vertices spread too, and a change of the input repairs the distances instead of starting over. The
+repulsive vectors are not offered; our planners do not steer by them.
+Cost: linear in the vertices within the radius; an update in the vertices whose distance changes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.parameters import parameter
+from mbf_mesh_nav.kernels.inflation import finite_rim, forget_dependents, spread
+from mbf_mesh_nav.layer import (
+    NOTHING_CHANGED,
+    CostArray,
+    IntArray,
+    LayerContext,
+    LayerParameters,
+    LethalArray,
+    MeshLayer,
+)
+
+THRESHOLD_STEP = 1.5
+"""Growth of the work list's threshold in mean edge lengths; the time is flat around it."""
+
+
+class InflationParameters(LayerParameters):
+    """Parameters of ``inflation``."""
+
+    inscribed_radius: float = parameter(0.25, "Radius of the robot's inner circle.", unit="m", gt=0.0)
+    inflation_radius: float = parameter(0.4, "Distance at which the cost ends.", unit="m", gt=0.0)
+    lethal_value: float = parameter(1.0, "Cost of lethal vertices; .inf is the safe choice.", ge=0.0, allow_inf=True)
+    inscribed_value: float = parameter(0.99, "Cost up to the inscribed radius.", ge=0.0)
+    cost_scaling_factor: float = parameter(1.0, "Rate of the exponential fall-off.", unit="1/m", ge=0.0)
+
+
+class InflationLayer(MeshLayer):
+    """Costs by geodesic distance from the lethal vertices of its one input.
+
+    Attributes
+    ----------
+    distances : (V,) float32
+        Geodesic distance [m] to the nearest lethal vertex, inf where farther than the inflation radius and a ring.
+    """
+
+    Parameters = InflationParameters
+    parameters: InflationParameters
+    inputs_allowed = (1, 1)
+
+    def __init__(self, context: LayerContext) -> None:
+        super().__init__(context)
+        lengths = self.topology.neighbour_lengths
+        self._step = THRESHOLD_STEP * float(lengths.mean()) if len(lengths) else 1.0
+        self._forget_all()
+
+    def compute(self) -> tuple[CostArray, LethalArray]:
+        """Distances from scratch, costs from distances, lethal as the input."""
+        lethal = self.inputs[0].lethal.copy()
+        seeds = np.flatnonzero(lethal).astype(np.int32)
+        self._forget_all()
+        self.distances[seeds] = 0.0
+        self._spread(seeds)
+        return self.cost_of_distance(self.distances), lethal
+
+    def update_from_inputs(self, changed: IntArray) -> IntArray:
+        """Repair the distances around the vertices whose lethal flag changed."""
+        lethal = self.inputs[0].lethal
+        flipped = changed[lethal[changed] != self._lethal[changed]]
+        if len(flipped) == 0:
+            return NOTHING_CHANGED
+        before = self.distances.copy()
+        mesh = self.topology
+        graph = (mesh.neighbour_offsets, mesh.neighbours)
+        added, removed = flipped[lethal[flipped]], flipped[~lethal[flipped]]
+        forgotten = forget_dependents(*graph, removed, self.distances, self._sources)
+        self.distances[added] = 0.0
+        self._sources[added] = -1
+        self._spread(np.concatenate([added, finite_rim(*graph, forgotten, self.distances)]))
+        self._lethal[flipped] = lethal[flipped]
+        moved = np.flatnonzero(self.distances != before).astype(np.int32)
+        self._costs[moved] = self.cost_of_distance(self.distances[moved])
+        return moved
+
+    def cost_of_distance(self, distances: NDArray[np.float32]) -> CostArray:
+        """Costs (n,) of distances (n,) [m] to the nearest lethal vertex."""
+        settings = self.parameters
+        decay = np.exp(-settings.cost_scaling_factor * (distances - settings.inscribed_radius))
+        costs = np.where(distances <= settings.inscribed_radius, 1.0, decay) * settings.inscribed_value
+        costs[distances > settings.inflation_radius] = 0.0
+        costs[distances == 0.0] = settings.lethal_value
+        return costs.astype(np.float32)
+
+    def _forget_all(self) -> None:
+        self.distances = np.full(self.topology.vertex_count, np.inf, dtype=np.float32)
+        self._sources = np.full((self.topology.vertex_count, 2), -1, dtype=np.int32)
+
+    def _spread(self, start: IntArray) -> None:
+        mesh = self.topology
+        spread(
+            mesh.vertices,
+            mesh.faces,
+            mesh.vertex_face_offsets,
+            mesh.vertex_faces,
+            self.parameters.inflation_radius,
+            self._step,
+            start,
+            self.distances,
+            self._sources,
+        )

@@ -1,0 +1,33 @@
+"""Keep-out: regions the robot must not enter, as polygons on the map.
+
+When to use: stairs, flower beds, areas closed by rule rather than by shape. When not: moving obstacles. A region
+narrower than the mesh's edges may contain no vertex: densify the mesh.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbf_abstract.parameters import parameter
+from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.layers.polygon_regions import Region
+
+
+class KeepOutParameters(LayerParameters):
+    """Parameters of ``keep_out``."""
+
+    regions: tuple[Region, ...] = parameter((), "Polygons that must not be entered.")
+
+
+class KeepOutLayer(MeshLayer):
+    """Lethal inside the regions, free outside."""
+
+    Parameters = KeepOutParameters
+    parameters: KeepOutParameters
+
+    def compute(self) -> tuple[CostArray, LethalArray]:
+        """Cost 1 and lethal inside any region, else 0."""
+        lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)
+        for region in self.parameters.regions:
+            lethal |= region.mask(self.topology.vertices)
+        return lethal.astype(np.float32), lethal

@@ -1,0 +1,55 @@
+"""Label: costs by kind of ground, drawn as labelled polygons.
+
+When to use: lawn costs more than path, mud is forbidden. When not: shapes known from the mesh itself. Where regions
+overlap the last one in the list counts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import model_validator
+
+from mbf_abstract.parameters import parameter
+from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.layers.polygon_regions import Region
+
+
+class LabelledRegion(Region):
+    """A polygon with the name of its ground."""
+
+    label: str = parameter(..., "Kind of ground, a key of ``label_costs``.")
+
+
+class LabelParameters(LayerParameters):
+    """Parameters of ``label``."""
+
+    regions: tuple[LabelledRegion, ...] = parameter((), "Labelled polygons.")
+    label_costs: dict[str, float] = parameter({}, "Cost of each label.")
+    lethal_labels: tuple[str, ...] = parameter((), "Labels the robot must not enter.")
+    default_cost: float = parameter(0.0, "Cost outside all regions.", ge=0.0)
+
+    @model_validator(mode="after")
+    def _labels_are_known(self) -> LabelParameters:
+        known = {*self.label_costs, *self.lethal_labels}
+        if unknown := sorted({region.label for region in self.regions} - known):
+            raise ValueError(f"labels without a cost: {', '.join(unknown)}; known are: {', '.join(sorted(known))}")
+        if negative := [label for label, cost in self.label_costs.items() if cost < 0.0]:
+            raise ValueError(f"label costs must not be negative: {', '.join(negative)}")
+        return self
+
+
+class LabelLayer(MeshLayer):
+    """Cost and lethal flag by the label of the region a vertex lies in."""
+
+    Parameters = LabelParameters
+    parameters: LabelParameters
+
+    def compute(self) -> tuple[CostArray, LethalArray]:
+        """Cost of the last region that holds the vertex, ``default_cost`` outside."""
+        costs = np.full(self.topology.vertex_count, self.parameters.default_cost, dtype=np.float32)
+        lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)
+        for region in self.parameters.regions:
+            inside = region.mask(self.topology.vertices)
+            costs[inside] = self.parameters.label_costs.get(region.label, 1.0)
+            lethal[inside] = region.label in self.parameters.lethal_labels
+        return costs, lethal

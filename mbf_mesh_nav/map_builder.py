@@ -1,0 +1,263 @@
+"""From a configuration to a mesh map with its layers.
+
+The configuration is an ordered list of layers and a block of parameters for each::
+
+    mesh_map:
+      mesh_file: garage.ply
+      repair: [zero_area]
+      layers:
+        - {name: border, type: border}
+        - {name: slopes, type: steepness}
+        - {name: sum, type: weighted_sum, inputs: [border, slopes]}
+        - {name: inflation, type: inflation, inputs: [sum]}
+      default_layer: inflation
+      slopes: {threshold: 0.5}
+      inflation: {inscribed_radius: 0.3, inflation_radius: 0.8}
+
+Everything that is wrong with the layers is reported at once, before the mesh is read.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import ValidationError
+
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_mesh_nav.densify import densify
+from mbf_mesh_nav.layer import LayerContext, LayerParameters, MeshLayer
+from mbf_mesh_nav.layer_cache import LayerCache
+from mbf_mesh_nav.layer_graph import LayerGraph, LayerGraphError, dependency_order
+from mbf_mesh_nav.mesh_io import read_mesh
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.repair import Finding, checked_mesh
+from mbf_mesh_nav.topology import build_topology
+
+LAYER_TYPES: dict[str, str] = {
+    "border": "mbf_mesh_nav.layers.border:BorderLayer",
+    "clearance": "mbf_mesh_nav.layers.clearance:ClearanceLayer",
+    "height_diff": "mbf_mesh_nav.layers.height_diff:HeightDiffLayer",
+    "inflation": "mbf_mesh_nav.layers.inflation:InflationLayer",
+    "keep_out": "mbf_mesh_nav.layers.keep_out:KeepOutLayer",
+    "label": "mbf_mesh_nav.layers.label:LabelLayer",
+    "max_combination": "mbf_mesh_nav.layers.max_combination:MaxCombinationLayer",
+    "mean": "mbf_mesh_nav.layers.mean:MeanLayer",
+    "obstacle": "mbf_mesh_nav.layers.obstacle:ObstacleLayer",
+    "ridge": "mbf_mesh_nav.layers.ridge:RidgeLayer",
+    "roughness": "mbf_mesh_nav.layers.roughness:RoughnessLayer",
+    "steepness": "mbf_mesh_nav.layers.steepness:SteepnessLayer",
+    "tilt": "mbf_mesh_nav.layers.tilt:TiltLayer",
+    "weighted_sum": "mbf_mesh_nav.layers.weighted_sum:WeightedSumLayer",
+}
+"""The layers that come with the package; further ones are found through the ``load_layer`` argument."""
+
+LayerLoader = Callable[[str], type[MeshLayer]]
+LayerBlocks = Mapping[str, Mapping[str, Any] | LayerParameters]
+
+
+class LayerEntry(ParameterModel):
+    """One line of the ``layers`` list."""
+
+    name: str = parameter(..., "Name of the layer; its parameters stand in the block of that name.")
+    type: str = parameter(..., "Type of the layer, or module:Class.")
+    inputs: tuple[str, ...] = parameter((), "Names of the layers it reads.")
+
+
+class MeshMapParameters(ParameterModel):
+    """Parameters of the ``mesh_map`` block, beside the blocks of the layers."""
+
+    mesh_file: str = parameter("", "File of the mesh; empty if the mesh is given as arrays.", dynamic=False)
+    mesh_part: str = parameter("", "Part of the file: path through the scene graph, or HDF5 group.", dynamic=False)
+    repair: tuple[str, ...] = parameter((), "Defects of the mesh that may be repaired.", dynamic=False)
+    densify: float = parameter(0.0, "Split edges longer than this; 0 = off.", unit="m", ge=0.0, dynamic=False)
+    layers: tuple[LayerEntry, ...] = parameter((), "The layers, in any order.", dynamic=False)
+    default_layer: str = parameter("", "The layer planners and controllers see; empty = the last one.", dynamic=False)
+    edge_cost_factor: float = parameter(0.0, "How much a cost of 1 lengthens an edge, in lengths.", ge=0.0, le=100.0)
+    inscribed_radius: float = parameter(
+        0.0,
+        "Radius of the robot's inner circle; the mesh should be finer than half of it. 0 = unknown.",
+        unit="m",
+        ge=0.0,
+    )
+    cache_dir: str = parameter("", "Folder for computed layers; empty = no cache.", dynamic=False)
+
+
+def load_builtin_layer(type_name: str) -> type[MeshLayer]:
+    """Class of a type in ``LAYER_TYPES`` or of ``module:Class``.
+
+    Raises
+    ------
+    LayerGraphError
+        No such type, or the class is no ``MeshLayer``.
+    """
+    target = LAYER_TYPES.get(type_name, type_name)
+    if ":" not in target:
+        raise LayerGraphError(f"unknown layer type '{type_name}', the types are: {', '.join(LAYER_TYPES)}")
+    module, _, name = target.partition(":")
+    layer_class = getattr(importlib.import_module(module), name)
+    if not (isinstance(layer_class, type) and issubclass(layer_class, MeshLayer)):
+        raise LayerGraphError(f"layer type '{type_name}' is no MeshLayer")
+    return layer_class
+
+
+def default_layers(inscribed_radius: float) -> MeshMapParameters:
+    """Return sane layers for a bare mesh: border, steepness, roughness and height steps, joined and inflated.
+
+    Use together with ``default_layer_blocks`` of the same radius [m].
+    """
+    guards = ("border", "steepness", "roughness", "height_diff")
+    entries = [LayerEntry(name=guard, type=guard) for guard in guards]
+    entries.append(LayerEntry(name="lethal", type="max_combination", inputs=guards))
+    entries.append(LayerEntry(name="inflation", type="inflation", inputs=("lethal",)))
+    return MeshMapParameters(
+        layers=tuple(entries), default_layer="inflation", edge_cost_factor=1.0, inscribed_radius=inscribed_radius
+    )
+
+
+def default_layer_blocks(inscribed_radius: float, inflation_radius: float | None = None) -> dict[str, dict[str, float]]:
+    """Parameters of ``default_layers`` for a robot of ``inscribed_radius`` [m]; inflation reaches twice as far."""
+    return {
+        "steepness": {"threshold": 0.6},
+        "roughness": {"threshold": 0.8},
+        "height_diff": {"threshold": 0.2, "height_limit": 1.0},
+        "inflation": {
+            "inscribed_radius": inscribed_radius,
+            "inflation_radius": inflation_radius or 2.0 * inscribed_radius,
+            "lethal_value": np.inf,
+            "inscribed_value": 1.0,
+            "cost_scaling_factor": 2.0,
+        },
+    }
+
+
+def build_mesh_map(
+    parameters: MeshMapParameters,
+    layer_blocks: LayerBlocks | None = None,
+    *,
+    vertices: ArrayLike | None = None,
+    faces: ArrayLike | None = None,
+    frame_id: str = "map",
+    load_layer: LayerLoader = load_builtin_layer,
+) -> MeshMap:
+    """Read or take a mesh, check it, build the map and compute its layers.
+
+    Parameters
+    ----------
+    parameters : MeshMapParameters
+    layer_blocks : mapping, optional
+        Layer name -> parameters, as read from the configuration or validated.
+    vertices, faces : (V, 3) float, (F, 3) int, optional
+        The mesh, instead of ``parameters.mesh_file``.
+    frame_id : str
+        Frame of the coordinates.
+    load_layer : callable
+        Layer type -> class; a server passes its registry's.
+
+    Raises
+    ------
+    LayerGraphError
+        Unknown or duplicate names, unknown types, wrong parameters, cycles: all findings in one text.
+    MeshError
+        The mesh cannot be read or has defects that may not be repaired.
+    """
+    plan = plan_layers(parameters, layer_blocks or {}, load_layer)
+    file = parameters.mesh_file if vertices is None or faces is None else "arrays"
+    repair = parameters.repair
+    if vertices is None or faces is None:
+        vertices, faces = read_mesh(parameters.mesh_file, parameters.mesh_part)
+        repair = (*repair, "duplicate_vertices")  # readers of STL, DAE and OBJ give every face its own corners
+    mesh, report = checked_mesh(vertices, faces, repair, file)
+    if parameters.densify > 0.0:
+        mesh = densify(mesh, parameters.densify)
+    topology = build_topology(mesh.vertices, mesh.faces, mesh.vertex_source, mesh.face_source, mesh.input_to_vertex)
+    mesh_map = MeshMap(topology, frame_id, report)
+    _warn_if_coarse(mesh_map, parameters.inscribed_radius)
+    if plan:
+        graph = _compute_layers(mesh_map, plan, parameters.cache_dir)
+        default = parameters.default_layer or parameters.layers[-1].name
+        mesh_map.set_layers(graph, default, parameters.edge_cost_factor)
+    return mesh_map
+
+
+PlannedLayer = tuple[LayerEntry, type[MeshLayer], LayerParameters]
+
+
+def plan_layers(
+    parameters: MeshMapParameters, layer_blocks: LayerBlocks, load_layer: LayerLoader = load_builtin_layer
+) -> list[PlannedLayer]:
+    """Check the layers of a configuration and order them, inputs first; ``LayerGraphError`` has all findings."""
+    names = [entry.name for entry in parameters.layers]
+    findings = [
+        f"layer name '{name}' is used twice" for name in sorted({name for name in names if names.count(name) > 1})
+    ]
+    findings += [f"there are parameters for '{name}', but no such layer" for name in layer_blocks if name not in names]
+    if parameters.default_layer and parameters.default_layer not in names:
+        findings.append(f"default_layer '{parameters.default_layer}' is no layer")
+    planned: dict[str, PlannedLayer] = {}
+    for entry in parameters.layers:
+        try:
+            layer_class = load_layer(entry.type)
+            planned[entry.name] = (entry, layer_class, _validated(layer_class, layer_blocks.get(entry.name, {})))
+            findings += _wrong_inputs(entry, layer_class)
+        except ValidationError as error:
+            findings += [f"layer '{entry.name}': {_place(item['loc'])}{item['msg']}" for item in error.errors()]
+        except LayerGraphError as error:
+            findings.append(f"layer '{entry.name}': {error}")
+    order: Sequence[str] = ()
+    try:
+        order = dependency_order({entry.name: entry.inputs for entry in parameters.layers})
+    except LayerGraphError as error:
+        findings.append(str(error))
+    if findings:
+        raise LayerGraphError("; ".join(findings))
+    return [planned[name] for name in order]
+
+
+def _validated(layer_class: type[MeshLayer], block: Mapping[str, Any] | LayerParameters) -> LayerParameters:
+    if isinstance(block, layer_class.Parameters):
+        return block
+    return layer_class.Parameters.model_validate(dict(block))
+
+
+def _wrong_inputs(entry: LayerEntry, layer_class: type[MeshLayer]) -> list[str]:
+    least, most = layer_class.inputs_allowed
+    if least <= len(entry.inputs) <= most:
+        return []
+    wanted = str(least) if least == most else f"at least {least}"
+    return [f"layer '{entry.name}' of type {entry.type} takes {wanted} inputs, got {len(entry.inputs)}"]
+
+
+def _place(location: tuple[int | str, ...]) -> str:
+    return ".".join(str(part) for part in location) + ": " if location else ""
+
+
+def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer], cache_dir: str) -> LayerGraph:
+    cache = LayerCache(cache_dir, mesh_map.topology.digest()) if cache_dir else None
+    layers: dict[str, MeshLayer] = {}
+    for entry, layer_class, settings in plan:
+        inputs = tuple(layers[name] for name in entry.inputs)
+        layer = layer_class(LayerContext(entry.name, mesh_map.topology, mesh_map.locator, settings, inputs))
+        stored = cache.load(layer) if cache and layer.cacheable else None
+        if stored is not None:
+            layer.replace(*stored)
+        else:
+            layer.recompute()
+            if cache and layer.cacheable:
+                cache.store(layer)
+        layers[entry.name] = layer
+    return LayerGraph(list(layers.values()))
+
+
+def _warn_if_coarse(mesh_map: MeshMap, inscribed_radius: float) -> None:
+    mean_edge = float(mesh_map.neighbour_lengths.mean())
+    if 0.0 < 0.5 * inscribed_radius < mean_edge:
+        text = (
+            f"edges are {mean_edge:.3g} m long on average, more than half the inscribed radius of "
+            f"{inscribed_radius:.3g} m; layers may miss obstacles, consider densify"
+        )
+        long = np.flatnonzero(np.diff(mesh_map.neighbour_offsets) > 0)
+        mesh_map.report.findings.append(Finding("coarse", text, long))
