@@ -43,6 +43,8 @@ class EventKind(str, Enum):
     GOAL_REJECTED = "goal_rejected"  # goal_id, message
     GOAL_STARTED = "goal_started"  # goal_id, slot, plugin
     GOAL_CANCEL = "goal_cancel"  # goal_id, reason
+    GOAL_PAUSED = "goal_paused"  # goal_id
+    GOAL_RESUMED = "goal_resumed"  # goal_id
     GOAL_FINISHED = "goal_finished"  # goal_id, status, outcome, message
     STATE_CHANGED = "state_changed"  # goal_id, old, new
     PLUGIN_CALL_STARTED = "plugin_call_started"  # goal_id, plugin, method
@@ -51,11 +53,11 @@ class EventKind(str, Enum):
     RECOVERY = "recovery"  # goal_id, plugin, reason
     FEEDBACK = "feedback"  # goal_id, action-specific sample
     COMMAND_CLAMPED = "command_clamped"  # requested, sent
-    COMMAND_DROPPED = "command_dropped"  # reason, lease
-    GATE_OPENED = "gate_opened"  # reason
+    COMMAND_DROPPED = "command_dropped"  # command, reason
     GATE_CLOSED = "gate_closed"  # reason
-    LEASE_GRANTED = "lease_granted"  # lease, holder
-    LEASE_REVOKED = "lease_revoked"  # lease, holder, reason
+    ROBOT_STOPPED = "robot_stopped"  # reason; sent by the gate, not by a plugin
+    LEASE_GRANTED = "lease_granted"  # holder
+    LEASE_REVOKED = "lease_revoked"  # holder, reason
     FAULT = "fault"  # where, type, message, traceback
     QUARANTINE = "quarantine"  # plugin, slot, reason
     MAP = "map"  # what a map server did: cleared, updated, found stale

@@ -22,6 +22,10 @@ FloatArray = NDArray[np.float64]
 QUATERNION_NORM_TOLERANCE = 0.01
 
 
+class NonFiniteError(ValueError):
+    """A number that must be finite is NaN or infinite; the text names the field or index."""
+
+
 def quaternion_from_yaw(yaw: float) -> Quaternion:
     """Quaternion (x y z w) of a rotation by ``yaw`` [rad] about z."""
     return (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0))
@@ -113,7 +117,7 @@ def _finite(name: str, values: Iterable[float]) -> tuple[float, ...]:
     numbers = tuple(float(value) for value in values)
     for index, value in enumerate(numbers):
         if not math.isfinite(value):
-            raise ValueError(f"{name}[{index}] must be finite, got {value}")
+            raise NonFiniteError(f"{name}[{index}] must be finite, got {value}")
     return numbers
 
 
@@ -296,7 +300,9 @@ class Path:
         bad = np.flatnonzero(~(np.isfinite(positions).all(axis=1) & np.isfinite(orientations).all(axis=1)))
         if bad.size:
             i = int(bad[0])
-            raise ValueError(f"pose {i} of the path is not finite: {positions[i].tolist()} {orientations[i].tolist()}")
+            raise NonFiniteError(
+                f"pose {i} of the path is not finite: {positions[i].tolist()} {orientations[i].tolist()}"
+            )
         norms = np.sum(orientations**2, axis=1)
         bad = np.flatnonzero(np.abs(norms - 1.0) > QUATERNION_NORM_TOLERANCE)
         if bad.size:

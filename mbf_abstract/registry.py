@@ -108,10 +108,7 @@ class PluginRegistry:
             Unknown type, name clash, import error, wrong base class or missing methods.
         """
         group_name = _group(group)
-        plugin_class = self._import(group_name, type_name)
-        if not isinstance(plugin_class, type):
-            raise PluginError(group_name, type_name, f"is no class but a {type(plugin_class).__name__}")
-        return self._checked(group_name, type_name, plugin_class, base)
+        return self._checked(group_name, type_name, self._import(group_name, type_name), base)
 
     def reload(self, group: PluginKind | str, type_name: str, base: type | None = None) -> type:
         """Load a type again from its changed source; objects of the old class keep their old code."""
@@ -142,7 +139,7 @@ class PluginRegistry:
             return PluginEntry(name, group, target, origin, error.reason)
         return PluginEntry(name, group, target, origin, None)
 
-    def _import(self, group: str, type_name: str) -> type:
+    def _import(self, group: str, type_name: str) -> object:
         if ":" in type_name:
             return self._import_module_type(group, type_name)
         name = self._resolve(group, type_name)
@@ -158,7 +155,7 @@ class PluginRegistry:
         candidates = (f"{self.backend}.{type_name}", type_name)
         return next((name for name in candidates if name in known), None)
 
-    def _import_known(self, group: str, name: str) -> type:
+    def _import_known(self, group: str, name: str) -> object:
         registered = self._registered.get((group, name))
         if registered is not None:
             return registered
@@ -167,22 +164,22 @@ class PluginRegistry:
             clash = " and ".join(f"{point.value} ({_origin(point)})" for point in points)
             raise PluginError(group, name, f"name clash between {clash}; use module:Class")
         try:
-            loaded: type = points[0].load()
+            return points[0].load()
         except Exception as error:
             raise PluginError(group, name, f"import failed: {_describe(error)}") from error
-        return loaded
 
-    def _import_module_type(self, group: str, type_name: str) -> type:
+    def _import_module_type(self, group: str, type_name: str) -> object:
         if not self.allow_module_types:
             raise PluginError(group, type_name, "module:Class types are switched off (allow_module_types)")
         module_name, _, class_name = type_name.partition(":")
         try:
-            loaded: type = getattr(importlib.import_module(module_name), class_name)
+            return getattr(importlib.import_module(module_name), class_name)
         except Exception as error:
             raise PluginError(group, type_name, f"import failed: {_describe(error)}") from error
-        return loaded
 
-    def _checked(self, group: str, type_name: str, plugin_class: type, base: type | None) -> type:
+    def _checked(self, group: str, type_name: str, plugin_class: object, base: type | None) -> type:
+        if not isinstance(plugin_class, type):
+            raise PluginError(group, type_name, f"is no class but a {type(plugin_class).__name__}")
         expected = base or _BASES.get(group, object)
         if issubclass(plugin_class, expected):
             if missing := sorted(getattr(plugin_class, "__abstractmethods__", ())):

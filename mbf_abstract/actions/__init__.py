@@ -1,0 +1,1 @@
+"""The actions: one file each, readable as the steps of one goal."""

@@ -1,0 +1,186 @@
+"""What all actions share: slots, acceptance, preemption, and exactly one final state for every goal.
+
+The flow of a goal: ``send`` checks it and either rejects it with the reason or queues it for its slot; the slot's
+worker runs ``execute``, whose result becomes the goal's final state. A new goal in a used slot asks the running one to
+end and waits its turn; only the newest waits, the one it displaces ends CANCELED. Nothing here ever joins a thread.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, ClassVar, Generic, TypeVar
+
+from mbf_abstract.actions.goals import ActionResult
+from mbf_abstract.actions.handle import GoalHandle, GoalStatus
+from mbf_abstract.events import EventKind
+from mbf_abstract.execution.plugin_run import Abandoned
+from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.execution.worker import Worker
+from mbf_abstract.outcomes import is_success
+
+G = TypeVar("G")
+R = TypeVar("R", bound=ActionResult)
+F = TypeVar("F")
+
+PREEMPTED = "preempted by a new goal"
+
+
+class GoalJob(Generic[G, R, F]):
+    """A goal as its slot's worker runs it; ``handle`` may become a newer goal's while it runs (plan update)."""
+
+    def __init__(self, action: Action[G, R, F], handle: GoalHandle[G, R, F], slot: int) -> None:
+        self.action = action
+        self.handle = handle
+        self.slot = slot
+
+    def run(self) -> None:
+        """Execute the goal unless it was canceled while it waited; always leaves it in a final state."""
+        action = self.action
+        if self.handle.cancel_requested:
+            action.finish(self.handle, action.canceled_outcome, self._before_start())
+            return
+        self.handle.activate()
+        try:
+            result = action.execute(self)
+            action.finish_with(self.handle, result)
+        except Abandoned:
+            pass  # the goal has ended without this thread
+        except Exception as error:
+            action.runtime.events.emit(
+                EventKind.FAULT, action.name, goal_id=self.handle.id, type=type(error).__name__, message=str(error)
+            )
+            text = f"{type(error).__name__} in the framework: {error}"
+            action.finish(self.handle, action.internal_error_outcome, text)
+
+    def preempt(self) -> None:
+        """Make way for a newer goal."""
+        self.handle.cancel(PREEMPTED)
+
+    def abandon(self, outcome: int, message: str) -> None:
+        """End the goal while its plugin hangs, and free the slot."""
+        self.action.finish(self.handle, outcome, message)
+        self.action.worker(self.slot).abandon(self)
+
+    def _before_start(self) -> str:
+        return f"{self.handle.cancel_token.reason} before it started"
+
+
+class Action(ABC, Generic[G, R, F]):
+    """One action of a server: accepts goals and runs them in slots."""
+
+    name: ClassVar[str]
+    canceled_outcome: ClassVar[int]
+    internal_error_outcome: ClassVar[int]
+
+    def __init__(self, runtime: Runtime) -> None:
+        self.runtime = runtime
+        self._workers: dict[int, Worker] = {}
+        self._condition = runtime.clock.condition()
+        self._unfinished: dict[int, GoalHandle[G, R, F]] = {}
+        self._closed = False
+
+    # ------------------------------------------------------------------------------------------ client
+    def send(self, goal: G, on_done: Callable[[GoalHandle[G, R, F]], None] | None = None) -> GoalHandle[G, R, F]:
+        """Send a goal; returns at once, also when the goal is rejected."""
+        handle: GoalHandle[G, R, F] = GoalHandle(next(self.runtime.goal_ids), self.name, goal, self.runtime)
+        if on_done is not None:
+            handle.add_done_callback(on_done)
+        rejection = self._rejection(goal)
+        if rejection is not None:
+            outcome, message = rejection
+            self.runtime.events.emit(EventKind.GOAL_REJECTED, self.name, goal_id=handle.id, message=message)
+            handle.finish(GoalStatus.REJECTED, self.make_result(handle, outcome, message))
+            return handle
+        slot = self._slot(goal)
+        self.runtime.events.emit(EventKind.GOAL_ACCEPTED, self.name, goal_id=handle.id, slot=slot, **self._tell(goal))
+        with self._condition:
+            self._unfinished[handle.id] = handle
+        self._dispatch(GoalJob(self, handle, slot))
+        return handle
+
+    def cancel_all(self, reason: str = "all goals canceled") -> None:
+        """Cancel every goal that is not final; never waits."""
+        for handle in self._active_handles():
+            handle.cancel(reason)
+
+    def close(self) -> None:
+        """Cancel everything and take no more goals."""
+        self._closed = True
+        self.cancel_all("server shut down")
+        for worker in list(self._workers.values()):
+            waiting = worker.close()
+            if isinstance(waiting, GoalJob):
+                self.finish(waiting.handle, self.canceled_outcome, "server shut down before it started")
+
+    @property
+    def busy(self) -> bool:
+        """Whether any goal is not final."""
+        return bool(self._unfinished)
+
+    # ------------------------------------------------------------------------------- for derived actions
+    @abstractmethod
+    def _check(self, goal: G) -> tuple[int, str] | None:
+        """Reason to reject the goal: (outcome, message), or None to accept it."""
+
+    @abstractmethod
+    def execute(self, job: GoalJob[G, R, F]) -> R:
+        """Run the goal on the worker's thread and return its result."""
+
+    @abstractmethod
+    def make_result(self, handle: GoalHandle[G, R, F], outcome: int, message: str) -> R:
+        """Build a result without path or pose, for ends that have none."""
+
+    @abstractmethod
+    def _tell(self, goal: G) -> dict[str, Any]:
+        """Return what the log shall say of an accepted goal."""
+
+    def _slot(self, goal: G) -> int:
+        return int(getattr(goal, "concurrency_slot", 0))
+
+    def _dispatch(self, job: GoalJob[G, R, F]) -> None:
+        """Queue the job for its slot; overridden where a running goal can take the new one over."""
+        displaced = self.worker(job.slot).submit(job)
+        if isinstance(displaced, GoalJob):
+            self.finish(displaced.handle, self.canceled_outcome, f"{PREEMPTED} before it started")
+
+    def worker(self, slot: int) -> Worker:
+        """Worker of a slot, made at its first use."""
+        with self._condition:
+            if slot not in self._workers:
+                self._workers[slot] = Worker(self.runtime.clock, f"{self.name} slot {slot}")
+            return self._workers[slot]
+
+    def finish(self, handle: GoalHandle[G, R, F], outcome: int, message: str) -> None:
+        """End a goal with an outcome and a text only."""
+        self.finish_with(handle, self.make_result(handle, outcome, message))
+
+    def finish_with(self, handle: GoalHandle[G, R, F], result: R) -> None:
+        """Set the goal's final state from its result."""
+        if is_success(result.outcome):
+            status = GoalStatus.SUCCEEDED
+        elif self._is_cancel(handle, result.outcome):
+            status = GoalStatus.CANCELED
+        else:
+            status = GoalStatus.ABORTED
+        handle.finish(status, result)
+        with self._condition:
+            self._unfinished.pop(handle.id, None)
+
+    def _is_cancel(self, handle: GoalHandle[G, R, F], outcome: int) -> bool:
+        return outcome == self.canceled_outcome
+
+    def _rejection(self, goal: G) -> tuple[int, str] | None:
+        if self._closed:
+            return self.internal_error_outcome, "the server is shut down"
+        slot = self._slot(goal)
+        if not 0 <= slot <= 255:
+            return self.internal_error_outcome, f"concurrency_slot must be 0..255, got {slot}"
+        limit = self.runtime.parameters.max_quarantined
+        if self.runtime.quarantined >= limit:
+            return self.internal_error_outcome, f"{limit} plugin calls hang; no more goals until one returns"
+        return self._check(goal)
+
+    def _active_handles(self) -> list[GoalHandle[G, R, F]]:
+        with self._condition:
+            return list(self._unfinished.values())

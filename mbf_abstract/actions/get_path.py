@@ -1,0 +1,134 @@
+"""The ``get_path`` action: from a start and a target pose to a path in the global frame.
+
+Steps of one goal: check names and frames - start pose - map kept alive - plugin under patience and retries - the path
+is checked and transformed - result. The robot never moves.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbf_abstract.actions.action import Action, GoalJob
+from mbf_abstract.actions.goals import GetPathGoal, GetPathResult, NoFeedback
+from mbf_abstract.actions.handle import GoalHandle
+from mbf_abstract.events import EventKind
+from mbf_abstract.execution.plan_check import check_path, in_global_frame
+from mbf_abstract.execution.planner import PlannerExecution, PlannerState
+from mbf_abstract.execution.plugin_run import PluginRun
+from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugin_table import PluginTable
+from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginKind
+from mbf_abstract.robot import RobotStateError
+from mbf_abstract.transforms import TransformError
+
+Handle = GoalHandle[GetPathGoal, GetPathResult, NoFeedback]
+Job = GoalJob[GetPathGoal, GetPathResult, NoFeedback]
+
+
+class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
+    """Plans paths."""
+
+    name = "get_path"
+    canceled_outcome = GetPathOutcome.CANCELED
+    internal_error_outcome = GetPathOutcome.INTERNAL_ERROR
+
+    def __init__(self, runtime: Runtime, plugins: PluginTable) -> None:
+        super().__init__(runtime)
+        self._plugins = plugins
+
+    def _check(self, goal: GetPathGoal) -> tuple[int, str] | None:
+        """1. Accept only what can be answered: a loaded planner, known frames, sane tolerances."""
+        problem = self._plugins.problem(PluginKind.PLANNER, goal.planner)
+        if problem:
+            return GetPathOutcome.INVALID_PLUGIN, problem
+        if goal.dist_tolerance < 0.0 or goal.angle_tolerance < 0.0:
+            return GetPathOutcome.INVALID_GOAL, "tolerances must not be negative"
+        return None
+
+    def execute(self, job: Job) -> GetPathResult:
+        """2. to 5.: from the accepted goal to its result, on the slot's thread."""
+        goal, handle = job.handle.goal, job.handle
+        plugin = self._plugins.get(PluginKind.PLANNER, goal.planner)
+        # 2. Everything the planner sees is in the global frame.
+        try:
+            request = self._request(goal, handle)
+        except (TransformError, RobotStateError) as error:
+            return GetPathResult(GetPathOutcome.TF_ERROR, str(error), planner=plugin.name)
+        self.runtime.events.emit(
+            EventKind.GOAL_STARTED, self.name, goal_id=handle.id, slot=job.slot, plugin=plugin.name
+        )
+        # 3. Plan, with the map kept alive, under patience and retries.
+        run: PluginRun[AbstractPlanner] = PluginRun(
+            self.runtime,
+            plugin,
+            handle,
+            patience=lambda: self.runtime.parameters.planner_patience,
+            on_abandon=lambda: job.abandon(*self._hung(plugin.name, handle)),
+        )
+        with self.runtime.map_hooks.using_map(PluginKind.PLANNER), run:
+            execution = PlannerExecution(run, request)
+            state = execution.execute()
+        # 4. Judge how it ended.
+        return self._result(state, execution.last_result, handle, request, plugin.name)
+
+    def _request(self, goal: GetPathGoal, handle: Handle) -> PlanRequest:
+        def to_global(pose: Pose) -> Pose:
+            return in_global_frame(pose, self.runtime)
+
+        return PlanRequest(
+            start=to_global(goal.start_pose) if goal.start_pose else self.runtime.robot.pose(),
+            goal=to_global(goal.target_pose),
+            dist_tolerance=goal.dist_tolerance,
+            angle_tolerance=goal.angle_tolerance,
+            via=tuple(to_global(pose) for pose in goal.via),
+            cancel_token=handle.cancel_token,
+        )
+
+    def _result(
+        self, state: PlannerState, last: PlanResult | None, handle: Handle, request: PlanRequest, planner: str
+    ) -> GetPathResult:
+        said = PlanResult(GetPathOutcome.FAILURE, "") if last is None else last
+        words: dict[str, Any] = {"planner": planner}
+        if last is not None:
+            words.update(plugin_outcome=int(said.outcome), plugin_message=said.message)
+        if state is PlannerState.FOUND_PLAN:
+            return self._found(said, handle, request, words)
+        if state is PlannerState.CANCELED:
+            return GetPathResult(GetPathOutcome.CANCELED, handle.cancel_token.reason, **words)
+        if state is PlannerState.PAT_EXCEEDED:
+            patience = self.runtime.parameters.planner_patience
+            tail = f"; the planner said last: {said.message}" if said.message else ""
+            return GetPathResult(GetPathOutcome.PAT_EXCEEDED, f"no plan within {patience:g} s{tail}", **words)
+        return GetPathResult(int(said.outcome), said.message, cost=said.cost, **words)
+
+    def _found(self, said: PlanResult, handle: Handle, request: PlanRequest, words: dict[str, Any]) -> GetPathResult:
+        """5. Believe a plugin's success only after a look at its path."""
+        checked = check_path(said, request, self.runtime)
+        if checked.path is None:
+            return GetPathResult(checked.outcome, checked.message, **words)
+        path, cost = checked.path, said.cost if said.cost != 0.0 else checked.path.length
+        self.runtime.events.emit(
+            EventKind.PLAN,
+            self.name,
+            goal_id=handle.id,
+            plugin=words["planner"],
+            cost=cost,
+            length=path.length,
+            poses=len(path),
+        )
+        return GetPathResult(int(said.outcome), said.message or "plan found", path=path, cost=cost, **words)
+
+    def _hung(self, planner: str, handle: Handle) -> tuple[int, str]:
+        if handle.cancel_requested:
+            return GetPathOutcome.CANCELED, f"{handle.cancel_token.reason}; planner {planner!r} has not ended yet"
+        patience = self.runtime.parameters.planner_patience
+        return GetPathOutcome.PAT_EXCEEDED, f"planner {planner!r} gave no answer within {patience:g} s and its grace"
+
+    def make_result(self, handle: Handle, outcome: int, message: str) -> GetPathResult:
+        """Result without a path."""
+        return GetPathResult(int(outcome), message)
+
+    def _tell(self, goal: GetPathGoal) -> dict[str, Any]:
+        return {"target": list(goal.target_pose.position), "planner": goal.planner}

@@ -1,0 +1,195 @@
+"""Goals, results and feedback of the actions, with the fields of ``mbf_msgs``.
+
+An empty plugin name means the first one loaded (for a running ``exe_path``: the running one). All values are frozen;
+a goal object can be sent any number of times.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mbf_abstract.geometry import Command, Path, Pose
+from mbf_abstract.outcomes import is_success, outcome_name
+
+
+@dataclass(frozen=True)
+class GetPathGoal:
+    """Ask for a path.
+
+    Attributes
+    ----------
+    target_pose : Pose
+    start_pose : Pose, optional
+        None = from where the robot is.
+    planner : str
+    dist_tolerance, angle_tolerance : float
+        How far [m, rad] from the target the path may end where the target itself cannot be reached.
+    via : tuple of Pose
+        Poses to pass on the way, in order.
+    concurrency_slot : int
+        0..255; goals in different slots run in parallel, a new goal in a used slot preempts.
+    """
+
+    target_pose: Pose
+    start_pose: Pose | None = None
+    planner: str = ""
+    dist_tolerance: float = 0.0
+    angle_tolerance: float = 0.0
+    via: tuple[Pose, ...] = ()
+    concurrency_slot: int = 0
+
+
+@dataclass(frozen=True)
+class ExePathGoal:
+    """Follow a path. Tolerances [m, rad] of None are the server's ``dist_tolerance`` and ``angle_tolerance``."""
+
+    path: Path
+    controller: str = ""
+    dist_tolerance: float | None = None
+    angle_tolerance: float | None = None
+    concurrency_slot: int = 0
+
+
+@dataclass(frozen=True)
+class RecoveryGoal:
+    """Run a recovery behaviour."""
+
+    behavior: str = ""
+    concurrency_slot: int = 0
+
+
+@dataclass(frozen=True)
+class RefinePathGoal:
+    """Improve a path."""
+
+    path: Path
+    refiner: str = ""
+    concurrency_slot: int = 0
+
+
+@dataclass(frozen=True)
+class MoveBaseGoal:
+    """Go to a pose: plan, follow, recover.
+
+    Attributes
+    ----------
+    recovery_behaviors : tuple of str, optional
+        Names to try in order; None = all that are loaded, in load order; empty = none.
+    dist_tolerance, angle_tolerance : float, optional
+        Arrival tolerances [m, rad], None = the server's. The planner may end its path that far from the target too.
+    """
+
+    target_pose: Pose
+    planner: str = ""
+    controller: str = ""
+    recovery_behaviors: tuple[str, ...] | None = None
+    dist_tolerance: float | None = None
+    angle_tolerance: float | None = None
+
+
+@dataclass(frozen=True)
+class ActionResult:
+    """What every result has: an outcome code (success < 10) and a text that is never empty."""
+
+    outcome: int
+    message: str
+
+    def __post_init__(self) -> None:
+        if not self.message:
+            object.__setattr__(self, "message", outcome_name(self.outcome))
+
+    @property
+    def success(self) -> bool:
+        """Whether the outcome is below 10."""
+        return is_success(self.outcome)
+
+    @property
+    def outcome_name(self) -> str:
+        """Readable name of the outcome."""
+        return outcome_name(self.outcome)
+
+
+@dataclass(frozen=True)
+class GetPathResult(ActionResult):
+    """Path in the global frame and its cost (the path's length where the planner gives none).
+
+    ``plugin_outcome`` and ``plugin_message`` are the planner's own last words, also where patience ran out.
+    """
+
+    path: Path | None = None
+    cost: float = 0.0
+    planner: str = ""
+    plugin_outcome: int | None = None
+    plugin_message: str = ""
+
+
+@dataclass(frozen=True)
+class ExePathResult(ActionResult):
+    """Where the robot ended, and how far [m, rad] from the last pose of the path."""
+
+    final_pose: Pose | None = None
+    dist_to_goal: float = float("inf")
+    angle_to_goal: float = float("inf")
+    controller: str = ""
+    plugin_outcome: int | None = None
+    plugin_message: str = ""
+
+
+@dataclass(frozen=True)
+class RecoveryResultMessage(ActionResult):
+    """The behaviour that ran."""
+
+    used_plugin: str = ""
+
+
+@dataclass(frozen=True)
+class RefinePathResult(ActionResult):
+    """The refined path, how far its end moved, and its length divided by the original's."""
+
+    refined_path: Path | None = None
+    final_position_error: float = 0.0
+    final_orientation_error: float = 0.0
+    path_length_ratio: float = 1.0
+    refiner: str = ""
+
+
+@dataclass(frozen=True)
+class MoveBaseResult(ActionResult):
+    """Where the robot ended, and how far [m, rad] from the target."""
+
+    final_pose: Pose | None = None
+    dist_to_goal: float = float("inf")
+    angle_to_goal: float = float("inf")
+
+
+@dataclass(frozen=True)
+class ExePathFeedback:
+    """One observed control cycle.
+
+    Attributes
+    ----------
+    outcome, message
+        Of the last controller call, also of a failed one that is being retried.
+    dist_to_goal, angle_to_goal : float
+        Straight distance [m] and rotation [rad] to the last pose of the path.
+    distance_along_path : float
+        Distance to go along the path [m].
+    time_to_goal : float
+        ``distance_along_path`` at the mean speed so far [s]; infinite while the robot has not moved.
+    last_command : Command, optional
+        What the plugin computed, also where something else was sent.
+    """
+
+    outcome: int
+    message: str
+    current_pose: Pose
+    dist_to_goal: float
+    angle_to_goal: float
+    distance_along_path: float
+    time_to_goal: float
+    last_command: Command | None = None
+
+
+@dataclass(frozen=True)
+class NoFeedback:
+    """Feedback of the actions that have none; never published."""

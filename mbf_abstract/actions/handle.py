@@ -1,0 +1,252 @@
+"""The client's end of one goal: status, result, feedback, cancel, pause. Every goal has a handle of its own.
+
+A handle works in three styles: block (``wait``), poll (``status``, ``feedback``) or ``await``. Callbacks run on the
+server's callback thread, so one that raises or is slow harms neither the robot nor the sender.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Generator
+from enum import Enum
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
+
+from mbf_abstract.actions.goals import ActionResult
+from mbf_abstract.cancel import CancelToken
+from mbf_abstract.events import EventKind
+
+if TYPE_CHECKING:
+    from mbf_abstract.execution.runtime import Runtime
+
+G = TypeVar("G")
+R = TypeVar("R", bound=ActionResult)
+F = TypeVar("F")
+
+
+class GoalStatus(Enum):
+    """Where a goal is. The last four are final; a goal reaches exactly one of them, once."""
+
+    PENDING = "pending"
+    ACTIVE = "active"
+    PAUSED = "paused"
+    CANCELING = "canceling"
+    SUCCEEDED = "succeeded"
+    ABORTED = "aborted"
+    CANCELED = "canceled"
+    REJECTED = "rejected"
+
+    @property
+    def is_final(self) -> bool:
+        """Whether the goal is over."""
+        return self in _FINAL
+
+
+_FINAL = {GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.CANCELED, GoalStatus.REJECTED}
+
+
+class GoalHandle(Generic[G, R, F]):
+    """One goal on its way through the server. Thread-safe; made by ``Action.send`` only.
+
+    Attributes
+    ----------
+    id : int
+        Unique in the server; every event and callback carries it.
+    goal : object
+        The goal as sent.
+    cancel_token : CancelToken
+        What the plugin polls. Set by ``cancel`` and, with another reason, when patience runs out.
+    """
+
+    def __init__(self, goal_id: int, action: str, goal: G, runtime: Runtime) -> None:
+        self.id = goal_id
+        self.action = action
+        self.goal = goal
+        self.cancel_token = CancelToken()
+        self.cancel_requested = False
+        self._runtime = runtime
+        self._condition = runtime.clock.condition()
+        self._status = GoalStatus.PENDING
+        self._result: R | None = None
+        self._feedback: F | None = None
+        self._paused = False
+        self._done_callbacks: list[Callable[[GoalHandle[G, R, F]], None]] = []
+        self._feedback_callbacks: list[Callable[[F], None]] = []
+        self._wake_callbacks: list[Callable[[], None]] = []
+        self._subscribers: list[Callable[[GoalHandle[G, R, F]], None]] = []
+
+    # ------------------------------------------------------------------------------------------ client
+    @property
+    def status(self) -> GoalStatus:
+        """Present status."""
+        return self._status
+
+    @property
+    def done(self) -> bool:
+        """Whether the goal has reached its final status."""
+        return self._status.is_final
+
+    @property
+    def result(self) -> R | None:
+        """The result, None until the goal is done."""
+        return self._result
+
+    @property
+    def feedback(self) -> F | None:
+        """The newest feedback, None before the first."""
+        return self._feedback
+
+    @property
+    def paused(self) -> bool:
+        """Whether the client has paused the goal."""
+        return self._paused
+
+    def wait(self, timeout: float | None = None) -> R:
+        """Wait for the result; raises TimeoutError when ``timeout`` [s] passes first (the goal goes on)."""
+        clock = self._runtime.clock
+        deadline = None if timeout is None else clock.now() + timeout
+        with self._condition:
+            while self._result is None:
+                remaining = None if deadline is None else deadline - clock.now()
+                if remaining is not None and remaining <= 0.0:
+                    raise TimeoutError(f"{self.action} goal {self.id} is still {self._status.value} after {timeout} s")
+                self._condition.wait(remaining)
+            return self._result
+
+    def __await__(self) -> Generator[Any, None, R]:
+        return self._wait_async().__await__()
+
+    async def _wait_async(self) -> R:
+        loop = asyncio.get_running_loop()
+        finished = loop.create_future()
+
+        def set_finished() -> None:
+            if not finished.done():
+                finished.set_result(None)
+
+        def wake(_: object) -> None:
+            loop.call_soon_threadsafe(set_finished)
+
+        self.add_done_callback(wake)
+        with self._runtime.clock.outside():
+            await finished
+        assert self._result is not None
+        return self._result
+
+    def cancel(self, reason: str = "canceled by the client") -> None:
+        """Ask the goal to end; idempotent, without effect on a finished goal. Never waits."""
+        with self._condition:
+            if self.done or self.cancel_requested:
+                return
+            self.cancel_requested = True
+            if self._status is not GoalStatus.PENDING:
+                self._status = GoalStatus.CANCELING
+        self._runtime.events.emit(EventKind.GOAL_CANCEL, self.action, goal_id=self.id, reason=reason)
+        self.cancel_token.cancel(reason)
+        self._wake()
+
+    def pause(self) -> None:
+        """Hold: the robot stands, goal and slot are kept, patience stops; idempotent."""
+        self._set_paused(True)
+
+    def resume(self) -> None:
+        """Go on after ``pause``; idempotent."""
+        self._set_paused(False)
+
+    def add_done_callback(self, callback: Callable[[GoalHandle[G, R, F]], None]) -> None:
+        """Call ``callback(handle)`` once when the goal is done, also if it already is."""
+        with self._condition:
+            if not self.done:
+                self._done_callbacks.append(callback)
+                return
+        self._runtime.callbacks.submit(lambda: callback(self))
+
+    def add_feedback_callback(self, callback: Callable[[F], None]) -> None:
+        """Call ``callback(feedback)`` for every feedback from now on."""
+        with self._condition:
+            self._feedback_callbacks.append(callback)
+
+    # ------------------------------------------------------------------------------------------ server
+    def on_wake(self, callback: Callable[[], None]) -> None:
+        """Run ``callback`` (server side, short) whenever the goal is canceled, paused or resumed."""
+        self._wake_callbacks.append(callback)
+
+    def subscribe(self, callback: Callable[[GoalHandle[G, R, F]], None]) -> None:
+        """Run ``callback`` (server side, short) on every feedback and on the final state, at once if there."""
+        with self._condition:
+            self._subscribers.append(callback)
+            done = self.done
+        if done:
+            callback(self)
+
+    def activate(self) -> None:
+        """PENDING -> ACTIVE (or CANCELING if the cancel was faster)."""
+        with self._condition:
+            if self._status is GoalStatus.PENDING:
+                self._status = self._running_status()
+
+    def publish_feedback(self, feedback: F) -> None:
+        """Make ``feedback`` the newest and hand it to the callbacks; dropped once the goal is done."""
+        with self._condition:
+            if self.done:
+                return
+            self._feedback = feedback
+            callbacks = list(self._feedback_callbacks)
+        self._tell_subscribers()
+        for callback in callbacks:
+            self._runtime.callbacks.submit(lambda callback=callback: callback(feedback))  # type: ignore[misc]
+
+    def finish(self, status: GoalStatus, result: R) -> bool:
+        """Set the final status and the result; False if the goal already was final (then nothing changes)."""
+        with self._condition:
+            if self.done:
+                return False
+            self._runtime.events.emit(
+                EventKind.GOAL_FINISHED,
+                self.action,
+                goal_id=self.id,
+                status=status.value,
+                outcome=result.outcome,
+                outcome_name=result.outcome_name,
+                message=result.message,
+            )
+            self._status = status
+            self._result = result
+            callbacks, self._done_callbacks = self._done_callbacks, []
+            self._feedback_callbacks.clear()
+            self._wake_callbacks.clear()
+            self._condition.notify_all()
+        self._tell_subscribers()
+        for callback in callbacks:
+            self._runtime.callbacks.submit(lambda callback=callback: callback(self))  # type: ignore[misc]
+        return True
+
+    def _tell_subscribers(self) -> None:
+        for subscriber in list(self._subscribers):
+            subscriber(self)
+
+    def _set_paused(self, paused: bool) -> None:
+        with self._condition:
+            if self.done or self._paused == paused:
+                return
+            self._paused = paused
+            if self._status in (GoalStatus.ACTIVE, GoalStatus.PAUSED):
+                self._status = self._running_status()
+        kind = EventKind.GOAL_PAUSED if paused else EventKind.GOAL_RESUMED
+        self._runtime.events.emit(kind, self.action, goal_id=self.id)
+        self._wake()
+
+    def _running_status(self) -> GoalStatus:
+        if self.cancel_requested:
+            return GoalStatus.CANCELING
+        return GoalStatus.PAUSED if self._paused else GoalStatus.ACTIVE
+
+    def _wake(self) -> None:
+        for callback in list(self._wake_callbacks):
+            callback()
+
+    def __repr__(self) -> str:
+        tail = f": {self._result.outcome_name}" if self._result else ""
+        return f"<{self.action} goal {self.id}, {self._status.value}{tail}>"
+
+
+AnyGoalHandle: TypeAlias = GoalHandle[Any, Any, Any]

@@ -1,0 +1,140 @@
+"""The ``move_base`` action: go to a pose by planning, following and recovering, as one explicit state machine.
+
+It is a client of the server's own ``get_path``, ``exe_path`` and ``recovery`` in a slot of its own, and does nothing an
+outside executive could not do. All that happens comes as messages into one mailbox and is handled in order by one
+thread, so nothing can be lost between two callbacks.
+
+======================  =====================================================================================
+event                   what follows
+======================  =====================================================================================
+plan found              follow it; while driving: swap the path without stopping
+plan failed             recover (trigger *plan*), else end with the planner's code
+plan failed, driving    ``replan_failed_policy``: keep the old path | stop and end | recover
+path followed           succeeded
+following failed        INVALID_PATH .. INTERNAL_ERROR end the goal, any other code: recover (trigger *control*)
+robot oscillates        stop, recover (trigger *oscillation*), else end with OSCILLATION
+recovery over           plan again, whatever its outcome
+new goal                takes over: the old one ends CANCELED, the robot drives on until the new plan is there
+cancel                  cancel the sub-goals, wait for their ends, end CANCELED
+======================  =====================================================================================
+
+Each behaviour of the list runs at most once until the list is reset: by a plan after trigger *plan*, by
+``oscillation_distance`` of motion after the other two (upstream forgets that for *control*).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbf_abstract.actions.action import PREEMPTED, Action, GoalJob
+from mbf_abstract.actions.exe_path import ExePathAction
+from mbf_abstract.actions.get_path import GetPathAction
+from mbf_abstract.actions.goals import ExePathFeedback, MoveBaseGoal, MoveBaseResult
+from mbf_abstract.actions.handle import GoalHandle
+from mbf_abstract.actions.move_base_machine import MoveBaseMachine
+from mbf_abstract.actions.recovery import RecoveryAction
+from mbf_abstract.events import EventKind
+from mbf_abstract.execution.plan_check import in_global_frame
+from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import MoveBaseOutcome
+from mbf_abstract.plugin_table import PluginTable
+from mbf_abstract.plugins import PluginKind
+from mbf_abstract.robot import RobotStateError
+from mbf_abstract.transforms import TransformError
+
+Handle = GoalHandle[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
+Job = GoalJob[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
+
+
+class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
+    """Goes to poses."""
+
+    name = "move_base"
+    canceled_outcome = MoveBaseOutcome.CANCELED
+    internal_error_outcome = MoveBaseOutcome.INTERNAL_ERROR
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        plugins: PluginTable,
+        get_path: GetPathAction,
+        exe_path: ExePathAction,
+        recovery: RecoveryAction,
+    ) -> None:
+        super().__init__(runtime)
+        self.plugins = plugins
+        self.get_path = get_path
+        self.exe_path = exe_path
+        self.recovery = recovery
+        self._machine: MoveBaseMachine | None = None
+
+    def _check(self, goal: MoveBaseGoal) -> tuple[int, str] | None:
+        """Accept only names that are loaded and tolerances that make sense."""
+        wanted = [(PluginKind.PLANNER, goal.planner), (PluginKind.CONTROLLER, goal.controller)]
+        wanted += [(PluginKind.RECOVERY, name) for name in goal.recovery_behaviors or ()]
+        for kind, name in wanted:
+            problem = self.plugins.problem(kind, name)
+            if problem:
+                return MoveBaseOutcome.FAILURE, problem
+        for name in ("dist_tolerance", "angle_tolerance"):
+            value = getattr(goal, name)
+            if value is not None and not value > 0.0:
+                return MoveBaseOutcome.FAILURE, f"{name} must be positive, got {value}"
+        return None
+
+    def _dispatch(self, job: Job) -> None:
+        """Hand the goal to the running machine, which takes it over while driving, else queue it."""
+        with self._condition:
+            machine = self._machine
+            taken, displaced = machine.offer(job) if machine is not None else (False, None)
+        if not taken:
+            super()._dispatch(job)
+        elif displaced is not None:
+            self.finish(displaced.handle, self.canceled_outcome, f"{PREEMPTED} before it started")
+
+    def execute(self, job: Job) -> MoveBaseResult:
+        """Run the state machine; the goal it ends with may be a later one than it began with."""
+        self.tell_started(job.handle)
+        try:
+            self.runtime.robot.pose()
+            target = self.target(job.handle)
+        except (RobotStateError, TransformError) as error:
+            return self.make_result(job.handle, MoveBaseOutcome.TF_ERROR, str(error))
+        machine = MoveBaseMachine(self, job, target)
+        with self._condition:
+            self._machine = machine
+        try:
+            outcome, message = machine.run()
+        finally:
+            with self._condition:
+                self._machine = None
+                late = machine.close()
+            if late is not None:
+                super()._dispatch(late)
+        return self.make_result(job.handle, outcome, message)
+
+    def target(self, handle: Handle) -> Pose:
+        """Target pose in the global frame; raises TransformError."""
+        return in_global_frame(handle.goal.target_pose, self.runtime)
+
+    def tell_started(self, handle: Handle) -> None:
+        """Record that a goal is being worked on."""
+        self.runtime.events.emit(EventKind.GOAL_STARTED, self.name, goal_id=handle.id, slot=0)
+
+    def make_result(self, handle: Handle, outcome: int, message: str) -> MoveBaseResult:
+        """Result with the robot's present pose and its distance to the target."""
+        try:
+            pose, target = self.runtime.robot.pose(), self.target(handle)
+        except (RobotStateError, TransformError):
+            return MoveBaseResult(int(outcome), message)
+        return MoveBaseResult(
+            int(outcome),
+            message,
+            final_pose=pose,
+            dist_to_goal=pose.distance_to(target),
+            angle_to_goal=pose.angle_to(target),
+        )
+
+    def _tell(self, goal: MoveBaseGoal) -> dict[str, Any]:
+        return {"target": list(goal.target_pose.position), "planner": goal.planner, "controller": goal.controller}

@@ -1,0 +1,370 @@
+"""The state machine behind ``move_base``; its table of events is in ``actions.move_base``."""
+
+from __future__ import annotations
+
+from collections import deque
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+from mbf_abstract.actions.action import PREEMPTED, GoalJob
+from mbf_abstract.actions.goals import (
+    ExePathFeedback,
+    ExePathGoal,
+    GetPathGoal,
+    GetPathResult,
+    MoveBaseGoal,
+    MoveBaseResult,
+    RecoveryGoal,
+)
+from mbf_abstract.actions.handle import AnyGoalHandle
+from mbf_abstract.clock import Stopwatch
+from mbf_abstract.events import EventKind
+from mbf_abstract.execution.oscillation import OscillationDetector
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
+from mbf_abstract.plugins import PluginKind
+from mbf_abstract.robot import RobotStateError
+from mbf_abstract.transforms import TransformError
+
+if TYPE_CHECKING:
+    from mbf_abstract.actions.move_base import MoveBaseAction
+
+Job = GoalJob[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
+SUB_GOAL_SLOT = 255  # so that a client's goal in slot 0 does not preempt a part of move_base
+NO_REPLAN_WITHIN = 0.1  # m from the goal
+FATAL = range(ExePathOutcome.INVALID_PATH, ExePathOutcome.INTERNAL_ERROR + 1)
+
+
+class MoveBaseState(Enum):
+    """What the machine waits for."""
+
+    GET_PATH = "get_path"
+    EXE_PATH = "exe_path"
+    STOPPING = "stopping"
+    RECOVERY = "recovery"
+    CANCELING = "canceling"
+
+
+class Trigger(Enum):
+    """What made the last recovery necessary."""
+
+    NONE = "none"
+    PLAN = "plan"
+    CONTROL = "control"
+    OSCILLATION = "oscillation"
+
+
+End = tuple[int, str]
+
+
+class MoveBaseMachine:
+    """One run of move_base, for one goal or several that take over from each other."""
+
+    def __init__(self, action: MoveBaseAction, job: Job, target: Pose) -> None:
+        self._action = action
+        self._runtime = action.runtime
+        self._job = job
+        self._target = target
+        self._state = MoveBaseState.GET_PATH
+        self._plan: AnyGoalHandle | None = None
+        self._follow: AnyGoalHandle | None = None
+        self._recover: AnyGoalHandle | None = None
+        self._trigger = Trigger.NONE
+        self._failure: End = (MoveBaseOutcome.FAILURE, "")
+        self._ending: End | None = None
+        self._next_behavior = 0
+        self._oscillation = OscillationDetector(self._runtime.clock)
+        self._recovered_at: Pose | None = None
+        self._replan_watch = Stopwatch(self._runtime.clock)
+        self._condition = self._runtime.clock.condition()
+        self._mailbox: deque[AnyGoalHandle] = deque()
+        self._offered: Job | None = None
+        self._closed = False
+
+    # ------------------------------------------------------------------------------ from other threads
+    def offer(self, job: Job) -> tuple[bool, Job | None]:
+        """Offer a newer goal; returns whether it is taken, and the offer it displaces."""
+        with self._condition:
+            if self._closed or self._job.handle.cancel_requested:
+                return False, None
+            displaced, self._offered = self._offered, job
+            self._condition.notify_all()
+            return True, displaced
+
+    def close(self) -> Job | None:
+        """Take no more offers; return one that came too late."""
+        with self._condition:
+            self._closed = True
+            late, self._offered = self._offered, None
+            return late
+
+    def _post(self, handle: AnyGoalHandle) -> None:
+        with self._condition:
+            self._mailbox.append(handle)
+            self._condition.notify_all()
+
+    def _wake(self) -> None:
+        with self._condition:
+            self._condition.notify_all()
+
+    # ------------------------------------------------------------------------------------ the loop
+    def run(self) -> End:
+        """Work until the goal has its end."""
+        self._job.handle.on_wake(self._wake)
+        self._ask_for_plan()
+        while True:
+            message = self._next_message()
+            end = self._react(message)
+            if end is not None:
+                return end
+
+    def _react(self, message: AnyGoalHandle | None) -> End | None:
+        handle = self._job.handle
+        self._forward_pause()
+        if handle.cancel_requested and self._state is not MoveBaseState.CANCELING:
+            self._cancel_sub_goals(MoveBaseState.CANCELING)
+        if self._state is not MoveBaseState.CANCELING:
+            self._take_offer()
+        if self._state is MoveBaseState.CANCELING:
+            return self._stopped_end() if not self._sub_goals() else None
+        if message is None:
+            self._replan_if_due()
+            return None
+        if not message.done:
+            return self._on_feedback(message)
+        if message is self._plan:
+            self._plan = None
+            return self._on_plan(message.result)
+        if message is self._follow:
+            self._follow = None
+            return self._on_followed(message.result)
+        if message is self._recover:
+            self._recover = None
+            return self._on_recovered()
+        return None  # a sub-goal that another one has replaced
+
+    def _next_message(self) -> AnyGoalHandle | None:
+        """Wait for a message, a wake-up of the handle, an offer, or the time to replan."""
+        with self._condition:
+            if not self._mailbox and not self._has_news():
+                self._condition.wait(self._time_to_replan())
+            return self._mailbox.popleft() if self._mailbox else None
+
+    def _has_news(self) -> bool:
+        handle = self._job.handle
+        canceling = handle.cancel_requested and self._state is not MoveBaseState.CANCELING
+        over = self._state is MoveBaseState.CANCELING and not self._sub_goals()
+        return self._offered is not None or canceling or over or handle.paused != self._oscillation.stopwatch.paused
+
+    # -------------------------------------------------------------------------------------- planning
+    def _ask_for_plan(self) -> None:
+        goal = self._job.handle.goal
+        self._replan_watch.restart()
+        if self._follow is None:
+            self._enter(MoveBaseState.GET_PATH)
+        self._plan = self._send(
+            self._action.get_path,
+            GetPathGoal(
+                self._target,
+                planner=goal.planner,
+                dist_tolerance=goal.dist_tolerance or 0.0,
+                angle_tolerance=goal.angle_tolerance or 0.0,
+                concurrency_slot=SUB_GOAL_SLOT,
+            ),
+        )
+
+    def _on_plan(self, result: Any) -> End | None:
+        if result.success and result.path is not None:
+            if self._trigger is Trigger.PLAN:
+                self._reset_recovery()
+            self._follow_path(result.path)
+            return None
+        if self._follow is None:
+            return self._recover_from(Trigger.PLAN, (result.outcome, result.message))
+        return self._on_replan_failed(result)
+
+    def _on_replan_failed(self, result: GetPathResult) -> End | None:
+        policy = self._runtime.parameters.replan_failed_policy
+        taken_over = self._state is MoveBaseState.GET_PATH  # the old path leads to an old goal: never keep it
+        if policy == "keep" and not taken_over:
+            return None
+        failure = (result.outcome, f"replanning failed: {result.message}")
+        if policy == "stop" and not taken_over:
+            return self._end_after_stop(failure)
+        self._stop_then_recover(Trigger.PLAN, failure)
+        return None
+
+    def _replan_if_due(self) -> None:
+        due = self._time_to_replan()
+        if due is not None and due <= 0.0:
+            self._ask_for_plan()
+
+    def _time_to_replan(self) -> float | None:
+        """Seconds until the next replanning; None while there is none to come."""
+        frequency = self._runtime.parameters.planner_frequency
+        driving = self._state is MoveBaseState.EXE_PATH and self._plan is None and not self._job.handle.paused
+        if frequency <= 0.0 or not driving or self._distance_to_goal() <= NO_REPLAN_WITHIN:
+            return None
+        return max(0.0, 1.0 / frequency - self._replan_watch.elapsed)
+
+    def _distance_to_goal(self) -> float:
+        feedback = self._follow.feedback if self._follow is not None else None
+        return feedback.dist_to_goal if feedback is not None else float("inf")
+
+    # ------------------------------------------------------------------------------------- following
+    def _follow_path(self, path: Path) -> None:
+        goal = self._job.handle.goal
+        if self._follow is None:
+            self._oscillation.reset()
+            self._replan_watch.restart()
+        self._enter(MoveBaseState.EXE_PATH)
+        self._follow = self._send(
+            self._action.exe_path,
+            ExePathGoal(
+                path,
+                controller=goal.controller,
+                dist_tolerance=goal.dist_tolerance,
+                angle_tolerance=goal.angle_tolerance,
+                concurrency_slot=SUB_GOAL_SLOT,
+            ),
+        )
+
+    def _on_feedback(self, message: AnyGoalHandle) -> End | None:
+        if message is not self._follow or message.feedback is None or self._state is MoveBaseState.STOPPING:
+            return None
+        feedback: ExePathFeedback = message.feedback
+        self._job.handle.publish_feedback(feedback)
+        parameters, pose = self._runtime.parameters, feedback.current_pose
+        self._reset_recovery_after_motion(pose)
+        if self._oscillation.check(
+            pose, parameters.oscillation_timeout, parameters.oscillation_distance, parameters.oscillation_angle
+        ):
+            text = f"the robot got nowhere in {parameters.oscillation_timeout:g} s"
+            self._stop_then_recover(Trigger.OSCILLATION, (MoveBaseOutcome.OSCILLATION, text))
+        return None
+
+    def _on_followed(self, result: Any) -> End | None:
+        if self._state is MoveBaseState.STOPPING:
+            return self._recover_from(self._trigger, self._failure)
+        if result.success:
+            return MoveBaseOutcome.SUCCESS, result.message
+        if result.outcome in FATAL:
+            return result.outcome, result.message
+        if self._plan is not None:
+            self._plan.cancel("following failed")
+            self._plan = None
+        if result.outcome == ExePathOutcome.OSCILLATION:
+            return self._recover_from(Trigger.OSCILLATION, (MoveBaseOutcome.OSCILLATION, result.message))
+        return self._recover_from(Trigger.CONTROL, (result.outcome, result.message))
+
+    # -------------------------------------------------------------------------------------- recovery
+    def _recover_from(self, trigger: Trigger, failure: End) -> End | None:
+        """Run the next behaviour of the list; without one the failure is the goal's end."""
+        behaviors = self._behaviors()
+        self._trigger = trigger
+        if not self._runtime.parameters.recovery_enabled or self._next_behavior >= len(behaviors):
+            return failure
+        behavior = behaviors[self._next_behavior]
+        self._next_behavior += 1
+        self._enter(MoveBaseState.RECOVERY, behavior=behavior, trigger=trigger.value, failure=failure[1])
+        self._recover = self._send(self._action.recovery, RecoveryGoal(behavior, concurrency_slot=SUB_GOAL_SLOT))
+        return None
+
+    def _on_recovered(self) -> End | None:
+        self._oscillation.reset()
+        try:
+            self._recovered_at = self._runtime.robot.pose()
+        except RobotStateError:  # the next plan reports the missing pose with its own text
+            self._recovered_at = None
+        self._ask_for_plan()
+        return None
+
+    def _behaviors(self) -> list[str]:
+        wanted = self._job.handle.goal.recovery_behaviors
+        return self._action.plugins.names(PluginKind.RECOVERY) if wanted is None else list(wanted)
+
+    def _reset_recovery_after_motion(self, pose: Pose) -> None:
+        if self._trigger in (Trigger.CONTROL, Trigger.OSCILLATION) and self._recovered_at is not None:
+            if pose.distance_to(self._recovered_at) >= self._runtime.parameters.oscillation_distance:
+                self._reset_recovery()
+
+    def _reset_recovery(self) -> None:
+        self._next_behavior = 0
+        self._trigger = Trigger.NONE
+        self._recovered_at = None
+
+    # -------------------------------------------------------------------------- new goal, cancel, pause
+    def _take_offer(self) -> None:
+        """Let a newer goal take over: a new plan is asked for, the robot drives on until it is there."""
+        with self._condition:
+            offer, self._offered = self._offered, None
+        if offer is None:
+            return
+        old, self._job.handle = self._job.handle, offer.handle
+        offer.handle.activate()
+        offer.handle.on_wake(self._wake)
+        self._action.finish(old, MoveBaseOutcome.CANCELED, PREEMPTED)
+        self._action.tell_started(offer.handle)
+        self._reset_recovery()
+        self._oscillation.reset()
+        try:
+            self._target = self._action.target(offer.handle)
+        except TransformError as error:
+            self._end_after_stop((MoveBaseOutcome.TF_ERROR, str(error)))
+            return
+        if self._state in (MoveBaseState.GET_PATH, MoveBaseState.EXE_PATH):
+            if self._plan is not None:
+                self._plan.cancel(PREEMPTED)
+            self._ask_for_plan()
+            self._enter(MoveBaseState.GET_PATH)
+
+    def _cancel_sub_goals(self, state: MoveBaseState) -> None:
+        self._enter(state)
+        for handle in self._sub_goals():
+            handle.cancel("move_base ends it")
+
+    def _sub_goals(self) -> list[AnyGoalHandle]:
+        return [h for h in (self._plan, self._follow, self._recover) if h is not None and not h.done]
+
+    def _stop_then_recover(self, trigger: Trigger, failure: End) -> None:
+        """Stop following; its end starts the recovery."""
+        self._trigger, self._failure = trigger, failure
+        self._cancel_sub_goals(MoveBaseState.STOPPING)
+        self._plan = None
+
+    def _end_after_stop(self, end: End) -> End | None:
+        """End the goal with ``end`` once all sub-goals are over."""
+        self._ending = end
+        self._cancel_sub_goals(MoveBaseState.CANCELING)
+        return None if self._sub_goals() else end
+
+    def _stopped_end(self) -> End:
+        return self._ending or (MoveBaseOutcome.CANCELED, self._job.handle.cancel_token.reason)
+
+    def _forward_pause(self) -> None:
+        paused = self._job.handle.paused
+        if paused == self._oscillation.stopwatch.paused:
+            return
+        for watch in (self._oscillation.stopwatch, self._replan_watch):
+            watch.pause() if paused else watch.resume()
+        for handle in self._sub_goals():
+            handle.pause() if paused else handle.resume()
+
+    def _send(self, action: Any, goal: object) -> AnyGoalHandle:
+        handle: AnyGoalHandle = action.send(goal)
+        if self._job.handle.paused:
+            handle.pause()
+        handle.subscribe(self._post)
+        return handle
+
+    def _enter(self, state: MoveBaseState, **why: object) -> None:
+        if state is not self._state or why:
+            self._runtime.events.emit(
+                EventKind.STATE_CHANGED,
+                "move_base",
+                goal_id=self._job.handle.id,
+                old=self._state.value,
+                new=state.value,
+                **why,
+            )
+        self._state = state

@@ -1,0 +1,358 @@
+"""Runs a controller: the loop that drives (reference: ``mbf.md`` 4.4, with the safe default everywhere).
+
+Each period, in this order: a new plan? canceled? paused? map current, pose and velocity fresh? arrived? then the
+plugin is asked for a command, the command is judged and sent, and feedback is published. Whatever ends the loop, the
+lease is given back and the robot stands. What differs from upstream is marked *ours* in ``docs/decisions``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+from mbf_abstract.clock import Stopwatch
+from mbf_abstract.events import EventKind
+from mbf_abstract.execution.arrival import ArrivalCheck
+from mbf_abstract.execution.loaded_plugin import PluginFault, PluginNonFinite
+from mbf_abstract.execution.oscillation import OscillationDetector
+from mbf_abstract.execution.plugin_run import PluginRun
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
+from mbf_abstract.robot import RobotStateError
+from mbf_abstract.velocity_gate import Lease
+
+
+class ControllerState(Enum):
+    """Where a controller execution is."""
+
+    INITIALIZED = "initialized"
+    STARTED = "started"
+    CONTROLLING = "controlling"
+    GOT_LOCAL_CMD = "got_local_cmd"
+    NO_LOCAL_CMD = "no_local_cmd"
+    HOLDING = "holding"
+    PAUSED = "paused"
+    STOPPING = "stopping"
+    ARRIVED_GOAL = "arrived_goal"
+    NO_PLAN = "no_plan"
+    EMPTY_PLAN = "empty_plan"
+    INVALID_PLAN = "invalid_plan"
+    MAX_RETRIES = "max_retries"
+    PAT_EXCEEDED = "pat_exceeded"
+    CANCELED = "canceled"
+    OSCILLATING = "oscillating"
+    ROBOT_DISABLED = "robot_disabled"
+    STOPPED = "stopped"
+    INTERNAL_ERROR = "internal_error"
+
+
+@dataclass(frozen=True)
+class ControllerEnd:
+    """How the loop ended: its last state, the outcome for the goal, and a text."""
+
+    state: ControllerState
+    outcome: int
+    message: str
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """What one cycle knew, for feedback."""
+
+    pose: Pose
+    velocity: Twist
+    result: ControlResult
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A path in the global frame with the arrival rule of its goal."""
+
+    path: Path
+    arrival: ArrivalCheck
+
+
+class ControllerExecution:
+    """One exe_path goal's (or, after plan updates, several goals') control loop.
+
+    Parameters
+    ----------
+    run : PluginRun
+        Supervises the plugin calls; its patience watch is restarted by every valid command.
+    take_new_plan : callable
+        Answers a plan that came for this running execution, at most once each, else None.
+    on_cycle : callable
+        Told after every cycle that called the plugin, e.g. to publish feedback.
+    """
+
+    def __init__(
+        self,
+        run: PluginRun[AbstractController],
+        take_new_plan: Callable[[], Plan | None],
+        on_cycle: Callable[[Cycle], None],
+    ) -> None:
+        self._run = run
+        self._runtime = run.runtime
+        self._take_new_plan = take_new_plan
+        self._on_cycle = on_cycle
+        self._plan: Plan | None = None
+        self._failures = 0
+        self._last_result = ControlResult(ExePathOutcome.NO_VALID_CMD, "")
+        self._hold_reason: tuple[int, str] | None = None
+        self._ignored = Stopwatch(run.runtime.clock)
+        self._oscillation = OscillationDetector(run.runtime.clock)
+        self._graceful_stop: Stopwatch | None = None
+        self._lease: Lease | None = None
+        self.state = ControllerState.INITIALIZED
+
+    @property
+    def last_result(self) -> ControlResult:
+        """The plugin's last words."""
+        return self._last_result
+
+    def execute(self) -> ControllerEnd:
+        """Drive until the loop ends; the robot stands when this returns."""
+        self._enter(ControllerState.STARTED)
+        if not self._run.acquire_plugin():
+            return self._canceled() if self._run.canceled else self._patience_end()
+        self._lease = lease = self._runtime.gate.acquire(f"exe_path {self._run.plugin.name}")
+        if lease is None:
+            holder = self._runtime.gate.holder or "nobody (the gate is closed)"
+            return self._end(ControllerState.INTERNAL_ERROR, ExePathOutcome.FAILURE, f"the robot is driven by {holder}")
+        end = ControllerEnd(ControllerState.STOPPED, ExePathOutcome.STOPPED, "stopped")
+        try:
+            end = self._loop(lease)
+            return end
+        finally:
+            lease.release(stop=self._stops_at(end.state), reason=end.state.value)
+
+    def stop_robot(self, reason: str) -> None:
+        """Take the lease away from the loop, from another thread: its plugin hangs."""
+        if self._lease is not None:
+            self._lease.release(reason=reason)
+
+    # -------------------------------------------------------------------------------------- the cycle
+    def _loop(self, lease: Lease) -> ControllerEnd:
+        clock = self._runtime.clock
+        next_cycle = clock.now()
+        while True:
+            try:
+                end = self._cycle(lease)
+            except PluginFault as fault:
+                end = self._end(ControllerState.INTERNAL_ERROR, ExePathOutcome.INTERNAL_ERROR, str(fault))
+            if end is not None:
+                return end
+            next_cycle += 1.0 / self._runtime.parameters.controller_frequency
+            if next_cycle < clock.now():  # over-run: keep the rate, drop the missed cycles
+                next_cycle = clock.now()
+            clock.sleep_until(next_cycle)
+
+    def _cycle(self, lease: Lease) -> ControllerEnd | None:
+        """One control cycle; the steps of the module's docstring. Returns the end, or None to go on."""
+        end = self._adopt_new_plan()
+        if end is None and self._run.canceled:
+            end = self._handle_cancel()
+        if end is not None or self._hold_while_paused(lease):
+            return end
+        state = self._fresh_state(lease)
+        if state is None:
+            return self._holding_too_long()
+        pose, velocity = state
+        if self._is_arrived(pose):
+            return self._come_to_rest(velocity, lease)
+        result = self._compute(pose, velocity)
+        end = self._judge(result, lease) or self._watch_motion(pose, velocity, result)
+        self._on_cycle(Cycle(pose, velocity, result))
+        return end
+
+    def _adopt_new_plan(self) -> ControllerEnd | None:
+        plan = self._take_new_plan()
+        if plan is None:
+            if self._plan is None:
+                return self._end(ControllerState.NO_PLAN, ExePathOutcome.INVALID_PATH, "started without a path")
+            return None
+        if len(plan.path) == 0:
+            return self._end(ControllerState.EMPTY_PLAN, ExePathOutcome.INVALID_PATH, "the path has no poses")
+        controller = self._run.plugin.instance
+        if not self._run.call("set_plan", lambda: controller.set_plan(plan.path)):
+            text = f"controller {self._run.plugin.name!r} refused the path"
+            return self._end(ControllerState.INVALID_PLAN, ExePathOutcome.INVALID_PATH, text)
+        self._plan = plan
+        if self.state is ControllerState.STOPPING:
+            self._enter(ControllerState.STARTED)
+        return None
+
+    def _handle_cancel(self) -> ControllerEnd | None:
+        """Let a controller that can stop smoothly do so, for at most ``cancel_grace``; else end now."""
+        if self._graceful_stop is None:
+            controller = self._run.plugin.instance
+            if not self._run.call("cancel", controller.cancel):
+                return self._canceled()
+            self._graceful_stop = Stopwatch(self._runtime.clock)
+        if self._graceful_stop.elapsed > self._runtime.parameters.cancel_grace:
+            return self._canceled()
+        return None
+
+    def _hold_while_paused(self, lease: Lease) -> bool:
+        if not self._run.handle.paused:
+            if lease.paused:
+                lease.resume()
+                for watch in (self._run.patience_watch, self._ignored, self._oscillation.stopwatch):
+                    watch.resume()
+            return False
+        if not lease.paused:
+            lease.pause()
+            for watch in (self._run.patience_watch, self._ignored, self._oscillation.stopwatch):
+                watch.pause()
+            self._enter(ControllerState.PAUSED)
+        return True
+
+    def _fresh_state(self, lease: Lease) -> tuple[Pose, Twist] | None:
+        """Pose and velocity, if the map is current too; else stop the robot and remember why it holds."""
+        problem = self._runtime.map_hooks.map_problem()
+        if problem:
+            self._hold(lease, ExePathOutcome.MAP_ERROR, problem)
+            return None
+        try:
+            state = self._runtime.robot.pose(), self._runtime.robot.velocity()
+        except RobotStateError as error:
+            self._hold(lease, ExePathOutcome.TF_ERROR, str(error))
+            return None
+        self._hold_reason = None
+        return state
+
+    def _hold(self, lease: Lease, outcome: int, reason: str) -> None:
+        lease.stop()
+        self._enter(ControllerState.HOLDING)
+        self._hold_reason = (outcome, reason)
+
+    def _holding_too_long(self) -> ControllerEnd | None:
+        assert self._hold_reason is not None
+        if not self._run.is_patience_over():
+            return None
+        outcome, reason = self._hold_reason
+        return self._end(ControllerState.PAT_EXCEEDED, outcome, reason)
+
+    def _is_arrived(self, pose: Pose) -> bool:
+        """Ask once; a robot that has arrived and coasts out of the tolerance while it stops has still arrived."""
+        assert self._plan is not None
+        if self.state is ControllerState.STOPPING:
+            return True
+        arrival, controller = self._plan.arrival, self._run.plugin.instance
+
+        def ask_plugin() -> bool:
+            return self._run.call(
+                "is_goal_reached",
+                lambda: bool(controller.is_goal_reached(pose, arrival.dist_tolerance, arrival.angle_tolerance)),
+            )
+
+        return arrival.reached(pose, ask_plugin)
+
+    def _come_to_rest(self, velocity: Twist, lease: Lease) -> ControllerEnd | None:
+        """At the goal: with ``force_stop_at_goal`` the goal succeeds once the robot stands, else at once."""
+        parameters = self._runtime.parameters
+        limit = parameters.goal_max_speed
+        if not parameters.force_stop_at_goal or velocity.is_stopped(limit, limit) or self._run.is_patience_over():
+            return self._end(ControllerState.ARRIVED_GOAL, ExePathOutcome.SUCCESS, "goal reached")
+        lease.stop()
+        self._enter(ControllerState.STOPPING)
+        return None
+
+    def _compute(self, pose: Pose, velocity: Twist) -> ControlResult:
+        self._enter(ControllerState.CONTROLLING)
+        controller = self._run.plugin.instance
+        request = ControlRequest(pose, velocity, self._run.handle.cancel_token)
+        try:
+            result = self._run.call("compute_velocity_commands", lambda: controller.compute_velocity_commands(request))
+        except PluginNonFinite as error:
+            result = ControlResult(ExePathOutcome.NO_VALID_CMD, str(error))
+        if not isinstance(result, ControlResult):
+            raise PluginFault(
+                f"plugin {self._run.plugin.name!r} returned {type(result).__name__} from compute_velocity_commands, "
+                "not ControlResult"
+            )
+        if result.success and result.command is None:
+            result = ControlResult(ExePathOutcome.NO_VALID_CMD, "success, but no command")
+        self._last_result = result
+        return result
+
+    # ------------------------------------------------------------------------------- judging a command
+    def _judge(self, result: ControlResult, lease: Lease) -> ControllerEnd | None:
+        """Send a good command; stop and count a bad one."""
+        if result.outcome == ExePathOutcome.CANCELED:
+            return self._canceled(result.message)
+        if result.success and result.command is not None:
+            self._failures = 0
+            self._run.patience_watch.restart()
+            self._enter(ControllerState.GOT_LOCAL_CMD)
+            lease.send(result.command)
+            return None
+        parameters = self._runtime.parameters
+        self._failures += 1
+        if parameters.force_stop_on_retry or result.command is None:
+            lease.stop()
+        else:
+            lease.send(result.command)
+        if self._failures > parameters.controller_max_retries >= 0:
+            text = result.message or f"{self._failures} failed cycle(s) in a row"
+            return self._end(ControllerState.MAX_RETRIES, result.outcome, text)
+        if self._run.is_patience_over():
+            return self._patience_end()
+        self._enter(ControllerState.NO_LOCAL_CMD)
+        return None
+
+    def _watch_motion(self, pose: Pose, velocity: Twist, result: ControlResult) -> ControllerEnd | None:
+        """Find a robot that ignores its commands, or one that moves without getting anywhere."""
+        parameters = self._runtime.parameters
+        moving_command = result.success and result.command is not None and not result.command.is_stopped()
+        if not (moving_command and self._runtime.robot.has_odometry and velocity.is_stopped()):
+            self._ignored.restart()
+        elif 0.0 < parameters.cmd_vel_ignored_tolerance < self._ignored.elapsed:
+            text = f"the robot has ignored its commands for {self._ignored.elapsed:.1f} s"
+            return self._end(ControllerState.ROBOT_DISABLED, ExePathOutcome.ROBOT_STUCK, text)
+        if self._oscillation.check(
+            pose, parameters.oscillation_timeout, parameters.oscillation_distance, parameters.oscillation_angle
+        ):
+            text = (
+                f"the robot has not moved {parameters.oscillation_distance:g} m "
+                f"nor turned {parameters.oscillation_angle:g} rad in {parameters.oscillation_timeout:g} s"
+            )
+            return self._end(ControllerState.OSCILLATING, ExePathOutcome.OSCILLATION, text)
+        return None
+
+    # ------------------------------------------------------------------------------------------- ends
+    def _canceled(self, last_words: str = "") -> ControllerEnd:
+        text = self._run.handle.cancel_token.reason or last_words or "the controller canceled"
+        return self._end(ControllerState.CANCELED, ExePathOutcome.CANCELED, text)
+
+    def _patience_end(self) -> ControllerEnd:
+        last = self._last_result.message
+        text = f"no valid command for {self._run.patience:g} s" + (f"; the controller said: {last}" if last else "")
+        return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, text)
+
+    def _end(self, state: ControllerState, outcome: int, message: str) -> ControllerEnd:
+        self._enter(state)
+        return ControllerEnd(state, int(outcome), message)
+
+    def _stops_at(self, state: ControllerState) -> bool:
+        parameters = self._runtime.parameters
+        if state is ControllerState.ARRIVED_GOAL:
+            return parameters.force_stop_at_goal
+        if state is ControllerState.CANCELED:
+            return parameters.force_stop_on_cancel
+        return True
+
+    def _enter(self, state: ControllerState) -> None:
+        """Record a change of state; the two states of a healthy cycle are not worth an event each."""
+        quiet = {ControllerState.CONTROLLING, ControllerState.GOT_LOCAL_CMD}
+        if state is not self.state and not (state in quiet and self.state in quiet):
+            self._runtime.events.emit(
+                EventKind.STATE_CHANGED,
+                "controller_execution",
+                goal_id=self._run.handle.id,
+                old=self.state.value,
+                new=state.value,
+            )
+        self.state = state

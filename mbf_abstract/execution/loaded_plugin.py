@@ -1,0 +1,126 @@
+"""A plugin instance as the executions hold it: exclusive use, guarded calls, quarantine.
+
+The same instance never runs twice at once: a second goal waits for it, as long as its own patience lasts.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import NonFiniteError
+from mbf_abstract.plugins import Plugin
+
+if TYPE_CHECKING:
+    from mbf_abstract.execution.runtime import Runtime
+
+P = TypeVar("P", bound=Plugin)
+T = TypeVar("T")
+
+
+class PluginFault(Exception):
+    """A plugin raised, or returned something that is no result; the text names plugin, type and message."""
+
+
+class PluginNonFinite(PluginFault):
+    """A plugin made a pose, path or command that is not finite."""
+
+
+class LoadedPlugin(Generic[P]):
+    """One named plugin instance of a server."""
+
+    def __init__(self, name: str, type_name: str, instance: P, runtime: Runtime) -> None:
+        self.name = name
+        self.type_name = type_name
+        self.instance = instance
+        self.quarantined = ""
+        self._runtime = runtime
+        self._condition = runtime.clock.condition()
+        self._user: object | None = None
+        self.retired = False
+
+    @property
+    def in_use(self) -> bool:
+        """Whether a goal is using the instance."""
+        return self._user is not None
+
+    def acquire(self, user: object, give_up: Callable[[], bool]) -> bool:
+        """Wait for exclusive use; False once ``give_up()`` says so (asked at every ``wake`` and 20 times a second)."""
+        with self._condition:
+            while self._user is not None:
+                if give_up():
+                    return False
+                self._condition.wait(0.05)
+            self._user = user
+            return True
+
+    def release(self, user: object) -> None:
+        """End the use by ``user`` (nobody else's) and lift a quarantine: the late call has come back."""
+        with self._condition:
+            if self._user is not user:
+                return
+            self._user = None
+            if self.quarantined:
+                self.quarantined = ""
+                self._runtime.events.emit(EventKind.QUARANTINE, self.name, reason="ended: the late call came back")
+            self._condition.notify_all()
+
+    def quarantine(self, reason: str) -> None:
+        """Mark the instance unavailable until its hung call returns."""
+        self.quarantined = reason
+        self._runtime.events.emit(EventKind.QUARANTINE, self.name, reason=reason)
+
+    def retire(self) -> bool:
+        """Forbid further use, for unloading; False while in use."""
+        with self._condition:
+            if self._user is not None:
+                return False
+            self.retired = True
+            return True
+
+    def call(self, goal_id: int, method: str, function: Callable[[], T]) -> T:
+        """Call into the plugin, guarded; exceptions become ``PluginFault`` and an event with the traceback."""
+        clock = self._runtime.clock
+        started = clock.now()
+        try:
+            with clock.guarded(f"{self.name}.{method}"):
+                result = function()
+                self._take_modelled_time(started)
+                return result
+        except Exception as error:
+            self.report(goal_id, method, error)
+            fault = PluginNonFinite if isinstance(error, NonFiniteError) else PluginFault
+            raise fault(f"plugin {self.name!r} raised {type(error).__name__} in {method}: {error}") from error
+
+    def _take_modelled_time(self, started: float) -> None:
+        modelled = self.instance.modelled_compute_time
+        if modelled > 0.0:
+            self._runtime.clock.sleep_until(started + modelled)
+
+    def report(self, goal_id: int, method: str, error: Exception) -> None:
+        """Record that the plugin raised, with where in its code it did."""
+        frames = traceback.extract_tb(error.__traceback__)[-8:]
+        self._runtime.events.emit(
+            EventKind.FAULT,
+            self.name,
+            goal_id=goal_id,
+            where=method,
+            type=type(error).__name__,
+            message=str(error),
+            traceback=[f"{PurePath(frame.filename).name}:{frame.lineno} in {frame.name}" for frame in frames],
+        )
+
+
+@contextmanager
+def plugin_events(runtime: Runtime, goal_id: int, plugin: str, method: str) -> Iterator[dict[str, object]]:
+    """Emit start and end of one plugin call; fill the yielded dict with outcome and message."""
+    outcome: dict[str, object] = {}
+    runtime.events.emit(EventKind.PLUGIN_CALL_STARTED, plugin, goal_id=goal_id, method=method)
+    try:
+        yield outcome
+    finally:
+        runtime.events.emit(EventKind.PLUGIN_CALL_ENDED, plugin, goal_id=goal_id, method=method, **outcome)

@@ -1,0 +1,45 @@
+"""A look at what a planner calls success, and the way of poses and paths into the global frame.
+
+A plugin may lie: an empty path, a path in another frame, or one that starts or ends somewhere else. Each becomes a
+failure that names what is wrong, so that no controller ever follows such a path.
+"""
+
+from __future__ import annotations
+
+from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PlanRequest, PlanResult
+from mbf_abstract.transforms import TransformError
+
+
+def in_global_frame(pose: Pose, runtime: Runtime) -> Pose:
+    """Return ``pose`` in the global frame; raises TransformError where that frame is not known."""
+    frame = runtime.robot.global_frame
+    return pose if pose.frame_id == frame else runtime.transforms.transform_pose(pose, frame)
+
+
+def path_in_global_frame(path: Path, runtime: Runtime) -> Path:
+    """Return ``path`` in the global frame; raises TransformError where that frame is not known."""
+    frame = runtime.robot.global_frame
+    return path if path.frame_id == frame else runtime.transforms.transform_path(path, frame)
+
+
+def check_path(said: PlanResult, request: PlanRequest, runtime: Runtime) -> PlanResult:
+    """Check a successful answer; return it with the path in the global frame, or a failure without a path."""
+    if said.path is None or len(said.path) == 0:
+        return PlanResult(GetPathOutcome.EMPTY_PATH, "the planner reported success but gave no poses")
+    try:
+        path = path_in_global_frame(said.path, runtime)
+    except TransformError as error:
+        return PlanResult(GetPathOutcome.TF_ERROR, f"the path can not be brought into the global frame: {error}")
+    slack = runtime.parameters.plan_end_tolerance
+    for name, index, pose, wanted, tolerance in (
+        ("start", 0, path[0], request.start, 0.0),
+        ("goal", len(path) - 1, path[-1], request.goal, request.dist_tolerance),
+    ):
+        distance = pose.distance_to(wanted)
+        if distance > tolerance + slack:
+            text = f"pose {index} of the path is {distance:.2f} m from the {name}, allowed {tolerance + slack:.2f} m"
+            return PlanResult(GetPathOutcome.INTERNAL_ERROR, text)
+    return PlanResult(said.outcome, said.message, path, said.cost)

@@ -1,0 +1,109 @@
+"""Runs a planner under patience and retries (reference: ``mbf.md`` 4.2 and 4.3).
+
+=========  ==========  ==============================================================================
+retries    patience    behaviour
+=========  ==========  ==============================================================================
+0          any         one call; the plugin's own code, or PAT_EXCEEDED if that call outlasted patience
+n > 0      0           n + 1 calls; the plugin's code of the last one
+n > 0      > 0         whichever comes first, retries tested first
+-1         > 0         until patience, then PAT_EXCEEDED; the plugin's last code stays in the result
+-1         0           forever, until canceled
+=========  ==========  ==============================================================================
+
+A success that comes after the patience but before the grace is over still counts. Between two calls there is a pause
+of ``planner_retry_delay``, so that a planner that fails at once does not keep a core busy.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from mbf_abstract.events import EventKind
+from mbf_abstract.execution.loaded_plugin import PluginFault, plugin_events
+from mbf_abstract.execution.plugin_run import PluginRun
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult
+
+
+class PlannerState(Enum):
+    """Where a planner execution is; the last seven are its ends."""
+
+    INITIALIZED = "initialized"
+    STARTED = "started"
+    PLANNING = "planning"
+    FOUND_PLAN = "found_plan"
+    MAX_RETRIES = "max_retries"
+    PAT_EXCEEDED = "pat_exceeded"
+    NO_PLAN_FOUND = "no_plan_found"
+    CANCELED = "canceled"
+    STOPPED = "stopped"
+    INTERNAL_ERROR = "internal_error"
+
+
+class PlannerExecution:
+    """One get_path goal's calls of its planner."""
+
+    def __init__(self, run: PluginRun[AbstractPlanner], request: PlanRequest) -> None:
+        self._run = run
+        self._runtime = run.runtime
+        self._request = request
+        self.state = PlannerState.INITIALIZED
+        self.last_result: PlanResult | None = None
+
+    def execute(self) -> PlannerState:
+        """Call the planner until it succeeds or the rules end it; the answer is in ``last_result``."""
+        self._enter(PlannerState.STARTED)
+        if not self._run.acquire_plugin():
+            return self._enter(PlannerState.CANCELED if self._run.canceled else PlannerState.PAT_EXCEEDED)
+        calls = 0
+        while True:
+            if self._run.canceled:
+                return self._enter(PlannerState.CANCELED)
+            self._enter(PlannerState.PLANNING)
+            try:
+                result = self._call()
+            except PluginFault as fault:
+                self.last_result = PlanResult(GetPathOutcome.INTERNAL_ERROR, str(fault))
+                return self._enter(PlannerState.INTERNAL_ERROR)
+            calls += 1
+            end = self._judge(result, calls)
+            if end is not None:
+                return self._enter(end)
+            self._runtime.clock.sleep(self._runtime.parameters.planner_retry_delay)
+
+    def _judge(self, result: PlanResult, calls: int) -> PlannerState | None:
+        """Whether this result ends the execution, in upstream's order; None = call again."""
+        max_retries = self._runtime.parameters.planner_max_retries
+        if self._run.canceled and not self._run.patience_exceeded:
+            return PlannerState.CANCELED
+        if result.success:
+            return PlannerState.FOUND_PLAN
+        if 0 < max_retries < calls:
+            return PlannerState.MAX_RETRIES
+        if self._run.is_patience_over():
+            return PlannerState.PAT_EXCEEDED
+        return PlannerState.NO_PLAN_FOUND if max_retries == 0 else None
+
+    def _call(self) -> PlanResult:
+        planner = self._run.plugin.instance
+        with plugin_events(self._runtime, self._run.handle.id, self._run.plugin.name, "make_plan") as told:
+            result = self._run.call("make_plan", lambda: planner.make_plan(self._request))
+            if not isinstance(result, PlanResult):
+                raise PluginFault(
+                    f"plugin {self._run.plugin.name!r} returned {type(result).__name__} from make_plan, not PlanResult"
+                )
+            told.update(outcome=int(result.outcome), message=result.message)
+        self.last_result = result
+        return result
+
+    def _enter(self, state: PlannerState) -> PlannerState:
+        if state is not self.state:
+            self._runtime.events.emit(
+                EventKind.STATE_CHANGED,
+                "planner_execution",
+                goal_id=self._run.handle.id,
+                old=self.state.value,
+                new=state.value,
+            )
+            self.state = state
+        return state

@@ -1,0 +1,111 @@
+"""Runs a recovery behaviour: one call, with its own patience, driving through the velocity gate."""
+
+from __future__ import annotations
+
+from mbf_abstract.clock import Stopwatch
+from mbf_abstract.execution.loaded_plugin import PluginFault, plugin_events
+from mbf_abstract.execution.plugin_run import PluginRun
+from mbf_abstract.geometry import Command, Pose, Twist
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.plugins import AbstractRecovery, RecoveryRequest, RecoveryResult
+from mbf_abstract.velocity_gate import Lease
+
+
+class GatedMotion:
+    """How a recovery moves the robot (``plugins.Motion``): takes the lease at the first command."""
+
+    def __init__(self, run: PluginRun[AbstractRecovery]) -> None:
+        self._run = run
+        self._runtime = run.runtime
+        self._lease: Lease | None = None
+        self._condition = self._runtime.clock.condition()
+        run.handle.on_wake(self._wake)
+        run.handle.cancel_token.on_cancel(self._wake)
+
+    def pose(self) -> Pose:
+        """Fresh robot pose in the global frame; raises RobotStateError."""
+        return self._runtime.robot.pose()
+
+    def velocity(self) -> Twist:
+        """Measured velocity in the base frame; raises RobotStateError."""
+        return self._runtime.robot.velocity()
+
+    def send(self, command: Command) -> bool:
+        """Send one command; False if another owner drives, the goal is paused or shall end."""
+        if self._run.abandoned or self._run.handle.paused:
+            return False
+        if self._lease is None or not self._lease.active:
+            self._lease = self._runtime.gate.acquire(f"recovery {self._run.plugin.name}")
+        return self._lease is not None and self._lease.send(command)
+
+    def sleep(self, seconds: float) -> bool:
+        """Wait; False as soon as the behaviour shall end. Paused time does not count."""
+        watch = Stopwatch(self._runtime.clock)
+        token = self._run.handle.cancel_token
+        with self._condition:
+            while watch.elapsed < seconds - 1e-9 and not token.cancelled:
+                self._follow_pause(watch)
+                self._condition.wait(None if self._run.handle.paused else seconds - watch.elapsed)
+        return not token.cancelled
+
+    def close(self, reason: str) -> None:
+        """Stop the robot if this behaviour moved it."""
+        if self._lease is not None:
+            self._lease.release(reason=reason)
+
+    def _follow_pause(self, watch: Stopwatch) -> None:
+        if self._run.handle.paused:
+            watch.pause()
+            self._run.patience_watch.pause()
+            if self._lease is not None:
+                self._lease.stop()
+        else:
+            watch.resume()
+            self._run.patience_watch.resume()
+
+    def _wake(self) -> None:
+        with self._condition:
+            self._condition.notify_all()
+
+
+class RecoveryExecution:
+    """One recovery goal's call of its behaviour."""
+
+    def __init__(self, run: PluginRun[AbstractRecovery]) -> None:
+        self._run = run
+        self.motion = GatedMotion(run)
+
+    def execute(self) -> RecoveryResult:
+        """Run the behaviour; its own outcome, or CANCELED, PAT_EXCEEDED, INTERNAL_ERROR."""
+        if not self._run.acquire_plugin() or self._run.canceled:
+            return self._ended_early()
+        try:
+            result = self._call()
+        except PluginFault as fault:
+            return RecoveryResult(RecoveryOutcome.INTERNAL_ERROR, str(fault))
+        finally:
+            self.motion.close("recovery over")
+        if self._run.canceled or (self._run.patience_exceeded and not result.success):
+            return self._ended_early(result.message)
+        return result
+
+    def _ended_early(self, last_words: str = "") -> RecoveryResult:
+        name, tail = self._run.plugin.name, f"; it said: {last_words}" if last_words else ""
+        if self._run.canceled:
+            return RecoveryResult(RecoveryOutcome.CANCELED, f"recovery {name!r} canceled{tail}")
+        return RecoveryResult(
+            RecoveryOutcome.PAT_EXCEEDED, f"recovery {name!r} took over {self._run.patience:g} s{tail}"
+        )
+
+    def _call(self) -> RecoveryResult:
+        behavior = self._run.plugin.instance
+        request = RecoveryRequest(self.motion, self._run.handle.cancel_token)
+        with plugin_events(self._run.runtime, self._run.handle.id, self._run.plugin.name, "run_behavior") as told:
+            result = self._run.call("run_behavior", lambda: behavior.run_behavior(request))
+            if not isinstance(result, RecoveryResult):
+                raise PluginFault(
+                    f"plugin {self._run.plugin.name!r} returned {type(result).__name__} from run_behavior, "
+                    "not RecoveryResult"
+                )
+            told.update(outcome=int(result.outcome), message=result.message)
+        return result

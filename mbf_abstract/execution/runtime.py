@@ -1,0 +1,70 @@
+"""What all executions and actions share: clock, events, gate, robot, live parameters, and the server's map hooks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from itertools import count
+from typing import TYPE_CHECKING, Any, Protocol
+
+from mbf_abstract.clock import Clock
+from mbf_abstract.events import EventBus
+from mbf_abstract.execution.callbacks import CallbackThread
+from mbf_abstract.execution.supervisor import Supervisor
+from mbf_abstract.navigation_parameters import NavigationParameters
+from mbf_abstract.plugins import PluginKind
+from mbf_abstract.robot import RobotInformation
+from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.velocity_gate import VelocityGate
+
+if TYPE_CHECKING:
+    from mbf_abstract.execution.plugin_run import PluginRun
+
+
+class MapHooks(Protocol):
+    """What a server of a map may add to every execution."""
+
+    def map_problem(self) -> str:
+        """Why the map must not be driven on right now (e.g. a silent sensor); empty = it is current."""
+
+    def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
+        """Keep the map alive while a goal of this kind runs."""
+
+
+class NoMap:
+    """Hooks of a server without a map: always current, nothing to keep alive."""
+
+    def map_problem(self) -> str:
+        """No map, no problem."""
+        return ""
+
+    def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
+        """Nothing to keep alive."""
+        return nullcontext()
+
+
+@dataclass
+class Runtime:
+    """One server's shared parts; ``parameters`` is replaced as a whole when parameters change at run time."""
+
+    clock: Clock
+    events: EventBus
+    supervisor: Supervisor
+    callbacks: CallbackThread
+    gate: VelocityGate
+    robot: RobotInformation
+    transforms: TransformBuffer
+    parameters: NavigationParameters
+    map_hooks: MapHooks = field(default_factory=NoMap)
+    goal_ids: Iterator[int] = field(default_factory=lambda: count(1))
+    """Goal ids, unique in this server."""
+    runs: set[PluginRun[Any]] = field(default_factory=set)
+    """The plugin runs in progress."""
+    quarantined: int = 0
+    """Threads that hang in a plugin right now; capped by ``max_quarantined``."""
+
+    def on_hang(self, label: str) -> None:
+        """Tell the run whose plugin call hangs; registered with a SimClock."""
+        for run in list(self.runs):
+            run.declare_hung(label)

@@ -1,0 +1,100 @@
+"""The robot as the framework sees it: a sink for commands, odometry, and poses through the transform buffer.
+
+``RobotInformation`` is what plugins and executions ask. It never answers with old data: a pose or a velocity beyond
+its age limit raises ``RobotStateError`` with the measured age, so no command is computed on it (promise P6).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from mbf_abstract.clock import Clock
+from mbf_abstract.geometry import Command, Pose, Twist
+from mbf_abstract.transforms import TransformBuffer, TransformError
+
+
+class RobotStateError(Exception):
+    """The robot's pose or velocity is unknown or too old; the text says which, and how old."""
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """A measured velocity in the base frame and its time [s]."""
+
+    velocity: Twist
+    stamp: float
+
+
+class Robot(Protocol):
+    """What a robot driver implements."""
+
+    def send_command(self, command: Command) -> None:
+        """Apply a command until the next one; called only by the velocity gate. Must not block."""
+
+    def odometry(self) -> Odometry | None:
+        """Last measured velocity, or None if this robot has no odometry."""
+
+
+class RobotInformation:
+    """Fresh robot state in the frames of the server.
+
+    Parameters
+    ----------
+    max_pose_age, max_velocity_age : float
+        Age limits [s] of the robot's transform and odometry.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        transforms: TransformBuffer,
+        clock: Clock,
+        global_frame: str = "map",
+        robot_frame: str = "base_link",
+        max_pose_age: float = 3.0,
+        max_velocity_age: float = 3.0,
+    ) -> None:
+        self._robot = robot
+        self._transforms = transforms
+        self._clock = clock
+        self.global_frame = global_frame
+        self.robot_frame = robot_frame
+        self.max_pose_age = max_pose_age
+        self.max_velocity_age = max_velocity_age
+
+    def pose(self) -> Pose:
+        """Robot pose in the global frame, at most ``max_pose_age`` old.
+
+        Raises
+        ------
+        RobotStateError
+            The transform is missing or too old.
+        """
+        now = self._clock.now()
+        try:
+            transform = self._transforms.lookup(self.global_frame, self.robot_frame, now=now, max_age=self.max_pose_age)
+        except TransformError as error:
+            raise RobotStateError(f"no fresh robot pose: {error}") from error
+        return Pose(transform.translation, transform.rotation, self.global_frame, transform.stamp)
+
+    @property
+    def has_odometry(self) -> bool:
+        """Whether the robot measures its velocity at all."""
+        return self._robot.odometry() is not None
+
+    def velocity(self) -> Twist:
+        """Measured velocity in the base frame; zero for a robot without odometry.
+
+        Raises
+        ------
+        RobotStateError
+            The last odometry is older than ``max_velocity_age``.
+        """
+        odometry = self._robot.odometry()
+        if odometry is None:
+            return Twist()
+        age = self._clock.now() - odometry.stamp
+        if age > self.max_velocity_age:
+            raise RobotStateError(f"odometry is {age:.2f} s old, limit {self.max_velocity_age:.2f} s")
+        return odometry.velocity

@@ -1,0 +1,263 @@
+"""The abstract navigation server: owns the runtime, the plugins and the five actions. It knows no map.
+
+A server of a map derives it and overrides hooks only: make the map, make a plugin's context, say whether the map may be
+driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_costmap_nav.server``,
+``mbf_mesh_nav.server``.
+"""
+
+from __future__ import annotations
+
+import atexit
+import weakref
+import zlib
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mbf_abstract.actions.exe_path import ExePathAction
+from mbf_abstract.actions.get_path import GetPathAction
+from mbf_abstract.actions.move_base import MoveBaseAction
+from mbf_abstract.actions.recovery import RecoveryAction
+from mbf_abstract.actions.refine_path import RefinePathAction
+from mbf_abstract.clock import Clock
+from mbf_abstract.config import Config, PluginDeclaration, PluginSpec
+from mbf_abstract.events import EventBus, EventKind
+from mbf_abstract.execution.callbacks import CallbackThread
+from mbf_abstract.execution.loaded_plugin import LoadedPlugin
+from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.execution.supervisor import Supervisor
+from mbf_abstract.map_queries import MapQueries
+from mbf_abstract.navigation_parameters import NavigationParameters
+from mbf_abstract.parameters import ParameterModel
+from mbf_abstract.plugin_table import PluginTable
+from mbf_abstract.plugins import Plugin, PluginContext, PluginKind
+from mbf_abstract.robot import Robot, RobotInformation
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.velocity_gate import VelocityGate, VelocityLimits
+
+
+class ServerError(Exception):
+    """A plugin can not be loaded, unloaded or changed; the text says why."""
+
+
+class AbstractNavigationServer(ABC):
+    """Actions, plugins and the velocity gate of one robot; use it as a context manager or call ``close``.
+
+    Parameters
+    ----------
+    config : Config
+        A validated configuration.
+    robot : Robot
+        The robot's driver.
+    clock : Clock
+        ``WallClock`` for a real robot, ``SimClock`` for simulated time.
+    transforms : TransformBuffer, optional
+        Where the robot's pose is published.
+    events : EventBus, optional
+        Where events go.
+    seed : int
+        Seed of the plugins' random generators.
+    """
+
+    backend: ClassVar[str]
+    """Prefix of this server's plugin types, e.g. ``mesh``."""
+    plugin_declaration: ClassVar[type[PluginDeclaration]] = PluginDeclaration
+    """Items of the plugin lists, with the options this server knows."""
+    config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {}
+    """Top-level blocks of a configuration that describe this server's map."""
+
+    def __init__(
+        self,
+        config: Config,
+        robot: Robot,
+        clock: Clock,
+        transforms: TransformBuffer | None = None,
+        events: EventBus | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.config = config
+        self._seed = seed
+        self._closed = False
+        self.runtime = self._make_runtime(config.parameters, robot, clock, transforms, events)
+        self.plugins = PluginTable()
+        try:
+            self.load_map(config)
+            for spec in config.plugins:
+                self.load_plugin(spec)
+        except BaseException:
+            self.close()
+            raise
+        self.get_path = GetPathAction(self.runtime, self.plugins)
+        self.exe_path = ExePathAction(self.runtime, self.plugins)
+        self.recovery = RecoveryAction(self.runtime, self.plugins)
+        self.refine_path = RefinePathAction(self.runtime, self.plugins)
+        self.move_base = MoveBaseAction(self.runtime, self.plugins, self.get_path, self.exe_path, self.recovery)
+        self._exit_hook = _close_at_exit(self)
+
+    # --------------------------------------------------------------------------- hooks for a map's server
+    @abstractmethod
+    def load_map(self, config: Config) -> None:
+        """Make the map from the configuration's sections; raises where its files are bad."""
+
+    @abstractmethod
+    def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
+        """Return the context a plugin of this kind is constructed with: ``base`` and the map."""
+
+    @property
+    @abstractmethod
+    def queries(self) -> MapQueries:
+        """The map-independent questions, answered by this server's map."""
+
+    def map_problem(self) -> str:
+        """Why the map must not be driven on right now; empty = it is current."""
+        return ""
+
+    def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
+        """Keep the map alive while a goal of this kind runs."""
+        return nullcontext()
+
+    def close_map(self) -> None:  # noqa: B027 - an optional hook
+        """Give back what the map holds; called once, after all goals were canceled."""
+
+    # ------------------------------------------------------------------------------------------ plugins
+    def load_plugin(self, spec: PluginSpec) -> None:
+        """Construct and add a plugin; raises ServerError with the reason if its constructor fails."""
+        rng = np.random.default_rng([self._seed, zlib.crc32(spec.name.encode())])
+        base = PluginContext(spec.name, spec.parameters, self.runtime.clock, rng, self.runtime.robot)
+        try:
+            instance: Plugin = spec.plugin_class(self.make_context(spec.kind, spec.options, base))
+            self.plugins.add(spec.kind, LoadedPlugin(spec.name, spec.type_name, instance, self.runtime))
+        except Exception as error:
+            text = f"{spec.kind.name.lower()} {spec.name!r} ({spec.type_name}): {type(error).__name__}: {error}"
+            if not spec.optional:
+                raise ServerError(text) from error
+            self.runtime.events.emit(EventKind.FAULT, "server", message=f"optional plugin left out: {text}")
+
+    def unload_plugin(self, kind: PluginKind, name: str) -> None:
+        """Remove a plugin; raises ServerError if there is none of that name or a goal is using it."""
+        plugin = self.plugins.find(kind, name) if name else None
+        if plugin is None:
+            raise ServerError(f"no {kind.name.lower()} named {name!r} is loaded")
+        if not plugin.retire():
+            raise ServerError(f"{kind.name.lower()} {name!r} is in use")
+        self.plugins.remove(kind, name)
+
+    def set_plugin_parameters(self, kind: PluginKind, name: str, **changes: Any) -> None:
+        """Change parameters of a plugin between two of its calls.
+
+        Raises
+        ------
+        ServerError
+            No such plugin, or it is in use.
+        pydantic.ValidationError
+            A value is not legal; nothing is changed.
+        """
+        plugin = self.plugins.find(kind, name) if name else None
+        if plugin is None:
+            raise ServerError(f"no {kind.name.lower()} named {name!r} is loaded")
+        instance = plugin.instance
+        new = type(instance.parameters).model_validate({**instance.parameters.model_dump(), **changes})
+        if not plugin.acquire(self, lambda: True):
+            raise ServerError(f"{kind.name.lower()} {name!r} is in use")
+        try:
+            instance.parameters = new
+            instance.parameters_changed()
+        finally:
+            plugin.release(self)
+        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, name, **changes)
+
+    def set_parameters(self, **changes: Any) -> None:
+        """Change the server's parameters at run time, all or none; raises pydantic.ValidationError."""
+        old = self.runtime.parameters
+        base = self.config.parameters if changes.pop("restore_defaults", False) else old
+        new = NavigationParameters.model_validate({**base.model_dump(), **changes})
+        self.runtime.parameters = new
+        self.runtime.gate.limits = _limits(new)
+        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "server", **changes)
+
+    # --------------------------------------------------------------------------------------- life cycle
+    def cancel_all(self, reason: str = "all goals canceled") -> None:
+        """Cancel every running goal; never waits."""
+        for action in self._actions():
+            action.cancel_all(reason)
+
+    def close(self) -> None:
+        """Stop the robot for good, cancel everything, end the threads; idempotent, never waits for a plugin."""
+        if self._closed:
+            return
+        self._closed = True
+        self.runtime.gate.close()
+        if hasattr(self, "_exit_hook"):
+            atexit.unregister(self._exit_hook)
+        for action in self._actions():
+            action.close()
+        self.runtime.callbacks.close()
+        self.runtime.supervisor.close()
+        self.close_map()
+
+    def __enter__(self) -> AbstractNavigationServer:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def _actions(self) -> list[Any]:
+        names = ("move_base", "get_path", "exe_path", "recovery", "refine_path")
+        return [getattr(self, name) for name in names if hasattr(self, name)]
+
+    def _make_runtime(
+        self,
+        parameters: NavigationParameters,
+        robot: Robot,
+        clock: Clock,
+        transforms: TransformBuffer | None,
+        events: EventBus | None,
+    ) -> Runtime:
+        transforms = transforms or TransformBuffer(parameters.tf_cache_time)
+        events = events or EventBus(clock.now)
+        supervisor = Supervisor(clock)
+        runtime = Runtime(
+            clock=clock,
+            events=events,
+            supervisor=supervisor,
+            callbacks=CallbackThread(clock, events, supervisor),
+            gate=VelocityGate(robot, clock, events, _limits(parameters), parameters.command_timeout),
+            robot=RobotInformation(
+                robot,
+                transforms,
+                clock,
+                parameters.global_frame,
+                parameters.robot_frame,
+                max_pose_age=parameters.tf_timeout,
+                max_velocity_age=parameters.tf_timeout,
+            ),
+            transforms=transforms,
+            parameters=parameters,
+            map_hooks=self,
+        )
+        if isinstance(clock, SimClock):
+            clock.hang_guard = parameters.hang_guard
+            clock.on_hang.append(runtime.on_hang)
+        return runtime
+
+
+def _limits(parameters: NavigationParameters) -> VelocityLimits:
+    given = {name: getattr(parameters, name) for name in ("max_vx", "min_vx", "max_vy", "max_wz", "max_steering_angle")}
+    return VelocityLimits(**{name: value for name, value in given.items() if value is not None})
+
+
+def _close_at_exit(server: AbstractNavigationServer) -> Callable[[], None]:
+    """Stop the robot when the interpreter ends, without keeping the server alive until then."""
+    reference = weakref.ref(server)
+
+    def close() -> None:
+        alive = reference()
+        if alive is not None:
+            alive.runtime.gate.close("the process ends")
+
+    atexit.register(close)
+    return close

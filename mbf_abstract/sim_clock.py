@@ -1,0 +1,414 @@
+"""Lockstep virtual time: the same threads, the same waits, but a run is as fast as the CPU and exactly repeatable.
+
+Every thread of the framework is known to the clock. Exactly one of them runs at a time; when it waits, the clock
+hands the baton to the next one in the order (time, priority, sequence), and time jumps to the earliest wake-up once
+nobody is ready. So the same scenario and seed give the same order of events, bit for bit.
+
+Threads the clock does not know (a viewer's callbacks) may call into the framework at any moment: their waits are
+served too, but they run beside the lockstep and a run they touch is no longer repeatable.
+
+A plugin call that never waits freezes virtual time. A wall-clock guard therefore watches the sections marked by
+``guarded``: after ``hang_guard`` wall seconds the thread is *detached*: time goes on without it, and its next call into
+the clock raises ``ThreadDetached``. This guard is the only place where a simulated run depends on the wall clock.
+
+Use it for simulation and tests. For a real robot use ``WallClock``.
+"""
+
+from __future__ import annotations
+
+import heapq
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from mbf_abstract.clock import ClockThread, Condition, Priority, ThreadDetached
+
+DEFAULT_HANG_GUARD = 30.0
+
+
+class ClockDeadlock(RuntimeError):
+    """Every known thread waits for a notification that nobody is left to send."""
+
+
+class _Participant:
+    """One known (or, while it waits, one foreign) thread."""
+
+    __slots__ = (
+        "baton", "deadlock", "detached", "foreign", "guarded", "held_locks", "name", "notified", "priority",
+        "resumed_at", "ticket", "waiting_on",
+    )  # fmt: skip
+
+    def __init__(self, name: str, priority: int, foreign: bool = False) -> None:
+        self.name = name
+        self.priority = priority
+        self.foreign = foreign
+        self.baton = threading.Semaphore(0)
+        self.ticket = 0  # grows with every wait: a timer entry of an older wait is stale
+        self.notified = False
+        self.detached = False
+        self.deadlock = False
+        self.held_locks = 0
+        self.guarded = ""
+        self.resumed_at = 0.0  # wall clock
+        self.waiting_on: _SimCondition | None = None
+
+
+class SimClock:
+    """Virtual time for any number of threads; the thread that makes it is the first known one.
+
+    Parameters
+    ----------
+    hang_guard : float
+        Wall seconds a guarded section may run without waiting before its thread is detached; 0 = never.
+    schedule : numpy.random.Generator, optional
+        Explore interleavings: ready threads are picked at random and every lock may yield. For tests.
+    external : bool
+        Wait instead of raising ``ClockDeadlock`` when nothing can wake a known thread (a viewer may yet do it).
+    """
+
+    def __init__(
+        self,
+        hang_guard: float = DEFAULT_HANG_GUARD,
+        schedule: np.random.Generator | None = None,
+        external: bool = False,
+    ) -> None:
+        self._mutex = threading.Lock()
+        self._now = 0.0
+        self._sequence = 0
+        self._ready: list[tuple[int, int, _Participant]] = []
+        self._timers: list[tuple[float, int, int, int, _Participant]] = []
+        self._local = threading.local()
+        self._founder = _Participant("main", Priority.CLIENT)
+        self._local.participant = self._founder
+        self._running: _Participant | None = self._founder
+        self._known: set[_Participant] = {self._founder}
+        self._outside = 0
+        self.hang_guard = hang_guard
+        self._guard_thread: threading.Thread | None = None
+        self._schedule = schedule
+        self._external = external
+        self.on_hang: list[Callable[[str], None]] = []
+        """Called (on the guard's thread) with the label of a section whose thread was detached."""
+
+    # ------------------------------------------------------------------------------------------- public
+    def now(self) -> float:
+        """Virtual seconds since the clock was made."""
+        return self._now
+
+    def sleep(self, seconds: float) -> None:
+        """Wait for ``seconds`` of virtual time; zero or less lets the others of this instant run first."""
+        self.sleep_until(self._now + seconds)
+
+    def sleep_until(self, stamp: float) -> None:
+        """Wait until virtual time ``stamp``."""
+        me = self._current()
+        self._forbid_waiting_with_lock(me, 0)
+        with self._mutex:
+            me.notified = False
+            self._add_timer(me, max(stamp, self._now))
+            self._release_baton(me)
+        self._await_baton(me)
+
+    def condition(self) -> Condition:
+        """Make a condition whose waiting moves virtual time."""
+        return _SimCondition(self)
+
+    def spawn(self, target: Callable[[], None], name: str, priority: int = Priority.WORKER) -> ClockThread:
+        """Start a daemon thread that joins the lockstep at the present instant."""
+        return _SimThread(self, target, name, priority)
+
+    @contextmanager
+    def guarded(self, label: str) -> Iterator[None]:
+        """Watch the section with the wall-clock guard."""
+        me = self._current()
+        me.resumed_at = time.monotonic()
+        me.guarded = label
+        self._start_guard()
+        try:
+            yield
+        finally:
+            me.guarded = ""
+            if me.detached:
+                raise ThreadDetached(label)
+
+    @contextmanager
+    def outside(self) -> Iterator[None]:
+        """Give up the baton while the body runs; on return wait for a turn."""
+        me = self._current()
+        if me.foreign:
+            yield
+            return
+        with self._mutex:
+            self._outside += 1
+            if self._running is me:
+                self._running = None
+                self._dispatch()
+        try:
+            yield
+        finally:
+            with self._mutex:
+                self._outside -= 1
+                self._make_ready(me)
+                if self._running is None:
+                    self._dispatch()
+            self._await_baton(me)
+
+    # -------------------------------------------------------------------------------- waiting and waking
+    def _wait(self, condition: _SimCondition, timeout: float | None) -> bool:
+        me = self._current()
+        self._forbid_waiting_with_lock(me, 1)
+        with self._mutex:
+            me.notified = False
+            me.waiting_on = condition
+            condition.waiters.append(me)
+            if timeout is not None:
+                self._add_timer(me, self._now + max(0.0, timeout))
+            else:
+                me.ticket += 1
+            condition.release(me)
+            self._release_baton(me)
+        try:
+            self._await_baton(me)
+        finally:
+            condition.acquire(me)
+        return me.notified
+
+    def _notify_all(self, condition: _SimCondition) -> None:
+        with self._mutex:
+            waiters, condition.waiters = condition.waiters, []
+            for waiter in waiters:
+                waiter.notified = True
+                waiter.waiting_on = None
+                self._make_ready(waiter)
+            if waiters and self._running is None:
+                self._dispatch()
+
+    def _maybe_yield(self, me: _Participant) -> None:
+        """Explore: let another ready thread run before a lock is taken."""
+        if self._schedule is None or me.foreign or me.held_locks:
+            return
+        with self._mutex:
+            if not self._ready or self._schedule.random() < 0.5:
+                return
+            self._make_ready(me)
+            self._release_baton(me)
+        self._await_baton(me)
+
+    # ------------------------------------------------------------------------------ the scheduler itself
+    def _current(self) -> _Participant:
+        me: _Participant | None = getattr(self._local, "participant", None)
+        if me is None:
+            me = _Participant(threading.current_thread().name, Priority.CLIENT, foreign=True)
+            self._local.participant = me
+        if me.detached:
+            raise ThreadDetached(me.name)
+        return me
+
+    def _add_timer(self, me: _Participant, stamp: float) -> None:
+        me.ticket += 1
+        self._sequence += 1
+        heapq.heappush(self._timers, (stamp, me.priority, self._sequence, me.ticket, me))
+
+    def _make_ready(self, who: _Participant) -> None:
+        who.ticket += 1
+        self._sequence += 1
+        heapq.heappush(self._ready, (who.priority, self._sequence, who))
+
+    def _release_baton(self, me: _Participant) -> None:
+        """Pass the baton on, mutex held; a foreign thread has none but may have to start an idle clock."""
+        if not me.foreign:
+            self._running = None
+        if self._running is None:
+            self._dispatch()
+
+    def _await_baton(self, me: _Participant) -> None:
+        me.baton.acquire()
+        if me.guarded:
+            me.resumed_at = time.monotonic()
+        if me.detached:
+            raise ThreadDetached(me.name)
+        if me.deadlock:
+            me.deadlock = False
+            raise ClockDeadlock(self._describe_waiters())
+
+    def _dispatch(self) -> None:
+        """Choose who runs next, moving time if nobody is ready; mutex held, nobody running."""
+        while True:
+            if not self._ready and not self._advance_time():
+                self._report_deadlock()
+                if not self._ready:
+                    return
+            nxt = self._pop_ready()
+            if nxt.detached:
+                continue
+            if not nxt.foreign:
+                self._running = nxt
+                nxt.baton.release()
+                return
+            nxt.baton.release()  # a foreign thread goes its way beside the lockstep
+
+    def _pop_ready(self) -> _Participant:
+        if self._schedule is not None and len(self._ready) > 1:
+            index = int(self._schedule.integers(len(self._ready)))
+            entry = self._ready.pop(index)
+            heapq.heapify(self._ready)
+            return entry[2]
+        return heapq.heappop(self._ready)[2]
+
+    def _advance_time(self) -> bool:
+        """Jump to the earliest wake-up and make everyone due then ready; False if there is none."""
+        while self._timers and self._timers[0][3] != self._timers[0][4].ticket:
+            heapq.heappop(self._timers)
+        if not self._timers:
+            return False
+        self._now = max(self._now, self._timers[0][0])
+        while self._timers and self._timers[0][0] <= self._now:
+            _, _, _, ticket, who = heapq.heappop(self._timers)
+            if ticket != who.ticket:
+                continue
+            if who.waiting_on is not None:
+                who.waiting_on.waiters.remove(who)
+                who.waiting_on = None
+            self._make_ready(who)
+        return True
+
+    def _report_deadlock(self) -> None:
+        founder = self._founder
+        if self._external or self._outside or founder.waiting_on is None:
+            return
+        founder.waiting_on.waiters.remove(founder)
+        founder.waiting_on = None
+        founder.deadlock = True
+        self._make_ready(founder)
+
+    def _describe_waiters(self) -> str:
+        names = sorted(p.name for p in self._known if p is not self._founder)
+        return f"at t={self._now:.3f} s every thread waits for another one: main, {', '.join(names) or 'nobody else'}"
+
+    def _forbid_waiting_with_lock(self, me: _Participant, allowed: int) -> None:
+        if me.held_locks > allowed:
+            raise RuntimeError(f"thread {me.name!r} waits while it holds {me.held_locks - allowed} more condition(s)")
+
+    # ----------------------------------------------------------------------------------- threads, guard
+    def _enter_thread(self, me: _Participant) -> None:
+        self._local.participant = me
+        self._await_baton(me)
+
+    def _leave_thread(self, me: _Participant) -> None:
+        with self._mutex:
+            self._known.discard(me)
+            if self._running is me:
+                self._running = None
+                self._dispatch()
+
+    def _start_guard(self) -> None:
+        if self.hang_guard > 0.0 and self._guard_thread is None:
+            self._guard_thread = threading.Thread(target=self._guard, name="hang guard", daemon=True)
+            self._guard_thread.start()
+
+    def _guard(self) -> None:
+        while True:
+            time.sleep(min(1.0, self.hang_guard / 4.0))
+            label = self._detach_if_hung()
+            for callback in list(self.on_hang) if label else ():
+                callback(label)
+
+    def _detach_if_hung(self) -> str:
+        with self._mutex:
+            suspect = self._running
+            if suspect is None or not suspect.guarded or suspect is self._founder:
+                return ""
+            if time.monotonic() - suspect.resumed_at < self.hang_guard:
+                return ""
+            suspect.detached = True
+            self._known.discard(suspect)
+            self._running = None
+            self._dispatch()
+            return suspect.guarded
+
+
+class _SimCondition:
+    """A condition of a SimClock; the real lock inside is contended only by foreign threads."""
+
+    __slots__ = ("_clock", "_lock", "waiters")
+
+    def __init__(self, clock: SimClock) -> None:
+        self._clock = clock
+        self._lock = threading.Lock()
+        self.waiters: list[_Participant] = []
+
+    def __enter__(self) -> _SimCondition:
+        me = self._clock._current()
+        self._clock._maybe_yield(me)
+        self.acquire(me)
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.release(self._clock._local.participant)
+
+    def acquire(self, me: _Participant) -> None:
+        self._lock.acquire()
+        me.held_locks += 1
+
+    def release(self, me: _Participant) -> None:
+        me.held_locks -= 1
+        self._lock.release()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        return self._clock._wait(self, timeout)
+
+    def notify_all(self) -> None:
+        self._clock._notify_all(self)
+
+
+class _SimThread:
+    """A thread in lockstep."""
+
+    def __init__(self, clock: SimClock, target: Callable[[], None], name: str, priority: int) -> None:
+        self._clock = clock
+        self._ended = clock.condition()
+        self._alive = True
+        self._me = _Participant(name, priority)
+        self._target = target
+        thread = threading.Thread(target=self._run, name=name, daemon=True)
+        with clock._mutex:
+            clock._known.add(self._me)
+            clock._make_ready(self._me)
+            if clock._running is None:
+                clock._dispatch()
+        thread.start()
+
+    @property
+    def name(self) -> str:
+        return self._me.name
+
+    def is_alive(self) -> bool:
+        return self._alive
+
+    def join(self, timeout: float | None = None) -> bool:
+        deadline = None if timeout is None else self._clock.now() + timeout
+        with self._ended:
+            while self._alive:
+                remaining = None if deadline is None else deadline - self._clock.now()
+                if remaining is not None and remaining <= 0.0:
+                    break
+                self._ended.wait(remaining)
+        return not self._alive
+
+    def _run(self) -> None:
+        clock = self._clock
+        try:
+            clock._enter_thread(self._me)
+            self._target()
+        except ThreadDetached:
+            pass
+        finally:
+            if self._me.detached:
+                clock._local.participant = _Participant(self._me.name, self._me.priority, foreign=True)
+            with self._ended:
+                self._alive = False
+                self._ended.notify_all()
+            clock._leave_thread(self._me)
