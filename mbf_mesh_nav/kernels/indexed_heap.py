@@ -21,7 +21,7 @@ Int32Array = NDArray[np.int32]
 
 @kernel
 def push_or_decrease(
-    keys: Float32Array, ids: Int32Array, positions: Int32Array, size: int, item: int, key: np.float32
+    keys: Float32Array, ids: Int32Array, positions: Int32Array, size: int, item: int, key: float
 ) -> int:
     """Queue ``item`` with ``key``, or lower its key if it is queued already; return the new size."""
     slot = positions[item]

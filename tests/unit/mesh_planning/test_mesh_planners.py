@@ -9,9 +9,10 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.planners.astar import AStarPlanner
+from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
 
-PLANNERS = [DijkstraPlanner, AStarPlanner]
+PLANNERS = [DijkstraPlanner, AStarPlanner, CVPPlanner]
 
 
 @pytest.fixture(params=PLANNERS, ids=lambda planner: planner.__name__)

@@ -1,0 +1,164 @@
+"""Continuous wave over a triangle mesh: distances whose level sets cross faces instead of following edges.
+
+The update rule is that of mesh_navigation's continuous vector planner: the triangle is unfolded into the plane, the
+two known distances define a virtual source on the far side of their edge, and the third corner's distance is the
+straight line to it if that line crosses the edge, else a walk along the nearer side. Angles are compared by their
+cosines, no arc cosine is taken.
+
+Exact for a point source on flat ground; on curved ground within 1-2 %. Cost: about 300 ns a vertex.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top
+
+ALONG_EDGE = -1
+# float32 constants: a plain number would turn the arithmetic of the update into float64.
+_ZERO: Any = np.float32(0)
+_HALF: Any = np.float32(0.5)
+_TWO: Any = np.float32(2)
+_INFINITE: Any = np.float32(np.inf)
+
+
+@kernel
+def propagate_wave(
+    neighbour_offsets: Int32Array,
+    neighbours: Int32Array,
+    edge_weights: Float32Array,
+    vertex_face_offsets: Int32Array,
+    corner_slots: Int32Array,
+    blocked: BoolArray,
+    distances: Float32Array,
+    predecessors: Int32Array,
+    cut_records: Int32Array,
+    seeds: Int32Array,
+    targets: Int32Array,
+    overshoot: float,
+    cancel_flag: FlagArray,
+) -> int:
+    """Spread a wave from ``seeds`` over the faces whose corners are all free.
+
+    Parameters
+    ----------
+    neighbour_offsets, neighbours, edge_weights : CSR arrays
+        int32 (V+1,), int32 (2E,), float32 (2E,) [m].
+    vertex_face_offsets, corner_slots : (V+1,) int32, (3F, 3) int32
+        Faces around a vertex as corner records, see ``corners.py``.
+    blocked : (V,) bool
+        Vertices never entered.
+    distances : (V,) float32
+        In: 0 or a known distance [m] at the seeds, inf elsewhere. Out: weighted distances [m], inf where not reached.
+    predecessors : (V,) int32
+        Out: the corner of the last crossed edge nearer to the ray, -1 at seeds and where not reached.
+    cut_records : (V,) int32
+        Out: the predecessor's corner record whose face the ray crosses, ``ALONG_EDGE`` where it follows an edge.
+    seeds : (s,) int32
+        Start vertices; they keep their distances.
+    targets : (t,) int32
+        Once all of them are settled the wave goes on for ``overshoot`` [m] and ends; empty: the whole field.
+    cancel_flag : (1,) uint8
+        Polled; nonzero ends the call.
+
+    Returns
+    -------
+    int
+        Number of settled vertices, -1 if cancelled.
+    """
+    vertex_count = len(distances)
+    keys = np.empty(vertex_count, dtype=np.float32)
+    ids = np.empty(vertex_count, dtype=np.int32)
+    positions = np.full(vertex_count, -1, dtype=np.int32)
+    settled = np.zeros(vertex_count, dtype=np.bool_)
+    size = 0
+    for seed in seeds:
+        size = push_or_decrease(keys, ids, positions, size, seed, distances[seed])
+        settled[seed] = True  # the corners of the source's face: their distances are exact from the start
+    limit = np.inf
+    pops = 0
+    while size > 0 and keys[0] <= limit:
+        if pops % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
+            return -1
+        vertex = ids[0]
+        size = remove_top(keys, ids, positions, size)
+        settled[vertex] = True
+        pops += 1
+        if limit == np.inf and len(targets) > 0:
+            all_settled = True
+            for target in targets:
+                all_settled = all_settled and settled[target]
+            if all_settled:
+                limit = distances[vertex] + overshoot
+        for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
+            slot_first, slot_second = corner_slots[record, 0], corner_slots[record, 1]
+            first, second = neighbours[slot_first], neighbours[slot_second]
+            if settled[first] == settled[second] or blocked[first] or blocked[second]:
+                continue
+            if settled[first]:
+                slot_known, slot_free = slot_first, slot_second
+            else:
+                slot_known, slot_free = slot_second, slot_first
+            known, free = neighbours[slot_known], neighbours[slot_free]
+            distance, nearer = unfolded_distance(
+                distances[vertex],
+                distances[known],
+                distances[free],
+                edge_weights[slot_known],
+                edge_weights[slot_free],
+                edge_weights[corner_slots[record, 2]],
+            )
+            if distance < distances[free]:
+                distances[free] = distance
+                predecessors[free] = vertex if abs(nearer) == 1 else known
+                cut_records[free] = record if nearer > 0 else ALONG_EDGE
+                size = push_or_decrease(keys, ids, positions, size, free, distance)
+    return pops
+
+
+@kernel
+def unfolded_distance(u1: float, u2: float, u3: float, c: float, b: float, a: float) -> tuple[float, int]:
+    """Distance of corner 3 of an unfolded triangle from the distances ``u1``, ``u2`` of corners 1 and 2.
+
+    Parameters
+    ----------
+    u1, u2, u3 : float
+        Distances; ``u3`` is the one known so far.
+    c, b, a : float
+        Lengths of the sides 12, 13 and 23.
+
+    Returns
+    -------
+    distance : float32
+        The candidate, inf if it cannot beat ``u3``.
+    nearer : int
+        Corner (1 or 2) next to which the way passes; negative if it runs along the side from that corner.
+    """
+    # Virtual source below side 12, corner 3 above it; the x axis runs from corner 1 to corner 2. Differences of squares
+    # are written as products: far from the source float32 would lose them otherwise.
+    half_inverse = _HALF / c
+    source_x = (c * c + (u1 - u2) * (u1 + u2)) * half_inverse
+    corner_x = (c * c + (b - a) * (b + a)) * half_inverse
+    source_depth = math.sqrt(max((u1 - source_x) * (u1 + source_x), _ZERO))
+    corner_height = math.sqrt(max((b - corner_x) * (b + corner_x), _ZERO))
+    across, along = corner_height + source_depth, corner_x - source_x
+    u = math.sqrt(across * across + along * along)
+    if not u < u3:
+        return _INFINITE, 0
+    # Cosines at corner 3 times twice the lengths of their sides: n0 between the sides, n1 and n2 from side 13 and 23 to
+    # the ray. Multiplying across compares them without a division.
+    n0 = a * a + (b - c) * (b + c)
+    n1 = b * b + (u - u1) * (u + u1)
+    n2 = a * a + (u - u2) * (u + u2)
+    if abs(n1) > _TWO * u * b:
+        return u1 + b, -1
+    if abs(n2) > _TWO * u * a:
+        return u2 + a, -2
+    if n1 * a > n2 * b:  # the ray passes nearer to corner 1
+        return (u, 1) if n2 * b > n0 * u else (u1 + b, -1)
+    return (u, 2) if n1 * a > n0 * u else (u2 + a, -2)

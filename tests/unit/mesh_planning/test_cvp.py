@@ -1,0 +1,164 @@
+"""The continuous wave, its directions and the exact descent: against a slow twin, exact shapes and random pairs."""
+
+import heapq
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.plugins import PlanRequest
+from mbf_mesh_nav.kernels.corners import build_corner_slots
+from mbf_mesh_nav.kernels.cvp import propagate_wave
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.planners.cvp import CVPPlanner
+from mbf_mesh_nav.vector_field import VectorField
+
+
+def wave_from_vertex(mesh_map, source, weights=None, blocked=None):
+    """Distances of the kernel, seeded with the true straight distances of the ring around one vertex."""
+    count = len(mesh_map.vertices)
+    slots = build_corner_slots(
+        mesh_map.faces, mesh_map.vertex_face_offsets, mesh_map.vertex_faces,
+        mesh_map.neighbour_offsets, mesh_map.neighbours,
+    )  # fmt: skip
+    weights = mesh_map.neighbour_lengths if weights is None else weights
+    blocked = np.zeros(count, bool) if blocked is None else blocked
+    distances = np.full(count, np.inf, np.float32)
+    ring = mesh_map.neighbours[mesh_map.neighbour_offsets[source] : mesh_map.neighbour_offsets[source + 1]]
+    seeds = np.concatenate([[source], ring]).astype(np.int32)
+    distances[seeds] = np.linalg.norm(mesh_map.vertices[seeds] - mesh_map.vertices[source], axis=1)
+    propagate_wave(
+        mesh_map.neighbour_offsets, mesh_map.neighbours, weights, mesh_map.vertex_face_offsets, slots, blocked,
+        distances, np.full(count, -1, np.int32), np.full(count, -1, np.int32), seeds, np.zeros(0, np.int32), 0.3,
+        np.zeros(1, np.uint8),
+    )  # fmt: skip
+    return distances, seeds
+
+
+def slow_wave(mesh_map, weights, seeds, distances):
+    """The twin: heapq and the rule as published, with arc cosines, in float64."""
+    count = len(mesh_map.vertices)
+    starts = np.repeat(np.arange(count), np.diff(mesh_map.neighbour_offsets))
+    length = {
+        pair: float(w) for *pair, w in zip(starts, mesh_map.neighbours, weights, strict=True) for pair in [(*pair,)]
+    }
+    u = {int(seed): float(distances[seed]) for seed in seeds}
+    settled, queue = set(u), [(d, v) for v, d in u.items()]
+    heapq.heapify(queue)
+    while queue:
+        d, v = heapq.heappop(queue)
+        if d > u[v]:
+            continue
+        settled.add(v)
+        for face in mesh_map.faces[(mesh_map.faces == v).any(axis=1)].tolist():
+            free = [corner for corner in face if corner not in settled]
+            if len(free) != 1:
+                continue
+            v3 = free[0]
+            v1, v2 = (corner for corner in face if corner != v3)
+            candidate = angle_rule(u[v1], u[v2], length[v1, v2], length[v1, v3], length[v2, v3])
+            if candidate < u.get(v3, math.inf):
+                u[v3] = candidate
+                heapq.heappush(queue, (candidate, v3))
+    return np.array([u.get(v, math.inf) for v in range(count)])
+
+
+def angle_rule(u1, u2, c, b, a):
+    sx = (c * c + u1 * u1 - u2 * u2) / (2 * c)
+    sy = -math.sqrt(max(u1 * u1 - sx * sx, 0))
+    p = (b * b + c * c - a * a) / (2 * c)
+    u = math.hypot(p - sx, math.sqrt(max(b * b - p * p, 0)) - sy)
+    cos1, cos2 = (u * u + b * b - u1 * u1) / (2 * u * b), (a * a + u * u - u2 * u2) / (2 * a * u)
+    if abs(cos1) > 1 or abs(cos2) > 1:
+        return u1 + b if abs(cos1) > 1 else u2 + a
+    angle0, angle1, angle2 = math.acos((a * a + b * b - c * c) / (2 * a * b)), math.acos(cos1), math.acos(cos2)
+    if angle1 < angle0 and angle2 < angle0:
+        return u
+    return u1 + b if angle1 < angle2 else u2 + a
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_wave_equals_the_published_rule_on_rough_weighted_ground(seed):
+    rng = np.random.default_rng(seed)
+    mesh_map = MeshMap.from_heights(rng.uniform(0, 0.3, (14, 14)), 0.5, 0.4)
+    costs = rng.uniform(0, 1, len(mesh_map.vertices))
+    starts = np.repeat(np.arange(len(costs)), np.diff(mesh_map.neighbour_offsets))
+    weights = (mesh_map.neighbour_lengths * (1 + (costs[starts] + costs[mesh_map.neighbours]) / 2)).astype(np.float32)
+    fast, seeds = wave_from_vertex(mesh_map, 90, weights)
+    slow = slow_wave(mesh_map, weights, seeds, np.linalg.norm(mesh_map.vertices - mesh_map.vertices[90], axis=1))
+    np.testing.assert_allclose(fast, slow, rtol=2e-5, atol=1e-6)
+
+
+def test_distances_on_a_plane_are_within_the_accepted_third_of_a_percent(shared_data):
+    mesh = trimesh.load(shared_data / "meshes/mesh_mppi/plane.ply", process=False)
+    mesh_map = MeshMap.from_arrays(mesh.vertices, mesh.faces)
+    center = int(np.argmin(np.linalg.norm(mesh_map.vertices - mesh_map.vertices.mean(axis=0), axis=1)))
+    distances, _ = wave_from_vertex(mesh_map, center)
+    exact = np.linalg.norm(mesh_map.vertices - mesh_map.vertices[center], axis=1)
+    assert np.abs(distances - exact)[exact > 0].max() <= 0.0033 * exact.max()
+
+
+def test_distances_on_a_sphere_are_within_the_accepted_percent(shared_data):
+    mesh = trimesh.load(shared_data / "meshes/mesh_mppi/sphere.ply", process=False)
+    mesh_map = MeshMap.from_arrays(mesh.vertices, mesh.faces)
+    distances, _ = wave_from_vertex(mesh_map, 0)
+    cosines = mesh_map.vertices @ mesh_map.vertices[0] / 4.0
+    exact = 2.0 * np.arccos(np.clip(cosines, -1, 1))
+    beyond = exact > 0.1
+    assert (np.abs(distances - exact)[beyond] / exact[beyond]).max() <= 0.0125
+
+
+def test_every_reachable_random_pair_gets_a_path_as_long_as_its_potential(make_plugin, paint):
+    rng = np.random.default_rng(5)
+    x, y = np.meshgrid(np.arange(80), np.arange(80))
+    heights = 0.3 * np.sin(x / 5) * np.cos(y / 7) + rng.uniform(0, 0.03, x.shape)
+    mesh_map = MeshMap.from_heights(heights, 0.1, 0.1)
+    pillars = rng.uniform(0, 8, (60, 2))
+
+    def costs(vertices):
+        nearest = np.linalg.norm(vertices[:, None, :2] - pillars, axis=2).min(axis=1)
+        return np.where(nearest < 0.25, np.inf, 0.0)
+
+    paint(mesh_map, costs)
+    planner = make_plugin(CVPPlanner, mesh_map)
+    free = mesh_map.vertices[~mesh_map.snapshot().lethal]
+    ratios = []
+    for _ in range(300):
+        start, goal = free[rng.choice(len(free), 2, replace=False)] + rng.uniform(-0.03, 0.03, (2, 3))
+        result = planner.make_plan(PlanRequest(Pose(tuple(start)), Pose(tuple(goal))))
+        assert result.success or "is blocked" in result.message or "no free way" in result.message
+        if result.success:
+            ratios.append(result.path.length / result.cost)
+    assert len(ratios) > 250
+    assert np.mean(ratios) < 1.01 and max(ratios) < 1.25
+
+
+def test_the_field_points_at_the_goal_everywhere_on_a_plane(make_plugin, plain):
+    mesh_map = plain()
+    goal = np.array([2.33, 3.14, 0.0])
+    request = PlanRequest(Pose.planar(0.1, 5.9), Pose(tuple(goal)))
+    result = make_plugin(CVPPlanner, mesh_map, goal_dist_offset=10.0).make_plan(request)
+    (field,) = result.path.guidance
+    assert isinstance(field, VectorField)
+    for point in np.random.default_rng(0).uniform(0.1, 5.9, (200, 2)):
+        spot = mesh_map.locate_one((*point, 0.0))
+        expected = (goal - spot.point) / np.linalg.norm(goal - spot.point)
+        direction = field.direction_at(mesh_map, spot)
+        if np.linalg.norm(goal - spot.point) > 0.8:
+            assert direction @ expected > math.cos(math.radians(4))
+        assert direction @ expected > math.cos(math.radians(20))
+    with pytest.raises(ValueError):
+        field.distances[0] = 1.0
+
+
+def test_a_path_ends_in_the_middle_of_lethal_vertices_if_one_free_vertex_is_left(make_plugin, plain, paint):
+    # The goal's nearest vertex (3, 3) is free, the other corners of its face are lethal.
+    mesh_map = plain()
+    face = mesh_map.faces[mesh_map.locate_one((3.02, 3.04, 0.0)).face]
+    lethal = [corner for corner in face if np.linalg.norm(mesh_map.vertices[corner] - [3, 3, 0]) > 0.1]
+    paint(mesh_map, lambda v: np.where(np.isin(np.arange(len(v)), lethal), np.inf, 0.0))
+    result = make_plugin(CVPPlanner, mesh_map).make_plan(PlanRequest(Pose.planar(0.5, 0.5), Pose.planar(3.02, 3.04)))
+    assert result.success, result.message
+    assert result.path.length < 3.9
