@@ -1,16 +1,19 @@
 """The one door to PyBullet: import it quietly, and say what to install where it is missing.
 
-PyBullet's C++ side prints to the process's standard output (a build line on import, warnings without a line end on
-loading). That output would glue onto ours, so both happen inside ``quiet_native_output``.
+PyBullet's C++ side prints straight to the process's output (a build line on import, warnings without a line end on
+loading). That would glue onto our own output, so such calls happen inside ``quiet_native_output``.
 """
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
+
+STANDARD_OUTPUT, STANDARD_ERROR = 1, 2
 
 
 class SimulatorMissingError(ImportError):
@@ -19,24 +22,39 @@ class SimulatorMissingError(ImportError):
 
 @contextmanager
 def quiet_native_output() -> Iterator[None]:
-    """Send what native code prints to standard output to nowhere, for the duration of the block.
+    """Send what native code prints to nowhere, for the duration of the block; exceptions pass.
 
-    Works on file descriptor 1, so it also hides what another thread prints meanwhile: keep the block short.
+    Works on file descriptors, so it also hides what another thread prints meanwhile: keep the block short.
     """
     sys.stdout.flush()
+    sys.stderr.flush()
+    with ExitStack() as streams:
+        for descriptor in (STANDARD_OUTPUT, STANDARD_ERROR):
+            streams.enter_context(_silenced(descriptor))
+        yield
+
+
+@contextmanager
+def _silenced(descriptor: int) -> Iterator[None]:
     try:
-        kept = os.dup(1)
-    except OSError:  # this process has no standard output: nothing to hide
+        kept = os.dup(descriptor)
+    except OSError:  # the process was started without this stream: nothing to hide
         yield
         return
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 1)
+        os.dup2(nowhere, descriptor)
         yield
     finally:
-        os.dup2(kept, 1)
+        _flush_native_buffers()  # text that C still buffers would come out after the block
+        os.dup2(kept, descriptor)
         os.close(nowhere)
         os.close(kept)
+
+
+def _flush_native_buffers() -> None:
+    if os.name == "posix":
+        ctypes.CDLL(None).fflush(None)
 
 
 def load_pybullet() -> Any:

@@ -7,11 +7,14 @@ splits its heightfields: ``height_at`` and ``triangles`` are that surface and no
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RectBivariateSpline
+
+from mbf_abstract.geometry import Pose, quaternions_from_axes
 
 FloatArray = NDArray[np.float64]
 
@@ -133,6 +136,24 @@ class Heightfield:
         rise_y = np.where(is_lower, h01 - h[iy, ix], h[iy + 1, ix + 1] - h10)
         normal = np.stack([-rise_x / self.dx, -rise_y / self.dy, np.where(np.isnan(s), np.nan, 1.0)], axis=-1)
         return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
+
+    def pose_at(self, x: float, y: float, yaw: float = 0.0) -> Pose:
+        """Pose on the ground at (x, y) [m]: z axis along the normal, x axis towards ``yaw`` [rad] seen from above.
+
+        Raises
+        ------
+        ValueError
+            The position is not on the terrain.
+        """
+        if not self.contains(x, y):
+            raise ValueError(
+                f"({x:g}, {y:g}) is off the terrain x {self.x0:g}..{self.x_max:g}, y {self.y0:g}..{self.y_max:g}"
+            )
+        normal = self.normal_at(x, y)
+        slope_along = -(normal[0] * math.cos(yaw) + normal[1] * math.sin(yaw)) / normal[2]
+        heading = [[math.cos(yaw), math.sin(yaw), slope_along]]
+        qx, qy, qz, qw = quaternions_from_axes(heading, [normal])[0].tolist()
+        return Pose((x, y, float(self.height_at(x, y))), (qx, qy, qz, qw))
 
     def triangles(self) -> tuple[FloatArray, NDArray[np.int32]]:
         """Build the surface as a mesh.

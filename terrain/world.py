@@ -58,6 +58,8 @@ class BulletWorld:
         PyBullet's number of this world, the ``physicsClientId`` of every call.
     step_count : int
         Steps since the clock was started (see ``restart_clock``); ``time`` is derived from it and thus exact.
+    ground_bodies : set of int
+        Bodies that are there to be driven on; touching any other counts as a collision.
     """
 
     time_step = TIME_STEP
@@ -67,6 +69,7 @@ class BulletWorld:
         with quiet_native_output():
             self.client: int = self.bullet.connect(self.bullet.DIRECT)
         self.step_count = 0
+        self.ground_bodies: set[int] = set()
         self._static: list[tuple[FloatArray, IntArray]] = []
         self._folder = tempfile.TemporaryDirectory(prefix="mbf_world_")
         self._before_step: list[Callable[[], None]] = []
@@ -144,10 +147,20 @@ class BulletWorld:
         middle = 0.5 * (float(raw.min()) + float(raw.max()))  # Bullet centres z on the middle of the range
         centre = [terrain.x0 + terrain.size[0] / 2, terrain.y0 + terrain.size[1] / 2, middle + shift]
         self._static.append(terrain.triangles())
-        return self._add_static_body(shape, centre, friction)
+        return self._add_static_body(shape, centre, friction, ground=True)
 
-    def add_mesh(self, vertices: ArrayLike, faces: ArrayLike, friction: float = 1.0) -> int:
-        """Put a fixed, maybe concave triangle mesh in: ``vertices`` (n, 3) [m], ``faces`` (m, 3); return the body."""
+    def add_mesh(self, vertices: ArrayLike, faces: ArrayLike, friction: float = 1.0, ground: bool = True) -> int:
+        """Put a fixed, maybe concave triangle mesh in and return its body.
+
+        Parameters
+        ----------
+        vertices : (n, 3) float
+            Corners [m].
+        faces : (m, 3) int
+            Counter-clockwise seen from outside.
+        ground : bool
+            False for walls: touching them is a collision.
+        """
         vertices = np.array(vertices, dtype=np.float64).reshape(-1, 3)
         faces = np.array(faces, dtype=np.int32).reshape(-1, 3)
         file = Path(self._folder.name) / f"mesh_{len(self._static)}.obj"
@@ -162,7 +175,7 @@ class BulletWorld:
                 physicsClientId=self.client,
             )
         self._static.append((vertices, faces))
-        return self._add_static_body(shape, [0.0, 0.0, 0.0], friction)
+        return self._add_static_body(shape, [0.0, 0.0, 0.0], friction, ground)
 
     def add_ground_plane(self, x_min: float, x_max: float, y_min: float, y_max: float, friction: float = 1.0) -> int:
         """Put a level floor in at z = 0; it is endless for wheels and as large as given [m] for lidar rays."""
@@ -171,7 +184,7 @@ class BulletWorld:
         shape = self.bullet.createCollisionShape(
             self.bullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=self.client
         )
-        return self._add_static_body(shape, [0.0, 0.0, 0.0], friction)
+        return self._add_static_body(shape, [0.0, 0.0, 0.0], friction, ground=True)
 
     def add_box(self, pose: Pose, size: Sequence[float], mass: float = 0.0, moving: bool = False) -> int:
         """Put a box of ``size`` (3,) [m] in, centred at ``pose``.
@@ -207,11 +220,13 @@ class BulletWorld:
         self.bullet.changeDynamics(body, -1, lateralFriction=1.0, physicsClientId=self.client)
         return body
 
-    def _add_static_body(self, shape: int, position: Sequence[float], friction: float) -> int:
+    def _add_static_body(self, shape: int, position: Sequence[float], friction: float, ground: bool) -> int:
         body: int = self.bullet.createMultiBody(0, shape, basePosition=position, physicsClientId=self.client)
         # Bullet multiplies the frictions of the two bodies, and its own default is 0.5
         self.bullet.changeDynamics(body, -1, lateralFriction=friction, physicsClientId=self.client)
         self.set_group(body, STATIC)
+        if ground:
+            self.ground_bodies.add(body)
         return body
 
     def set_group(self, body: int, group: int) -> None:

@@ -1,0 +1,174 @@
+"""Notice when driving goes wrong: tipped over, slipping, high-centred, stuck, collided. Pure, fed with samples.
+
+Use it on the simulator's ground truth, to count what physics did to a run; a controller must not look at it. Each
+kind has a condition that must hold for a while, then counts once until it has been false again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+
+from mbf_abstract.geometry import Pose, Twist
+
+
+class MishapKind(Enum):
+    """What went wrong."""
+
+    TIPPED_OVER = "tipped_over"
+    SLIPPING = "slipping"
+    HIGH_CENTRED = "high_centred"
+    STUCK = "stuck"
+    COLLISION = "collision"
+
+
+@dataclass(frozen=True)
+class MotionSample:
+    """State of a robot at one instant.
+
+    Attributes
+    ----------
+    pose, velocity : Pose, Twist
+        Ground truth of base_link; velocity in the base frame.
+    commanded : Twist
+        Motion asked for.
+    rolling : Twist
+        Motion that the turning wheels would make without slip.
+    body_on_ground, body_on_obstacle : bool
+        Whether the body touches the ground, or any part touches something that is not ground.
+    power : float
+        Mechanical power of the motors [W], losses counted positive.
+    """
+
+    pose: Pose
+    velocity: Twist
+    commanded: Twist
+    rolling: Twist
+    body_on_ground: bool = False
+    body_on_obstacle: bool = False
+    power: float = 0.0
+
+
+@dataclass(frozen=True)
+class Mishap:
+    """Something that went wrong, when [s] and where."""
+
+    kind: MishapKind
+    stamp: float
+    pose: Pose
+
+
+@dataclass(frozen=True)
+class MishapLimits:
+    """When a motion counts as a mishap; ``hold`` times [s] in brackets of the kind."""
+
+    tilt: float = math.radians(60.0)
+    tilt_hold: float = 0.3
+    slip_speed: float = 0.25
+    slip_hold: float = 0.5
+    standing_speed: float = 0.05
+    standing_share: float = 0.2
+    high_centred_hold: float = 1.5
+    stuck_hold: float = 3.0
+
+
+def tilt_of(pose: Pose) -> float:
+    """Angle [rad] between the robot's z axis and the vertical."""
+    x, y, _, _ = pose.orientation
+    return math.acos(max(-1.0, min(1.0, 1.0 - 2.0 * (x * x + y * y))))
+
+
+def roll_pitch(pose: Pose) -> tuple[float, float]:
+    """Roll and pitch [rad] of the fixed-axis (REP-103) convention; nose down is positive pitch."""
+    x, y, z, w = pose.orientation
+    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    return roll, math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
+
+
+@dataclass
+class MishapMonitor:
+    """Counts mishaps and keeps the extremes of a run; call ``update`` at a steady rate (20 Hz is enough).
+
+    Attributes
+    ----------
+    counts : Counter of MishapKind
+    max_roll, max_pitch : float
+        Largest magnitudes so far [rad].
+    slipped : float
+        Distance [m] between what the wheels rolled and what the robot moved, summed.
+    distance : float
+        Distance driven [m].
+    energy : float
+        Work of the motors [J].
+    """
+
+    limits: MishapLimits = field(default_factory=MishapLimits)
+    counts: Counter[MishapKind] = field(default_factory=Counter)
+    max_roll: float = 0.0
+    max_pitch: float = 0.0
+    slipped: float = 0.0
+    distance: float = 0.0
+    energy: float = 0.0
+    _since: dict[MishapKind, float] = field(default_factory=dict)
+    _counted: set[MishapKind] = field(default_factory=set)
+    _last: MotionSample | None = None
+
+    def update(self, sample: MotionSample) -> list[Mishap]:
+        """Take one sample, stamped by its pose; return the mishaps that count from this instant on."""
+        self._sum_up(sample)
+        limits = self.limits
+        conditions: list[tuple[MishapKind, float, Callable[[MotionSample], bool]]] = [
+            (MishapKind.TIPPED_OVER, limits.tilt_hold, self._is_tipped),
+            (MishapKind.SLIPPING, limits.slip_hold, lambda s: slip_speed(s) > limits.slip_speed),
+            (MishapKind.HIGH_CENTRED, limits.high_centred_hold, lambda s: s.body_on_ground and self._stands(s)),
+            (MishapKind.STUCK, limits.stuck_hold, self._stands),
+            (MishapKind.COLLISION, 0.0, lambda s: s.body_on_obstacle),
+        ]
+        return [
+            Mishap(kind, sample.pose.stamp, sample.pose)
+            for kind, hold, condition in conditions
+            if self._begins(kind, hold, condition(sample), sample.pose.stamp)
+        ]
+
+    def _sum_up(self, sample: MotionSample) -> None:
+        roll, pitch = roll_pitch(sample.pose)
+        self.max_roll, self.max_pitch = max(self.max_roll, abs(roll)), max(self.max_pitch, abs(pitch))
+        if self._last is not None:
+            passed = sample.pose.stamp - self._last.pose.stamp
+            self.distance += sample.pose.distance_to(self._last.pose)
+            self.slipped += slip_speed(sample) * passed
+            self.energy += sample.power * passed
+        self._last = sample
+
+    def _begins(self, kind: MishapKind, hold: float, holds: bool, now: float) -> bool:
+        """Whether ``kind`` has held long enough and was not counted yet."""
+        if not holds:
+            self._since.pop(kind, None)
+            self._counted.discard(kind)
+            return False
+        if kind in self._counted or now - self._since.setdefault(kind, now) < hold:
+            return False
+        self._counted.add(kind)
+        self.counts[kind] += 1
+        return True
+
+    def _is_tipped(self, sample: MotionSample) -> bool:
+        return tilt_of(sample.pose) > self.limits.tilt
+
+    def _stands(self, sample: MotionSample) -> bool:
+        """Whether the robot is asked to move and does neither move nor turn."""
+        asked, does = sample.commanded, sample.velocity
+        if asked.is_stopped(self.limits.standing_speed, self.limits.standing_speed):
+            return False
+        share = self.limits.standing_share
+        moves = math.hypot(does.vx, does.vy) > max(share * abs(asked.vx), 0.5 * self.limits.standing_speed)
+        turns = abs(does.wz) > max(share * abs(asked.wz), 0.5 * self.limits.standing_speed)
+        return not (moves or turns)
+
+
+def slip_speed(sample: MotionSample) -> float:
+    """Speed [m/s] at which the robot moves other than its wheels roll: sliding forward, backward or sideways."""
+    return math.hypot(sample.rolling.vx - sample.velocity.vx, sample.velocity.vy)

@@ -1,0 +1,74 @@
+"""Mishaps are counted once per occurrence, after they have held long enough."""
+
+import math
+
+import pytest
+
+from mbf_abstract.geometry import Pose, Twist
+from terrain.mishaps import MishapKind, MishapMonitor, MotionSample, roll_pitch, tilt_of
+
+
+def rolled(angle: float, stamp: float = 0.0, x: float = 0.0) -> Pose:
+    return Pose((x, 0.0, 0.0), (math.sin(angle / 2), 0.0, 0.0, math.cos(angle / 2)), stamp=stamp)
+
+
+def feed(monitor: MishapMonitor, seconds: float, start: float = 0.0, **fields: object) -> list[MishapKind]:
+    defaults = {"velocity": Twist(), "commanded": Twist(), "rolling": Twist()}
+    kinds = []
+    for step in range(round(seconds / 0.05)):
+        sample = MotionSample(**{"pose": rolled(0.0, start + 0.05 * step), **defaults, **fields})  # type: ignore[arg-type]
+        kinds += [mishap.kind for mishap in monitor.update(sample)]
+    return kinds
+
+
+def test_tilt_roll_and_pitch() -> None:
+    assert tilt_of(rolled(0.3)) == pytest.approx(0.3)
+    assert roll_pitch(rolled(-0.3)) == pytest.approx((-0.3, 0.0))
+    nose_down = Pose((0.0, 0.0, 0.0), (0.0, math.sin(0.2), 0.0, math.cos(0.2)))
+    assert roll_pitch(nose_down) == pytest.approx((0.0, 0.4))
+
+
+def test_tipping_over_counts_once_while_it_lasts() -> None:
+    monitor = MishapMonitor()
+    for step in range(40):
+        still = Twist()
+        monitor.update(MotionSample(rolled(1.3, 0.05 * step), still, still, still))
+    assert monitor.counts[MishapKind.TIPPED_OVER] == 1 and monitor.max_roll == pytest.approx(1.3)
+
+
+def test_a_short_slip_is_forgiven_a_long_one_counts() -> None:
+    monitor = MishapMonitor()
+    asked = Twist.planar(0.8)
+    sliding = {"velocity": Twist.planar(0.4), "commanded": asked, "rolling": asked}
+    assert feed(monitor, 0.4, **sliding) == []
+    assert feed(monitor, 1.0, 0.4, velocity=asked, commanded=asked, rolling=asked) == []
+    assert feed(monitor, 1.0, 1.4, **sliding) == [MishapKind.SLIPPING]
+    assert feed(monitor, 1.0, 3.4, velocity=asked, commanded=asked, rolling=asked) == []
+    assert feed(monitor, 1.0, 4.4, **sliding) == [MishapKind.SLIPPING]
+
+
+def test_stuck_needs_a_command_and_high_centred_needs_ground_contact() -> None:
+    monitor = MishapMonitor()
+    assert feed(monitor, 10.0) == []
+    driven = {"commanded": Twist.planar(0.5)}
+    assert feed(monitor, 4.0, 10.0, **driven) == [MishapKind.STUCK]
+    monitor = MishapMonitor()
+    kinds = feed(monitor, 2.0, body_on_ground=True, **driven)
+    assert kinds == [MishapKind.HIGH_CENTRED]
+    assert (
+        feed(MishapMonitor(), 10.0, velocity=Twist.planar(0.0, 0.0, 0.5), commanded=Twist.planar(0.0, 0.0, 0.6)) == []
+    )
+
+
+def test_collision_counts_at_once() -> None:
+    assert feed(MishapMonitor(), 0.05, body_on_obstacle=True) == [MishapKind.COLLISION]
+
+
+def test_distance_slip_and_energy_add_up() -> None:
+    monitor = MishapMonitor()
+    for step in range(21):
+        pose = rolled(0.0, 0.05 * step, x=0.02 * step)
+        asked = Twist.planar(0.5)
+        monitor.update(MotionSample(pose, Twist.planar(0.4), asked, asked, power=30.0))
+    assert monitor.distance == pytest.approx(0.4)
+    assert monitor.slipped == pytest.approx(0.1) and monitor.energy == pytest.approx(30.0)
