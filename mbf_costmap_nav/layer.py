@@ -15,14 +15,17 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_costmap_nav.costmap import FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
+
+CellType = TypeVar("CellType", bound=np.generic)
 
 
 class LayerParameters(PluginParameters):
@@ -115,6 +118,10 @@ class CostmapLayer(ABC):
         """Why the layer's data is too old at ``now`` [s]; empty while it is current."""
         return ""
 
+    def speed_limit(self, x: float, y: float, full_speed: float) -> float:
+        """Allowed speed [m/s] at the point (x, y) [m], at most ``full_speed``."""
+        return full_speed
+
 
 class GridLayer(CostmapLayer):
     """A layer that keeps its own cells and combines them into the costmap."""
@@ -145,7 +152,7 @@ class GridLayer(CostmapLayer):
         clear_cells(self.cells, box.clipped(self.geometry.box), inside, self.default_value)
 
 
-def shifted(cells: CellArray, dx: int, dy: int, fill: int) -> CellArray:
+def shifted(cells: NDArray[CellType], dx: int, dy: int, fill: float) -> NDArray[CellType]:
     """Return the cells seen by a window that moved by (dx, dy) cells; what was outside becomes ``fill``."""
     height, width = cells.shape
     moved = np.full_like(cells, fill)
@@ -155,7 +162,7 @@ def shifted(cells: CellArray, dx: int, dy: int, fill: int) -> CellArray:
     return moved
 
 
-def clear_cells(cells: CellArray, box: CellBox, inside: bool, value: int) -> None:
+def clear_cells(cells: NDArray[CellType], box: CellBox, inside: bool, value: float) -> None:
     """Set the cells inside ``box`` to ``value``, or all others (``inside`` false). ``box`` lies on the grid."""
     if inside:
         if not box.empty:

@@ -146,6 +146,11 @@ class LayeredCostmap:
             problems = (layer.currency_problem(now) for layer in self._enabled_layers())
             return next((problem for problem in problems if problem), "")
 
+    def speed_limit(self, x: float, y: float, full_speed: float) -> float:
+        """Lowest speed [m/s] the layers allow at the point (x, y) [m]; ``full_speed`` where there is no limit."""
+        with self._lock:
+            return min((layer.speed_limit(x, y, full_speed) for layer in self._enabled_layers()), default=full_speed)
+
     # ----------------------------------------------------------------------------------------------- updating
     def update(self, robot_pose: Pose | None, now: float) -> CellBox:
         """Bring the map up to ``now`` [s] and return the box of cells that were recomputed.

@@ -7,6 +7,7 @@ A source that has fallen silent is the classic reason for a robot driving into s
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +16,19 @@ from numpy.typing import ArrayLike, NDArray
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_costmap_nav.layer import CostmapLayer
 
+MAX_OBSERVATIONS = 256
+"""Bound of the memory of one source, however long its persistence."""
 
-class SourceParameters(ParameterModel):
+
+class SourceTiming(ParameterModel):
+    """How often a sensor must speak."""
+
+    expected_update_rate: float = parameter(
+        1.0, "Longest allowed time between two observations; 0 switches the check off.", unit="s", ge=0.0
+    )
+
+
+class SourceParameters(SourceTiming):
     """One observation source of a layer."""
 
     marking: bool = parameter(True, "Whether hits of this source put obstacles on the map.")
@@ -28,10 +40,7 @@ class SourceParameters(ParameterModel):
     min_obstacle_height: float = parameter(0.0, "Points below this height (map frame) are ignored.", unit="m")
     max_obstacle_height: float = parameter(2.0, "Points above this height (map frame) are ignored.", unit="m")
     observation_persistence: float = parameter(
-        0.0, "How long an observation is used; 0 = only the newest one.", unit="s", ge=0.0
-    )
-    expected_update_rate: float = parameter(
-        1.0, "Longest allowed time between two observations; 0 switches the check off.", unit="s", ge=0.0
+        0.0, "How long an observation is used; 0 = only the newest one.", unit="s", ge=0.0, le=60.0
     )
 
 
@@ -91,8 +100,39 @@ class Observation:
         return Observation(self.origin, self.ends[inside], self.hits[inside], self.stamp)
 
 
+class SourceWatch:
+    """Notices when a source falls silent.
+
+    Parameters
+    ----------
+    name : str
+        Name of the source, for messages.
+    timing : SourceTiming
+    """
+
+    def __init__(self, name: str, timing: SourceTiming) -> None:
+        self.name = name
+        self._limit = timing.expected_update_rate
+        self._newest: float | None = None
+
+    def heard(self, stamp: float) -> None:
+        """Note an observation made at ``stamp`` [s]."""
+        self._newest = stamp if self._newest is None else max(self._newest, stamp)
+
+    def currency_problem(self, now: float) -> str:
+        """Say how late the source is at ``now`` [s]; empty while it is in time."""
+        if self._limit == 0.0:
+            return ""
+        if self._newest is None:
+            return f"observation source {self.name!r} has not sent anything yet"
+        age = now - self._newest
+        if age <= self._limit:
+            return ""
+        return f"observation source {self.name!r} is silent for {age:.2f} s, expected every {self._limit:.2f} s"
+
+
 class ObservationBuffer:
-    """The observations of one source that are still in use.
+    """The observations of one source that are still in use, at most ``MAX_OBSERVATIONS``.
 
     Parameters
     ----------
@@ -102,42 +142,28 @@ class ObservationBuffer:
     """
 
     def __init__(self, name: str, parameters: SourceParameters) -> None:
-        self.name = name
         self.parameters = parameters
-        self._observations: list[Observation] = []
-        self._newest: float | None = None
+        self.watch = SourceWatch(name, parameters)
+        self._observations: deque[Observation] = deque(
+            maxlen=1 if parameters.observation_persistence == 0.0 else MAX_OBSERVATIONS
+        )
 
     def insert(self, observation: Observation) -> None:
         """Keep an observation; without persistence it replaces the one before."""
         limits = self.parameters
-        kept = observation.between_heights(limits.min_obstacle_height, limits.max_obstacle_height)
-        if limits.observation_persistence == 0.0:
-            self._observations.clear()
-        self._observations.append(kept)
-        self._newest = observation.stamp if self._newest is None else max(self._newest, observation.stamp)
+        self._observations.append(observation.between_heights(limits.min_obstacle_height, limits.max_obstacle_height))
+        self.watch.heard(observation.stamp)
 
     def current(self, now: float) -> list[Observation]:
         """Observations in use at ``now`` [s], oldest first; older ones are forgotten."""
         persistence = self.parameters.observation_persistence
-        if persistence > 0.0:
-            self._observations = [seen for seen in self._observations if seen.stamp >= now - persistence]
+        while persistence > 0.0 and self._observations and self._observations[0].stamp < now - persistence:
+            self._observations.popleft()
         return list(self._observations)
 
     def forget(self) -> None:
         """Drop the kept observations, e.g. because the map is cleared."""
         self._observations.clear()
-
-    def currency_problem(self, now: float) -> str:
-        """Say how late the source is at ``now`` [s]; empty while it is in time."""
-        limit = self.parameters.expected_update_rate
-        if limit == 0.0:
-            return ""
-        if self._newest is None:
-            return f"observation source {self.name!r} has not sent anything yet"
-        age = now - self._newest
-        if age <= limit:
-            return ""
-        return f"observation source {self.name!r} is silent for {age:.2f} s, expected every {limit:.2f} s"
 
 
 class SensorLayer(CostmapLayer):

@@ -13,13 +13,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
-from mbf_costmap_nav.costmap import EMPTY_BOX, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.costmap import EMPTY_BOX, UNKNOWN, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.layer import CombinationMethod, GridLayer, LayerContext, LayerParameters, combine
 from mbf_costmap_nav.map_io import load_costmap
+from mbf_costmap_nav.zones import sample_costmap
 
 
 class StaticLayerParameters(LayerParameters):
@@ -56,11 +55,6 @@ class StaticLayer(GridLayer):
         """Grid of the map."""
         return self._map.geometry
 
-    def set_map(self, new_map: Costmap) -> None:
-        """Replace the map, e.g. on another floor; call it through ``LayeredCostmap.replace_static_map``."""
-        self._map = new_map
-        self.match_geometry(self.geometry)
-
     def match_geometry(self, geometry: GridGeometry) -> None:
         """Sample the map at the costmap's cells."""
         super().match_geometry(geometry)
@@ -77,23 +71,14 @@ class StaticLayer(GridLayer):
     def _sample(self, box: CellBox) -> None:
         """Take each cell's value from the map cell at its centre."""
         box = box.clipped(self.geometry.box)
-        if box.empty:
-            return
-        source = self._map
-        x = self.geometry.origin_x + (np.arange(box.x0, box.x1) + 0.5) * self.geometry.resolution
-        y = self.geometry.origin_y + (np.arange(box.y0, box.y1) + 0.5) * self.geometry.resolution
-        ix = np.floor((x - source.origin_x) / source.resolution).astype(np.int64)
-        iy = np.floor((y - source.origin_y) / source.resolution).astype(np.int64)
-        columns, rows = (ix >= 0) & (ix < source.width), (iy >= 0) & (iy < source.height)
-        window = self.cells[box.slices]
-        window[np.ix_(rows, columns)] = source.cells[np.ix_(iy[rows], ix[columns])]
+        self.cells[box.slices] = sample_costmap(self._map, self.geometry, box, self.default_value)
 
     def reset(self) -> None:
         """Return to the map as loaded, undoing cleared areas."""
         self.match_geometry(self.geometry)
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
-        """Report the cells that came from a new map."""
+        """Report the whole map once after sampling it."""
         changed, self._changed = self._changed, EMPTY_BOX
         return box.union(changed)
 

@@ -1,0 +1,74 @@
+"""Keep-out layer: areas the robot must not enter, from polygons and from a mask image.
+
+When to use: stairs, glass doors, places that are free but forbidden; list it before the inflation layer if the whole
+robot must stay out, after it if only the robot's centre must. When not: for areas that are only undesirable paint grey
+in the mask, or use the speed-limit layer. Cost: nothing after the first update, one refill when a rolling window moves.
+Known failure: a robot that stands inside such an area finds no plan; the escape recovery leads out.
+
+Every cell a polygon touches is lethal. A mask's occupancy raises costs in proportion (as Nav2's keep-out filter);
+free and unknown parts of a mask say nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.parameters import parameter
+from mbf_costmap_nav.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
+from mbf_costmap_nav.kernels.cover import fill_polygon
+from mbf_costmap_nav.layer import CombinationMethod, CostmapLayer, LayerContext, LayerParameters, combine
+from mbf_costmap_nav.map_io import load_costmap
+from mbf_costmap_nav.zones import Zone, load_zones, sample_costmap
+
+
+class KeepoutLayerParameters(LayerParameters):
+    """Parameters of the keep-out layer."""
+
+    zones: tuple[Zone, ...] = parameter((), "Polygons written in place.", dynamic=False)
+    zones_file: str = parameter("", "YAML file with more polygons.", dynamic=False)
+    mask_file: str = parameter("", "map_server YAML file of a mask image.", dynamic=False)
+
+
+class KeepoutLayer(CostmapLayer):
+    """Forbidden areas; clearing the costmap does not remove them. See the module's text for when to use it."""
+
+    Parameters = KeepoutLayerParameters
+    parameters: KeepoutLayerParameters
+
+    def __init__(self, context: LayerContext) -> None:
+        super().__init__(context)
+        files = self.parameters
+        self._zones = files.zones + (load_zones(context.base_folder / files.zones_file) if files.zones_file else ())
+        self._mask = load_costmap(context.base_folder / files.mask_file, context.frame_id) if files.mask_file else None
+        self._changed = EMPTY_BOX
+
+    def match_geometry(self, geometry: GridGeometry) -> None:
+        """Paint the areas onto the grid."""
+        super().match_geometry(geometry)
+        self._paint()
+
+    def shift(self, geometry: GridGeometry, dx: int, dy: int) -> None:
+        """Paint again where the window is now."""
+        super().shift(geometry, dx, dy)
+        self._paint()
+
+    def _paint(self) -> None:
+        grid = self.geometry
+        self.cells: CellArray = np.full((grid.height, grid.width), UNKNOWN, dtype=np.uint8)
+        if self._mask is not None:
+            self.cells[:] = sample_costmap(self._mask, grid, grid.box, UNKNOWN)
+            self.cells[self.cells == FREE] = UNKNOWN
+        for zone in self._zones:
+            corners = (zone.corners - np.array([grid.origin_x, grid.origin_y])) / grid.resolution
+            fill_polygon(self.cells, corners, LETHAL)
+        self._changed = grid.box
+
+    def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
+        """Report everything once after painting."""
+        changed, self._changed = self._changed, EMPTY_BOX
+        return box.union(changed)
+
+    def update_costs(self, cells: CellArray, box: CellBox) -> None:
+        """Raise costs to those of the areas."""
+        combine(cells, self.cells, box, CombinationMethod.MAXIMUM)

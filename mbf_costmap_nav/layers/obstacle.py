@@ -1,0 +1,114 @@
+"""Obstacle layer: what planar and 3D sensors see, marked where rays end and cleared along their way.
+
+When to use: in every map of a robot that has a range finder, below the inflation layer. When not: for overhanging or
+low things that a ray at another height passes over and would clear, use the voxel layer; for sonars with wide cones the
+range sensor layer. Cost: one visit per cell of every ray, about 0.1 ms for 720 rays of 5 m at 0.05 m. Known failure: a
+cell is cleared only by a ray that passes it, so a moved obstacle leaves traces where no ray goes; several sensors at
+different heights clear each other's marks.
+
+The order (clear all, then mark all), the range and height limits and the three ways of combining are costmap_2d's. A
+source that is silent for longer than its ``expected_update_rate`` makes the map not current; that is on by default.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.parameters import parameter
+from mbf_costmap_nav.costmap import FREE, LETHAL, CellArray, CellBox
+from mbf_costmap_nav.footprint import Footprint
+from mbf_costmap_nav.kernels.cover import fill_polygon
+from mbf_costmap_nav.kernels.raytrace import clear_rays, mark_points
+from mbf_costmap_nav.layer import CombinationMethod, GridLayer, LayerContext, LayerParameters, combine
+from mbf_costmap_nav.sensor_data import Observation, ObservationBuffer, SensorLayer, SourceParameters
+
+
+class ObstacleLayerParameters(LayerParameters):
+    """Parameters of the obstacle layer."""
+
+    sources: dict[str, SourceParameters] = parameter({}, "Observation sources by name.", dynamic=False)
+    combination_method: CombinationMethod = parameter(
+        CombinationMethod.MAXIMUM, "How the layer's cells enter the costmap."
+    )
+    footprint_clearing_enabled: bool = parameter(True, "Free the cells under the robot.")
+
+
+class ObstacleLayer(GridLayer, SensorLayer):
+    """Marks and clears by rays. See the module's text for when to use it."""
+
+    Parameters = ObstacleLayerParameters
+    parameters: ObstacleLayerParameters
+
+    def __init__(self, context: LayerContext) -> None:
+        super().__init__(context)
+        self.buffers = {name: ObservationBuffer(name, source) for name, source in self.parameters.sources.items()}
+        self._footprint = Footprint([])
+
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of the configured sources."""
+        return tuple(self.buffers)
+
+    def insert(self, source: str, observation: Observation) -> None:
+        """Keep an observation for the next update."""
+        self.buffers[source].insert(observation)
+
+    def set_footprint(self, footprint: Footprint) -> None:
+        """Take over the outline under which the map is free."""
+        self._footprint = footprint
+
+    def currency_problem(self, now: float) -> str:
+        """Name the source that is late at ``now`` [s]."""
+        problems = (buffer.watch.currency_problem(now) for buffer in self.buffers.values())
+        return next((f"layer {self.name!r}: {problem}" for problem in problems if problem), "")
+
+    def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
+        """Trace the rays of all observations, mark their hits, free the robot's place; report the touched box."""
+        touched = np.zeros(4, dtype=np.int64)
+        observed = [(buffer.parameters, seen) for buffer in self.buffers.values() for seen in buffer.current(now)]
+        for limits, seen in observed:
+            if limits.clearing:
+                self._clear(seen, limits, touched)
+        for limits, seen in observed:
+            if limits.marking:
+                self._mark(seen, limits, touched)
+        box = box.union(CellBox(*touched.tolist()))
+        if self.parameters.footprint_clearing_enabled and robot_pose is not None and len(self._footprint.vertices) > 2:
+            corners = self._footprint.at(robot_pose.x, robot_pose.y, robot_pose.yaw)
+            box = box.union(self._free_polygon(self._in_cells(corners)))
+        return box
+
+    def _clear(self, seen: Observation, limits: SourceParameters, touched: NDArray[np.int64]) -> None:
+        clear_rays(
+            self.cells, self._lower_left, self.geometry.resolution, seen.origin, seen.ends,
+            limits.raytrace_min_range, limits.raytrace_max_range, FREE, touched,
+        )  # fmt: skip
+
+    def _mark(self, seen: Observation, limits: SourceParameters, touched: NDArray[np.int64]) -> None:
+        mark_points(
+            self.cells, self._lower_left, self.geometry.resolution, seen.origin, seen.ends, seen.hits,
+            limits.obstacle_min_range, limits.obstacle_max_range, LETHAL, touched,
+        )  # fmt: skip
+
+    def _free_polygon(self, corners: NDArray[np.float64]) -> CellBox:
+        return CellBox(*fill_polygon(self.cells, corners, FREE))
+
+    @property
+    def _lower_left(self) -> NDArray[np.float64]:
+        return np.array([self.geometry.origin_x, self.geometry.origin_y])
+
+    def _in_cells(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """World points (n, 2) [m] in cell coordinates."""
+        return np.asarray((points - self._lower_left) / self.geometry.resolution)
+
+    def update_costs(self, cells: CellArray, box: CellBox) -> None:
+        """Combine the kept cells into the costmap."""
+        combine(cells, self.cells, box, self.parameters.combination_method)
+
+    def reset(self) -> None:
+        """Forget all marks and the observations they came from."""
+        super().reset()
+        for buffer in self.buffers.values():
+            buffer.forget()

@@ -1,0 +1,132 @@
+"""Range sensor layer: sonars and infrared sensors, whose single reading fills a cone.
+
+When to use: for sensors with one distance and a field of view of several degrees. When not: for lidars and cameras; the
+obstacle layer places their points exactly. Cost: one visit per cell of a square around the cone. Known failure: the
+side lobes of a sonar mark walls beside the axis at the wrong place; ``mark_threshold`` decides how soon.
+
+Readings come as scans: the ray's end lies on the sensor's axis at the measured distance, its hit flag is false for a
+reading at maximum range. Cells hold a probability that readings update by Bayes' rule. The cell at the measured
+point itself is raised to a strong belief at once, as costmap_2d's range sensor layer does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.parameters import parameter
+from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
+from mbf_costmap_nav.kernels.sonar import update_cone
+from mbf_costmap_nav.layer import (
+    CombinationMethod,
+    LayerContext,
+    LayerParameters,
+    clear_cells,
+    combine,
+    shifted,
+)
+from mbf_costmap_nav.sensor_data import MAX_OBSERVATIONS, Observation, SensorLayer, SourceTiming, SourceWatch
+
+UNDECIDED = 0.5
+TARGET_PROBABILITY = 233.0 / 254.0
+"""Belief of the cell at the measured point."""
+
+
+class RangeSourceParameters(SourceTiming):
+    """One range sensor."""
+
+    field_of_view: float = parameter(math.radians(15.0), "Full angle of the cone.", unit="rad", ge=0.0, le=math.pi)
+
+
+class RangeSensorLayerParameters(LayerParameters):
+    """Parameters of the range sensor layer."""
+
+    sources: dict[str, RangeSourceParameters] = parameter({}, "Range sensors by name.", dynamic=False)
+    clear_on_max_reading: bool = parameter(False, "Free the whole cone when nothing was seen.")
+    mark_threshold: float = parameter(0.8, "A cell believed occupied above this is lethal.", gt=0.5, lt=1.0)
+    clear_threshold: float = parameter(0.2, "A cell believed occupied below this is free.", gt=0.0, lt=0.5)
+
+
+class RangeSensorLayer(SensorLayer):
+    """Cones of single readings. See the module's text for when to use it."""
+
+    Parameters = RangeSensorLayerParameters
+    parameters: RangeSensorLayerParameters
+
+    def __init__(self, context: LayerContext) -> None:
+        super().__init__(context)
+        self.watches = {name: SourceWatch(name, source) for name, source in self.parameters.sources.items()}
+        self._waiting: deque[tuple[RangeSourceParameters, Observation]] = deque(maxlen=MAX_OBSERVATIONS)
+
+    def match_geometry(self, geometry: GridGeometry) -> None:
+        """Start undecided everywhere."""
+        super().match_geometry(geometry)
+        self.probability: NDArray[np.float32] = np.full((geometry.height, geometry.width), UNDECIDED, dtype=np.float32)
+
+    def shift(self, geometry: GridGeometry, dx: int, dy: int) -> None:
+        """Move the beliefs with the window."""
+        super().shift(geometry, dx, dy)
+        self.probability = shifted(self.probability, dx, dy, UNDECIDED)
+
+    def reset(self) -> None:
+        """Forget all readings."""
+        self.probability.fill(UNDECIDED)
+        self._waiting.clear()
+
+    def clear_area(self, box: CellBox, inside: bool) -> None:
+        """Forget the readings inside or outside of ``box``."""
+        clear_cells(self.probability, box.clipped(self.geometry.box), inside, UNDECIDED)
+
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of the configured sensors."""
+        return tuple(self.watches)
+
+    def insert(self, source: str, observation: Observation) -> None:
+        """Keep a reading for the next update; unlike points, every reading counts once."""
+        self.watches[source].heard(observation.stamp)
+        self._waiting.append((self.parameters.sources[source], observation))
+
+    def currency_problem(self, now: float) -> str:
+        """Name the sensor that is late at ``now`` [s]."""
+        problems = (watch.currency_problem(now) for watch in self.watches.values())
+        return next((f"layer {self.name!r}: {problem}" for problem in problems if problem), "")
+
+    def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
+        """Take the waiting readings into the beliefs."""
+        while self._waiting:
+            limits, seen = self._waiting.popleft()
+            for end, hit in zip(seen.ends, seen.hits, strict=True):
+                box = box.union(self._take(seen.origin, end, bool(hit), limits))
+        return box
+
+    def _take(
+        self, origin: NDArray[np.float64], end: NDArray[np.float64], hit: bool, limits: RangeSourceParameters
+    ) -> CellBox:
+        if not hit and not self.parameters.clear_on_max_reading:
+            return CellBox(0, 0, 0, 0)
+        grid = self.geometry
+        lower_left = np.array([grid.origin_x, grid.origin_y])
+        changed = CellBox(
+            *update_cone(
+                self.probability, lower_left, grid.resolution, origin, end, limits.field_of_view / 2.0, not hit
+            )
+        )
+        target = grid.world_to_cell(float(end[0]), float(end[1]))
+        if hit and target is not None:
+            ix, iy = target
+            self.probability[iy, ix] = TARGET_PROBABILITY
+            changed = changed.union(CellBox(ix, iy, ix + 1, iy + 1))
+        return changed
+
+    def update_costs(self, cells: CellArray, box: CellBox) -> None:
+        """Write decided cells; free ones replace only unknown ones."""
+        decided = np.full(cells.shape, UNKNOWN, dtype=np.uint8)
+        window = self.probability[box.slices]
+        decided[box.slices][window > self.parameters.mark_threshold] = LETHAL
+        decided[box.slices][window < self.parameters.clear_threshold] = FREE
+        combine(cells, decided, box, CombinationMethod.MAXIMUM)

@@ -1,0 +1,59 @@
+"""Speed-limit layer: areas where the robot must drive slowly, from polygons and from a mask image.
+
+When to use: ramps, crossings, places with people. When not: to keep the robot out, use the keep-out layer. Cost: no
+cells at all; one look-up per question. Known failure: the limit applies from the moment the robot's centre is inside,
+so draw an area with the distance the robot needs to brake.
+
+It writes no costs. ``LayeredCostmap.speed_limit`` asks it. A zone's ``speed_limit`` is a speed [m/s], or a share of the
+full speed [%] with ``limit_type: percent``. In a mask, limit = ``base`` + ``multiplier`` * occupancy (0..100); free and
+unknown mask cells set no limit (Nav2's speed filter).
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from mbf_abstract.parameters import parameter
+from mbf_costmap_nav.costmap import FREE, CellArray, CellBox, Costmap
+from mbf_costmap_nav.layer import CostmapLayer, LayerContext, LayerParameters
+from mbf_costmap_nav.map_io import UNKNOWN_OCCUPANCY, load_map
+from mbf_costmap_nav.zones import Zone, load_zones
+
+
+class SpeedLimitLayerParameters(LayerParameters):
+    """Parameters of the speed-limit layer."""
+
+    zones: tuple[Zone, ...] = parameter((), "Polygons written in place.", dynamic=False)
+    zones_file: str = parameter("", "YAML file with more polygons.", dynamic=False)
+    mask_file: str = parameter("", "map_server YAML file of a mask image.", dynamic=False)
+    limit_type: Literal["absolute", "percent"] = parameter("absolute", "Whether limits are m/s or % of full speed.")
+    base: float = parameter(100.0, "Limit of a mask cell of occupancy 0, in the unit of limit_type.")
+    multiplier: float = parameter(-1.0, "Change of the limit per point of occupancy.")
+
+
+class SpeedLimitLayer(CostmapLayer):
+    """Slow areas. See the module's text for when to use it."""
+
+    Parameters = SpeedLimitLayerParameters
+    parameters: SpeedLimitLayerParameters
+
+    def __init__(self, context: LayerContext) -> None:
+        super().__init__(context)
+        files = self.parameters
+        self._zones = files.zones + (load_zones(context.base_folder / files.zones_file) if files.zones_file else ())
+        self._mask: Costmap | None = None
+        if files.mask_file:
+            mask = load_map(context.base_folder / files.mask_file).upright()
+            self._mask = Costmap(mask.occupancy, mask.resolution, mask.origin[0], mask.origin[1], context.frame_id)
+
+    def update_costs(self, cells: CellArray, box: CellBox) -> None:
+        """Write nothing: a limit is no cost."""
+
+    def speed_limit(self, x: float, y: float, full_speed: float) -> float:
+        """Allowed speed [m/s] at the point (x, y) [m], at most ``full_speed``."""
+        limits = [zone.speed_limit for zone in self._zones if zone.speed_limit is not None and zone.contains(x, y)]
+        occupancy = self._mask.cost_at(x, y) if self._mask is not None else None
+        if occupancy is not None and occupancy not in (FREE, UNKNOWN_OCCUPANCY):
+            limits.append(max(0.0, self.parameters.base + self.parameters.multiplier * occupancy))
+        scale = full_speed / 100.0 if self.parameters.limit_type == "percent" else 1.0
+        return min([full_speed, *(limit * scale for limit in limits)])
