@@ -1,0 +1,23 @@
+"""Put a building into a PyBullet world: a level floor, and every occupied cell of a map as a wall."""
+
+from __future__ import annotations
+
+from terrain.occupancy import OccupancyGrid, wall_triangles
+from terrain.world import BulletWorld
+
+WALL_HEIGHT = 2.0
+
+
+def add_building(world: BulletWorld, grid: OccupancyGrid, wall_height: float = WALL_HEIGHT) -> int:
+    """Add floor and walls of a map; return the body of the walls.
+
+    Parameters
+    ----------
+    world : BulletWorld
+    grid : OccupancyGrid
+        From ``read_occupancy`` or ``FloorPlan.draw``; unknown cells become floor.
+    wall_height : float
+        [m]
+    """
+    world.add_ground_plane(*grid.bounds)
+    return world.add_mesh(*wall_triangles(grid, wall_height), ground=False)
