@@ -1,0 +1,183 @@
+"""Regulated pure pursuit: steer along the arc to a carrot on the path, slower in curves, near obstacles, at the end.
+
+When to use: a good global path that is to be followed as it is, at little computing time (under 0.2 ms a cycle).
+Forward-only, reversing and turn-in-place robots. When not: obstacles that are not in the path - it stops before them
+(BLOCKED_PATH) and never drives around; that needs replanning, ``costmap.dwa`` or ``costmap.mppi``. It cuts corners by
+about look_ahead^2 / (8 * radius).
+
+Formula: pure pursuit (Coulter 1992), curvature = 2 y / L^2; regulation by curvature, by proximity and by approach
+(Macenski, Singh, Martin, Gines 2023, eq. 4 to 7) with Nav2's parameter meanings.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from mbf_abstract.geometry import Path, Twist, normalize_angle
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_costmap_nav.costmap import FREE, INSCRIBED
+from mbf_costmap_nav.footprint_check import arc_poses
+from mbf_costmap_nav.path_geometry import look_ahead_point
+from mbf_costmap_nav.path_handling import PATH_LENGTH_TOLERANCE, ControlCycle, PathFollower, to_base_frame
+
+
+class RegulatedPurePursuitParameters(PluginParameters):
+    """Parameters of ``costmap.regulated_pure_pursuit``."""
+
+    max_linear_vel: float = parameter(0.5, "Speed on a free straight path.", unit="m/s", gt=0.0, le=20.0)
+    max_linear_accel: float = parameter(2.5, "Largest change of speed.", unit="m/s^2", gt=0.0, le=100.0)
+    look_ahead_dist: float = parameter(0.6, "Carrot distance if it is fixed.", unit="m", gt=0.0, le=20.0)
+    use_velocity_scaled_look_ahead: bool = parameter(True, "Let the carrot distance grow with speed.")
+    look_ahead_time: float = parameter(1.5, "Carrot distance per speed.", unit="s", gt=0.0, le=20.0)
+    min_look_ahead_dist: float = parameter(0.3, "Least scaled carrot distance.", unit="m", gt=0.0, le=20.0)
+    max_look_ahead_dist: float = parameter(0.9, "Largest scaled carrot distance.", unit="m", gt=0.0, le=20.0)
+    regulated_min_radius: float = parameter(0.9, "Tighter curves slow down; 0 = off.", unit="m", ge=0.0, le=20.0)
+    regulated_min_speed: float = parameter(0.25, "Regulation never slows below this.", unit="m/s", ge=0.0, le=20.0)
+    cost_scaling_dist: float = parameter(
+        0.6, "Obstacles nearer than this slow down; 0 = off.", unit="m", ge=0.0, le=20.0
+    )
+    cost_scaling_gain: float = parameter(1.0, "Factor on the obstacle slow-down.", gt=0.0, le=1.0)
+    inflation_cost_scaling_factor: float = parameter(
+        10.0, "Decay of the inflation layer, to turn costs into distances.", unit="1/m", gt=0.0, le=1000.0
+    )
+    approach_dist: float = parameter(0.6, "Slow down over this length before the end.", unit="m", ge=0.0, le=20.0)
+    min_approach_vel: float = parameter(0.05, "Speed at the end of the approach.", unit="m/s", gt=0.0, le=5.0)
+    rotate_to_heading: bool = parameter(True, "Turn in place to the path and at the goal; off for car-like robots.")
+    rotate_to_heading_min_angle: float = parameter(
+        0.785, "Turn in place if the carrot is further off than this.", unit="rad", gt=0.0, le=3.2
+    )
+    rotate_to_heading_vel: float = parameter(1.8, "Yaw rate of turning in place.", unit="rad/s", gt=0.0, le=20.0)
+    max_angular_vel: float = parameter(1.8, "Largest yaw rate while driving.", unit="rad/s", gt=0.0, le=20.0)
+    max_angular_accel: float = parameter(3.2, "Change of the yaw rate in place.", unit="rad/s^2", gt=0.0, le=100.0)
+    allow_reversing: bool = parameter(True, "Drive backward where the poses of the path look against its direction.")
+    max_cross_track: float = parameter(1.5, "Farther from the path than this it is missed.", unit="m", gt=0.0, le=100.0)
+    collision_check: bool = parameter(True, "Simulate the footprint ahead along the arc.")
+    collision_check_time: float = parameter(1.0, "How far ahead in time it is simulated.", unit="s", gt=0.0, le=10.0)
+    control_period: float = parameter(0.05, "Time between two calls, for accelerations.", unit="s", gt=0.0, le=1.0)
+
+
+class RegulatedPurePursuitController(PathFollower):
+    """Carrot follower with regulated speed."""
+
+    Parameters: ClassVar[type[PluginParameters]] = RegulatedPurePursuitParameters
+    parameters: RegulatedPurePursuitParameters
+
+    _at_goal = False
+
+    def set_plan(self, path: Path) -> bool:
+        """Take over a path and forget that the robot stood at the end of the last one."""
+        self._at_goal = False
+        return super().set_plan(path)
+
+    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+        """Find the carrot, choose between turning and driving, regulate the speed, look ahead for collisions."""
+        cycle = self.begin_cycle(request)
+        if isinstance(cycle, ControlResult):
+            return cycle
+        tracker = cycle.tracker
+        if tracker.cross_track > self.parameters.max_cross_track:
+            text = f"{tracker.cross_track:.2f} m off the path, limit {self.parameters.max_cross_track:.2f} m"
+            return ControlResult(ExePathOutcome.MISSED_PATH, text)
+        turn = self._turn_at_goal(cycle)
+        if turn is None:
+            carrot = self._carrot(cycle)
+            backward = self.parameters.allow_reversing and tracker.driving_backward
+            bearing = math.atan2(carrot[1], carrot[0])
+            error = normalize_angle(bearing + math.pi) if backward else bearing
+            if self.parameters.rotate_to_heading and abs(error) > self.parameters.rotate_to_heading_min_angle:
+                turn = error
+        if turn is not None:
+            command = Twist.planar(wz=self.rotation_speed(turn, request.velocity.wz))
+        else:
+            command = self._drive(cycle, carrot, backward)
+        return self._checked(cycle, command)
+
+    # ------------------------------------------------------------------------------------------------ steering
+    def look_ahead_distance(self, speed: float) -> float:
+        """Carrot distance [m] at a speed [m/s]."""
+        p = self.parameters
+        if not p.use_velocity_scaled_look_ahead:
+            return p.look_ahead_dist
+        return min(max(abs(speed) * p.look_ahead_time, p.min_look_ahead_dist), p.max_look_ahead_dist)
+
+    def rotation_speed(self, angle: float, speed: float) -> float:
+        """Yaw rate [rad/s] that turns by ``angle`` [rad] and can still brake in time, from the present ``speed``."""
+        p = self.parameters
+        change = p.max_angular_accel * p.control_period
+        wanted = math.copysign(p.rotate_to_heading_vel, angle)
+        reachable = min(max(wanted, speed - change), speed + change)
+        braking = math.sqrt(2.0 * p.max_angular_accel * abs(angle))
+        return min(max(reachable, -braking), braking)
+
+    def regulated_speed(self, curvature: float, cost: int, remaining: float) -> float:
+        """Speed [m/s] for a curvature [1/m], the cost under the robot, and the length left [m]."""
+        p = self.parameters
+        in_curve = near_obstacle = p.max_linear_vel
+        if p.regulated_min_radius > 0.0 and abs(curvature) * p.regulated_min_radius > 1.0:
+            in_curve *= 1.0 / (abs(curvature) * p.regulated_min_radius)
+        if p.cost_scaling_dist > 0.0 and FREE < cost <= INSCRIBED:
+            clearance = (
+                self.costmap.inscribed_radius - math.log(cost / (INSCRIBED - 1)) / p.inflation_cost_scaling_factor
+            )
+            if clearance < p.cost_scaling_dist:
+                near_obstacle *= p.cost_scaling_gain * max(clearance, 0.0) / p.cost_scaling_dist
+        speed = max(min(in_curve, near_obstacle), min(p.regulated_min_speed, p.max_linear_vel))
+        if remaining < p.approach_dist:
+            speed = min(speed, max(speed * remaining / p.approach_dist, p.min_approach_vel))
+        return speed
+
+    def _carrot(self, cycle: ControlCycle) -> tuple[float, float]:
+        """Look-ahead point in the base frame; it does not pass a change of driving direction."""
+        distance = self.look_ahead_distance(cycle.request.velocity.vx)
+        reach = distance + cycle.tracker.cross_track
+        if self.parameters.allow_reversing:
+            reach = min(reach, max(cycle.tracker.to_cusp, 0.05))
+        local = to_base_frame(cycle.tracker.ahead(reach), cycle.request.pose)
+        x, y = look_ahead_point(local, distance)
+        return float(x), float(y)
+
+    def _turn_at_goal(self, cycle: ControlCycle) -> float | None:
+        """Angle to the goal's heading once the robot stands at the goal's position."""
+        goal, pose = cycle.tracker.goal, cycle.request.pose
+        if not self.parameters.rotate_to_heading or cycle.tracker.remaining > PATH_LENGTH_TOLERANCE:
+            return None
+        # Once inside, twice the tolerance keeps the robot turning although it slides a little while it stops.
+        reach = self.goal_dist_tolerance * (2.0 if self._at_goal else 1.0)
+        self._at_goal = math.hypot(goal.x - pose.x, goal.y - pose.y) <= reach
+        if not self._at_goal:
+            return None
+        return normalize_angle(goal.yaw - pose.yaw)
+
+    def _drive(self, cycle: ControlCycle, carrot: tuple[float, float], backward: bool) -> Twist:
+        """Command along the arc through the carrot."""
+        p, velocity = self.parameters, cycle.request.velocity
+        curvature = 2.0 * carrot[1] / max(carrot[0] ** 2 + carrot[1] ** 2, 1e-6)
+        remaining = cycle.tracker.to_cusp if p.allow_reversing else cycle.tracker.remaining
+        cost = cycle.costmap.cost_at(cycle.request.pose.x, cycle.request.pose.y) or FREE
+        wanted = self.regulated_speed(curvature, cost, remaining) * (-1.0 if backward else 1.0)
+        change = p.max_linear_accel * p.control_period
+        speed = min(max(wanted, velocity.vx - change), velocity.vx + change)
+        if abs(speed * curvature) > p.max_angular_vel:
+            speed = math.copysign(p.max_angular_vel / abs(curvature), speed)
+        return Twist.planar(vx=speed, wz=speed * curvature)
+
+    # ----------------------------------------------------------------------------------------------- collisions
+    def _checked(self, cycle: ControlCycle, command: Twist) -> ControlResult:
+        """Refuse a command that leads into an obstacle within the check time, but not beyond the path's end."""
+        if not self.parameters.collision_check:
+            return ControlResult(ExePathOutcome.SUCCESS, "", command)
+        duration = self.parameters.collision_check_time
+        if command.vx != 0.0:
+            duration = min(duration, max(cycle.tracker.remaining, 0.0) / abs(command.vx))
+        step = min(cycle.costmap.resolution / max(abs(command.vx), 1e-3), 0.1, max(duration, 1e-3))
+        pose = cycle.request.pose
+        poses = arc_poses((pose.x, pose.y, pose.yaw), command.vx, 0.0, command.wz, max(duration, 1e-3), step)
+        hit = cycle.footprint.first_collision(cycle.costmap, poses)
+        if hit < 0:
+            return ControlResult(ExePathOutcome.SUCCESS, "", command)
+        x, y = poses[hit, 0], poses[hit, 1]
+        text = f"obstacle ahead: the footprint would collide at ({x:.2f}, {y:.2f}) in {(hit + 1) * step:.2f} s"
+        return ControlResult(ExePathOutcome.BLOCKED_PATH, text)

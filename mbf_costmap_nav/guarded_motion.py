@@ -1,0 +1,96 @@
+"""Moving the robot inside a recovery: slowly, with the footprint checked ahead, cancelable, stopped at the end.
+
+``GuardedRecovery`` is the base of the recoveries that move. Its ``drive`` repeats one velocity until a condition holds
+and ends with IMPASSABLE before the footprint would meet an obstacle. A robot that already touches one may move as long
+as it touches no more than before, so backing out of a collision works and driving deeper into it does not.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+
+import numpy as np
+
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+from mbf_abstract.robot import RobotStateError
+from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.footprint_check import FootprintCheck, arc_poses
+from mbf_costmap_nav.plugins import CostmapRecovery
+
+
+class GuardedMotionParameters(PluginParameters):
+    """Parameters every moving recovery has."""
+
+    control_period: float = parameter(0.05, "Time between two commands.", unit="s", gt=0.0, le=1.0)
+    check_ahead_time: float = parameter(0.6, "How far ahead the footprint is checked.", unit="s", gt=0.0, le=10.0)
+    time_limit: float = parameter(15.0, "Give up after this time.", unit="s", gt=0.0, le=600.0)
+
+
+class GuardedRecovery(CostmapRecovery):
+    """Base of the recoveries that move the robot: write ``recover`` and use ``drive``."""
+
+    parameters: GuardedMotionParameters
+
+    @abstractmethod
+    def recover(self, request: RecoveryRequest) -> RecoveryResult:
+        """Do the behaviour's work; the robot is stopped afterwards in any case."""
+
+    def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
+        """Run ``recover``, report a lost pose as TF_ERROR, and send zero velocity on every way out."""
+        try:
+            return self.recover(request)
+        except RobotStateError as error:
+            return RecoveryResult(RecoveryOutcome.TF_ERROR, str(error))
+        finally:
+            request.motion.send(Twist())
+
+    def drive(
+        self,
+        request: RecoveryRequest,
+        velocity: Callable[[Pose], Twist],
+        finished: Callable[[Pose], bool],
+    ) -> RecoveryResult:
+        """Command ``velocity(pose)`` each period until ``finished(pose)``.
+
+        Returns
+        -------
+        RecoveryResult
+            SUCCESS, CANCELED, IMPASSABLE (with the place of the obstacle), or FAILURE when the time is over.
+        """
+        end = self.clock.now() + self.parameters.time_limit
+        while not request.cancel_token.cancelled:
+            pose = request.motion.pose()
+            if finished(pose):
+                return RecoveryResult(RecoveryOutcome.SUCCESS)
+            if self.clock.now() >= end:
+                return RecoveryResult(RecoveryOutcome.FAILURE, f"not done after {self.parameters.time_limit:g} s")
+            command = velocity(pose)
+            obstacle = self.obstacle_ahead(pose, command)
+            if obstacle:
+                return RecoveryResult(RecoveryOutcome.IMPASSABLE, obstacle)
+            if not request.motion.send(command):
+                return RecoveryResult(RecoveryOutcome.CANCELED, "the velocity gate refused the command")
+            if not request.motion.sleep(self.parameters.control_period):
+                break
+        return RecoveryResult(RecoveryOutcome.CANCELED, request.cancel_token.reason)
+
+    def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
+        """Say where moving on would touch more lethal cells than now; empty if the way is free."""
+        costmap = self.costmap.snapshot()
+        check = FootprintCheck(self.costmap.footprint, costmap.resolution)
+        touched = check.lethal_count(costmap, pose.x, pose.y, pose.yaw)
+        for x, y, yaw in self._poses_ahead(pose, command, costmap):
+            if check.lethal_count(costmap, x, y, yaw) > touched:
+                return f"an obstacle is in the way: the footprint would touch it at ({x:.2f}, {y:.2f}, {yaw:.2f} rad)"
+        return ""
+
+    def _poses_ahead(self, pose: Pose, command: Twist, costmap: Costmap) -> list[list[float]]:
+        duration = self.parameters.check_ahead_time
+        rim_speed = command.speed + abs(command.wz) * self.costmap.circumscribed_radius
+        step = float(np.clip(0.5 * costmap.resolution / max(rim_speed, 1e-6), duration / 100.0, duration))
+        poses = arc_poses((pose.x, pose.y, pose.yaw), command.vx, command.vy, command.wz, duration, step)
+        return [list(row) for row in poses.tolist()]

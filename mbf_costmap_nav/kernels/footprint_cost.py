@@ -1,0 +1,80 @@
+"""Cost of a footprint at many poses, for rollouts: the largest cell value under points that cover the outline.
+
+When to use: thousands of poses a cycle (controllers, recoveries, hybrid A*). When not: one exact answer with every
+cell counted once, which is the job of the pose queries. The covering points are at most half a cell apart on the
+outline and a cell apart inside, so only a corner of a cell that the outline clips by less than a quarter of its side
+can be missed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_costmap_nav.kernels.compiled import kernel
+
+OUTSIDE = -1
+"""Cost of a pose whose footprint leaves the map and touches nothing worse."""
+
+
+@kernel
+def footprint_cost(
+    cells: NDArray[np.uint8],
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    samples: NDArray[np.float64],
+    x: float,
+    y: float,
+    yaw: float,
+) -> int:
+    """Largest cost under the footprint, unknown not counted.
+
+    Parameters
+    ----------
+    cells : (height, width) uint8
+    resolution, origin_x, origin_y : float
+        Grid geometry [m].
+    samples : (n, 2) float64
+        Points that cover the footprint in the base frame [m].
+    x, y, yaw : float
+        Pose of the base [m, rad].
+
+    Returns
+    -------
+    int
+        0..254, or OUTSIDE if a point is off the map and no cell is lethal.
+    """
+    height, width = cells.shape
+    c, s = np.cos(yaw) / resolution, np.sin(yaw) / resolution
+    x_cells, y_cells = (x - origin_x) / resolution, (y - origin_y) / resolution
+    worst, outside = 0, False
+    for i in range(samples.shape[0]):
+        ix = int(np.floor(x_cells + c * samples[i, 0] - s * samples[i, 1]))
+        iy = int(np.floor(y_cells + s * samples[i, 0] + c * samples[i, 1]))
+        if ix < 0 or iy < 0 or ix >= width or iy >= height:
+            outside = True
+            continue
+        cost = int(cells[iy, ix])
+        if cost == 254:
+            return 254
+        if worst < cost < 254:
+            worst = cost
+    return OUTSIDE if outside else worst
+
+
+@kernel
+def first_collision(
+    cells: NDArray[np.uint8],
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    samples: NDArray[np.float64],
+    poses: NDArray[np.float64],
+) -> int:
+    """Index of the first of the poses (n, 3: x, y, yaw) whose footprint touches a lethal cell; -1 without one."""
+    for i in range(poses.shape[0]):
+        cost = footprint_cost(cells, resolution, origin_x, origin_y, samples, poses[i, 0], poses[i, 1], poses[i, 2])
+        if cost == 254:
+            return i
+    return -1

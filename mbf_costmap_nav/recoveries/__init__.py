@@ -1,0 +1,1 @@
+"""Recovery behaviours on costmaps, one a file; those that move share ``mbf_costmap_nav.guarded_motion``."""

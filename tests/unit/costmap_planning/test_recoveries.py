@@ -1,0 +1,117 @@
+"""Recoveries drive a kinematic robot through the ``Motion`` protocol."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbf_abstract.cancel import CancelToken
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.plugins import RecoveryRequest
+from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.recoveries.back_up import BackUpRecovery
+from mbf_costmap_nav.recoveries.clear import ClearRecovery
+from mbf_costmap_nav.recoveries.rotate import RotateRecovery
+from mbf_costmap_nav.recoveries.wait import WaitRecovery
+
+MOVING = [RotateRecovery, BackUpRecovery]
+
+
+def around(*boxes):
+    """10 m x 10 m around the origin at 0.05 m with lethal boxes (x0, y0, x1, y1) [m]."""
+    cells = np.zeros((200, 200), dtype=np.uint8)
+    for box in boxes:
+        x0, y0, x1, y1 = (round((v + 5.0) / 0.05) for v in box)
+        cells[y0:y1, x0:x1] = 254
+    return Costmap(cells, 0.05, -5.0, -5.0)
+
+
+@pytest.fixture
+def run(make_plugin, closed_loop):
+    """``run(Class, costmap, **parameters)`` -> (result, robot, plugin)."""
+
+    def run(plugin_class, costmap=None, start=(0.0, 0.0, 0.0), token=None, on_sleep=None, **parameters):
+        plugin = make_plugin(plugin_class, costmap or around(), **parameters)
+        robot = closed_loop.robot(*start)
+        robot.clock = plugin.clock
+        if on_sleep:
+            robot.on_sleep = on_sleep
+        return plugin.run_behavior(RecoveryRequest(robot, token or CancelToken())), robot, plugin
+
+    return run
+
+
+def test_rotate_turns_a_full_revolution_and_stops(run):
+    result, robot, _ = run(RotateRecovery)
+    assert result.success
+    assert abs(robot.state[2] - 2 * math.pi) < 0.15
+    assert robot.commands[-1].is_stopped()
+
+
+def test_rotate_to_the_right(run):
+    _, robot, _ = run(RotateRecovery, angle=-1.0)
+    assert robot.state[2] == pytest.approx(-1.0, abs=0.1)
+
+
+def test_back_up_covers_the_distance_and_stops(run):
+    result, robot, _ = run(BackUpRecovery, distance=0.5)
+    assert result.success and robot.state[0] == pytest.approx(-0.5, abs=0.03)
+    assert robot.commands[-1].is_stopped()
+
+
+def test_back_up_stops_before_a_wall_behind(run):
+    result, robot, _ = run(BackUpRecovery, around((-0.6, -1, -0.5, 1)), distance=1.0)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    assert robot.state[0] - 0.2 > -0.5
+    assert "obstacle is in the way" in result.message
+
+
+def test_rotate_stops_before_a_corner_would_sweep_a_wall(run):
+    result, robot, _ = run(RotateRecovery, around((0.22, -1, 0.3, 1)))
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    assert abs(robot.state[2]) < 0.2
+
+
+def test_a_robot_that_touches_a_wall_in_front_may_back_out(run):
+    result, robot, _ = run(BackUpRecovery, around((0.15, -1, 0.3, 1)), distance=0.3)
+    assert result.success and robot.state[0] < -0.25
+
+
+@pytest.mark.parametrize("recovery", [*MOVING, WaitRecovery, ClearRecovery])
+def test_a_token_set_before_is_honoured(run, recovery):
+    token = CancelToken()
+    token.cancel("no longer wanted")
+    result, robot, _ = run(recovery, token=token)
+    assert result.outcome == RecoveryOutcome.CANCELED and "no longer wanted" in result.message
+    assert all(command.is_stopped() for command in robot.commands)
+
+
+@pytest.mark.parametrize("recovery", MOVING)
+def test_cancel_while_moving_stops_the_robot(run, recovery):
+    token = CancelToken()
+    result, robot, _ = run(recovery, token=token, on_sleep=token.cancel)
+    assert result.outcome == RecoveryOutcome.CANCELED
+    assert len(robot.commands) == 2 and robot.commands[-1].is_stopped()
+
+
+def test_a_robot_that_does_not_move_runs_into_the_time_limit(run, make_plugin, closed_loop):
+    plugin = make_plugin(BackUpRecovery, around(), time_limit=1.0)
+    robot = closed_loop.robot(0, 0, 0, linear_accel=0.0)
+    robot.clock = plugin.clock
+    result = plugin.run_behavior(RecoveryRequest(robot))
+    assert result.outcome == RecoveryOutcome.FAILURE and "not done after 1 s" in result.message
+
+
+def test_wait_takes_its_time(run):
+    result, _, plugin = run(WaitRecovery, duration=2.0)
+    assert result.success and plugin.clock.now() == pytest.approx(2.0)
+
+
+def test_clear_resets_both_maps(run):
+    result, _, plugin = run(ClearRecovery)
+    assert result.success and plugin.costmap.cleared == ["all", "all"]
+
+
+def test_clear_around_the_robot_on_one_map(run):
+    result, _, plugin = run(ClearRecovery, costmaps="local", radius=1.5)
+    assert result.success and plugin.costmap.cleared == ["area 3"]
