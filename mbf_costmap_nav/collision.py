@@ -7,25 +7,15 @@ first, which decides most poses; for a batch of trajectories call the kernels di
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.map_queries import CellState
 from mbf_costmap_nav.costmap import INSCRIBED, LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.kernels.cover import polygon_costs
-
-
-class CostState(IntEnum):
-    """What a point or a footprint stands on, with MBF's numbers; of several states the larger one counts."""
-
-    FREE = 0
-    INSCRIBED = 1
-    LETHAL = 2
-    UNKNOWN = 3
-    OUTSIDE = 4
 
 
 class FootprintCosts(NamedTuple):
@@ -61,15 +51,15 @@ class FootprintCosts(NamedTuple):
         return self.outside or self.lethal > 0
 
     @property
-    def state(self) -> CostState:
-        """Largest state among the cells."""
+    def state(self) -> CellState:
+        """Worst state among the cells; unknown counts as worse than lethal (MBF)."""
         if self.outside:
-            return CostState.OUTSIDE
+            return CellState.OUTSIDE
         if self.unknown:
-            return CostState.UNKNOWN
+            return CellState.UNKNOWN
         if self.lethal:
-            return CostState.LETHAL
-        return CostState.INSCRIBED if self.inscribed else CostState.FREE
+            return CellState.LETHAL
+        return CellState.INSCRIBED if self.inscribed else CellState.FREE
 
     def weighted_sum(self, lethal: float = 1.0, inscribed: float = 1.0, unknown: float = 1.0) -> float:
         """Sum of the costs, with factors for the three special values."""

@@ -1,7 +1,7 @@
 """The four questions a client may ask a costmap without planning: cost of a point, a pose, a path; nearest valid pose.
 
-Semantics are those of MBF's costmap services (check_point_cost, check_pose_cost, check_path_cost, find_valid_pose), with
-these deviations, each the cure of a known fault:
+Semantics are those of MBF's costmap services (check_point_cost, check_pose_cost, check_path_cost, find_valid_pose),
+with these deviations, each the cure of a known fault:
 
 - no cell is counted twice (there the outline was), and the safety distance is a true offset of the footprint;
 - a pose or path in another frame is refused (there the untransformed request was searched); the server transforms;
@@ -13,87 +13,42 @@ All functions work on a snapshot, so they hold no lock.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Path, Pose
-from mbf_costmap_nav.collision import CostState, footprint_costs
+from mbf_abstract.map_queries import CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_costmap_nav.collision import footprint_costs
 from mbf_costmap_nav.costmap import INSCRIBED, LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.kernels.free_pose import first_fitting_pose
 
 DEFAULT_ANGLE_INCREMENT = math.radians(5.0)
-STATE_OF_COST = {INSCRIBED: CostState.INSCRIBED, LETHAL: CostState.LETHAL, UNKNOWN: CostState.UNKNOWN}
+NO_EXTRAS = PlaceQuery()
+STATE_OF_COST = {INSCRIBED: CellState.INSCRIBED, LETHAL: CellState.LETHAL, UNKNOWN: CellState.UNKNOWN}
 
 
-@dataclass(frozen=True)
-class CostMultipliers:
-    """Factors for lethal, inscribed and unknown cells in a sum of costs."""
-
-    lethal: float = 1.0
-    inscribed: float = 1.0
-    unknown: float = 1.0
-
-
-@dataclass(frozen=True)
-class CostAnswer:
-    """State and (summed) cost of what was asked about; the cost of anything outside is 0."""
-
-    state: CostState
-    cost: float
-
-
-@dataclass(frozen=True)
-class PathAnswer:
-    """Largest state and summed cost over the checked poses, and the index of the last one looked at (-1: none)."""
-
-    last_checked: int
-    state: CostState
-    cost: float
-
-
-@dataclass(frozen=True)
-class ValidPoseAnswer:
-    """Result of the search for a valid pose.
-
-    FREE or INSCRIBED: ``pose`` fits. UNKNOWN or OUTSIDE: nothing fits, ``pose`` is the nearest that only touches unknown
-    cells or the border. LETHAL: nothing at all, ``pose`` is None. ``cost`` is the highest cost under the footprint.
-    """
-
-    state: CostState
-    cost: float
-    pose: Pose | None
-
-
-def check_point(costmap: Costmap, x: float, y: float) -> CostAnswer:
+def check_point(costmap: Costmap, x: float, y: float) -> PlaceAnswer:
     """State and cost of the cell at the point (x, y) [m]."""
     cost = costmap.cost_at(x, y)
     if cost is None:
-        return CostAnswer(CostState.OUTSIDE, 0.0)
-    return CostAnswer(STATE_OF_COST.get(cost, CostState.FREE), float(cost))
+        return PlaceAnswer(CellState.OUTSIDE, 0.0)
+    return PlaceAnswer(STATE_OF_COST.get(cost, CellState.FREE), float(cost))
 
 
-def check_pose(
-    costmap: Costmap,
-    footprint: Footprint,
-    pose: Pose,
-    safety_distance: float = 0.0,
-    multipliers: CostMultipliers = CostMultipliers(),  # noqa: B008 - frozen
-) -> CostAnswer:
+def check_pose(costmap: Costmap, footprint: Footprint, pose: Pose, query: PlaceQuery = NO_EXTRAS) -> PlaceAnswer:
     """State and summed cost of the footprint at a pose.
 
     Parameters
     ----------
     costmap : Costmap
     footprint : Footprint
-        Padded or not, as the caller wishes.
+        Padded or not, as the caller wishes; the query's choices of map and padding are not looked at here.
     pose : Pose
         In the costmap's frame.
-    safety_distance : float
-        Distance [m] the footprint must keep; it is offset by that.
-    multipliers : CostMultipliers
+    query : PlaceQuery
+        Safety distance and cost multipliers; a multiplier of 0 counts as 1 (MBF).
 
     Raises
     ------
@@ -101,22 +56,24 @@ def check_pose(
         The pose is in another frame.
     """
     _require_frame(costmap, pose.frame_id)
-    return _check(costmap, footprint.offset(safety_distance), pose, multipliers)
+    return _check(costmap, footprint.offset(query.safety_dist), pose, query)
 
 
-def _check(costmap: Costmap, footprint: Footprint, pose: Pose, multipliers: CostMultipliers) -> CostAnswer:
-    costs = footprint_costs(costmap, footprint, pose.x, pose.y, pose.yaw)
-    return CostAnswer(costs.state, costs.weighted_sum(multipliers.lethal, multipliers.inscribed, multipliers.unknown))
+def _check(costmap: Costmap, outline: Footprint, pose: Pose, query: PlaceQuery) -> PlaceAnswer:
+    costs = footprint_costs(costmap, outline, pose.x, pose.y, pose.yaw)
+    total = costs.weighted_sum(
+        query.lethal_cost_mult or 1.0, query.inscrib_cost_mult or 1.0, query.unknown_cost_mult or 1.0
+    )
+    return PlaceAnswer(costs.state, total)
 
 
 def check_path(
     costmap: Costmap,
     footprint: Footprint,
     path: Path,
-    safety_distance: float = 0.0,
-    multipliers: CostMultipliers = CostMultipliers(),  # noqa: B008 - frozen
+    query: PlaceQuery = NO_EXTRAS,
     *,
-    return_on: CostState = CostState.FREE,
+    return_on: CellState | None = None,
     skip_poses: int = 0,
     path_cells_only: bool = False,
 ) -> PathAnswer:
@@ -124,8 +81,8 @@ def check_path(
 
     Parameters
     ----------
-    return_on : CostState
-        Stop after the pose at which the accumulated state reaches this one; FREE = never.
+    return_on : CellState, optional
+        Stop after the pose at which the accumulated state reaches this one; None or FREE = never.
     skip_poses : int
         Poses to leave out after each checked one.
     path_cells_only : bool
@@ -139,12 +96,12 @@ def check_path(
     _require_frame(costmap, path.frame_id)
     if skip_poses < 0:
         raise ValueError(f"skip_poses must not be negative, got {skip_poses}")
-    outline = Footprint([]) if path_cells_only else footprint.offset(safety_distance)
-    last_checked, state, cost = -1, CostState.FREE, 0.0
+    outline = Footprint([]) if path_cells_only else footprint.offset(query.safety_dist)
+    last_checked, state, cost = -1, CellState.FREE, 0.0
     for index in range(0, len(path), skip_poses + 1):
-        answer = _check(costmap, outline, path[index], multipliers)
+        answer = _check(costmap, outline, path[index], query)
         last_checked, state, cost = index, max(state, answer.state), cost + answer.cost
-        if CostState.FREE < return_on <= state:
+        if return_on and state >= return_on:
             break
     return PathAnswer(last_checked, state, cost)
 
@@ -157,11 +114,14 @@ def find_valid_pose(
     angle_tolerance: float,
     safety_distance: float = 0.0,
     angle_increment: float = DEFAULT_ANGLE_INCREMENT,
-) -> ValidPoseAnswer:
+) -> PoseAnswer:
     """Find the pose nearest to ``pose`` at which the footprint touches nothing lethal or unknown.
 
     The requested pose comes first, then cell centres by their distance from its cell; at each the requested heading
     comes first, then growing turns to the left and right. If the heading stays, the orientation is returned as given.
+
+    The answer is FREE or INSCRIBED with a pose that fits; UNKNOWN or OUTSIDE with the nearest pose that only touches
+    unknown cells or the border; or LETHAL without a pose. Its cost is the highest one under the footprint.
 
     Parameters
     ----------
@@ -191,11 +151,11 @@ def find_valid_pose(
         costmap.cells, vertices / costmap.resolution, (candidates - lower_left) / costmap.resolution, pose.yaw + turns
     )
     if which < 0:
-        return ValidPoseAnswer(CostState.LETHAL, float(LETHAL), None)
+        return PoseAnswer(CellState.LETHAL, float(LETHAL), None)
     x, y = candidates[which].tolist()
     orientation = pose.orientation if turn == 0 else Pose.planar(0.0, 0.0, pose.yaw + float(turns[turn])).orientation
     found = Pose((x, y, pose.z), orientation, pose.frame_id, pose.stamp)
-    return ValidPoseAnswer(CostState(state), float(cost), found)
+    return PoseAnswer(CellState(state), float(cost), found)
 
 
 def _candidates(costmap: Costmap, pose: Pose, dist_tolerance: float) -> NDArray[np.float64]:
