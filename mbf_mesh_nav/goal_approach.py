@@ -42,6 +42,27 @@ def is_at_goal(pose: Pose, goal: Pose, dist_tolerance: float, angle_tolerance: f
     return ground_distance(pose, goal) <= dist_tolerance and abs(heading_error(pose, goal)) <= angle_tolerance
 
 
+class ArrivalLatch:
+    """Remembers that the goal's position was reached and only the heading is left.
+
+    Once there, the robot may drift twice as far before it has to drive again, so turning does not flicker.
+
+    Parameters
+    ----------
+    reach : float
+        Distance [m] at which the position counts as reached.
+    """
+
+    def __init__(self, reach: float) -> None:
+        self._reach = reach
+        self._arrived = False
+
+    def update(self, pose: Pose, goal: Pose) -> bool:
+        """Take in the pose of this cycle; whether only turning is left."""
+        self._arrived = ground_distance(pose, goal) <= self._reach * (2.0 if self._arrived else 1.0)
+        return self._arrived
+
+
 def clamp(value: float, limit: float) -> float:
     """Limit a value symmetrically to [-limit, limit]."""
     return max(-limit, min(limit, value))

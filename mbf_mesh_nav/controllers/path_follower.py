@@ -17,7 +17,7 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_mesh_nav.goal_approach import braking_speed, clamp, ground_distance, heading_error, in_robot_frame, is_at_goal
+from mbf_mesh_nav.goal_approach import ArrivalLatch, braking_speed, clamp, heading_error, in_robot_frame, is_at_goal
 from mbf_mesh_nav.path_progress import PathProgress, PathProjection
 from mbf_mesh_nav.plugins import MeshController
 
@@ -57,7 +57,6 @@ class PathFollower(MeshController):
     parameters: PathFollowerParameters
 
     _goal: Pose | None = None
-    _turning_to_goal = False
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the map's frame."""
@@ -65,7 +64,7 @@ class PathFollower(MeshController):
             return False
         self._goal = path[-1]
         self._progress = PathProgress(path, window=3.0 * self.parameters.lookahead)
-        self._turning_to_goal = False
+        self._arrival = ArrivalLatch(self.parameters.goal_distance)
         return True
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
@@ -84,7 +83,7 @@ class PathFollower(MeshController):
                 f"allowed are {self.parameters.max_path_distance:g} m"
             )
             return ControlResult(ExePathOutcome.MISSED_PATH, message)
-        if self._arrived(pose):
+        if self._arrival.update(pose, self._goal):
             turn = self.parameters.turn_gain * heading_error(pose, self._goal)
             return self._command(0.0, turn)
         slope = math.acos(clamp(float(self.mesh_map.face_normals[surface.face, 2]), 1.0))
@@ -93,13 +92,6 @@ class PathFollower(MeshController):
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the last pose of the plan is reached."""
         return self._goal is not None and is_at_goal(pose, self._goal, dist_tolerance, angle_tolerance)
-
-    def _arrived(self, pose: Pose) -> bool:
-        """Whether only the heading is left; once there, the robot may drift twice as far before it drives again."""
-        assert self._goal is not None
-        reach = self.parameters.goal_distance * (2.0 if self._turning_to_goal else 1.0)
-        self._turning_to_goal = ground_distance(pose, self._goal) <= reach
-        return self._turning_to_goal
 
     def _pursue(self, pose: Pose, projection: PathProjection, slope: float) -> ControlResult:
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""
