@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 
+from mbf_abstract.clock import Clock
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.map_queries import CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
-from mbf_abstract.robot import RobotInformation
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.robot import RobotInformation, RobotStateError
+from mbf_abstract.transforms import TransformBuffer, TransformError
 from mbf_costmap_nav import queries
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
@@ -29,12 +30,11 @@ class CostmapQueries:
     Parameters
     ----------
     global_costmap, local_costmap : LayeredCostmap
-    transforms : TransformBuffer
-        Takes poses into the frames of the maps.
     robot : RobotInformation
-        Where the robot is, for questions without a pose.
-    update : callable
-        Bring one map up to date now.
+        Where the robot is, for questions without a pose and for updates.
+    transforms : TransformBuffer
+        Takes poses and paths into the frames of the maps.
+    clock : Clock
     using : callable
         Context manager that keeps one map alive while it is asked (``MapLifecycle.in_use``).
     """
@@ -43,15 +43,15 @@ class CostmapQueries:
         self,
         global_costmap: LayeredCostmap,
         local_costmap: LayeredCostmap,
-        transforms: TransformBuffer,
         robot: RobotInformation,
-        update: Callable[[LayeredCostmap], None],
+        transforms: TransformBuffer,
+        clock: Clock,
         using: Callable[[LayeredCostmap], AbstractContextManager[None]] = _always_running,
     ) -> None:
         self._global, self._local = global_costmap, local_costmap
         self._transforms = transforms
         self._robot = robot
-        self._update = update
+        self._clock = clock
         self._using = using
 
     def check_point(self, point: Pose, local: bool = False) -> PlaceAnswer:
@@ -100,7 +100,7 @@ class CostmapQueries:
                 self._there(pose, costmap),
                 dist_tolerance,
                 angle_tolerance,
-                query.safety_dist,
+                query,
             )
 
     def clear_map(self) -> None:
@@ -114,6 +114,13 @@ class CostmapQueries:
         for costmap in (self._local, self._global):
             with self._using(costmap):
                 self._update(costmap)
+
+    def _update(self, costmap: LayeredCostmap) -> None:
+        try:
+            pose = self._there(None, costmap)
+        except (RobotStateError, TransformError):
+            pose = None  # a rolling map then keeps its place
+        costmap.update(pose, self._clock.now())
 
     def _map_of(self, query: PlaceQuery) -> LayeredCostmap:
         return self._local if query.local else self._global

@@ -99,6 +99,11 @@ class LayeredCostmap:
         return self._geometry.resolution
 
     @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of all observation sources of the layers, sorted."""
+        return tuple(sorted({name for layer in self.layers.values() for name in _sources(layer)}))
+
+    @property
     def last_update(self) -> float | None:
         """Time [s] of the last update; None before the first one."""
         return self._last_update
@@ -158,15 +163,14 @@ class LayeredCostmap:
         Parameters
         ----------
         robot_pose : Pose or None
-            Pose of the base in ``frame_id``. None is enough for a map that neither rolls nor clears under the robot.
+            Pose of the base in ``frame_id``. While it is unknown (None) a rolling window stays where it is, and nothing
+            is cleared under the robot.
 
         Raises
         ------
         ValueError
-            The window rolls and no pose is given, or the pose is in another frame.
+            The pose is in another frame.
         """
-        if robot_pose is None and self.rolling_window:
-            raise ValueError("a rolling costmap needs the robot's pose to follow it")
         if robot_pose is not None and robot_pose.frame_id != self.frame_id:
             raise ValueError(f"robot pose is in frame {robot_pose.frame_id!r}, the costmap in {self.frame_id!r}")
         with self._lock:
@@ -279,8 +283,7 @@ class LayeredCostmap:
                 if isinstance(layer, SensorLayer) and source in layer.source_names
             ]
             if not listening:
-                known = sorted({name for layer in self.layers.values() for name in _sources(layer)})
-                raise ValueError(f"no layer has an observation source {source!r}, known are {known}")
+                raise ValueError(f"no layer has an observation source {source!r}, known are {list(self.source_names)}")
             for layer in listening:
                 layer.insert(source, observation)
         return len(listening)

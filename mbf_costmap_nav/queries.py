@@ -112,7 +112,7 @@ def find_valid_pose(
     pose: Pose,
     dist_tolerance: float,
     angle_tolerance: float,
-    safety_distance: float = 0.0,
+    query: PlaceQuery = NO_EXTRAS,
     angle_increment: float = DEFAULT_ANGLE_INCREMENT,
 ) -> PoseAnswer:
     """Find the pose nearest to ``pose`` at which the footprint touches nothing lethal or unknown.
@@ -129,8 +129,8 @@ def find_valid_pose(
         Largest distance [m] of the position from the requested one.
     angle_tolerance : float
         Largest turn [rad] from the requested heading.
-    safety_distance : float
-        Distance [m] the footprint must keep.
+    query : PlaceQuery
+        Its safety distance; nothing else of it matters here.
     angle_increment : float
         Largest step between two headings [rad].
 
@@ -144,7 +144,7 @@ def find_valid_pose(
         raise ValueError(f"tolerances {dist_tolerance}, {angle_tolerance}, increment {angle_increment} out of range")
     candidates = _candidates(costmap, pose, dist_tolerance)
     turns = _turns(angle_tolerance, angle_increment)
-    outline = footprint.offset(safety_distance)
+    outline = footprint.offset(query.safety_dist)
     vertices = outline.vertices if len(outline.vertices) >= 3 else np.zeros((1, 2))
     lower_left = np.array([costmap.origin_x, costmap.origin_y])
     which, turn, state, cost = first_fitting_pose(
