@@ -1,0 +1,81 @@
+"""Collects a run while it happens and turns it into a ``Recording``.
+
+Use one per run, on one thread: the runner's, which steps the simulator. Give it samples at a steady rate of 10 to
+20 Hz; more makes files larger and pictures no better.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbf_abstract.events import Event
+from mbf_abstract.geometry import Command, Pose, Twist
+from terrain.recording import Recording, RobotShape, StampedPoints, Surface
+
+
+@dataclass(eq=False)
+class Recorder:
+    """Collects a run while it happens; everything given is copied.
+
+    Parameters
+    ----------
+    scenario, backend : str
+        Names, for titles.
+    start : Pose
+    goals : sequence of Pose
+        More may be added to ``goals`` during the run.
+    """
+
+    scenario: str
+    backend: str
+    robot: RobotShape
+    start: Pose
+    goals: list[Pose]
+    ground: Surface | None = None
+    walls: Surface | None = None
+    obstacles: Surface | None = None
+    paths: list[StampedPoints] = field(default_factory=list)
+    scans: list[StampedPoints] = field(default_factory=list)
+    _samples: list[list[float]] = field(default_factory=list)
+
+    def sample(self, time: float, pose: Pose, velocity: Twist, command: Command) -> None:
+        """Add one sample; call at a steady rate (10 to 20 Hz). Commands of a car are its speed and zero turning."""
+        asked = [command.vx, command.vy, command.wz] if isinstance(command, Twist) else [command.speed, 0.0, 0.0]
+        row = [time, *pose.position, *pose.orientation, velocity.vx, velocity.vy, velocity.wz, *asked]
+        self._samples.append(row)
+
+    def path(self, time: float, points: ArrayLike) -> None:
+        """Add a plan (m, 3) [m] that the robot follows from now on."""
+        self.paths.append((time, np.array(points, dtype=np.float64).reshape(-1, 3)))
+
+    def scan(self, time: float, points: ArrayLike) -> None:
+        """Add the points (k, 3) [m] of a range sensor, in the map."""
+        self.scans.append((time, np.array(points, dtype=np.float64).reshape(-1, 3)))
+
+    def finish(self, success: bool, outcome: str, message: str, events: Sequence[Event] = ()) -> Recording:
+        """Return what was recorded."""
+        rows = np.array(self._samples, dtype=np.float64).reshape(-1, 14)
+        return Recording(
+            scenario=self.scenario,
+            backend=self.backend,
+            robot=self.robot,
+            ground=self.ground,
+            walls=self.walls,
+            obstacles=self.obstacles,
+            start=self.start,
+            goals=tuple(self.goals),
+            times=rows[:, 0].copy(),
+            poses=rows[:, 1:8].copy(),
+            twists=rows[:, 8:11].copy(),
+            commands=rows[:, 11:14].copy(),
+            paths=list(self.paths),
+            scans=list(self.scans),
+            events=tuple(events),
+            success=success,
+            outcome=outcome,
+            message=message,
+        )

@@ -1,0 +1,84 @@
+"""Synthetic recordings: a drive over a hill and a drive through an office, no simulator needed."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbf_abstract.events import Event, EventKind
+from mbf_abstract.geometry import Pose, Twist
+from terrain.heightfield import Heightfield
+from terrain.occupancy import OccupancyGrid, wall_triangles
+from terrain.recorder import Recorder
+from terrain.recording import Recording, RobotShape, Surface
+from terrain.robot_models import HUSKY, TURTLEBOT
+from terrain.solids import box_triangles
+
+RATE = 10.0
+
+
+def drive(recorder: Recorder, poses: list[Pose], speed: float) -> None:
+    """Record standing still for half a second, then one pose per sample."""
+    for index, pose in enumerate([poses[0]] * 5 + poses):
+        moving = speed if index >= 5 else 0.0
+        recorder.sample(index / RATE, pose, Twist.planar(moving), Twist.planar(moving, wz=0.1))
+
+
+def life_of_a_goal(duration: float, outcome: int, message: str) -> list[Event]:
+    return [
+        Event(0.0, EventKind.GOAL_ACCEPTED, "move_base", {"goal_id": 1}),
+        Event(0.0, EventKind.GOAL_ACCEPTED, "get_path", {"goal_id": 2}),
+        Event(
+            0.0, EventKind.PLUGIN_CALL_STARTED, "get_path", {"goal_id": 2, "plugin": "dijkstra", "method": "make_plan"}
+        ),
+        Event(0.4, EventKind.PLAN, "get_path", {"goal_id": 2, "plugin": "dijkstra", "cost": 30.0, "length": 29.0}),
+        Event(0.4, EventKind.GOAL_FINISHED, "get_path", {"goal_id": 2, "outcome": 0, "message": "plan found"}),
+        Event(0.4, EventKind.GOAL_ACCEPTED, "exe_path", {"goal_id": 3}),
+        Event(3.0, EventKind.ROBOT_STOPPED, "velocity_gate", {"reason": "no command for 0.5 s"}),
+        Event(duration, EventKind.GOAL_FINISHED, "exe_path", {"goal_id": 3, "outcome": outcome, "message": message}),
+        Event(duration, EventKind.GOAL_FINISHED, "move_base", {"goal_id": 1, "outcome": outcome, "message": message}),
+    ]
+
+
+@pytest.fixture
+def hill_recording() -> Recording:
+    """Thirty metres over hills, planned and driven, arrived."""
+    x, y = np.meshgrid(np.linspace(0.0, 40.0, 81), np.linspace(0.0, 30.0, 61))
+    heights = 1.5 * np.sin(x / 6.0) * np.cos(y / 5.0) + 0.02 * x
+    field = Heightfield(heights.astype(np.float32), 0.5, 0.5)
+    along = np.linspace(0.0, 1.0, 300)
+    xs, ys = 4.0 + 30.0 * along, 5.0 + 18.0 * along + 3.0 * np.sin(6.0 * along)
+    yaws = np.arctan2(np.gradient(ys), np.gradient(xs))
+    poses = [field.pose_at(px, py, yaw) for px, py, yaw in zip(xs, ys, yaws, strict=True)]
+    recorder = Recorder("hill", "mesh", RobotShape.of(HUSKY), poses[0], [poses[-1]], ground=Surface(*field.triangles()))
+    recorder.path(0.4, np.column_stack([xs, ys + 0.3 * np.sin(20 * along), field.height_at(xs, ys)]))
+    drive(recorder, poses, speed=1.2)
+    events = life_of_a_goal(30.4, 0, "goal reached")
+    return recorder.finish(True, "SUCCESS", "goal reached", events)
+
+
+@pytest.fixture
+def office_recording() -> Recording:
+    """Two rooms and a door, a box in the way, a lidar; ends before the goal."""
+    occupied = np.zeros((120, 160), dtype=bool)
+    occupied[[0, 1, -1, -2], :] = occupied[:, [0, 1, -1, -2]] = True
+    occupied[:50, 78:82] = occupied[70:, 78:82] = True
+    grid = OccupancyGrid(occupied, ~occupied, 0.1)
+    floor = Surface(
+        np.array([[0, 0, 0], [16, 0, 0], [16, 12, 0], [0, 12, 0]], float), np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    )
+    box_vertices, box_faces = box_triangles([0.6, 0.6, 1.0])
+    box = Surface(box_vertices + np.array([11.0, 6.5, 0.5]), box_faces)
+    poses = [Pose.planar(2.0 + 8.0 * t, 3.0 + 3.0 * math.sin(1.5 * t), 0.4) for t in np.linspace(0.0, 1.0, 150)]
+    recorder = Recorder(
+        "office", "costmap", RobotShape.of(TURTLEBOT), poses[0], [Pose.planar(14.0, 9.0)],
+        ground=floor, walls=Surface(*wall_triangles(grid, 2.0)), obstacles=box,
+    )  # fmt: skip
+    recorder.path(0.4, [[2, 3, 0], [8, 6, 0], [14, 9, 0]])
+    angles = np.linspace(-2.0, 2.0, 180)
+    for index in range(0, 150, 5):
+        pose = poses[index]
+        ring = np.column_stack([pose.x + 2 * np.cos(angles), pose.y + 2 * np.sin(angles), np.full(180, 0.3)])
+        recorder.scan(index / RATE, ring)
+    drive(recorder, poses, speed=0.5)
+    return recorder.finish(False, "BLOCKED_PATH", "a box stands on the path", life_of_a_goal(15.4, 110, "blocked"))

@@ -1,0 +1,82 @@
+"""What is recorded comes back from the file, and what is derived is right."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbf_abstract.geometry import AckermannCommand, Pose, Twist
+from terrain.recorder import Recorder
+from terrain.recording import Recording, RecordingError, RobotShape
+from terrain.robot_models import CAR, HUSKY, TURTLEBOT
+
+
+@pytest.mark.parametrize("name", ["hill_recording", "office_recording"])
+def test_a_recording_comes_back_from_its_file_unchanged(name, request, tmp_path):
+    recording = request.getfixturevalue(name)
+    recording.save(tmp_path / "recording.npz")
+
+    loaded = Recording.load(tmp_path / "recording.npz")
+
+    for field in ("times", "poses", "twists", "commands"):
+        np.testing.assert_array_equal(getattr(loaded, field), getattr(recording, field))
+    for field in ("ground", "walls", "obstacles"):
+        ours, theirs = getattr(recording, field), getattr(loaded, field)
+        assert (ours is None) == (theirs is None)
+        if ours is not None:
+            np.testing.assert_array_equal(theirs.vertices, ours.vertices)
+            np.testing.assert_array_equal(theirs.faces, ours.faces)
+    for field in ("paths", "scans"):
+        ours, theirs = getattr(recording, field), getattr(loaded, field)
+        assert [stamp for stamp, _ in theirs] == [stamp for stamp, _ in ours]
+        for (_, mine), (_, yours) in zip(ours, theirs, strict=True):
+            np.testing.assert_array_equal(yours, mine)
+    assert (loaded.start, loaded.goals, loaded.events) == (recording.start, recording.goals, recording.events)
+    assert (loaded.success, loaded.outcome, loaded.message) == (recording.success, recording.outcome, recording.message)
+
+
+def test_a_file_that_is_no_recording_is_refused_by_name(tmp_path):
+    (tmp_path / "broken.npz").write_bytes(b"no archive")
+
+    with pytest.raises(RecordingError, match=r"broken\.npz"):
+        Recording.load(tmp_path / "broken.npz")
+
+
+def test_an_empty_run_can_be_saved_and_has_no_duration(tmp_path):
+    empty = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(
+        False, "FAILURE", "no robot"
+    )
+    empty.save(tmp_path / "recording.npz")
+
+    loaded = Recording.load(tmp_path / "recording.npz")
+
+    assert loaded.duration == 0.0
+    assert loaded.goals == () and loaded.paths == []
+
+
+def test_tilt_is_the_angle_of_the_z_axis():
+    recorder = Recorder("tilted", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), [])
+    half = math.radians(30.0) / 2
+    recorder.sample(0.0, Pose((0, 0, 0), (math.sin(half), 0, 0, math.cos(half))), Twist(), Twist())
+    recorder.sample(0.1, Pose.planar(0, 0, yaw=2.0), Twist(), Twist())
+
+    recording = recorder.finish(True, "SUCCESS", "")
+
+    np.testing.assert_allclose(np.degrees(recording.tilt), [30.0, 0.0], atol=1e-9)
+
+
+def test_the_command_of_a_car_is_recorded_as_its_speed():
+    recorder = Recorder("car", "mesh", RobotShape.of(CAR), Pose.planar(0, 0), [])
+    recorder.sample(0.0, Pose.planar(0, 0), Twist(), AckermannCommand(1.5, 0.2))
+
+    assert recorder.finish(True, "SUCCESS", "").commands.tolist() == [[1.5, 0.0, 0.0]]
+
+
+@pytest.mark.parametrize(("spec", "count", "rear"), [(HUSKY, 4, -0.256), (TURTLEBOT, 2, 0.0), (CAR, 4, 0.0)])
+def test_wheels_stand_where_the_robot_has_them(spec, count, rear):
+    wheels = RobotShape.of(spec).wheels
+
+    assert wheels.shape == (count, 3)
+    assert wheels[:, 0].min() == pytest.approx(rear)
+    np.testing.assert_allclose(np.abs(wheels[:, 1]), spec.track / 2)
+    np.testing.assert_allclose(wheels[:, 2], spec.wheel_radius)
