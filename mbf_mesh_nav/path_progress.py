@@ -76,7 +76,12 @@ class PathProgress:
 
     def point_at(self, travelled: float) -> NDArray[np.float64]:
         """Point (3,) of the path at an arc length [m]; its ends beyond them."""
-        return np.array([np.interp(travelled, self.arc_lengths, self.positions[:, axis]) for axis in range(3)])
+        return np.asarray(self.points_at(np.array([travelled]))[0])
+
+    def points_at(self, travelled: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (n, 3) of the path at arc lengths (n,) [m]."""
+        columns = [np.interp(travelled, self.arc_lengths, self.positions[:, axis]) for axis in range(3)]
+        return np.stack(columns, axis=-1)
 
 
 def _nearest_on_polyline(

@@ -95,7 +95,8 @@ def drive(pose_on):
                 break
             result = controller.compute_velocity_commands(ControlRequest(poses[-1], velocity))
             assert result.success, f"{result.outcome} {result.message} after {len(poses)} cycles"
-            velocity = Twist.planar(vx=result.command.vx, wz=yaw_response * result.command.wz)
+            speed, turn = result.command.vx, result.command.wz
+            velocity = Twist.planar(vx=speed, wz=yaw_response * turn)
             x_axis, y_axis, _ = poses[-1].rotation.T
             turned = np.cos(velocity.wz * period) * x_axis + np.sin(velocity.wz * period) * y_axis
             ahead = np.asarray(poses[-1].position) + velocity.vx * period * (x_axis + turned) / 2

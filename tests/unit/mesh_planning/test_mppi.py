@@ -1,0 +1,98 @@
+"""MPPI on the surface: drives plans, goes round what the plan did not know, says when nothing is free."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.plugins import ControlRequest, PlanRequest
+from mbf_mesh_nav.controllers.mppi import MPPIController
+from mbf_mesh_nav.planners.cvp import CVPPlanner
+
+
+def straight_path(y=3.0):
+    return Path.from_points([(x, y, 0.0) for x in np.linspace(0.8, 5.2, 45)])
+
+
+def pillar(vertices):
+    return np.where(np.hypot(vertices[:, 0] - 3.0, vertices[:, 1] - 3.0) < 0.45, np.inf, 0.0)
+
+
+def test_it_drives_a_plan_over_hills_to_the_goal_pose(make_plugin, hills, drive, pose_on):
+    goal = Pose.planar(5.0, 4.6, 1.0)
+    plan = make_plugin(CVPPlanner, hills).make_plan(PlanRequest(Pose.planar(0.8, 0.8), goal))
+    controller = make_plugin(MPPIController, hills)
+    assert controller.set_plan(plan.path)
+    poses = drive(controller, hills, pose_on(hills, (0.8, 0.8, 0), (-0.3, 1, 0)), 30.0)
+    assert controller.is_goal_reached(poses[-1], 0.15, 0.2), poses[-1]
+
+
+def test_it_goes_round_an_obstacle_that_appeared_after_planning(make_plugin, plain, paint, drive, pose_on):
+    mesh_map = plain(spacing=0.1)
+    controller = make_plugin(MPPIController, mesh_map)
+    controller.set_plan(straight_path())
+    paint(mesh_map, pillar)
+    poses = drive(controller, mesh_map, pose_on(mesh_map, (0.8, 3, 0), (1, 0, 0)), 40.0)
+    assert controller.is_goal_reached(poses[-1], 0.15, 4.0), poses[-1]
+    assert min(math.hypot(pose.x - 3.0, pose.y - 3.0) for pose in poses) > 0.4
+
+
+def test_an_ackermann_robot_gets_steering_and_reaches_the_goal(make_plugin, plain, pose_on):
+    mesh_map = plain()
+    controller = make_plugin(MPPIController, mesh_map, motion_model="ackermann", wheelbase=0.4)
+    controller.set_plan(Path.from_points([(0.8, 1.0, 0.0), (3.0, 1.2, 0.0), (4.5, 2.5, 0.0), (4.8, 4.8, 0.0)]))
+    pose = Pose.planar(0.8, 1.0)
+    for _ in range(400):
+        if controller.is_goal_reached(pose, 0.2, math.pi):
+            break
+        command = controller.compute_velocity_commands(ControlRequest(pose, Twist())).command
+        assert isinstance(command, AckermannCommand) and abs(command.steering_angle) <= 0.5
+        yaw = pose.yaw + 0.05 * command.speed * math.tan(command.steering_angle) / 0.4
+        step = 0.05 * command.speed
+        pose = Pose.planar(pose.x + step * math.cos(yaw), pose.y + step * math.sin(yaw), yaw)
+    assert controller.is_goal_reached(pose, 0.2, math.pi), pose
+
+
+def test_walled_in_on_all_sides_it_finds_no_valid_command(make_plugin, plain, paint):
+    mesh_map = paint(plain(spacing=0.05, width=2.0, height=2.0), lambda v: np.where(v[:, 0] > 1.06, np.inf, 0.0))
+    controller = make_plugin(MPPIController, mesh_map, samples=50)
+    controller.set_plan(Path.from_points([(0.5, 1.0, 0.0), (1.9, 1.0, 0.0)]))
+    stand = controller.compute_velocity_commands(ControlRequest(Pose.planar(1.0, 1.0), Twist()))
+    assert stand.success and stand.command.vx < 0.2  # standing still is free
+    off_the_map = controller.compute_velocity_commands(ControlRequest(Pose.planar(1.0, 1.0, z=3.0), Twist()))
+    assert off_the_map.outcome == ExePathOutcome.OUT_OF_MAP
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_path_far_away_is_missed(make_plugin, plain, side):
+    controller = make_plugin(MPPIController, plain(), max_path_distance=1.0)
+    assert not controller.set_plan(Path(np.zeros((0, 3))))
+    controller.set_plan(straight_path())
+    result = controller.compute_velocity_commands(ControlRequest(Pose.planar(2.0, 3.0 + 1.5 * side), Twist()))
+    assert result.outcome == ExePathOutcome.MISSED_PATH
+
+
+def test_two_controllers_with_one_seed_give_the_same_commands(make_plugin, hills):
+    commands = []
+    for _ in range(2):
+        controller = make_plugin(MPPIController, hills)
+        controller.set_plan(straight_path())
+        request = ControlRequest(Pose.planar(1.0, 3.2, 0.3), Twist())
+        commands.append([controller.compute_velocity_commands(request).command for _ in range(3)])
+    assert commands[0] == commands[1]
+
+
+def test_a_side_slope_is_avoided_when_tilt_weighs(make_plugin, drive, pose_on):
+    from mbf_mesh_nav.mesh_map import MeshMap
+
+    x, y = np.meshgrid(np.arange(61) * 0.1, np.arange(61) * 0.1)
+    ridge = MeshMap.from_heights(0.6 * np.exp(-(((x - 3) / 0.8) ** 2) - ((y - 3) / 0.5) ** 2), 0.1, 0.1)
+    heights = {}
+    for weight in (0.0, 20.0):
+        controller = make_plugin(MPPIController, ridge, tilt_weight=weight, path_weight=1.0)
+        controller.set_plan(straight_path(y=3.3))
+        poses = drive(controller, ridge, pose_on(ridge, (0.8, 3.3, 0), (1, 0, 0)), 30.0)
+        heights[weight] = max(pose.z for pose in poses)
+    assert heights[20.0] < 0.7 * heights[0.0]
