@@ -1,0 +1,47 @@
+"""The promises of the framework as checks a test can call: stop (P1), end (P2), stay (P3)."""
+
+from __future__ import annotations
+
+from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.actions.handle import AnyGoalHandle
+from mbf_abstract.events import EventKind
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.scripted import Scripted, straight_plan
+
+
+def assert_stops(bench: Bench, fault_time: float) -> None:
+    """P1: from ``command_timeout`` plus one period after the fault on, the robot is only told to stand.
+
+    Parameters
+    ----------
+    bench : Bench
+    fault_time : float
+        When the fault happened [s].
+    """
+    parameters = bench.server.runtime.parameters
+    limit = fault_time + parameters.command_timeout + 1.0 / parameters.controller_frequency
+    late = bench.robot.moved_after(limit)
+    assert not late, f"commands after the fault at {fault_time:.3f} s: {late[:3]}"
+    assert bench.robot.command.is_stopped(), f"the robot still does {bench.robot.command}"
+
+
+def assert_ended_once(bench: Bench, handle: AnyGoalHandle) -> None:
+    """P2: the goal has exactly one final state, with an outcome and a text."""
+    ends = [event for event in bench.events(EventKind.GOAL_FINISHED) if event.data["goal_id"] == handle.id]
+    assert len(ends) == 1, f"goal {handle.id} ended {len(ends)} times"
+    assert handle.done
+    assert handle.result is not None
+    assert handle.result.message
+
+
+def assert_next_goals_work(bench: Bench) -> None:
+    """P3: the scripted plugins, told to behave, serve the next get_path and exe_path goals."""
+    for plugin, answer in ((bench.planner, straight_plan), (bench.controller, bench.controller.follow)):
+        assert isinstance(plugin, Scripted)
+        plugin.play(answer)
+    here = bench.robot.pose
+    goal = bench.path_to(here.x + 0.5, here.y)
+    plan = bench.navigator.get_path(goal[-1])
+    assert plan.success, plan.message
+    driven = bench.navigator.send(ExePathGoal(goal)).wait()
+    assert driven.success, driven.message

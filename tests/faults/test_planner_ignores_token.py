@@ -1,0 +1,99 @@
+"""Fault table, row 2: a planner hangs and ignores its cancel token."""
+
+import pytest
+
+from mbf_abstract.actions.goals import GetPathGoal
+from mbf_abstract.actions.handle import GoalStatus
+from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.bench import SCRIPTED, Bench
+from mbf_abstract.testing.faulty import BusyHang, Hang
+from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
+from mbf_abstract.testing.scripted import ScriptedPlanner
+
+GOAL = GetPathGoal(Pose.planar(3.0, 0.0))
+
+
+def test_a_hanging_planner_ends_its_goal_after_patience_and_grace_and_is_quarantined():
+    with Bench(planner_patience=2.0, cancel_grace=1.0) as bench:
+        hang = Hang(bench.clock, then=None)
+        bench.planner.play(hang)
+        handle = bench.navigator.send(GOAL)
+        result = handle.wait()
+        assert (hang.entered, hang.left) == (1, 0)
+        assert result.outcome == GetPathOutcome.PAT_EXCEEDED
+        assert "'planner'" in result.message
+        assert 3.0 <= bench.clock.now() < 3.2
+        assert_ended_once(bench, handle)
+        rejected = bench.navigator.send(GOAL)
+        assert rejected.status is GoalStatus.REJECTED
+        assert "quarantined" in rejected.result.message
+        hang.release()
+
+
+def test_another_planner_serves_the_same_slot_while_the_first_hangs():
+    with Bench({**SCRIPTED, "second": ScriptedPlanner}, planner_patience=1.0, cancel_grace=0.5) as bench:
+        hang = Hang(bench.clock)
+        bench.planner.play(hang)
+        bench.navigator.send(GOAL).wait()
+        assert hang.entered == 1
+        assert bench.navigator.get_path(Pose.planar(3.0, 0.0), planner="second").success
+        hang.release()
+
+
+def test_the_plugin_is_back_once_its_late_call_returns():
+    with Bench(planner_patience=1.0, cancel_grace=0.5) as bench:
+        hang = Hang(bench.clock)
+        bench.planner.play(hang)
+        handle = bench.navigator.send(GOAL)
+        handle.wait()
+        hang.release()
+        bench.clock.sleep(0.1)
+        assert hang.left == 1
+        assert_ended_once(bench, handle)
+        assert_next_goals_work(bench)
+        assert bench.server.runtime.quarantined == 0
+        assert len(bench.events(EventKind.QUARANTINE)) == 2
+
+
+def test_a_cancel_of_a_hanging_planner_ends_after_the_grace():
+    with Bench(planner_patience=0.0, cancel_grace=1.0) as bench:
+        hang = Hang(bench.clock)
+        bench.planner.play(hang)
+        handle = bench.navigator.send(GOAL)
+        bench.clock.sleep(5.0)
+        handle.cancel()
+        assert handle.wait().outcome == GetPathOutcome.CANCELED
+        assert bench.clock.now() == pytest.approx(6.0, abs=0.1)
+        hang.release()
+
+
+def test_hanging_planners_are_capped():
+    names = {f"planner{i}": ScriptedPlanner for i in range(4)}
+    with Bench(names, planner_patience=0.5, cancel_grace=0.5, max_quarantined=3) as bench:
+        hang = Hang(bench.clock)
+        for name in names:
+            bench.plugin(name, ScriptedPlanner).play(hang)
+        handles = [bench.navigator.send(GetPathGoal(GOAL.target_pose, planner=name)) for name in list(names)[:1]]
+        for index, name in enumerate(list(names)[1:3], start=1):
+            handles.append(bench.navigator.send(GetPathGoal(GOAL.target_pose, planner=name, concurrency_slot=index)))
+        for handle in handles:
+            handle.wait()
+        assert (hang.entered, bench.server.runtime.quarantined) == (3, 3)
+        rejected = bench.navigator.send(GetPathGoal(GOAL.target_pose, planner="planner3"))
+        assert rejected.status is GoalStatus.REJECTED
+        assert "3 plugin calls hang" in rejected.result.message
+        hang.release()
+
+
+def test_a_planner_that_keeps_the_processor_busy_is_found_by_the_wall_clock_guard():
+    with Bench(clock=SimClock(), hang_guard=0.2, planner_patience=5.0) as bench:
+        hang = BusyHang()
+        bench.planner.play(hang)
+        handle = bench.navigator.send(GOAL)
+        result = handle.wait()
+        hang.release.cancel()
+        assert (hang.entered, result.outcome) == (1, GetPathOutcome.PAT_EXCEEDED)
+        assert_ended_once(bench, handle)

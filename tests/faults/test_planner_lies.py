@@ -1,0 +1,42 @@
+"""Fault table, row 3: a planner "succeeds" with a path that cannot be followed."""
+
+import pytest
+
+from mbf_abstract.actions.goals import GetPathGoal
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import GetPathOutcome, is_success
+from mbf_abstract.plugins import PlanResult
+from mbf_abstract.testing import faulty
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
+
+
+@pytest.mark.parametrize(
+    ("lie", "outcome", "text"),
+    [
+        (faulty.no_path, GetPathOutcome.EMPTY_PATH, "no poses"),
+        (faulty.empty_path, GetPathOutcome.EMPTY_PATH, "no poses"),
+        (faulty.nan_path, GetPathOutcome.INTERNAL_ERROR, "pose 1 of the path is not finite: [nan"),
+        (faulty.wrong_frame_path, GetPathOutcome.TF_ERROR, "'nowhere'"),
+        (faulty.path_that_ends_elsewhere, GetPathOutcome.INTERNAL_ERROR, "5.00 m from the goal"),
+        (faulty.path_that_starts_elsewhere, GetPathOutcome.INTERNAL_ERROR, "pose 0 of the path is 5.00 m"),
+        (lambda request: None, GetPathOutcome.INTERNAL_ERROR, "returned NoneType from make_plan"),
+        (lambda request: (0, "found"), GetPathOutcome.INTERNAL_ERROR, "returned tuple from make_plan"),
+    ],
+)
+def test_a_lie_becomes_a_failure_that_names_it(lie, outcome, text):
+    with Bench() as bench:
+        bench.planner.play(lie)
+        handle = bench.navigator.send(GetPathGoal(Pose.planar(3.0, 0.0)))
+        result = handle.wait()
+        assert len(bench.planner.requests) == 1  # the lie was told
+        assert (result.outcome, result.path) == (outcome, None)
+        assert text in result.message
+        assert_ended_once(bench, handle)
+        assert_next_goals_work(bench)
+
+
+def test_an_outcome_of_another_action_does_not_pass_as_success():
+    with Bench(planner_max_retries=0) as bench:
+        bench.planner.play(PlanResult(999, "strange"))
+        assert not is_success(bench.navigator.get_path(Pose.planar(3.0, 0.0)).outcome)

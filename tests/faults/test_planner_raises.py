@@ -1,0 +1,34 @@
+"""Fault table, row 1: a planner raises."""
+
+import pytest
+
+from mbf_abstract.actions.goals import GetPathGoal
+from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
+
+
+@pytest.mark.parametrize("error", [RuntimeError("boom"), KeyError("x"), ZeroDivisionError(), RecursionError("deep")])
+def test_a_raising_planner_ends_the_goal_with_type_message_and_plugin(error):
+    with Bench() as bench:
+        bench.planner.play(error)
+        handle = bench.navigator.send(GetPathGoal(Pose.planar(3.0, 0.0)))
+        result = handle.wait()
+        assert len(bench.planner.requests) == 1  # the fault happened, and is not retried
+        assert result.outcome == GetPathOutcome.INTERNAL_ERROR
+        assert "planner" in result.message
+        assert type(error).__name__ in result.message
+        assert str(error) in result.message
+        assert_ended_once(bench, handle)
+        assert_next_goals_work(bench)
+
+
+def test_the_traceback_is_in_the_event():
+    with Bench() as bench:
+        bench.planner.play(RuntimeError("boom"))
+        bench.navigator.get_path(Pose.planar(3.0, 0.0))
+        (fault,) = bench.events(EventKind.FAULT)
+        assert fault.data["type"] == "RuntimeError"
+        assert any("scripted.py" in line for line in fault.data["traceback"])
