@@ -1,7 +1,7 @@
 """A PyBullet world without a window: ground, walls and things put in, and fixed steps of 1/240 s.
 
 Use it where contact matters: slopes, bumps, wheels that slip, doors that push. For sweeps on ground that does not
-matter take ``terrain.flat_world`` instead, which is some hundred times faster.
+matter take ``terrain.kinematic_robot`` instead, which is some hundred times faster.
 
 Two ways to put ground in. ``add_heightfield`` is Bullet's own heightfield; the planner's mesh from
 ``Heightfield.triangles`` is the same surface to a fraction of a millimetre. ``add_mesh`` is a concave triangle mesh:
@@ -70,6 +70,7 @@ class BulletWorld:
             self.client: int = self.bullet.connect(self.bullet.DIRECT)
         self.step_count = 0
         self.ground_bodies: set[int] = set()
+        self.has_moving_bodies = False
         self._static: list[tuple[FloatArray, IntArray]] = []
         self._folder = tempfile.TemporaryDirectory(prefix="mbf_world_")
         self._before_step: list[Callable[[], None]] = []
@@ -211,6 +212,7 @@ class BulletWorld:
         self, shape: int, pose: Pose, mass: float, moving: bool, vertices: FloatArray, faces: IntArray
     ) -> int:
         group = MOVING if moving or mass > 0.0 else STATIC
+        self.has_moving_bodies |= group == MOVING
         if group == STATIC:
             self._static.append((vertices @ pose.rotation.T + pose.position, faces))
         body: int = self.bullet.createMultiBody(
@@ -228,6 +230,10 @@ class BulletWorld:
         if ground:
             self.ground_bodies.add(body)
         return body
+
+    def place_body(self, body: int, pose: Pose) -> None:
+        """Put a body at ``pose`` at once."""
+        self.bullet.resetBasePositionAndOrientation(body, pose.position, pose.orientation, physicsClientId=self.client)
 
     def set_group(self, body: int, group: int) -> None:
         """Put all links of a body into a collision group; it still collides with every group."""

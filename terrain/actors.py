@@ -1,0 +1,151 @@
+"""Things that move by themselves: people and carts on routes, doors that close. Only sensors see them.
+
+Their positions are functions of the world's time and of what they were made with, nothing else; seeds go into the
+routes. They are as heavy as walls: a robot in their way is pushed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from mbf_abstract.geometry import Pose
+from terrain.occupancy import OccupancyGrid
+from terrain.world import BulletWorld
+
+FloatArray = NDArray[np.float64]
+
+PERSON_RADIUS, PERSON_HEIGHT = 0.25, 1.7
+MAX_ROUTE_DRAWS = 10_000
+
+
+class RouteWalker:
+    """An upright cylinder that walks a closed route of straight lines at constant speed.
+
+    Parameters
+    ----------
+    world : BulletWorld
+    route : (n, 2) or (n, 3) float
+        Corners [m]; after the last it goes back to the first. With three columns the third is the ground's height.
+    speed : float
+        [m/s]
+    start : float
+        How far along the route [m] it is at time 0.
+    """
+
+    def __init__(
+        self,
+        world: BulletWorld,
+        route: FloatArray,
+        speed: float,
+        start: float = 0.0,
+        radius: float = PERSON_RADIUS,
+        height: float = PERSON_HEIGHT,
+    ) -> None:
+        corners = np.asarray(route, dtype=float)
+        if corners.shape[1] == 2:
+            corners = np.column_stack([corners, np.zeros(len(corners))])
+        self._corners = np.vstack([corners, corners[:1]])
+        self._travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self._corners, axis=0), axis=1))])
+        self._world = world
+        self._speed = speed
+        self._start = start
+        self._lift = 0.5 * height
+        self.body = world.add_cylinder(self.pose(), radius, height, moving=True)
+        world.before_step(self._move)
+
+    def pose(self) -> Pose:
+        """Pose of the cylinder's middle now."""
+        length = float(self._travelled[-1])
+        along = (self._start + self._speed * self._world.time) % length if length > 0.0 else 0.0
+        x, y, z = (float(np.interp(along, self._travelled, self._corners[:, k])) for k in range(3))
+        leg = min(int(np.searchsorted(self._travelled, along, side="right")), len(self._corners) - 1)
+        ahead = self._corners[leg] - self._corners[leg - 1]
+        return Pose.planar(x, y, math.atan2(ahead[1], ahead[0]), z + self._lift)
+
+    def _move(self) -> None:
+        self._world.place_body(self.body, self.pose())
+
+
+class SlidingDoor:
+    """A leaf that slides from its open into its closed place at a given time.
+
+    Parameters
+    ----------
+    opened, closed : Pose
+        Middle of the leaf in both places.
+    size : (3,) float
+        Of the leaf [m].
+    closes_at, duration : float
+        When it starts to close and how long that takes [s].
+    """
+
+    def __init__(
+        self,
+        world: BulletWorld,
+        opened: Pose,
+        closed: Pose,
+        size: Sequence[float],
+        closes_at: float,
+        duration: float = 2.0,
+    ) -> None:
+        self._world = world
+        self._opened, self._closed = np.array(opened.position), np.array(closed.position)
+        self._orientation = closed.orientation
+        self._closes_at = closes_at
+        self._duration = duration
+        self.body = world.add_box(opened, size, moving=True)
+        world.before_step(self._move)
+
+    def pose(self) -> Pose:
+        """Pose of the leaf's middle now."""
+        share = min(1.0, max(0.0, (self._world.time - self._closes_at) / self._duration))
+        x, y, z = (self._opened + share * (self._closed - self._opened)).tolist()
+        return Pose((x, y, z), self._orientation)
+
+    def _move(self) -> None:
+        self._world.place_body(self.body, self.pose())
+
+
+def random_route(
+    grid: OccupancyGrid, rng: np.random.Generator, corners: int = 4, clearance: float = 0.4, longest_leg: float = 12.0
+) -> FloatArray:
+    """Draw a closed route (corners, 2) [m] through free cells, each leg straight and clear of walls.
+
+    Parameters
+    ----------
+    clearance : float
+        Distance kept to walls [m].
+    longest_leg : float
+        [m]; short legs are found sooner.
+
+    Raises
+    ------
+    ValueError
+        No such route was found: the map is too narrow for the clearance.
+    """
+    open_cells = grid.free & (ndimage.distance_transform_edt(~grid.occupied) * grid.resolution > clearance)
+    cells = np.argwhere(open_cells)
+    route: list[NDArray[np.intp]] = []
+    for _ in range(MAX_ROUTE_DRAWS if len(cells) else 0):
+        cell = cells[rng.integers(len(cells))]
+        ends = [cell] if not route else [route[-1], cell] if len(route) < corners - 1 else [route[-1], cell, route[0]]
+        if all(_leg_is_open(open_cells, a, b, longest_leg / grid.resolution) for a, b in pairwise(ends)):
+            route.append(cell)
+        if len(route) == corners:
+            centres = (np.array(route, dtype=float)[:, ::-1] + 0.5) * grid.resolution
+            return np.asarray(centres + np.array([grid.origin_x, grid.origin_y]))
+    raise ValueError(f"found no route of {corners} corners with {clearance} m to the walls")
+
+
+def _leg_is_open(open_cells: NDArray[np.bool_], a: NDArray[np.intp], b: NDArray[np.intp], longest: float) -> bool:
+    length = float(np.linalg.norm(b - a))
+    if length > longest:
+        return False
+    points = np.rint(a + np.linspace(0.0, 1.0, 2 * math.ceil(length) + 2)[:, None] * (b - a)).astype(np.intp)
+    return bool(open_cells[points[:, 0], points[:, 1]].all())

@@ -1,0 +1,145 @@
+"""Sensors: true where they should be, noisy by seed, and faulty on demand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbf_abstract.geometry import Pose, Twist
+from terrain.ego_sensors import Imu, Localization, WheelOdometry
+from terrain.generate import fractal_terrain
+from terrain.kinematic_robot import KinematicWorld
+from terrain.rays import MovingRays, StaticRays
+from terrain.robot_models import TURTLEBOT
+from terrain.robots import WheeledRobot
+from terrain.sensors import Lidar, planar_directions, ring_directions
+from terrain.world import BulletWorld
+
+
+class PosedRobot:
+    """A robot that is where the test says."""
+
+    def __init__(self, pose: Pose, velocity: Twist | None = None) -> None:
+        self.place, self.speed = pose, velocity or Twist()
+
+    def pose(self) -> Pose:
+        return self.place
+
+    def velocity(self) -> Twist:
+        return self.speed
+
+    def rolling_velocity(self) -> Twist:
+        return self.speed
+
+
+def rng(seed: int = 0) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+def boxed_world() -> BulletWorld:
+    world = BulletWorld()
+    world.add_ground_plane(-10.0, 10.0, -10.0, 10.0)
+    world.add_box(Pose.planar(3.0, 0.0, z=0.5), (1.0, 8.0, 1.0))
+    return world
+
+
+def planar_lidar(world: BulletWorld, pose: Pose, **options: float) -> Lidar:
+    casters = [StaticRays(*world.static_triangles()), MovingRays(world)]
+    options = {"noise": 0.0, "max_range": 8.0} | options
+    return Lidar(PosedRobot(pose), "scan", casters, (0.0, 0.0, 0.4), planar_directions(), 10.0, rng(), **options)
+
+
+def test_a_planar_lidar_sees_the_wall_where_it_is() -> None:
+    with boxed_world() as world:
+        scan = planar_lidar(world, Pose.planar(0.0, 1.0, 0.7)).measure(2.5)
+    assert scan is not None and (scan.source, scan.frame_id, scan.stamp) == ("scan", "map", 2.5)
+    assert np.allclose(scan.points[:, 0], 2.5, atol=1e-3) and 60 < scan.hits.sum() < 180
+    misses = np.linalg.norm(scan.ends[~scan.hits] - scan.origin, axis=1)
+    assert np.allclose(misses, 8.0) and len(scan.ends) == 360
+
+
+def test_moving_bodies_hide_what_is_behind_them_and_the_own_robot_is_not_seen() -> None:
+    with boxed_world() as world:
+        WheeledRobot(world, TURTLEBOT, Pose.planar(0.0, 0.0))
+        world.add_cylinder(Pose.planar(1.5, 0.0, z=0.8), 0.25, 1.6, moving=True)
+        scan = planar_lidar(world, Pose.planar(0.0, 0.0)).measure(0.0)
+    assert scan is not None
+    ahead = scan.points[np.abs(scan.points[:, 1]) < 0.05]
+    assert len(ahead) and ahead[:, 0] == pytest.approx(1.25, abs=0.02)
+    assert np.linalg.norm(scan.points[:, :2], axis=1).min() > 1.2
+
+
+def test_embree_and_bullet_agree_on_rough_ground() -> None:
+    hills = fractal_terrain(20.0, 20.0, 0.2, rng(3), median_slope=12.0, roughness=0.05)
+    directions = ring_directions()
+    origins = np.tile([10.0, 10.0, float(hills.height_at(10.0, 10.0)) + 1.0], (len(directions), 1))
+    with BulletWorld() as world:
+        world.add_mesh(*hills.triangles())
+        bullet = world.cast_rays(origins, origins + 15.0 * directions)
+        embree = StaticRays(*world.static_triangles()).distances(origins, directions, 15.0)
+    both = bullet.hit & np.isfinite(embree)
+    assert both.sum() > 1000 and (bullet.hit != np.isfinite(embree)).mean() < 0.002
+    assert np.abs(np.linalg.norm(bullet.points - origins, axis=1) - embree)[both].max() < 2e-3
+
+
+def test_noise_has_its_spread_and_drop_out_its_share_by_seed() -> None:
+    with boxed_world() as world:
+        lidar = planar_lidar(world, Pose.planar(0.0, 0.0), noise=0.02, drop_out=0.2)
+        scans = [lidar.measure(0.1 * k) for k in range(40)]
+        again = planar_lidar(world, Pose.planar(0.0, 0.0), noise=0.02, drop_out=0.2).measure(0.0)
+    assert np.mean([len(scan.ends) for scan in scans if scan]) == pytest.approx(0.8 * 360, rel=0.02)
+    ahead = np.concatenate([scan.points[np.abs(scan.points[:, 1]) < 0.2, 0] for scan in scans if scan])
+    assert ahead.std() == pytest.approx(0.02, rel=0.2) and ahead.mean() == pytest.approx(2.5, abs=5e-3)
+    assert again is not None and scans[0] is not None and np.array_equal(again.ends, scans[0].ends)
+
+
+def test_a_lidar_can_be_silent_stale_or_wrong() -> None:
+    with boxed_world() as world:
+        lidar = planar_lidar(world, Pose.planar(0.0, 0.0))
+        good = lidar.measure(0.0)
+        lidar.silent = True
+        assert lidar.measure(0.1) is None
+        lidar.silent, lidar.stale = False, True
+        assert lidar.measure(0.2) is good
+        lidar.stale, lidar.wrong = False, True
+        bad = lidar.measure(0.3)
+    assert good is not None and bad is not None and bad.stamp == 0.3
+    assert np.linalg.norm(bad.points - bad.origin, axis=1).min() == pytest.approx(1.25, abs=0.01)
+
+
+def test_rays_into_an_empty_world_hit_nothing() -> None:
+    empty = StaticRays(np.zeros((0, 3)), np.zeros((0, 3), np.int32))
+    assert np.isinf(empty.distances(np.zeros((4, 3)), np.tile([1.0, 0.0, 0.0], (4, 1)), 10.0)).all()
+    vertices, faces = KinematicWorld().static_triangles()
+    down = StaticRays(vertices, faces).distances(np.array([[0.3, 0.2, 1.0]]), np.array([[0.0, 0.0, -1.0]]), 5.0)
+    assert down[0] == pytest.approx(1.0)
+
+
+def test_the_imu_measures_roll_and_pitch() -> None:
+    rolled = Pose((0.0, 0.0, 0.0), (math.sin(0.1), 0.0, 0.0, math.cos(0.1)))
+    imu = Imu(PosedRobot(rolled, Twist((0.0, 0.0, 0.0), (0.1, 0.2, 0.3))), rng())
+    tilts = [imu.measure(0.02 * k) for k in range(400)]
+    assert np.mean([tilt.roll for tilt in tilts if tilt]) == pytest.approx(0.2, abs=1e-3)
+    assert np.mean([tilt.angular_velocity[2] for tilt in tilts if tilt]) == pytest.approx(0.3, abs=2e-3)
+
+
+def test_perfect_wheel_odometry_follows_an_arc_and_a_real_one_drifts() -> None:
+    robot = PosedRobot(Pose.planar(0.0, 0.0), Twist.planar(0.5, 0.0, 0.25))
+    perfect = WheelOdometry(robot, rng(), scale_error=0.0, yaw_scale_error=0.0, noise=0.0)
+    real = WheelOdometry(robot, rng(1))
+    for step in range(501):
+        ideal, drifted = perfect.measure(0.02 * step), real.measure(0.02 * step)
+    assert ideal is not None and drifted is not None
+    yaw, radius = 2.5, 2.0  # 10 s at 0.25 rad/s, 0.5 / 0.25 m
+    truth = Pose.planar(radius * math.sin(yaw), radius * (1.0 - math.cos(yaw)), yaw)
+    assert ideal.pose.distance_to(truth) < 1e-3 and ideal.pose.frame_id == "odom"
+    assert 0.01 < drifted.pose.distance_to(truth) < 0.5
+
+
+def test_localisation_jumps_when_told_to() -> None:
+    localization = Localization(PosedRobot(Pose.planar(1.0, 2.0, 0.5)), rng())
+    before = localization.measure(0.0)
+    localization.offset = (0.5, 0.0, 0.1)
+    after = localization.measure(0.1)
+    assert before == Pose.planar(1.0, 2.0, 0.5) and after is not None
+    assert (after.x, after.y, after.yaw) == pytest.approx((1.5, 2.0, 0.6)) and after.stamp == 0.1

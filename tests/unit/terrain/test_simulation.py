@@ -1,0 +1,145 @@
+"""World, robot, sensors and actors on one time line; kinematic stand-in; the same run for the same seed."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbf_abstract.geometry import AckermannCommand, Pose, Twist
+from mbf_abstract.sensing import RangeScan
+from terrain.actors import RouteWalker, SlidingDoor, random_route
+from terrain.ego_sensors import Imu, WheelOdometry
+from terrain.floor_plan import OFFICE_MAP
+from terrain.heightfield import Heightfield
+from terrain.indoor import add_building
+from terrain.kinematic_robot import KinematicRobot, KinematicWorld
+from terrain.mishaps import MishapKind
+from terrain.occupancy import read_occupancy
+from terrain.rays import MovingRays, StaticRays
+from terrain.robot_models import CAR, HUSKY, TURTLEBOT
+from terrain.robots import WheeledRobot
+from terrain.sensors import Lidar, planar_directions
+from terrain.simulation import Simulation
+from terrain.world import BulletWorld
+
+
+def office_run(seed: int) -> tuple[list[Pose], list[RangeScan]]:
+    grid = read_occupancy(OFFICE_MAP)
+    with BulletWorld() as world:
+        add_building(world, grid)
+        RouteWalker(world, random_route(grid, np.random.default_rng(seed)), 1.0)
+        robot = WheeledRobot(world, TURTLEBOT, Pose.planar(2.0, 9.7))
+        robot.settle()
+        casters = [StaticRays(*world.static_triangles()), MovingRays(world)]
+        lidar_rng, odometry_rng = np.random.default_rng([seed, 1]), np.random.default_rng([seed, 2])
+        lidar = Lidar(robot, "scan", casters, TURTLEBOT.lidar_position, planar_directions(180), 10.0, lidar_rng)
+        simulation = Simulation(world, robot, {"scan": lidar, "odom": WheelOdometry(robot, odometry_rng)})
+        scans: list[RangeScan] = [simulation.latest["scan"]]
+        simulation.on_measurement(lambda name, value: scans.append(value) if name == "scan" else None)
+        for tick in range(100):
+            robot.send_command(Twist.planar(0.5, 0.0, 0.2 * math.sin(0.1 * tick)))
+            simulation.advance_to(0.05 * (tick + 1))
+        assert simulation.time == pytest.approx(5.0)
+        return simulation.track, scans
+
+
+def test_five_seconds_in_the_office_repeat_bit_for_bit_and_differ_by_seed() -> None:
+    (track, scans), (track_again, scans_again), (_, scans_other) = office_run(1), office_run(1), office_run(2)
+    assert track == track_again and track[-1].distance_to(track[0]) > 2.0
+    assert all(np.array_equal(a.ends, b.ends) for a, b in zip(scans, scans_again, strict=True))
+    assert not np.array_equal(scans[-1].ends, scans_other[-1].ends)
+
+
+def test_sensors_measure_at_their_rates() -> None:
+    world = KinematicWorld()
+    robot = KinematicRobot(world, HUSKY, Pose.planar(0.0, 0.0))
+    fast, slow = Imu(robot, np.random.default_rng(0), rate=30.0), Imu(robot, np.random.default_rng(0), rate=5.0)
+    simulation = Simulation(world, robot, {"fast": fast, "slow": slow})
+    names: list[str] = []
+    simulation.on_measurement(lambda name, _: names.append(name))
+    simulation.advance_to(2.0)
+    simulation.advance_to(1.0)
+    assert names.count("fast") == 60 and names.count("slow") == 10 and simulation.time == pytest.approx(2.0)
+
+
+def test_the_kinematic_robot_keeps_to_its_limits_and_drives_an_arc() -> None:
+    world = KinematicWorld()
+    robot = KinematicRobot(world, HUSKY, Pose.planar(0.0, 0.0), command_timeout=math.inf)
+    robot.send_command(Twist.planar(9.0))
+    world.step()
+    assert robot.velocity().vx == pytest.approx(HUSKY.max_acceleration * world.time_step)
+    robot = KinematicRobot(world, CAR, Pose.planar(0.0, 0.0), command_timeout=math.inf)
+    robot.send_command(AckermannCommand(1.0, 0.3))
+    Simulation(world, robot).advance_to(4.0)
+    assert robot.velocity().wz == pytest.approx(math.tan(0.3) / CAR.wheelbase, rel=1e-6)
+
+
+def test_the_kinematic_robot_stops_without_commands() -> None:
+    world = KinematicWorld()
+    robot = KinematicRobot(world, HUSKY, Pose.planar(0.0, 0.0))
+    robot.send_command(Twist.planar(1.0))
+    Simulation(world, robot).advance_to(2.0)
+    assert robot.velocity() == Twist() and 0.4 < robot.pose().x < 1.0
+
+
+def test_on_a_slope_the_kinematic_robot_tilts_and_covers_ground_length() -> None:
+    _, x = np.mgrid[0:31, 0:31] * 0.5
+    world = KinematicWorld(Heightfield(x * math.tan(math.radians(20.0)), 0.5, 0.5))
+    robot = KinematicRobot(world, HUSKY, Pose.planar(2.0, 7.0), command_timeout=math.inf)
+    robot.send_command(Twist.planar(1.0))
+    simulation = Simulation(world, robot)
+    simulation.advance_to(5.0)
+    assert simulation.monitor.max_pitch == pytest.approx(math.radians(20.0), abs=1e-3)
+    assert simulation.monitor.distance == pytest.approx(5.0, abs=0.3)
+    robot.place(Pose.planar(14.0, 7.0))
+    simulation.advance_to(10.0)
+    assert robot.pose().x <= 15.0 and simulation.monitor.counts[MishapKind.COLLISION] == 1
+
+
+def test_walls_stop_the_kinematic_robot() -> None:
+    grid = read_occupancy(OFFICE_MAP)
+    world = KinematicWorld(building=grid)
+    robot = KinematicRobot(world, TURTLEBOT, Pose.planar(2.0, 9.7, math.pi / 2), command_timeout=math.inf)
+    robot.send_command(Twist.planar(0.5))
+    simulation = Simulation(world, robot)
+    simulation.advance_to(5.0)
+    assert robot.pose().y < 11.0 and simulation.monitor.counts[MishapKind.COLLISION] == 1
+    robot.send_command(Twist.planar(-0.5))
+    simulation.advance_to(6.0)
+    assert robot.pose().y < 10.6
+
+
+def test_a_walker_is_where_its_speed_says_and_comes_back() -> None:
+    with BulletWorld() as world:
+        world.add_ground_plane(-5.0, 5.0, -5.0, 5.0)
+        walker = RouteWalker(world, np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]), 1.0)
+        for _ in range(720):
+            world.step()
+        assert (walker.pose().x, walker.pose().y) == pytest.approx((2.0, 1.0), abs=0.01)
+        for _ in range(1200):
+            world.step()
+        assert (walker.pose().x, walker.pose().y) == pytest.approx((0.0, 0.0), abs=0.01)
+
+
+def test_a_door_closes_at_its_time_and_stops_the_robot() -> None:
+    with BulletWorld() as world:
+        world.add_ground_plane(-5.0, 5.0, -5.0, 5.0)
+        opened, closed = Pose.planar(1.0, 1.5, z=1.0), Pose.planar(1.0, 0.0, z=1.0)
+        door = SlidingDoor(world, opened, closed, (0.08, 1.2, 2.0), closes_at=0.5, duration=1.0)
+        robot = WheeledRobot(world, TURTLEBOT, Pose.planar(-0.5, 0.0), command_timeout=math.inf)
+        robot.settle()
+        simulation = Simulation(world, robot)
+        robot.send_command(Twist.planar(0.4))
+        simulation.advance_to(0.4)
+        assert door.pose().y == 1.5
+        simulation.advance_to(6.0)
+        assert door.pose().y == 0.0 and robot.pose().x < 0.85
+    assert next(mishap.kind for mishap in simulation.mishaps) is MishapKind.COLLISION
+
+
+def test_random_routes_keep_clear_of_walls() -> None:
+    grid = read_occupancy(OFFICE_MAP)
+    route = random_route(grid, np.random.default_rng(5), corners=5)
+    assert route.shape == (5, 2) and all(grid.is_free(x, y) for x, y in route)
+    with pytest.raises(ValueError, match="no route"):
+        random_route(grid, np.random.default_rng(5), clearance=9.0)
