@@ -116,7 +116,6 @@ class NavigationParameters(ParameterModel):
     max_quarantined: int = parameter(
         8, "Hung plugin threads that are tolerated before goals are rejected.", ge=1, le=1000
     )
-    max_pending_goals: int = parameter(1, "Goals that may wait for a slot.", ge=0, le=1000, dynamic=False)
     max_vx: float | None = parameter(None, "Forward limit of commands; absent = none.", unit="m/s", ge=0.0)
     min_vx: float | None = parameter(None, "Reverse limit of commands, negative or 0.", unit="m/s", le=0.0)
     max_vy: float | None = parameter(None, "Sideways limit of commands.", unit="m/s", ge=0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbf_abstract.execution.loaded_plugin import LoadedPlugin
+from mbf_abstract.execution.loaded_plugin import LoadedPlugin, PluginGone
 from mbf_abstract.plugins import PluginKind
 
 _WORDS = {
@@ -35,16 +35,20 @@ class PluginTable:
         """Names in load order."""
         return list(self._plugins[kind])
 
+    def all_of(self, kind: PluginKind) -> list[LoadedPlugin[Any]]:
+        """Plugins of one kind in load order."""
+        return list(self._plugins[kind].values())
+
     def find(self, kind: PluginKind, name: str) -> LoadedPlugin[Any] | None:
         """Plugin by name; an empty name is the first loaded."""
         plugins = self._plugins[kind]
         return next(iter(plugins.values()), None) if not name else plugins.get(name)
 
     def get(self, kind: PluginKind, name: str) -> LoadedPlugin[Any]:
-        """Plugin that is known to exist (the goal was accepted with its name)."""
+        """Plugin of an accepted goal; raises PluginGone if it was unloaded since."""
         plugin = self.find(kind, name)
         if plugin is None:
-            raise KeyError(self.problem(kind, name))
+            raise PluginGone(self.problem(kind, name))
         return plugin
 
     def problem(self, kind: PluginKind, name: str) -> str:

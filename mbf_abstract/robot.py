@@ -80,8 +80,8 @@ class RobotInformation:
 
     @property
     def has_odometry(self) -> bool:
-        """Whether the robot measures its velocity at all."""
-        return self._robot.odometry() is not None
+        """Whether the robot measures its velocity at all; raises RobotStateError."""
+        return self._odometry() is not None
 
     def velocity(self) -> Twist:
         """Measured velocity in the base frame; zero for a robot without odometry.
@@ -89,12 +89,18 @@ class RobotInformation:
         Raises
         ------
         RobotStateError
-            The last odometry is older than ``max_velocity_age``.
+            The last odometry is older than ``max_velocity_age``, or the driver raised.
         """
-        odometry = self._robot.odometry()
+        odometry = self._odometry()
         if odometry is None:
             return Twist()
         age = self._clock.now() - odometry.stamp
         if age > self.max_velocity_age:
             raise RobotStateError(f"odometry is {age:.2f} s old, limit {self.max_velocity_age:.2f} s")
         return odometry.velocity
+
+    def _odometry(self) -> Odometry | None:
+        try:
+            return self._robot.odometry()
+        except Exception as error:
+            raise RobotStateError(f"no odometry: the driver raised {type(error).__name__}: {error}") from error

@@ -37,8 +37,8 @@ class _Participant:
     """One known (or, while it waits, one foreign) thread."""
 
     __slots__ = (
-        "baton", "deadlock", "detached", "foreign", "guarded", "held_locks", "name", "notified", "priority",
-        "resumed_at", "ticket", "waiting_on",
+        "baton", "deadlock", "detached", "foreign", "guarded", "held_locks", "name", "notified", "outside_depth",
+        "priority", "resumed_at", "ticket", "waiting_on",
     )  # fmt: skip
 
     def __init__(self, name: str, priority: int, foreign: bool = False) -> None:
@@ -51,6 +51,7 @@ class _Participant:
         self.detached = False
         self.deadlock = False
         self.held_locks = 0
+        self.outside_depth = 0  # coroutines of this thread that are outside the lockstep
         self.guarded = ""
         self.resumed_at = 0.0  # wall clock
         self.waiting_on: _SimCondition | None = None
@@ -87,7 +88,8 @@ class SimClock:
         self._known: set[_Participant] = {self._founder}
         self._outside = 0
         self.hang_guard = hang_guard
-        self._guard_thread: threading.Thread | None = None
+        self._guarding = False
+        self._alone = threading.Event()
         self._schedule = schedule
         self._external = external
         self.on_hang: list[Callable[[str], None]] = []
@@ -136,25 +138,39 @@ class SimClock:
 
     @contextmanager
     def outside(self) -> Iterator[None]:
-        """Give up the baton while the body runs; on return wait for a turn."""
+        """Give up the baton while the body runs; on return wait for a turn.
+
+        Several coroutines of one thread may be inside at once, entered and left in any order: the thread counts as
+        foreign until the last of them is back.
+        """
         me = self._current()
-        if me.foreign:
-            yield
-            return
-        with self._mutex:
-            self._outside += 1
-            if self._running is me:
-                self._running = None
-                self._dispatch()
+        self._leave_lockstep(me)
         try:
             yield
         finally:
-            with self._mutex:
-                self._outside -= 1
-                self._make_ready(me)
-                if self._running is None:
-                    self._dispatch()
-            self._await_baton(me)
+            self._join_lockstep(me)
+
+    def _leave_lockstep(self, me: _Participant) -> None:
+        with self._mutex:
+            me.outside_depth += 1
+            if me.outside_depth > 1 or me not in self._known:
+                return
+            me.foreign = True
+            self._outside += 1
+            self._running = None
+            self._dispatch()
+
+    def _join_lockstep(self, me: _Participant) -> None:
+        with self._mutex:
+            me.outside_depth -= 1
+            if me.outside_depth > 0 or me not in self._known:
+                return
+            me.foreign = False
+            self._outside -= 1
+            self._make_ready(me)
+            if self._running is None:
+                self._dispatch()
+        self._await_baton(me)
 
     # -------------------------------------------------------------------------------- waiting and waking
     def _wait(self, condition: _SimCondition, timeout: float | None) -> bool:
@@ -300,18 +316,22 @@ class SimClock:
     def _leave_thread(self, me: _Participant) -> None:
         with self._mutex:
             self._known.discard(me)
+            if self._known <= {self._founder}:
+                self._guarding = False
+                self._alone.set()
             if self._running is me:
                 self._running = None
                 self._dispatch()
 
     def _start_guard(self) -> None:
-        if self.hang_guard > 0.0 and self._guard_thread is None:
-            self._guard_thread = threading.Thread(target=self._guard, name="hang guard", daemon=True)
-            self._guard_thread.start()
+        if self.hang_guard > 0.0 and not self._guarding:
+            self._guarding = True
+            self._alone.clear()
+            threading.Thread(target=self._guard, name="hang guard", daemon=True).start()
 
     def _guard(self) -> None:
-        while True:
-            time.sleep(min(1.0, self.hang_guard / 4.0))
+        """Look for hung threads until only the founder is left."""
+        while not self._alone.wait(min(1.0, self.hang_guard / 4.0)):
             label = self._detach_if_hung()
             for callback in list(self.on_hang) if label else ():
                 callback(label)

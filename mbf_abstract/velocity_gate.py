@@ -170,8 +170,7 @@ class VelocityGate:
                 self._events.emit(
                     EventKind.COMMAND_CLAMPED, lease.owner, requested=command_data(command), sent=command_data(limited)
                 )
-            self._write(limited)
-            return True
+            return self._write(limited)
 
     def _stop(self, lease: Lease, reason: str) -> None:
         with self._condition:
@@ -196,13 +195,23 @@ class VelocityGate:
             self._events.emit(EventKind.LEASE_REVOKED, "velocity_gate", holder=lease.owner, reason=reason)
 
     # ---------------------------------------------------------------------------------------- writing
-    def _write(self, command: Command) -> None:
-        self._robot.send_command(command)
+    def _write(self, command: Command) -> bool:
+        """Give one command to the driver; False, and an event, if the driver raises."""
+        delivered = True
+        try:
+            self._robot.send_command(command)
+        except Exception as error:
+            delivered = False
+            self._events.emit(
+                EventKind.FAULT, "robot", where="send_command", type=type(error).__name__, message=str(error)
+            )
         was_stopped = self._last_command.is_stopped(0.0, 0.0)
-        self._last_command = command
+        if delivered or not command.is_stopped(0.0, 0.0):
+            self._last_command = command  # a zero that was not delivered is tried again by the watchdog
         self._last_time = self._clock.now()
         if was_stopped:
             self._condition.notify_all()  # the watchdog sleeps while the robot is told to stand
+        return delivered
 
     def _zero(self) -> None:
         self._write(zero_like(self._last_command))

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 from mbf_abstract.actions.goals import ActionResult
 from mbf_abstract.actions.handle import GoalHandle, GoalStatus
 from mbf_abstract.events import EventKind
+from mbf_abstract.execution.loaded_plugin import PluginGone
 from mbf_abstract.execution.plugin_run import Abandoned
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.worker import Worker
@@ -24,6 +25,7 @@ R = TypeVar("R", bound=ActionResult)
 F = TypeVar("F")
 
 PREEMPTED = "preempted by a new goal"
+SHUT_DOWN = "the server is shut down"
 
 
 class GoalJob(Generic[G, R, F]):
@@ -46,6 +48,8 @@ class GoalJob(Generic[G, R, F]):
             action.finish_with(self.handle, result)
         except Abandoned:
             pass  # the goal has ended without this thread
+        except PluginGone as error:
+            action.finish(self.handle, action.invalid_plugin_outcome, str(error))
         except Exception as error:
             action.runtime.events.emit(
                 EventKind.FAULT, action.name, goal_id=self.handle.id, type=type(error).__name__, message=str(error)
@@ -63,7 +67,7 @@ class GoalJob(Generic[G, R, F]):
         self.action.worker(self.slot).abandon(self)
 
     def _before_start(self) -> str:
-        return f"{self.handle.cancel_token.reason} before it started"
+        return f"{self.handle.cancel_reason} before it started"
 
 
 class Action(ABC, Generic[G, R, F]):
@@ -71,6 +75,7 @@ class Action(ABC, Generic[G, R, F]):
 
     name: ClassVar[str]
     canceled_outcome: ClassVar[int]
+    invalid_plugin_outcome: ClassVar[int]
     internal_error_outcome: ClassVar[int]
 
     def __init__(self, runtime: Runtime) -> None:
@@ -79,6 +84,8 @@ class Action(ABC, Generic[G, R, F]):
         self._condition = runtime.clock.condition()
         self._unfinished: dict[int, GoalHandle[G, R, F]] = {}
         self._closed = False
+        self.listeners: list[Callable[[GoalHandle[G, R, F]], None]] = []
+        """Called with every goal that has ended, on the thread that ended it: must be short and must not raise."""
 
     # ------------------------------------------------------------------------------------------ client
     def send(self, goal: G, on_done: Callable[[GoalHandle[G, R, F]], None] | None = None) -> GoalHandle[G, R, F]:
@@ -106,12 +113,14 @@ class Action(ABC, Generic[G, R, F]):
 
     def close(self) -> None:
         """Cancel everything and take no more goals."""
-        self._closed = True
-        self.cancel_all("server shut down")
-        for worker in list(self._workers.values()):
+        with self._condition:
+            self._closed = True
+            workers = list(self._workers.values())
+        self.cancel_all(SHUT_DOWN)
+        for worker in workers:
             waiting = worker.close()
             if isinstance(waiting, GoalJob):
-                self.finish(waiting.handle, self.canceled_outcome, "server shut down before it started")
+                self.finish(waiting.handle, self.canceled_outcome, f"{SHUT_DOWN} before it started")
 
     @property
     def busy(self) -> bool:
@@ -142,13 +151,16 @@ class Action(ABC, Generic[G, R, F]):
         """Queue the job for its slot; overridden where a running goal can take the new one over."""
         displaced = self.worker(job.slot).submit(job)
         if isinstance(displaced, GoalJob):
-            self.finish(displaced.handle, self.canceled_outcome, f"{PREEMPTED} before it started")
+            reason = SHUT_DOWN if displaced is job else PREEMPTED
+            self.finish(displaced.handle, self.canceled_outcome, f"{reason} before it started")
 
     def worker(self, slot: int) -> Worker:
         """Worker of a slot, made at its first use."""
         with self._condition:
             if slot not in self._workers:
                 self._workers[slot] = Worker(self.runtime.clock, f"{self.name} slot {slot}")
+                if self._closed:
+                    self._workers[slot].close()
             return self._workers[slot]
 
     def finish(self, handle: GoalHandle[G, R, F], outcome: int, message: str) -> None:
@@ -166,13 +178,15 @@ class Action(ABC, Generic[G, R, F]):
         handle.finish(status, result)
         with self._condition:
             self._unfinished.pop(handle.id, None)
+        for listener in self.listeners:
+            listener(handle)
 
     def _is_cancel(self, handle: GoalHandle[G, R, F], outcome: int) -> bool:
         return outcome == self.canceled_outcome
 
     def _rejection(self, goal: G) -> tuple[int, str] | None:
         if self._closed:
-            return self.internal_error_outcome, "the server is shut down"
+            return self.internal_error_outcome, SHUT_DOWN
         slot = self._slot(goal)
         if not 0 <= slot <= 255:
             return self.internal_error_outcome, f"concurrency_slot must be 0..255, got {slot}"

@@ -47,6 +47,7 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
 
     name = "exe_path"
     canceled_outcome = ExePathOutcome.CANCELED
+    invalid_plugin_outcome = ExePathOutcome.INVALID_PLUGIN
     internal_error_outcome = ExePathOutcome.INTERNAL_ERROR
 
     def __init__(self, runtime: Runtime, plugins: PluginTable) -> None:
@@ -181,7 +182,7 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
         handle = following.job.handle
         self._end_following(following)
         if handle.cancel_requested:
-            text = f"{handle.cancel_token.reason}; controller {following.controller!r} has not ended yet"
+            text = f"{handle.cancel_reason}; controller {following.controller!r} has not ended yet"
             following.job.abandon(ExePathOutcome.CANCELED, text)
         else:
             patience = self.runtime.parameters.controller_patience
@@ -190,7 +191,7 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
 
     # ---------------------------------------------------------------------------------------- 4. results
     def _result(self, end: ControllerEnd, execution: ControllerExecution, path: Path, controller: str) -> ExePathResult:
-        pose = self._robot_pose()
+        pose, last = self._robot_pose(), execution.last_result
         return ExePathResult(
             end.outcome,
             end.message,
@@ -198,8 +199,8 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
             dist_to_goal=pose.distance_to(path[-1]) if pose else float("inf"),
             angle_to_goal=pose.angle_to(path[-1]) if pose else float("inf"),
             controller=controller,
-            plugin_outcome=int(execution.last_result.outcome),
-            plugin_message=execution.last_result.message,
+            plugin_outcome=None if last is None else int(last.outcome),
+            plugin_message="" if last is None else last.message,
         )
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> ExePathResult:

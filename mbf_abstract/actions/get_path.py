@@ -32,6 +32,7 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
 
     name = "get_path"
     canceled_outcome = GetPathOutcome.CANCELED
+    invalid_plugin_outcome = GetPathOutcome.INVALID_PLUGIN
     internal_error_outcome = GetPathOutcome.INTERNAL_ERROR
 
     def __init__(self, runtime: Runtime, plugins: PluginTable) -> None:
@@ -96,7 +97,7 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
         if state is PlannerState.FOUND_PLAN:
             return self._found(said, handle, request, words)
         if state is PlannerState.CANCELED:
-            return GetPathResult(GetPathOutcome.CANCELED, handle.cancel_token.reason, **words)
+            return GetPathResult(GetPathOutcome.CANCELED, handle.cancel_reason, **words)
         if state is PlannerState.PAT_EXCEEDED:
             patience = self.runtime.parameters.planner_patience
             tail = f"; the planner said last: {said.message}" if said.message else ""
@@ -122,7 +123,7 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
 
     def _hung(self, planner: str, handle: Handle) -> tuple[int, str]:
         if handle.cancel_requested:
-            return GetPathOutcome.CANCELED, f"{handle.cancel_token.reason}; planner {planner!r} has not ended yet"
+            return GetPathOutcome.CANCELED, f"{handle.cancel_reason}; planner {planner!r} has not ended yet"
         patience = self.runtime.parameters.planner_patience
         return GetPathOutcome.PAT_EXCEEDED, f"planner {planner!r} gave no answer within {patience:g} s and its grace"
 

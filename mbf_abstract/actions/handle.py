@@ -55,6 +55,8 @@ class GoalHandle(Generic[G, R, F]):
         The goal as sent.
     cancel_token : CancelToken
         What the plugin polls. Set by ``cancel`` and, with another reason, when patience runs out.
+    cancel_requested, cancel_reason : bool, str
+        Whether a client, or a newer goal, has asked this goal to end, and why.
     """
 
     def __init__(self, goal_id: int, action: str, goal: G, runtime: Runtime) -> None:
@@ -63,6 +65,7 @@ class GoalHandle(Generic[G, R, F]):
         self.goal = goal
         self.cancel_token = CancelToken()
         self.cancel_requested = False
+        self.cancel_reason = ""
         self._runtime = runtime
         self._condition = runtime.clock.condition()
         self._status = GoalStatus.PENDING
@@ -138,6 +141,7 @@ class GoalHandle(Generic[G, R, F]):
             if self.done or self.cancel_requested:
                 return
             self.cancel_requested = True
+            self.cancel_reason = reason
             if self._status is not GoalStatus.PENDING:
                 self._status = GoalStatus.CANCELING
         self._runtime.events.emit(EventKind.GOAL_CANCEL, self.action, goal_id=self.id, reason=reason)
@@ -173,10 +177,10 @@ class GoalHandle(Generic[G, R, F]):
     def subscribe(self, callback: Callable[[GoalHandle[G, R, F]], None]) -> None:
         """Run ``callback`` (server side, short) on every feedback and on the final state, at once if there."""
         with self._condition:
-            self._subscribers.append(callback)
-            done = self.done
-        if done:
-            callback(self)
+            if not self.done:
+                self._subscribers.append(callback)
+                return
+        callback(self)
 
     def activate(self) -> None:
         """PENDING -> ACTIVE (or CANCELING if the cancel was faster)."""
@@ -191,7 +195,9 @@ class GoalHandle(Generic[G, R, F]):
                 return
             self._feedback = feedback
             callbacks = list(self._feedback_callbacks)
-        self._tell_subscribers()
+            subscribers = list(self._subscribers)
+        for subscriber in subscribers:
+            subscriber(self)
         for callback in callbacks:
             self._runtime.callbacks.submit(lambda callback=callback: callback(feedback))  # type: ignore[misc]
 
@@ -212,17 +218,15 @@ class GoalHandle(Generic[G, R, F]):
             self._status = status
             self._result = result
             callbacks, self._done_callbacks = self._done_callbacks, []
+            subscribers, self._subscribers = self._subscribers, []
             self._feedback_callbacks.clear()
             self._wake_callbacks.clear()
             self._condition.notify_all()
-        self._tell_subscribers()
+        for subscriber in subscribers:
+            subscriber(self)
         for callback in callbacks:
             self._runtime.callbacks.submit(lambda callback=callback: callback(self))  # type: ignore[misc]
         return True
-
-    def _tell_subscribers(self) -> None:
-        for subscriber in list(self._subscribers):
-            subscriber(self)
 
     def _set_paused(self, paused: bool) -> None:
         with self._condition:

@@ -52,6 +52,7 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
 
     name = "move_base"
     canceled_outcome = MoveBaseOutcome.CANCELED
+    invalid_plugin_outcome = MoveBaseOutcome.FAILURE
     internal_error_outcome = MoveBaseOutcome.INTERNAL_ERROR
 
     def __init__(

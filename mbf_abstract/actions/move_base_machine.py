@@ -70,7 +70,7 @@ class MoveBaseMachine:
         self._follow: AnyGoalHandle | None = None
         self._recover: AnyGoalHandle | None = None
         self._trigger = Trigger.NONE
-        self._failure: End = (MoveBaseOutcome.FAILURE, "")
+        self._failure: End | None = None
         self._ending: End | None = None
         self._next_behavior = 0
         self._oscillation = OscillationDetector(self._runtime.clock)
@@ -112,11 +112,14 @@ class MoveBaseMachine:
         """Work until the goal has its end."""
         self._job.handle.on_wake(self._wake)
         self._ask_for_plan()
-        while True:
-            message = self._next_message()
-            end = self._react(message)
-            if end is not None:
-                return end
+        try:
+            end = None
+            while end is None:
+                end = self._react(self._next_message())
+            return end
+        finally:  # e.g. a replanning that is still under way when the robot arrives
+            for handle in self._sub_goals():
+                handle.cancel("move_base is over")
 
     def _react(self, message: AnyGoalHandle | None) -> End | None:
         handle = self._job.handle
@@ -230,7 +233,7 @@ class MoveBaseMachine:
         )
 
     def _on_feedback(self, message: AnyGoalHandle) -> End | None:
-        if message is not self._follow or message.feedback is None or self._state is MoveBaseState.STOPPING:
+        if message is not self._follow or message.feedback is None or self._state is not MoveBaseState.EXE_PATH:
             return None
         feedback: ExePathFeedback = message.feedback
         self._job.handle.publish_feedback(feedback)
@@ -244,8 +247,10 @@ class MoveBaseMachine:
         return None
 
     def _on_followed(self, result: Any) -> End | None:
+        if self._state is MoveBaseState.GET_PATH:  # the end of an older goal's path: the plan for this one comes
+            return None
         if self._state is MoveBaseState.STOPPING:
-            return self._recover_from(self._trigger, self._failure)
+            return self._go_on_after_stop()
         if result.success:
             return MoveBaseOutcome.SUCCESS, result.message
         if result.outcome in FATAL:
@@ -306,6 +311,7 @@ class MoveBaseMachine:
         self._action.finish(old, MoveBaseOutcome.CANCELED, PREEMPTED)
         self._action.tell_started(offer.handle)
         self._reset_recovery()
+        self._failure = None
         self._oscillation.reset()
         try:
             self._target = self._action.target(offer.handle)
@@ -338,8 +344,15 @@ class MoveBaseMachine:
         self._cancel_sub_goals(MoveBaseState.CANCELING)
         return None if self._sub_goals() else end
 
+    def _go_on_after_stop(self) -> End | None:
+        """The robot stands: recover from what made it stop, or plan for a goal that took over meanwhile."""
+        if self._failure is not None:
+            return self._recover_from(self._trigger, self._failure)
+        self._ask_for_plan()
+        return None
+
     def _stopped_end(self) -> End:
-        return self._ending or (MoveBaseOutcome.CANCELED, self._job.handle.cancel_token.reason)
+        return self._ending or (MoveBaseOutcome.CANCELED, self._job.handle.cancel_reason)
 
     def _forward_pause(self) -> None:
         paused = self._job.handle.paused

@@ -28,6 +28,7 @@ class RecoveryAction(Action[RecoveryGoal, RecoveryResultMessage, NoFeedback]):
 
     name = "recovery"
     canceled_outcome = RecoveryOutcome.CANCELED
+    invalid_plugin_outcome = RecoveryOutcome.INVALID_PLUGIN
     internal_error_outcome = RecoveryOutcome.INTERNAL_ERROR
 
     def __init__(self, runtime: Runtime, plugins: PluginTable) -> None:
@@ -65,7 +66,7 @@ class RecoveryAction(Action[RecoveryGoal, RecoveryResultMessage, NoFeedback]):
         execution.motion.close("the behaviour hangs")
         name = job.handle.goal.behavior or "default"
         if job.handle.cancel_requested:
-            text = f"{job.handle.cancel_token.reason}; recovery {name!r} has not ended yet"
+            text = f"{job.handle.cancel_reason}; recovery {name!r} has not ended yet"
             job.abandon(RecoveryOutcome.CANCELED, text)
         else:
             patience = self.runtime.parameters.recovery_patience

@@ -25,6 +25,7 @@ class RefinePathAction(Action[RefinePathGoal, RefinePathResult, NoFeedback]):
 
     name = "refine_path"
     canceled_outcome = RefinePathOutcome.CANCELED
+    invalid_plugin_outcome = RefinePathOutcome.FAILURE
     internal_error_outcome = RefinePathOutcome.INTERNAL_ERROR
 
     def __init__(self, runtime: Runtime, plugins: PluginTable) -> None:

@@ -21,6 +21,7 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
 from mbf_abstract.robot import RobotStateError
+from mbf_abstract.transforms import TransformError
 from mbf_abstract.velocity_gate import Lease
 
 
@@ -82,7 +83,8 @@ class ControllerExecution:
     run : PluginRun
         Supervises the plugin calls; its patience watch is restarted by every valid command.
     take_new_plan : callable
-        Answers a plan that came for this running execution, at most once each, else None.
+        Answers a plan that came for this running execution, at most once each, else None; raises TransformError for
+        a path that can not be brought into the global frame.
     on_cycle : callable
         Told after every cycle that called the plugin, e.g. to publish feedback.
     """
@@ -99,7 +101,7 @@ class ControllerExecution:
         self._on_cycle = on_cycle
         self._plan: Plan | None = None
         self._failures = 0
-        self._last_result = ControlResult(ExePathOutcome.NO_VALID_CMD, "")
+        self._last_result: ControlResult | None = None
         self._hold_reason: tuple[int, str] | None = None
         self._ignored = Stopwatch(run.runtime.clock)
         self._oscillation = OscillationDetector(run.runtime.clock)
@@ -108,8 +110,8 @@ class ControllerExecution:
         self.state = ControllerState.INITIALIZED
 
     @property
-    def last_result(self) -> ControlResult:
-        """The plugin's last words."""
+    def last_result(self) -> ControlResult | None:
+        """The plugin's last words; None if it was never asked for a command."""
         return self._last_result
 
     def execute(self) -> ControllerEnd:
@@ -168,7 +170,10 @@ class ControllerExecution:
         return end
 
     def _adopt_new_plan(self) -> ControllerEnd | None:
-        plan = self._take_new_plan()
+        try:
+            plan = self._take_new_plan()
+        except TransformError as error:
+            return self._end(ControllerState.INVALID_PLAN, ExePathOutcome.TF_ERROR, str(error))
         if plan is None:
             if self._plan is None:
                 return self._end(ControllerState.NO_PLAN, ExePathOutcome.INVALID_PATH, "started without a path")
@@ -180,6 +185,7 @@ class ControllerExecution:
             text = f"controller {self._run.plugin.name!r} refused the path"
             return self._end(ControllerState.INVALID_PLAN, ExePathOutcome.INVALID_PATH, text)
         self._plan = plan
+        self._graceful_stop = None
         if self.state is ControllerState.STOPPING:
             self._enter(ControllerState.STARTED)
         return None
@@ -188,7 +194,7 @@ class ControllerExecution:
         """Let a controller that can stop smoothly do so, for at most ``cancel_grace``; else end now."""
         if self._graceful_stop is None:
             controller = self._run.plugin.instance
-            if not self._run.call("cancel", controller.cancel):
+            if self._run.handle.paused or not self._run.call("cancel", controller.cancel):
                 return self._canceled()
             self._graceful_stop = Stopwatch(self._runtime.clock)
         if self._graceful_stop.elapsed > self._runtime.parameters.cancel_grace:
@@ -199,13 +205,13 @@ class ControllerExecution:
         if not self._run.handle.paused:
             if lease.paused:
                 lease.resume()
-                for watch in (self._run.patience_watch, self._ignored, self._oscillation.stopwatch):
-                    watch.resume()
+                self._ignored.resume()
+                self._oscillation.stopwatch.resume()
             return False
         if not lease.paused:
             lease.pause()
-            for watch in (self._run.patience_watch, self._ignored, self._oscillation.stopwatch):
-                watch.pause()
+            self._ignored.pause()
+            self._oscillation.stopwatch.pause()
             self._enter(ControllerState.PAUSED)
         return True
 
@@ -254,10 +260,15 @@ class ControllerExecution:
         """At the goal: with ``force_stop_at_goal`` the goal succeeds once the robot stands, else at once."""
         parameters = self._runtime.parameters
         limit = parameters.goal_max_speed
-        if not parameters.force_stop_at_goal or velocity.is_stopped(limit, limit) or self._run.is_patience_over():
+        if not parameters.force_stop_at_goal or velocity.is_stopped(limit, limit):
             return self._end(ControllerState.ARRIVED_GOAL, ExePathOutcome.SUCCESS, "goal reached")
+        if self.state is not ControllerState.STOPPING:
+            self._run.patience_watch.restart()
+            self._enter(ControllerState.STOPPING)
         lease.stop()
-        self._enter(ControllerState.STOPPING)
+        if self._run.is_patience_over():
+            text = f"the robot is at its goal but still moves at {velocity.speed:.2f} m/s, {velocity.wz:.2f} rad/s"
+            return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, text)
         return None
 
     def _compute(self, pose: Pose, velocity: Twist) -> ControlResult:
@@ -283,6 +294,8 @@ class ControllerExecution:
         """Send a good command; stop and count a bad one."""
         if result.outcome == ExePathOutcome.CANCELED:
             return self._canceled(result.message)
+        if self._run.patience_exceeded:  # by this very call: its command is as old as the pose it was made from
+            return self._patience_end()
         if result.success and result.command is not None:
             self._failures = 0
             self._run.patience_watch.restart()
@@ -324,11 +337,11 @@ class ControllerExecution:
 
     # ------------------------------------------------------------------------------------------- ends
     def _canceled(self, last_words: str = "") -> ControllerEnd:
-        text = self._run.handle.cancel_token.reason or last_words or "the controller canceled"
+        text = self._run.handle.cancel_reason or last_words or "the controller canceled"
         return self._end(ControllerState.CANCELED, ExePathOutcome.CANCELED, text)
 
     def _patience_end(self) -> ControllerEnd:
-        last = self._last_result.message
+        last = self._last_result.message if self._last_result is not None else ""
         text = f"no valid command for {self._run.patience:g} s" + (f"; the controller said: {last}" if last else "")
         return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, text)
 

@@ -30,6 +30,10 @@ class PluginNonFinite(PluginFault):
     """A plugin made a pose, path or command that is not finite."""
 
 
+class PluginGone(LookupError):
+    """A plugin was unloaded between the acceptance of a goal and its use."""
+
+
 class LoadedPlugin(Generic[P]):
     """One named plugin instance of a server."""
 
@@ -41,7 +45,7 @@ class LoadedPlugin(Generic[P]):
         self._runtime = runtime
         self._condition = runtime.clock.condition()
         self._user: object | None = None
-        self.retired = False
+        self._retired = False
 
     @property
     def in_use(self) -> bool:
@@ -49,12 +53,20 @@ class LoadedPlugin(Generic[P]):
         return self._user is not None
 
     def acquire(self, user: object, give_up: Callable[[], bool]) -> bool:
-        """Wait for exclusive use; False once ``give_up()`` says so (asked at every ``wake`` and 20 times a second)."""
+        """Wait for exclusive use; False once ``give_up()``, asked 20 times a second, says so.
+
+        Raises
+        ------
+        PluginGone
+            The plugin was unloaded meanwhile.
+        """
         with self._condition:
             while self._user is not None:
                 if give_up():
                     return False
                 self._condition.wait(0.05)
+            if self._retired:
+                raise PluginGone(f"plugin {self.name!r} was unloaded")
             self._user = user
             return True
 
@@ -79,7 +91,7 @@ class LoadedPlugin(Generic[P]):
         with self._condition:
             if self._user is not None:
                 return False
-            self.retired = True
+            self._retired = True
             return True
 
     def call(self, goal_id: int, method: str, function: Callable[[], T]) -> T:

@@ -29,8 +29,3 @@ class OscillationDetector:
         elif pose.angle_to(self._reference) >= angle:
             self.reset(pose)
         return timeout > 0.0 and self.stopwatch.elapsed >= timeout
-
-    @property
-    def moved(self) -> bool:
-        """Whether the last checked pose became the new reference (the robot got somewhere)."""
-        return self.stopwatch.elapsed == 0.0

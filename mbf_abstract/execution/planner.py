@@ -59,6 +59,8 @@ class PlannerExecution:
         while True:
             if self._run.canceled:
                 return self._enter(PlannerState.CANCELED)
+            if calls and self._run.is_patience_over():
+                return self._enter(PlannerState.PAT_EXCEEDED)
             self._enter(PlannerState.PLANNING)
             try:
                 result = self._call()

@@ -3,7 +3,7 @@
 Patience runs from the start of the run (planner, recovery, refiner) or is restarted by progress (controller). When it
 is exceeded, or the client cancels, the plugin's token is set and its ``cancel`` called. A plugin that is still inside
 its call after ``cancel_grace`` more seconds is *abandoned*: the goal ends at once, the thread drains, and the
-instance stays quarantined until the call returns.
+instance stays quarantined until the call returns. While the goal is paused its patience stands still.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ P = TypeVar("P", bound=Plugin)
 T = TypeVar("T")
 
 IDLE_CHECK = 1.0  # s; how often a run without a patience limit is looked at
+SHORTEST_CHECK = 0.05  # s; how often one is whose patience is over, but that is not inside a call
 
 
 class Abandoned(Exception):
@@ -54,9 +55,9 @@ class PluginRun(Generic[P]):
         self.abandoned = False
         self._patience = patience
         self._on_abandon = on_abandon
-        self._in_call = False
+        self._call_began: float | None = None
+        self._stop_asked: float | None = None
         self._hung = False
-        self._stop_watch: Stopwatch | None = None
 
     def __enter__(self) -> PluginRun[P]:
         self._watch = self.runtime.supervisor.watch(self._check, self._patience() or IDLE_CHECK)
@@ -74,8 +75,9 @@ class PluginRun(Generic[P]):
     def adopt(self, handle: AnyGoalHandle) -> None:
         """Serve ``handle`` from now on (plan update): its cancel is the one that counts."""
         self.handle = handle
+        self._stop_asked = None  # a cancel of the goal before is none of this one
         handle.on_wake(lambda: self.runtime.supervisor.poke(self._watch))
-        if handle.cancel_requested:
+        if handle.cancel_requested or handle.paused:
             self.runtime.supervisor.poke(self._watch)
 
     @property
@@ -94,11 +96,11 @@ class PluginRun(Generic[P]):
 
     def call(self, method: str, function: Callable[[], T]) -> T:
         """Call into the plugin; raises PluginFault if it raises, Abandoned if the goal ended meanwhile."""
-        self._in_call = True
+        self._call_began = self.runtime.clock.now()
         try:
             return self.plugin.call(self.handle.id, method, function)
         finally:
-            self._in_call = False
+            self._call_began = None
             if self.abandoned and not self._hung:
                 raise Abandoned(self.plugin.name)
 
@@ -111,7 +113,7 @@ class PluginRun(Generic[P]):
 
     def declare_hung(self, label: str) -> None:
         """Give up at once if the hung section is this run's call: its thread was detached from the clock."""
-        if self._in_call and label.startswith(f"{self.plugin.name}."):
+        if self._call_began is not None and label.startswith(f"{self.plugin.name}."):
             self._hung = True
             self.runtime.supervisor.poke(self._watch)
 
@@ -121,26 +123,38 @@ class PluginRun(Generic[P]):
             self.patience_exceeded = not self.canceled
             self._abandon()
             return None
-        if self._stop_watch is None:
-            if not (self.canceled or (self._in_call and self.is_patience_over())):
-                limit = self._patience()
-                if limit <= 0.0:
-                    return IDLE_CHECK
-                return max(limit - self.patience_watch.elapsed, 0.0) + 1e-6 if self._in_call else limit / 2.0
-            self._begin_stop("canceled" if self.canceled else "patience exceeded")
-        assert self._stop_watch is not None
-        remaining = self.runtime.parameters.cancel_grace - self._stop_watch.elapsed
-        if remaining > 1e-9:
-            return remaining
-        if self._in_call:
-            self._abandon()
-            return None
-        return IDLE_CHECK
+        if self.handle.paused:
+            self.patience_watch.pause()
+        else:
+            self.patience_watch.resume()
+        began = self._call_began
+        if self._stop_asked is None:
+            if not (self.canceled or (began is not None and self.is_patience_over())):
+                return self._next_check()
+            self._stop_asked = self.runtime.clock.now()
+            self._ask_to_stop("canceled" if self.canceled else "patience exceeded")
+        if began is None:
+            return IDLE_CHECK
+        grace_left = self.runtime.parameters.cancel_grace + max(began, self._stop_asked) - self.runtime.clock.now()
+        if grace_left > 1e-9:
+            return grace_left
+        self._abandon()
+        return None
 
-    def _begin_stop(self, reason: str) -> None:
-        self._stop_watch = Stopwatch(self.runtime.clock)
+    def _next_check(self) -> float:
+        """Seconds until the patience of the present call, or of one that begins soon, may be over."""
+        limit = self._patience()
+        if limit <= 0.0:
+            return IDLE_CHECK
+        remaining = limit - self.patience_watch.elapsed
+        if self._call_began is not None:
+            return max(remaining, 0.0) + 1e-6
+        return max(min(remaining, limit / 2.0), SHORTEST_CHECK)
+
+    def _ask_to_stop(self, reason: str) -> None:
         self.handle.cancel_token.cancel(reason)
-        if type(self.plugin.instance).cancel is not Plugin.cancel:  # it may hang or raise: not on this thread
+        overridden = type(self.plugin.instance).cancel is not Plugin.cancel
+        if self._call_began is not None and overridden:  # it may hang or raise: not on this thread
             self.runtime.clock.spawn(self._cancel_plugin, f"cancel {self.plugin.name}", Priority.WATCHDOG)
 
     def _cancel_plugin(self) -> None:

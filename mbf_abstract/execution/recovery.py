@@ -44,8 +44,9 @@ class GatedMotion:
         token = self._run.handle.cancel_token
         with self._condition:
             while watch.elapsed < seconds - 1e-9 and not token.cancelled:
-                self._follow_pause(watch)
-                self._condition.wait(None if self._run.handle.paused else seconds - watch.elapsed)
+                paused = self._run.handle.paused
+                watch.pause() if paused else watch.resume()
+                self._condition.wait(None if paused else seconds - watch.elapsed)
         return not token.cancelled
 
     def close(self, reason: str) -> None:
@@ -53,17 +54,9 @@ class GatedMotion:
         if self._lease is not None:
             self._lease.release(reason=reason)
 
-    def _follow_pause(self, watch: Stopwatch) -> None:
-        if self._run.handle.paused:
-            watch.pause()
-            self._run.patience_watch.pause()
-            if self._lease is not None:
-                self._lease.stop()
-        else:
-            watch.resume()
-            self._run.patience_watch.resume()
-
     def _wake(self) -> None:
+        if self._run.handle.paused and self._lease is not None:
+            self._lease.stop()
         with self._condition:
             self._condition.notify_all()
 

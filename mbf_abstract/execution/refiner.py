@@ -36,7 +36,7 @@ class RefinerExecution:
         """What ends the execution after this call; None = call again."""
         limit = self._run.runtime.parameters.refiner_max_retries
         if self._run.canceled:
-            return RefineResult(RefinePathOutcome.CANCELED, self._run.handle.cancel_token.reason)
+            return RefineResult(RefinePathOutcome.CANCELED, self._run.handle.cancel_reason)
         if result.success or limit == 0:
             return result
         if self._run.is_patience_over():

@@ -71,11 +71,16 @@ class Supervisor:
             if due is None:
                 return
             for watch in due:
+                watch.due = float("inf")
                 again = watch.check()
                 if again is None:
                     self.stop(watch)
                 else:
-                    watch.due = self._clock.now() + again
+                    self._ask_again(watch, again)
+
+    def _ask_again(self, watch: Watch, seconds: float) -> None:
+        with self._condition:  # a poke that came during the check has set an earlier time: keep it
+            watch.due = min(watch.due, self._clock.now() + seconds)
 
     def _next_due(self) -> list[Watch] | None:
         """Wait until at least one watch is due; None = closed."""

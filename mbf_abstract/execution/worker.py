@@ -45,16 +45,13 @@ class Worker:
         return self._current is not None or self._pending is not None
 
     def submit(self, job: Job) -> Job | None:
-        """Queue ``job``, asking a running one to end; return the waiting job it displaced, if any.
+        """Queue ``job`` and ask a running one to end; return the job that will never run because of it.
 
-        Raises
-        ------
-        RuntimeError
-            The worker is closed.
+        That is the one that was waiting so far, or ``job`` itself when the worker is closed.
         """
         with self._condition:
             if self._closed:
-                raise RuntimeError(f"{self._name} is closed")
+                return job
             displaced, self._pending = self._pending, job
             running = self._current
             self._ensure_thread()
