@@ -23,9 +23,13 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.costmap import LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.kernels.grid_search import pad_cells
+from mbf_costmap_nav.path_geometry import resample
 from mbf_costmap_nav.plugins import CostmapPlanner
 
 Cell = tuple[int, int]
+
+NEAR_END = 0.75
+"""Points this near [cells] to an exact start or goal are dropped: going there first would be a step back."""
 
 
 class GridPlannerParameters(PluginParameters):
@@ -130,6 +134,11 @@ class GridPlanner(CostmapPlanner):
     Parameters: ClassVar[type[PluginParameters]] = GridPlannerParameters
     parameters: GridPlannerParameters
 
+    @property
+    def pose_spacing(self) -> float:
+        """Largest distance [m] of two poses of the path; 0 = as the search gives them."""
+        return 0.0
+
     @abstractmethod
     def search(self, grid: SearchGrid, start: Cell, goal: Pose, tolerance: float, token: CancelToken) -> Leg:
         """Find a way from ``start``, a free cell, to the goal's cell or a reachable one within ``tolerance`` [m]."""
@@ -156,7 +165,8 @@ class GridPlanner(CostmapPlanner):
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if len(leg.points) == 0:
                 return _no_path(grid, start, goal, tolerance, name)
-            pieces.append(_with_exact_ends(leg, start, goal))
+            piece = _with_exact_ends(leg, start, goal, grid.costmap.resolution)
+            pieces.append(resample(piece, self.pose_spacing) if self.pose_spacing > 0.0 else piece)
             cost += leg.cost
             reached_goal = leg.reached_goal
         path = _assemble(pieces, request, reached_goal, grid.costmap.frame_id, self.clock.now())
@@ -203,12 +213,13 @@ def _no_path(grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, name: 
     return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)
 
 
-def _with_exact_ends(leg: Leg, start: Pose, goal: Pose) -> NDArray[np.float64]:
-    """Replace the centres of the first and last cell by the exact poses."""
-    points = leg.points if len(leg.points) > 1 else np.repeat(leg.points, 2, axis=0)
+def _with_exact_ends(leg: Leg, start: Pose, goal: Pose, resolution: float) -> NDArray[np.float64]:
+    """Replace the centres of the first and last cell, and what lies as near to the exact ends, by those."""
     first = np.array([[start.x, start.y]])
-    last = np.array([[goal.x, goal.y]]) if leg.reached_goal else points[-1:]
-    return np.concatenate([first, points[1:-1], last])
+    last = np.array([[goal.x, goal.y]]) if leg.reached_goal else leg.points[-1:]
+    inner = leg.points[1:-1]
+    clear = np.minimum(np.hypot(*(inner - first).T), np.hypot(*(inner - last).T)) > NEAR_END * resolution
+    return np.concatenate([first, inner[clear], last])
 
 
 def _assemble(

@@ -26,6 +26,8 @@ FOUND, EXHAUSTED, CANCELED = 0, 1, 2
 
 BUCKET_WIDTH = np.float32(0.5)
 POLL_INTERVAL = 4096
+STEP_X = np.array([1, -1, 0, 0, 1, -1, 1, -1])
+STEP_Y = np.array([0, 0, 1, -1, 1, 1, -1, -1])
 SQRT2 = np.float32(np.sqrt(2.0))
 
 
@@ -85,7 +87,8 @@ def search(
         at the rim of the search.
     """
     g = np.full(cells.size, np.float32(np.inf), dtype=np.float32)
-    steps = np.array([1, -1, stride, -stride, stride + 1, stride - 1, 1 - stride, -stride - 1], dtype=np.int64)
+    steps = STEP_X + stride * STEP_Y
+    halves = (np.float32(0.5) * table).astype(np.float32)
     goal_y, goal_x = max(goal, 0) // stride, max(goal, 0) % stride
     scale = np.float32(heuristic_scale)
     inverse_width = np.float32(1.0) / BUCKET_WIDTH
@@ -134,12 +137,12 @@ def search(
         polls += 1
         y = cell // stride
         x = cell - y * stride
-        here = np.float32(0.5) * table[cells[cell]]
+        here = halves[cells[cell]]
 
         # 4. Relax the four straight and then the four diagonal neighbours.
         for k in range(8):
             neighbour = cell + steps[k]
-            half = np.float32(0.5) * table[cells[neighbour]]
+            half = halves[cells[neighbour]]
             if k < 4:
                 open_straight[k] = half < np.inf
                 g_new = g_cell + here + half
@@ -150,9 +153,9 @@ def search(
             if g_new >= g[neighbour]:
                 continue
             g[neighbour] = g_new
-            dx = 1 - 2 * (k & 1) if k < 2 or k >= 4 else 0
-            dy = 0 if k < 2 else 1 - 2 * (((k - 2) if k < 4 else (k - 4) >> 1) & 1)
-            f = g_new + scale * octile_distance(abs(x + dx - goal_x), abs(y + dy - goal_y))
+            f = g_new
+            if goal >= 0:
+                f += scale * octile_distance(abs(x + STEP_X[k] - goal_x), abs(y + STEP_Y[k] - goal_y))
             slot = max(int(f * inverse_width), bucket) & mask
             if free >= 0:
                 new = free

@@ -13,8 +13,10 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
+from mbf_costmap_nav.planners.straight_line import StraightLinePlanner
+from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
 
-PLANNERS = [AStarPlanner, DijkstraPlanner]
+PLANNERS = [AStarPlanner, DijkstraPlanner, ThetaStarPlanner]
 CODES = {"o": 0, "u": 127, "i": 253, "x": 254, "n": 255}
 # shortest octile length without | with corner cutting, from (1, 1) to (8, 8)
 F171_LENGTHS = {
@@ -55,7 +57,7 @@ def test_start_and_goal_poses_are_kept_exactly(make_plugin, planner_class):
 
 @pytest.mark.parametrize("planner_class", PLANNERS)
 def test_start_and_goal_in_one_cell_give_two_poses(make_plugin, planner_class):
-    result = plan(make_plugin(planner_class, np.zeros((4, 4))), (1.2, 1.2), (1.8, 1.3))
+    result = plan(make_plugin(planner_class, np.zeros((4, 4))), (1.2, 1.2), (1.29, 1.2))
     assert result.success and len(result.path) == 2
 
 
@@ -156,3 +158,53 @@ def test_dijkstra_can_give_the_exact_cell_path(make_plugin):
     astar = plan(make_plugin(AStarPlanner, cells), (2.5, 9.5), (17.5, 9.5))
     assert exact.cost == pytest.approx(astar.cost, rel=1e-5)
     assert exact.path.length == pytest.approx(astar.path.length)
+
+
+def block_map():
+    cells = np.zeros((50, 50), dtype=np.uint8)
+    cells[7:15, 7:15] = 253
+    return cells
+
+
+def test_f160_theta_star_finds_a_way_around_the_block(make_plugin):
+    result = plan(make_plugin(ThetaStarPlanner, block_map()), (5.5, 5.5), (18.5, 18.5))
+    assert result.success and len(result.path) > 0
+    assert result.path.length == pytest.approx(math.hypot(10, 1) + math.hypot(3, 12), abs=1e-3)
+
+
+def test_f161_start_inside_the_block_gives_no_path(make_plugin):
+    result = plan(make_plugin(ThetaStarPlanner, block_map()), (10.5, 10.5), (18.5, 18.5))
+    assert result.outcome == GetPathOutcome.BLOCKED_START and result.path is None
+
+
+def test_f162_goal_on_a_lethal_cell_is_blocked(make_plugin):
+    result = plan(make_plugin(ThetaStarPlanner, block_map()), (5.5, 5.5), (10.5, 10.5))
+    assert result.outcome == GetPathOutcome.BLOCKED_GOAL
+
+
+def test_theta_star_in_the_open_is_one_straight_line(make_plugin):
+    result = plan(make_plugin(ThetaStarPlanner, np.zeros((60, 90)), spacing=0.0), (3.5, 5.5), (80.5, 41.5))
+    assert len(result.path) == 2
+    assert result.cost == pytest.approx(math.hypot(77, 36), rel=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_theta_star_is_never_longer_than_the_octile_path(make_plugin, seed):
+    cells = np.where(np.random.default_rng(seed).random((40, 40)) < 0.25, 254, 0).astype(np.uint8)
+    cells[0, 0] = cells[-1, -1] = 0
+    octile = plan(make_plugin(AStarPlanner, cells), (0.5, 0.5), (39.5, 39.5))
+    theta = plan(make_plugin(ThetaStarPlanner, cells), (0.5, 0.5), (39.5, 39.5))
+    assert theta.outcome == octile.outcome
+    assert not octile.success or theta.path.length <= octile.path.length + 1e-9
+
+
+def test_straight_line_is_straight_or_nothing(make_plugin):
+    free = plan(make_plugin(StraightLinePlanner, np.zeros((10, 10))), (1.2, 1.7), (8.1, 6.6))
+    assert free.path.length == pytest.approx(math.hypot(6.9, 4.9))
+    blocked = plan(make_plugin(StraightLinePlanner, block_map()), (5.5, 5.5), (18.5, 18.5))
+    assert blocked.outcome == GetPathOutcome.NO_PATH_FOUND
+
+
+def test_straight_line_may_end_before_an_obstacle_within_the_tolerance(make_plugin):
+    result = plan(make_plugin(StraightLinePlanner, WALLED), (0.5, 1.5), (5.6, 1.5), dist_tolerance=1.5)
+    assert result.success and 4.0 < result.path[-1].x < 5.0

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from mbf_costmap_nav.grid_planning import traversal_table
+from mbf_costmap_nav.kernels.grid_line import line_cost
 from mbf_costmap_nav.kernels.grid_path import trace_cells, trace_gradient
 from mbf_costmap_nav.kernels.grid_search import CANCELED, EXHAUSTED, FOUND, pad_cells, search
 
@@ -138,3 +139,36 @@ def test_smac_block_map_without_corner_cutting_f164():
     _, g, grid, index = run(cells, (20, 20), (80, 80))
     assert g[80, 80] == pytest.approx(97.7401, abs=1e-3)
     assert len(trace_cells(*grid, index((80, 80)), False)) - 1 == 82
+
+
+def naive_line_cost(cells, table, a, b, samples=20001):
+    """Mean traversal of dense samples on the segment; blocked where a sample, or a touched corner, is blocked."""
+    t = (np.arange(samples) + 0.5) / samples
+    x, y = a[1] + t * (b[1] - a[1]), a[0] + t * (b[0] - a[0])
+    traversal = table[cells[np.floor(y + 0.5).astype(int), np.floor(x + 0.5).astype(int)]]
+    return traversal.astype(float).mean() * math.dist(a, b)
+
+
+@settings(max_examples=80, deadline=None)
+@given(cells=small_maps, data=st.data())
+def test_line_cost_is_the_integral_of_the_traversal(cells, data):
+    points = st.tuples(st.integers(0, cells.shape[0] - 1), st.integers(0, cells.shape[1] - 1))
+    a, b = data.draw(points), data.draw(points)
+    cells[a], cells[b] = 0, 0
+    table, stride = traversal_table(3.0, 253, False), cells.shape[1] + 2
+    flat = [(p[0] + 1) * stride + p[1] + 1 for p in (a, b)]
+    cost = line_cost(pad_cells(cells, 254), stride, table, *flat)
+    expected = naive_line_cost(cells, table, a, b)
+    if np.isfinite(cost):
+        assert cost == pytest.approx(expected, rel=2e-3)
+    elif np.isfinite(expected):  # only a touched corner may block a line whose inner points are all free
+        dy, dx = abs(a[0] - b[0]), abs(a[1] - b[1])
+        assert any((2 * i + 1) * dy == (2 * j + 1) * dx for i in range(dx) for j in range(dy))
+
+
+@pytest.mark.parametrize(("end", "free"), [((20, 7), True), ((18, 18), False)], ids=["F159-yes", "F159-no"])
+def test_line_of_sight_past_the_block(end, free):
+    cells = np.zeros((50, 50), dtype=np.uint8)
+    cells[7:15, 7:15] = 253
+    index = [(y + 1) * 52 + x + 1 for y, x in ((2, 2), end)]
+    assert np.isfinite(line_cost(pad_cells(cells, 254), 52, traversal_table(0.0, 253, False), *index)) == free

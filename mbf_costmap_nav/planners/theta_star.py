@@ -1,0 +1,81 @@
+"""Theta*: paths of few straight pieces at any angle.
+
+When to use: long straight runs matter (fast robots, smooth heading) and a car's turning circle does not. When not: the
+exact optimum is asked for (``costmap.astar`` on the eight directions; Theta* is a heuristic, typically within 1 % of
+the any-angle optimum), or smooth corners are needed (put ``costmap.smoother`` behind it).
+
+Cost: about three times ``costmap.astar``.
+
+Formula: Lazy Theta* (Nash, Koenig, Tovey 2010), see ``kernels.theta_star``; lines end after a few cells during the
+search and are joined afterwards (``kernels.grid_line.pull_string``). ``spacing`` fills the pieces with poses, as
+controllers that look only at poses want them.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.cancel import CancelToken
+from mbf_abstract.geometry import Pose
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_costmap_nav.grid_planning import (
+    CANCELED_LEG,
+    NO_LEG,
+    Cell,
+    GridPlanner,
+    GridPlannerParameters,
+    Leg,
+    SearchGrid,
+)
+from mbf_costmap_nav.kernels.grid_line import line_cost, pull_string
+from mbf_costmap_nav.kernels.grid_search import CANCELED, FOUND
+from mbf_costmap_nav.kernels.theta_star import theta_search
+
+
+class ThetaStarParameters(GridPlannerParameters):
+    """Parameters of ``costmap.theta_star``."""
+
+    spacing: float = parameter(0.1, "Largest distance of two poses; 0 = corners only.", unit="m", ge=0.0, le=10.0)
+
+
+class ThetaStarPlanner(GridPlanner):
+    """Any-angle planner with goal tolerance and via poses."""
+
+    Parameters: ClassVar[type[PluginParameters]] = ThetaStarParameters
+    parameters: ThetaStarParameters
+
+    @property
+    def pose_spacing(self) -> float:
+        """Fill the straight pieces with poses."""
+        return self.parameters.spacing
+
+    def search(self, grid: SearchGrid, start: Cell, goal: Pose, tolerance: float, token: CancelToken) -> Leg:
+        """Search and pull the string."""
+        goal_cell = grid.costmap.world_to_cell_clamped(goal.x, goal.y)
+        source = grid.index(start)
+        status, g, parent = theta_search(grid.cells, grid.stride, grid.table, source, grid.index(goal_cell), token.flag)
+        if status == CANCELED:
+            return CANCELED_LEG
+        end = goal_cell if status == FOUND else grid.nearest_reached(g, goal, tolerance)
+        if end is None:
+            return NO_LEG
+        corners = pull_string(grid.cells, grid.stride, grid.table, _ancestors(parent, grid.index(end), source))
+        return Leg(grid.points(corners), path_cost(grid, corners), end == goal_cell)
+
+
+def _ancestors(parent: NDArray[np.int32], end: int, source: int) -> NDArray[np.int32]:
+    """Cells from the source to ``end`` along the parents."""
+    chain = [end]
+    while chain[-1] != source:
+        chain.append(int(parent[chain[-1]]))
+    return np.array(chain[::-1], dtype=np.int32)
+
+
+def path_cost(grid: SearchGrid, corners: NDArray[np.int32]) -> float:
+    """Cost [m, weighted] of straight lines between flat padded indices."""
+    pieces = zip(corners[:-1].tolist(), corners[1:].tolist(), strict=True)
+    total = sum(float(line_cost(grid.cells, grid.stride, grid.table, a, b)) for a, b in pieces)
+    return total * grid.costmap.resolution
