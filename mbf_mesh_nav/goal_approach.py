@@ -17,6 +17,12 @@ def in_robot_frame(pose: Pose, point: NDArray[np.float64]) -> NDArray[np.float64
     return np.asarray(pose.rotation.T @ (point - np.asarray(pose.position)))
 
 
+def arc_to(pose: Pose, point: NDArray[np.float64]) -> tuple[float, float]:
+    """Bearing [rad] of a point, and curvature [1/m] of the arc tangent to the robot's heading through it (left > 0)."""
+    x, y, _ = in_robot_frame(pose, point)
+    return math.atan2(y, x), 2.0 * float(y) / max(float(x * x + y * y), 1e-6)
+
+
 def heading_error(pose: Pose, other: Pose) -> float:
     """Angle [rad] in (-pi, pi] the robot has to turn left, about its own z axis, to look where ``other`` looks."""
     ahead = pose.rotation.T @ other.rotation[:, 0]

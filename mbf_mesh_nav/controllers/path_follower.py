@@ -17,7 +17,7 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_mesh_nav.goal_approach import ArrivalLatch, braking_speed, clamp, heading_error, in_robot_frame, is_at_goal
+from mbf_mesh_nav.goal_approach import ArrivalLatch, arc_to, braking_speed, clamp, heading_error, is_at_goal
 from mbf_mesh_nav.path_progress import PathProgress, PathProjection
 from mbf_mesh_nav.plugins import MeshController
 
@@ -96,14 +96,13 @@ class PathFollower(MeshController):
     def _pursue(self, pose: Pose, projection: PathProjection, slope: float) -> ControlResult:
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""
         p = self.parameters
-        target = in_robot_frame(pose, self._progress.point_at(projection.travelled + p.lookahead))
-        bearing = math.atan2(target[1], target[0])
+        target = self._progress.point_at(projection.travelled + p.lookahead)
+        bearing, curvature = arc_to(pose, target)
         if abs(bearing) > p.turn_in_place_angle:
             return self._command(0.0, p.turn_gain * bearing)
-        distance = math.hypot(target[0], target[1])
-        curvature = 2.0 * target[1] / max(distance**2, 1e-6)
         slope_factor = 1.0 - (1.0 - p.slope_speed_factor) * min(slope / p.slow_slope, 1.0)
-        left = max(projection.remaining, distance if projection.remaining < p.lookahead else 0.0)
+        # A robot that ran past the goal has no path left, but still the way back to it.
+        left = max(projection.remaining, float(np.linalg.norm(target - pose.position)))
         speed = min(
             p.max_lin_velocity * slope_factor,
             math.sqrt(p.max_lateral_acceleration / max(abs(curvature), 1e-6)),

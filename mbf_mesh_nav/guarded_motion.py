@@ -1,0 +1,91 @@
+"""What recoveries that move the robot share: one loop with all ways out, and a look at the ground ahead.
+
+The loop polls the cancel token, keeps a time limit, hands each fresh pose to a step function and sends what it
+answers; whatever happens the last command is zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.clock import Clock
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+from mbf_mesh_nav.kernels.surface_walk import tangent, walk
+from mbf_mesh_nav.locate import SurfacePoint
+from mbf_mesh_nav.mesh_map import MeshMap
+
+CONTROL_PERIOD = 0.05
+"""Seconds between two commands."""
+
+
+def run_guarded(
+    request: RecoveryRequest, clock: Clock, time_limit: float, step: Callable[[Pose], Twist | RecoveryResult]
+) -> RecoveryResult:
+    """Drive by ``step`` until it answers a result, the goal is cancelled, or ``time_limit`` [s] is over."""
+    motion, token = request.motion, request.cancel_token
+    deadline = clock.now() + time_limit
+    try:
+        while not token.cancelled:
+            if clock.now() > deadline:
+                return RecoveryResult(RecoveryOutcome.PAT_EXCEEDED, f"not finished within {time_limit:g} s")
+            answer = step(motion.pose())
+            if isinstance(answer, RecoveryResult):
+                return answer
+            if not motion.send(answer):
+                return RecoveryResult(RecoveryOutcome.STOPPED, "the velocity gate refused the command")
+            if not motion.sleep(CONTROL_PERIOD) and not token.cancelled:
+                return RecoveryResult(RecoveryOutcome.STOPPED, "the behaviour was told to end")
+        return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
+    finally:
+        motion.send(Twist())
+
+
+def blocked_vertices(mesh_map: MeshMap, cost_limit: float) -> NDArray[np.bool_]:
+    """Vertices (V,) of the current map that are lethal or whose cost reaches the limit."""
+    snapshot = mesh_map.snapshot()
+    return np.asarray(snapshot.lethal | ~(snapshot.costs < cost_limit))
+
+
+def free_distance(
+    mesh_map: MeshMap,
+    blocked: NDArray[np.bool_],
+    spot: SurfacePoint,
+    direction: NDArray[np.float64],
+    distance: float,
+    stride: float = 0.05,
+) -> float:
+    """How far [m], up to ``distance``, the ground is free straight ahead of a surface point.
+
+    Faces with a blocked corner and borders end it; faces the robot stands in when they are blocked may be left.
+    """
+    face = spot.face
+    x, y, z = spot.point
+    normal = mesh_map.face_normals[face]
+    point = (float(x), float(y), float(z))
+    way = tangent((float(direction[0]), float(direction[1]), float(direction[2])), tuple(normal.tolist()))
+    was_blocked = bool(blocked[mesh_map.faces[face]].any())
+    travelled = 0.0
+    while travelled < distance:
+        face, point, way, walked = walk(
+            mesh_map.vertices,
+            mesh_map.faces,
+            mesh_map.face_neighbours,
+            mesh_map.face_normals,
+            face,
+            point,
+            way,
+            min(stride, distance - travelled),
+        )
+        is_blocked = bool(blocked[mesh_map.faces[face]].any())
+        if is_blocked and not was_blocked:
+            break
+        was_blocked = is_blocked
+        travelled += walked
+        if walked < 1e-6:
+            break
+    return travelled

@@ -1,0 +1,90 @@
+"""Leave ground that has become forbidden: drive slowly to the nearest free vertex over the surface.
+
+For a robot that stands in an inflated or lethal area (a new obstacle, a pushed robot), where every planner answers
+BLOCKED_START. It crosses costly and lethal-by-inflation ground on purpose, so it is slow, short (``max_distance``) and
+measures distance on the surface, never across a gap or to another storey. It does not know what the
+lethal ground really is: order it after ``mesh.clear_layers`` and ``mesh.back_up``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+from mbf_mesh_nav.goal_approach import arc_to, clamp
+from mbf_mesh_nav.guarded_motion import blocked_vertices, run_guarded
+from mbf_mesh_nav.kernels.dijkstra import propagate_distances
+from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, follow_predecessors, mean_edge_length, seeded_arrays
+from mbf_mesh_nav.locate import SurfacePoint
+from mbf_mesh_nav.path_progress import PathProgress
+from mbf_mesh_nav.plugins import MeshRecovery
+
+
+class EscapeParameters(PluginParameters):
+    """Parameters of ``mesh.escape``."""
+
+    cost_limit: float = parameter(0.9, "Ground is safe below this cost.", gt=0.0, allow_inf=True)
+    max_distance: float = parameter(2.0, "Longest way over forbidden ground.", unit="m", gt=0.0, le=20.0)
+    speed: float = parameter(0.2, "Driving speed.", unit="m/s", gt=0.0, le=1.0)
+    yaw_rate: float = parameter(0.6, "Yaw rate limit.", unit="rad/s", gt=0.0, le=3.0)
+    reach: float = parameter(0.1, "The free vertex is reached within this distance.", unit="m", gt=0.0)
+    time_limit: float = parameter(40.0, "Longest run.", unit="s", gt=0.0)
+
+
+class EscapeRecovery(MeshRecovery):
+    """Drives to the nearest safe ground."""
+
+    Parameters = EscapeParameters
+    parameters: EscapeParameters
+
+    def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
+        """Find the nearest free vertex, drive there; a free start is a success at once."""
+        p = self.parameters
+        spot = self.mesh_map.locate_one(request.motion.pose().position, 1.0)
+        if spot is None:
+            return RecoveryResult(RecoveryOutcome.FAILURE, "the robot is more than 1 m from the surface")
+        blocked = blocked_vertices(self.mesh_map, p.cost_limit)
+        if not blocked[self.mesh_map.faces[spot.face]].any():
+            return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on safe ground")
+        way = self._way_to_safety(spot, blocked, request)
+        if way is None:
+            message = f"no safe ground within {p.max_distance:g} m over the surface"
+            return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)
+        progress = PathProgress(Path.from_points(way, frame_id=self.mesh_map.frame_id), window=1.0)
+
+        def step(pose: Pose) -> Twist | RecoveryResult:
+            position = np.asarray(pose.position)
+            if np.linalg.norm(way[-1] - position) <= p.reach:
+                return RecoveryResult(RecoveryOutcome.SUCCESS, f"reached safe ground after {progress.length:.2f} m")
+            bearing, curvature = arc_to(pose, progress.point_at(progress.update(position).travelled + 0.3))
+            if abs(bearing) > 0.6:
+                return Twist.planar(wz=math.copysign(p.yaw_rate, bearing))
+            return Twist.planar(vx=p.speed, wz=clamp(p.speed * curvature, p.yaw_rate))
+
+        return run_guarded(request, self.clock, p.time_limit, step)
+
+    def _way_to_safety(
+        self, spot: SurfacePoint, blocked: NDArray[np.bool_], request: RecoveryRequest
+    ) -> NDArray[np.float64] | None:
+        """Points (n, 3) over the mesh to the nearest vertex around which no face is forbidden."""
+        mesh_map = self.mesh_map
+        nowhere = np.zeros(len(blocked), dtype=np.bool_)
+        distances, predecessors, seeds = seeded_arrays(mesh_map, nowhere, spot)
+        graph = (mesh_map.neighbour_offsets, mesh_map.neighbours, mesh_map.neighbour_lengths, nowhere)
+        step, flag = mean_edge_length(mesh_map), request.cancel_token.flag
+        propagate_distances(*graph, distances, predecessors, seeds, step, NO_TARGETS, NO_OFFSETS, flag)
+        beside_blocked = blocked[mesh_map.edges].any(axis=1)
+        safe = ~blocked
+        safe[mesh_map.edges[beside_blocked].ravel()] = False
+        candidates = np.where(safe, distances, np.inf)
+        nearest = int(np.argmin(candidates))
+        if not candidates[nearest] <= self.parameters.max_distance:
+            return None
+        chain = follow_predecessors(predecessors, nearest)[::-1]
+        return np.concatenate([[spot.point], mesh_map.vertices[chain]])

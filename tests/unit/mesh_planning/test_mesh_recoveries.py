@@ -1,0 +1,150 @@
+"""Recoveries on meshes: what they do on free and on forbidden ground, and that every way out ends with zero."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbf_abstract.cancel import CancelToken
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.plugins import RecoveryRequest
+from mbf_mesh_nav.layer import NOTHING_CHANGED
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.recoveries.back_up import BackUpRecovery
+from mbf_mesh_nav.recoveries.clear_layers import ClearLayersRecovery
+from mbf_mesh_nav.recoveries.escape import EscapeRecovery
+from mbf_mesh_nav.recoveries.rotate import RotateRecovery
+from mbf_mesh_nav.recoveries.wait import WaitRecovery
+
+
+class SimulatedMotion:
+    """A unicycle on the surface; sleeping advances the recovery's clock. ``stop_after``: sleeps until told to end."""
+
+    def __init__(self, mesh_map, pose_on, clock, position, heading, stop_after=10**9, gate_open=True):
+        self.mesh_map, self.pose_on, self.clock = mesh_map, pose_on, clock
+        self.current = pose_on(mesh_map, position, heading)
+        self.commands, self.stop_after, self.gate_open = [], stop_after, gate_open
+
+    def pose(self):
+        return self.current
+
+    def velocity(self):
+        return self.commands[-1] if self.commands else Twist()
+
+    def send(self, command):
+        self.commands.append(command)
+        return self.gate_open
+
+    def sleep(self, seconds):
+        command, (x, y, _) = self.commands[-1], self.current.rotation.T
+        turned = math.cos(command.wz * seconds) * x + math.sin(command.wz * seconds) * y
+        ahead = np.asarray(self.current.position) + command.vx * seconds * turned
+        self.current = self.pose_on(self.mesh_map, ahead, turned)
+        self.clock.time += seconds
+        self.stop_after -= 1
+        return self.stop_after > 0
+
+
+@pytest.fixture
+def run(make_plugin, pose_on):
+    """Factory: run a recovery on a map from a pose; returns the result and the simulated motion."""
+
+    def run_it(
+        recovery_class, mesh_map, position=(3.0, 3.0, 0.0), heading=(1, 0, 0), motion=None, token=None, **params
+    ):
+        recovery = make_plugin(recovery_class, mesh_map, **params)
+        simulated = SimulatedMotion(mesh_map, pose_on, recovery.clock, position, heading, **(motion or {}))
+        result = recovery.run_behavior(RecoveryRequest(simulated, token or CancelToken()))
+        assert not simulated.commands or simulated.commands[-1] == Twist()
+        return result, simulated
+
+    return run_it
+
+
+MOVING = [BackUpRecovery, RotateRecovery, WaitRecovery]
+
+
+def test_backing_up_drives_the_distance_straight_back(run, plain):
+    result, motion = run(BackUpRecovery, plain(), distance=0.6)
+    assert result.success, result.message
+    assert motion.current.x == pytest.approx(2.4, abs=0.05) and motion.current.y == pytest.approx(3.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("ground", ["border", "lethal"])
+def test_backing_up_stops_before_a_border_and_before_lethal_ground(run, plain, paint, ground):
+    mesh_map = plain()
+    if ground == "lethal":
+        paint(mesh_map, lambda v: np.where(v[:, 0] < 2.05, np.inf, 0.0))
+    start = 0.7 if ground == "border" else 2.9
+    result, motion = run(BackUpRecovery, mesh_map, (start, 3.0, 0.0), distance=2.0, clearance=0.3)
+    assert result.success and "blocked" in result.message
+    assert 0.3 < start - motion.current.x < 0.75
+    result, motion = run(BackUpRecovery, mesh_map, tuple(motion.current.position), distance=2.0, clearance=0.3)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+
+
+def test_rotating_turns_once_around_on_level_ground_but_not_on_a_slope(run, plain, pose_on):
+    result, motion = run(RotateRecovery, plain())
+    assert result.success
+    assert motion.clock.time == pytest.approx(2 * math.pi / 0.6, abs=0.2)
+    ramp = MeshMap.from_heights(np.tile(0.6 * np.arange(31) * 0.2, (31, 1)), 0.2, 0.2)
+    result, motion = run(RotateRecovery, ramp, (3.0, 3.0, 1.8), (0, 1, 0))
+    assert result.outcome == RecoveryOutcome.IMPASSABLE and "slopes 0.54" in result.message
+    assert all(command == Twist() for command in motion.commands)
+
+
+def test_waiting_lasts_as_long_as_told(run, plain):
+    result, motion = run(WaitRecovery, plain(), duration=2.0)
+    assert result.success and motion.clock.time == pytest.approx(2.0, abs=0.06)
+
+
+def test_clearing_layers_frees_what_was_sensed(run, plain, paint, monkeypatch):
+    mesh_map = paint(plain(), lambda v: np.where(v[:, 0] > 5, np.inf, 0.0))
+    layer = mesh_map.layers["painted"]
+    monkeypatch.setattr(layer, "clear", lambda: layer.replace(np.zeros_like(layer.costs), np.zeros_like(layer.lethal)))
+    lethal = int(mesh_map.snapshot().lethal.sum())
+    result, _ = run(ClearLayersRecovery, mesh_map)
+    assert result.success and f"{lethal} vertices" in result.message
+    assert not mesh_map.snapshot().lethal.any()
+    assert layer.update_from_inputs(NOTHING_CHANGED) is NOTHING_CHANGED
+
+
+def test_escaping_leaves_a_lethal_disc_by_the_shortest_way(run, plain, paint):
+    mesh_map = paint(plain(spacing=0.1), lambda v: np.where(np.hypot(v[:, 0] - 3, v[:, 1] - 3) < 0.8, np.inf, 0.0))
+    result, motion = run(EscapeRecovery, mesh_map, (2.6, 3.0, 0.0), (1, 0, 0))
+    assert result.success, result.message
+    assert motion.current.x < 2.25
+    result, motion = run(EscapeRecovery, mesh_map, tuple(motion.current.position))
+    assert result.success and "safe ground" in result.message
+    result, _ = run(EscapeRecovery, mesh_map, (2.6, 3.0, 0.0), max_distance=0.2)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+
+
+@pytest.mark.parametrize("recovery_class", MOVING)
+def test_cancel_a_closed_gate_and_an_end_signal_stop_the_robot(run, plain, recovery_class):
+    token = CancelToken()
+    token.cancel("enough")
+    assert run(recovery_class, plain(), token=token)[0].outcome == RecoveryOutcome.CANCELED
+    assert run(recovery_class, plain(), motion={"gate_open": False})[0].outcome == RecoveryOutcome.STOPPED
+    assert run(recovery_class, plain(), motion={"stop_after": 3})[0].outcome == RecoveryOutcome.STOPPED
+
+
+def test_a_robot_that_does_not_move_runs_into_the_time_limit(make_plugin, plain):
+    class StuckMotion:
+        commands = ()
+
+        def pose(self):
+            return Pose.planar(3.0, 3.0)
+
+        def send(self, command):
+            self.commands += (command,)
+            return True
+
+        def sleep(self, seconds):
+            recovery.clock.time += seconds
+            return True
+
+    recovery, motion = make_plugin(BackUpRecovery, plain(), time_limit=2.0), StuckMotion()
+    result = recovery.run_behavior(RecoveryRequest(motion))
+    assert result.outcome == RecoveryOutcome.PAT_EXCEEDED and motion.commands[-1] == Twist()
