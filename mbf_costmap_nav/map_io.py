@@ -293,7 +293,9 @@ def save_map(
     ----------
     image_format : {"pgm", "png", "bmp"}
     mode : MapMode
-        Trinary keeps 0, 100 and unknown; scale keeps 0..100, and unknown only in a png; raw keeps every value.
+        Trinary keeps 0, 100 and unknown; raw keeps every value; scale keeps 0..100, and unknown only in a png.
+    occupied_thresh, free_thresh : float
+        In scale mode 99 exists only if ``occupied_thresh`` is a multiple of 1/255, such as 0.6.
 
     Raises
     ------

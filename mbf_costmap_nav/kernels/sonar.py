@@ -26,7 +26,7 @@ def occupied_given_reading(distance: float, angle: float, reading: float, half_a
 
     Free before the reading, occupied in a band of +-``band`` [m] around it, unknown (0.5) behind.
     """
-    off_axis = max(0.0, 1.0 - (angle / half_angle) ** 2) if half_angle > 0.0 else float(angle == 0.0)
+    off_axis = max(0.0, 1.0 - (angle / half_angle) ** 2)
     belief = off_axis * (1.0 - (1.0 + math.tanh(2.0 * (distance - FADE_DISTANCE))) / 2.0)
     if distance < reading - 2.0 * band:
         return (1.0 - belief) * 0.5
@@ -71,7 +71,7 @@ def update_cone(
     """
     height, width = probability.shape
     reading = math.hypot(end[0] - sensor[0], end[1] - sensor[1])
-    axis = math.atan2(end[1] - sensor[1], end[0] - sensor[0])
+    axis_x, axis_y = end[0] - sensor[0], end[1] - sensor[1]
     reach = reading if clear else reading + resolution
     x0 = max(0, int((sensor[0] - reach - lower_left[0]) / resolution))
     y0 = max(0, int((sensor[1] - reach - lower_left[1]) / resolution))
@@ -82,7 +82,7 @@ def update_cone(
             dx = lower_left[0] + (ix + 0.5) * resolution - sensor[0]
             dy = lower_left[1] + (iy + 0.5) * resolution - sensor[1]
             distance = math.hypot(dx, dy)
-            angle = math.remainder(math.atan2(dy, dx) - axis, 2.0 * math.pi)
+            angle = math.atan2(axis_x * dy - axis_y * dx, axis_x * dx + axis_y * dy)
             if clear:
                 # A cell belongs to the cone if the cone passes within half a cell's diagonal of its centre.
                 beside = distance * math.sin(min(max(0.0, abs(angle) - half_angle), math.pi / 2))

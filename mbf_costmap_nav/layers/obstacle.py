@@ -110,5 +110,13 @@ class ObstacleLayer(GridLayer, SensorLayer):
     def reset(self) -> None:
         """Forget all marks and the observations they came from."""
         super().reset()
+        self._forget_observations()
+
+    def clear_area(self, box: CellBox, inside: bool) -> None:
+        """Forget the cells inside or outside of ``box``, and the observations, which would mark them again."""
+        super().clear_area(box, inside)
+        self._forget_observations()
+
+    def _forget_observations(self) -> None:
         for buffer in self.buffers.values():
             buffer.forget()

@@ -39,7 +39,7 @@ TARGET_PROBABILITY = 233.0 / 254.0
 class RangeSourceParameters(SourceTiming):
     """One range sensor."""
 
-    field_of_view: float = parameter(math.radians(15.0), "Full angle of the cone.", unit="rad", ge=0.0, le=math.pi)
+    field_of_view: float = parameter(math.radians(15.0), "Full angle of the cone.", unit="rad", gt=0.0, le=math.pi)
 
 
 class RangeSensorLayerParameters(LayerParameters):

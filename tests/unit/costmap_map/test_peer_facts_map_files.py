@@ -1,0 +1,208 @@
+"""Map files: the published cell counts of real maps, and the facts of map_server's tests (F053-F060)."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+
+from mbf_costmap_nav.map_io import MapError, MapMode, OccupancyMap, load_image, load_map, save_map
+
+# yaml file: (width, height, resolution, free, occupied, other cells)
+COUNTS = {
+    "aws_small_house/map": (500, 500, 0.05, 63021, 3442, 183537),
+    "aws_small_warehouse/005/map": (286, 423, 0.05, 93698, 3673, 23607),
+    "costmap_tests/TenByTen": (10, 10, 1.0, 78, 20, 2),
+    "gpl3_brsu/brsu-c069/map": (576, 544, 0.05, 43757, 4055, 265532),
+    "gpl3_brsu/wrs20-arena/map": (192, 416, 0.05, 8470, 714, 70688),
+    "lse_arena/lse_arena": (80, 60, 0.05, 4455, 345, 0),
+    "map_server_tests/testmap": (10, 10, 0.1, 71, 29, 0),
+    "map_server_tests_ros1/testmap": (10, 10, 0.1, 71, 29, 0),
+    "map_server_tests_ros1/testmap2": (12, 12, 0.1, 88, 56, 0),
+    "nav2_bringup/depot": (604, 307, 0.05, 179481, 5947, 0),
+    "nav2_bringup/depot_keepout": (604, 307, 0.05, 154215, 31213, 0),
+    "nav2_bringup/depot_speed": (604, 307, 0.05, 0, 0, 185428),
+    "nav2_bringup/tb3_sandbox": (384, 384, 0.05, 7903, 870, 138683),
+    "nav2_bringup/warehouse": (1006, 1674, 0.03, 1422292, 30951, 230801),
+    "nav2_smoother_bench/smoothers_world": (300, 300, 0.05, 79424, 10576, 0),
+    "nav2_system_tests/keepout_mask": (384, 384, 0.05, 8690, 171, 138595),
+    "nav2_system_tests/map_circular": (384, 384, 0.05, 7930, 920, 138606),
+    "nav2_system_tests/speed_mask": (384, 384, 0.05, 8690, 0, 138766),
+    "nku_benchmark/maze/map": (600, 600, 0.05, 327668, 16170, 16162),
+    "nku_benchmark/narrow_graph/map": (280, 280, 0.05, 66160, 4300, 7940),
+    "nku_benchmark/office02/map": (600, 600, 0.05, 214370, 11645, 133985),
+    "nku_benchmark/room02/map": (360, 360, 0.05, 121062, 4287, 4251),
+    "nku_benchmark/shopping_mall/map": (760, 760, 0.05, 522952, 23236, 31412),
+    "nku_benchmark/track/map": (480, 480, 0.05, 44594, 3975, 181831),
+    "osnabrueck_rilo/rilo": (1235, 1200, 0.05, 1455516, 26484, 0),
+    "turtlebot3/map": (384, 384, 0.05, 7939, 795, 138722),
+}
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_a_published_map_has_its_published_counts(shared_data: Path, name):
+    file = shared_data / "maps" / f"{name}.yaml"
+    if not file.is_file():
+        pytest.skip("not in this copy of the shared data")
+    width, height, resolution, free, occupied, other = COUNTS[name]
+    content = load_map(file)
+    counted = np.count_nonzero(content.occupancy == 0), np.count_nonzero(content.occupancy == 100)
+    assert content.occupancy.shape == (height, width) and content.resolution == resolution
+    assert (*counted, content.occupancy.size - sum(counted)) == (free, occupied, other)
+
+
+@pytest.mark.parametrize("suffix", ["pgm", "png", "bmp"])
+def test_f053_the_test_image_reads_the_same_in_every_format(shared_data: Path, suffix):
+    image = shared_data / "maps" / "map_server_tests" / f"testmap.{suffix}"
+    content = load_image(image, 0.1, occupied_thresh=0.65, free_thresh=0.1)
+    assert content.occupancy.shape == (10, 10)
+    assert content.occupancy[0].tolist() == [0] * 10, "the bottom row comes first"
+    assert content.occupancy[1].tolist() == [100, 100, 100, 100, 0, 0, 100, 100, 100, 0]
+    assert np.count_nonzero(content.occupancy == 100) == 29
+
+
+@pytest.fixture
+def spectrum(tmp_path: Path) -> Path:
+    """All 256 grey values once, like map_server's spectrum.png."""
+    file = tmp_path / "spectrum.png"
+    Image.fromarray(np.arange(256, dtype=np.uint8).reshape(16, 16)).save(file)
+    return file
+
+
+@pytest.mark.parametrize(
+    "mode", [pytest.param(MapMode.TRINARY, id="F055-trinary"), pytest.param(MapMode.SCALE, id="F056-scale")]
+)
+def test_every_grey_value_is_read_by_the_thresholds(spectrum, mode):
+    occupancy = load_image(spectrum, 0.1, occupied_thresh=0.65, free_thresh=0.1, mode=mode).occupancy
+    assert (np.count_nonzero(occupancy == 100), np.count_nonzero(occupancy == 0)) == (90, 26)
+    between = occupancy[(occupancy != 100) & (occupancy != 0)]
+    assert len(between) == 140
+    assert set(between) == {255} if mode is MapMode.TRINARY else between.min() >= 1 and between.max() <= 99
+
+
+def test_f057_raw_mode_keeps_every_value(spectrum):
+    occupancy = load_image(spectrum, 0.1, mode=MapMode.RAW).occupancy
+    assert sorted(occupancy.ravel().tolist()) == list(range(256))
+
+
+def test_f058_a_missing_image_is_named(tmp_path):
+    with pytest.raises(MapError, match=r"nowhere\.png.*No such file"):
+        load_image(tmp_path / "nowhere.png", 0.1)
+
+
+@pytest.mark.parametrize("name", ["map_server_tests/invalid_image.yaml", "nav2_system_tests/empty_room.yaml"])
+def test_f059_a_description_of_a_missing_image_is_refused(shared_data: Path, name):
+    with pytest.raises(MapError, match="No such file"):
+        load_map(shared_data / "maps" / name)
+
+
+@pytest.mark.parametrize("image_format", ["pgm", "png", "bmp"])
+@pytest.mark.parametrize("mode", list(MapMode), ids=lambda mode: mode.value)
+def test_f060_a_saved_map_loads_as_it_was(tmp_path, image_format, mode):
+    values = {"trinary": [0, 100, 255], "scale": list(range(101)), "raw": list(range(256))}[mode.value]
+    occupancy = np.random.default_rng(1).choice(values, size=(30, 20)).astype(np.uint8)
+    content = OccupancyMap(occupancy, 0.25, (1.0, -2.0, 0.5))
+    save_map(tmp_path / "map.yaml", content, image_format=image_format, mode=mode, occupied_thresh=0.6)
+    again = load_map(tmp_path / "map.yaml")
+    assert np.array_equal(again.occupancy, occupancy)
+    assert (again.resolution, again.origin) == (content.resolution, content.origin)
+
+
+def test_unknown_cells_survive_scale_mode_as_transparent_pixels(tmp_path):
+    content = OccupancyMap(np.array([[0, 50], [255, 100]], dtype=np.uint8), 1.0)
+    save_map(tmp_path / "map.yaml", content, image_format="png", mode=MapMode.SCALE)
+    assert np.array_equal(load_map(tmp_path / "map.yaml").occupancy, content.occupancy)
+    with pytest.raises(MapError, match=r"cannot express the occupancies \[255\]"):
+        save_map(tmp_path / "map.yaml", content, image_format="pgm", mode=MapMode.SCALE)
+
+
+def test_negate_turns_black_into_free(tmp_path):
+    Image.fromarray(np.array([[0, 255]], dtype=np.uint8)).save(tmp_path / "map.png")
+    assert load_image(tmp_path / "map.png", 1.0, negate=True).occupancy.tolist() == [[0, 100]]
+
+
+def test_rows_of_the_image_run_from_top_to_bottom(tmp_path):
+    Image.fromarray(np.array([[0], [254], [254]], dtype=np.uint8)).save(tmp_path / "map.png")
+    assert load_image(tmp_path / "map.png", 1.0).occupancy.ravel().tolist() == [0, 0, 100]
+
+
+def test_a_costmap_of_a_map_scales_occupancy(tmp_path):
+    content = OccupancyMap(np.array([[0, 50, 100, 255]], dtype=np.uint8), 1.0, (3.0, 4.0, 0.0))
+    costmap = content.to_costmap()
+    assert costmap.cells.tolist() == [[0, 127, 254, 255]] and (costmap.origin_x, costmap.origin_y) == (3.0, 4.0)
+    assert content.to_costmap(track_unknown_space=False).cells.tolist() == [[0, 127, 254, 0]]
+
+
+def test_a_quarter_turn_of_the_origin_turns_the_map():
+    content = OccupancyMap(np.array([[100, 0, 0]], dtype=np.uint8), 1.0, (5.0, 5.0, np.pi / 2))
+    costmap = content.to_costmap()
+    assert costmap.cells.tolist() == [[254], [0], [0]]
+    assert (costmap.origin_x, costmap.origin_y) == pytest.approx((4.0, 5.0))
+
+
+@pytest.mark.parametrize("yaw", [0.3, 1.0, -1.0, 2.5])
+def test_a_turned_map_keeps_every_obstacle_where_it_is(yaw):
+    occupancy = np.where(np.random.default_rng(2).random((20, 30)) < 0.2, 100, 0).astype(np.uint8)
+    costmap = OccupancyMap(occupancy, 0.1, (2.0, 3.0, yaw)).to_costmap()
+    for row, column in np.argwhere(occupancy == 100):
+        u, v = (column + 0.5) * 0.1, (row + 0.5) * 0.1
+        x, y = 2.0 + np.cos(yaw) * u - np.sin(yaw) * v, 3.0 + np.sin(yaw) * u + np.cos(yaw) * v
+        assert costmap.cost_at(x, y) == 254
+    assert np.count_nonzero(costmap.cells == 0) == pytest.approx(np.count_nonzero(occupancy == 0), rel=0.15)
+
+
+GOOD = {"image": "map.pgm", "resolution": 0.05, "origin": [0.0, 0.0, 0.0]}
+BAD_DESCRIPTIONS = {
+    "no image": ({"image": None}, "image"),
+    "zero resolution": ({"resolution": 0.0}, "resolution"),
+    "tiny resolution": ({"resolution": 1e-300}, "resolution"),
+    "infinite resolution": ({"resolution": float("inf")}, "resolution"),
+    "origin of two": ({"origin": [0.0, 0.0]}, "origin"),
+    "origin with nan": ({"origin": [0.0, float("nan"), 0.0]}, "origin"),
+    "unknown mode": ({"mode": "binary"}, "mode"),
+    "thresholds swapped": ({"occupied_thresh": 0.1, "free_thresh": 0.9}, "free_thresh"),
+    "threshold too large": ({"occupied_thresh": 65}, "occupied_thresh"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_DESCRIPTIONS)
+def test_a_bad_description_is_refused_with_the_key(tmp_path, case):
+    change, key = BAD_DESCRIPTIONS[case]
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(GOOD | change))
+    with pytest.raises(MapError, match=key) as caught:
+        load_map(tmp_path / "map.yaml")
+    assert caught.value.file == tmp_path / "map.yaml"
+
+
+@pytest.mark.parametrize("text", ["", "just text", "[1, 2]", "image: [", "\x00", "a: !!python/object:os.system 1"])
+def test_a_file_that_is_no_mapping_is_refused(tmp_path, text):
+    (tmp_path / "map.yaml").write_text(text)
+    with pytest.raises(MapError):
+        load_map(tmp_path / "map.yaml")
+
+
+BAD_IMAGES = {
+    "empty": b"",
+    "no image": b"hello",
+    "bad header": b"P5\nten 10\n255\n" + bytes(100),
+    "short data": b"P5\n10 10\n255\n" + bytes(50),
+    "no pixels": b"P5\n0 10\n255\n",
+    "sixteen bit": b"P5\n2 2\n65535\n" + bytes(8),
+    "absurd size": b"P5\n100000 100000\n255\n",
+    "too many cells": b"P5\n9000 9000\n255\n",
+}
+
+
+@pytest.mark.parametrize("case", BAD_IMAGES)
+def test_a_bad_image_is_refused_before_memory_is_taken(tmp_path, case):
+    (tmp_path / "map.pgm").write_bytes(BAD_IMAGES[case])
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(GOOD))
+    with pytest.raises(MapError) as caught:
+        load_map(tmp_path / "map.yaml")
+    assert caught.value.file == tmp_path / "map.pgm" and caught.value.reason
+
+
+def test_a_map_with_more_cells_than_asked_for_is_refused(spectrum):
+    with pytest.raises(MapError, match="16 x 16 pixels are more than the limit of 255"):
+        load_image(spectrum, 0.1, max_cells=255)
