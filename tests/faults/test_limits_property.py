@@ -1,0 +1,70 @@
+"""Fault table, row 7: commands beyond the robot's limits."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import AckermannCommand, Twist
+from mbf_abstract.plugins import ControlResult
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.faulty import drive
+from mbf_abstract.velocity_gate import VelocityLimits
+
+LIMITS = VelocityLimits(max_vx=1.0, min_vx=-0.3, max_vy=0.5, max_wz=2.0, max_steering_angle=0.6)
+number = st.floats(-50.0, 50.0).map(lambda value: round(value, 6))
+
+
+@given(number, number, number)
+def test_a_limited_twist_keeps_its_direction_and_its_limits(vx, vy, wz):
+    asked = Twist.planar(vx, vy, wz)
+    sent = LIMITS.apply(asked)
+    slack = 1.0 + 1e-9
+    assert LIMITS.min_vx * slack <= sent.vx <= LIMITS.max_vx * slack
+    assert abs(sent.vy) <= LIMITS.max_vy * slack
+    assert abs(sent.wz) <= LIMITS.max_wz * slack
+    pairs = zip((sent.vx, sent.vy, sent.wz), (vx, vy, wz), strict=True)
+    scale = max((abs(given) / abs(wanted) for given, wanted in pairs if wanted), default=1.0)
+    assert (sent.vx, sent.vy, sent.wz) == pytest.approx((vx * scale, vy * scale, wz * scale), abs=1e-12)
+    assert 0.0 <= scale <= 1.0
+
+
+@given(number, st.floats(-3.0, 3.0))
+def test_a_limited_ackermann_command_keeps_each_limit(speed, angle):
+    sent = LIMITS.apply(AckermannCommand(speed, angle))
+    assert LIMITS.min_vx <= sent.speed <= LIMITS.max_vx
+    assert abs(sent.steering_angle) <= LIMITS.max_steering_angle
+    assert math.copysign(1.0, sent.steering_angle) == math.copysign(1.0, angle) or sent.steering_angle == 0.0
+
+
+def test_within_the_limits_a_command_passes_untouched():
+    command = Twist.planar(1.0, -0.5, 2.0)
+    assert LIMITS.apply(command) is command
+
+
+def test_the_robot_gets_the_limited_command_and_the_event_tells_both():
+    with Bench(max_vx=0.4, max_wz=0.8) as bench:
+        bench.controller.play(drive(2.0, 1.0))
+        handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
+        bench.clock.sleep(1.0)
+        handle.cancel()
+        handle.wait()
+        moving = bench.robot.moved_after(-1.0)
+        assert len(moving) >= 20
+        assert all((command.vx, command.wz) == (0.4, 0.2) for _, command in moving)
+        clamped = bench.events(EventKind.COMMAND_CLAMPED)
+        assert clamped[0].data == {"requested": [2.0, 0.0, 1.0], "sent": [0.4, 0.0, 0.2]}
+
+
+def test_a_car_is_limited_in_speed_and_steering_angle():
+    with Bench(max_vx=0.4, max_steering_angle=0.3) as bench:
+        bench.controller.play(ControlResult(0, "go", AckermannCommand(2.0, 1.0)))
+        handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
+        bench.clock.sleep(0.5)
+        handle.cancel()
+        handle.wait()
+        assert {command for _, command in bench.robot.moved_after(-1.0)} == {AckermannCommand(0.4, 0.3)}
+        assert bench.robot.command == AckermannCommand(0.0, 0.3)
