@@ -1,7 +1,5 @@
 """Fault table, row 8: commands after a cancel or after the end of a goal."""
 
-import pytest
-
 from mbf_abstract.actions.goals import ExePathGoal, RecoveryGoal
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Twist
@@ -11,7 +9,6 @@ from mbf_abstract.testing.faulty import drive, slow
 from mbf_abstract.testing.promises import assert_next_goals_work, assert_stops
 
 
-@pytest.mark.xfail(reason="the control loop does not look at the cancel between computing and sending", strict=True)
 def test_a_command_computed_during_the_cancel_does_not_reach_the_robot():
     with Bench(cancel_grace=1.0) as bench:
         bench.controller.play(drive(), slow(bench.clock, 0.4, drive(3.0)))
@@ -26,7 +23,6 @@ def test_a_command_computed_during_the_cancel_does_not_reach_the_robot():
         assert_next_goals_work(bench)
 
 
-@pytest.mark.xfail(reason="a recovery's motion takes a new lease after the behaviour has ended", strict=True)
 def test_a_recovery_that_keeps_its_motion_cannot_drive_after_its_end():
     kept = []
 
