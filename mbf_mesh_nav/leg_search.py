@@ -102,21 +102,27 @@ def mean_edge_length(mesh_map: MeshMap) -> float:
 
 
 def vertex_path_leg(
-    mesh_map: MeshMap, query: LegQuery, distances: NDArray[np.float32], predecessors: NDArray[np.int32]
+    mesh_map: MeshMap,
+    query: LegQuery,
+    distances: NDArray[np.float32],
+    predecessors: NDArray[np.int32],
+    rooted_at_goal: bool = False,
 ) -> Leg | None:
-    """Leg along the predecessors of a search from ``query.start``; None if the goal was not reached.
+    """Leg along the predecessors of a search from ``query.start``, or from the goal; None without a way.
 
     Start and goal in one face are joined by the straight line within it.
     """
     start, goal = query.start, query.goal
     if start.face == goal.face:
         return straight_leg(mesh_map, query)
-    corners, offsets = corner_distances(mesh_map, query.blocked, goal)
+    corners, offsets = corner_distances(mesh_map, query.blocked, start if rooted_at_goal else goal)
     totals = distances[corners] + offsets
     if not np.isfinite(totals).any():
         return None
     best = int(np.argmin(totals))
-    chain = follow_predecessors(predecessors, int(corners[best]))[::-1]
+    chain = follow_predecessors(predecessors, int(corners[best]))
+    if not rooted_at_goal:
+        chain.reverse()
     positions = np.concatenate([[start.point], mesh_map.vertices[chain], [goal.point]])
     normals = np.concatenate(
         [mesh_map.face_normals[[start.face]], mesh_map.vertex_normals[chain], mesh_map.face_normals[[goal.face]]]

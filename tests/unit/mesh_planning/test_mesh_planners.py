@@ -11,8 +11,9 @@ from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
+from mbf_mesh_nav.planners.repairing import RepairingPlanner
 
-PLANNERS = [DijkstraPlanner, AStarPlanner, CVPPlanner]
+PLANNERS = [DijkstraPlanner, AStarPlanner, CVPPlanner, RepairingPlanner]
 
 
 @pytest.fixture(params=PLANNERS, ids=lambda planner: planner.__name__)
