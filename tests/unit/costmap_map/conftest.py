@@ -66,7 +66,7 @@ def build(ten_by_ten: Costmap) -> Callable[..., LayeredCostmap]:
 
 @pytest.fixture
 def seeing() -> dict[str, Any]:
-    """Block of an obstacle layer with one source "laser" that sees far and keeps what it saw, as the peers' tests do."""
+    """Block of an obstacle layer with one source "laser" that sees far and remembers, as in the peers. tests."""
     laser = {
         "obstacle_max_range": 100.0,
         "raytrace_max_range": 100.0,

@@ -35,7 +35,7 @@ def test_f033_without_configuration_the_radius_is_0_46_plus_padding():
 
 @pytest.mark.parametrize("value", ["[[1, 2], [3]]", "[[1, 2, 3], [1, 2, 3], [4, 5, 6]]", "[1, 2, 3]"], ids=str)
 def test_f034_a_malformed_list_is_refused(value):
-    with pytest.raises(ValueError, match="footprint|list"):
+    with pytest.raises(ValueError, match=r"footprint|list"):
         CostmapParameters(footprint=value).robot_footprint()
 
 
