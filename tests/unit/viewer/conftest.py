@@ -40,8 +40,7 @@ def life_of_a_goal(duration: float, outcome: int, message: str) -> list[Event]:
     ]
 
 
-@pytest.fixture
-def hill_recording() -> Recording:
+def make_hill_recording() -> Recording:
     """Thirty metres over hills, planned and driven, arrived."""
     x, y = np.meshgrid(np.linspace(0.0, 40.0, 81), np.linspace(0.0, 30.0, 61))
     heights = 1.5 * np.sin(x / 6.0) * np.cos(y / 5.0) + 0.02 * x
@@ -57,8 +56,7 @@ def hill_recording() -> Recording:
     return recorder.finish(True, "SUCCESS", "goal reached", events)
 
 
-@pytest.fixture
-def office_recording() -> Recording:
+def make_office_recording() -> Recording:
     """Two rooms and a door, a box in the way, a lidar; ends before the goal."""
     occupied = np.zeros((120, 160), dtype=bool)
     occupied[[0, 1, -1, -2], :] = occupied[:, [0, 1, -1, -2]] = True
@@ -82,3 +80,13 @@ def office_recording() -> Recording:
         recorder.scan(index / RATE, ring)
     drive(recorder, poses, speed=0.5)
     return recorder.finish(False, "BLOCKED_PATH", "a box stands on the path", life_of_a_goal(15.4, 110, "blocked"))
+
+
+@pytest.fixture
+def hill_recording() -> Recording:
+    return make_hill_recording()
+
+
+@pytest.fixture
+def office_recording() -> Recording:
+    return make_office_recording()

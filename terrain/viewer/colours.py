@@ -1,0 +1,47 @@
+"""The colours of pictures and replays, in one place, so that a plan is the same blue everywhere. sRGB, 0 to 255.
+
+Slopes go from grass green over ochre to brick red; the ramp stays readable with the common kinds of colour blindness
+because its lightness falls all the way.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Colour = tuple[int, int, int]
+
+PLANNED: Colour = (25, 90, 220)
+DRIVEN: Colour = (225, 85, 10)
+START: Colour = (30, 140, 60)
+GOAL: Colour = (200, 20, 80)
+WALL: Colour = (66, 72, 84)
+OBSTACLE: Colour = (196, 140, 60)
+FLOOR: Colour = (222, 220, 212)
+SCAN: Colour = (220, 30, 40)
+BODY: Colour = (245, 190, 40)
+WHEEL: Colour = (40, 40, 44)
+
+SLOPE_STOPS = np.array([0.0, 10.0, 20.0, 30.0, 45.0])  # degrees
+SLOPE_COLOURS = np.array(
+    [(196, 214, 160), (164, 186, 112), (205, 170, 95), (178, 104, 62), (120, 40, 40)], dtype=np.float64
+)
+
+
+def slope_colours(slopes: ArrayLike) -> NDArray[np.float64]:
+    """Colours (n, 3) float64 0..255 of slopes [degrees] (n,)."""
+    slopes = np.asarray(slopes, dtype=np.float64)
+    return np.stack([np.interp(slopes, SLOPE_STOPS, channel) for channel in SLOPE_COLOURS.T], axis=-1)
+
+
+def slope_legend() -> list[tuple[str, Colour]]:
+    """Labels and colours for a legend of slopes."""
+    return [
+        (f"{stop:.0f}°", (int(red), int(green), int(blue)))
+        for stop, (red, green, blue) in zip(SLOPE_STOPS, SLOPE_COLOURS, strict=True)
+    ]
+
+
+def linear_for_viewer(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Vertex colours (n, 3) as glTF wants them: linear light; sRGB values look washed out there."""
+    return np.asarray(np.round((colours / 255.0) ** 2.2 * 255.0), dtype=np.uint8)
