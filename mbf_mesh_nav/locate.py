@@ -13,12 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbf_mesh_nav.kernels.bounding_boxes import build_boxes, closest_face, closest_faces
+from mbf_mesh_nav.kernels.bounding_boxes import build_boxes, closest_faces, closest_surface_point
 from mbf_mesh_nav.kernels.rays import first_hits
+from mbf_mesh_nav.kernels.topology import morton_codes
 from mbf_mesh_nav.topology import MeshTopology
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
+
+SORT_FROM = 100
+"""Number of points from which sorting them costs less than the cache misses it saves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +60,6 @@ class SurfaceLocator:
     """Nearest-point and ray queries on one mesh; building it is linear in the faces."""
 
     def __init__(self, topology: MeshTopology) -> None:
-        self._vertices = topology.vertices
-        self._faces = topology.faces
         boxes, levels = build_boxes(topology.vertices, topology.faces)
         self._tree = (topology.vertices, topology.faces, boxes, levels)
 
@@ -67,12 +69,13 @@ class SurfaceLocator:
         Parameters
         ----------
         points : (n, 3) float
-            Positions [m]; neighbours in the list should be neighbours in space, that is faster.
+            Positions [m].
         max_distance : float
             Limit [m]; farther away there is no face.
         """
         queries = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
-        return Location(*closest_faces(*self._tree, queries, float(max_distance)))
+        order = np.arange(len(queries)) if len(queries) < SORT_FROM else _locality_order(queries)
+        return Location(*closest_faces(*self._tree, queries, order, float(max_distance)))
 
     def locate_one(self, point: ArrayLike, max_distance: float = np.inf, hint_face: int = -1) -> SurfacePoint | None:
         """Nearest surface point of one point, or None beyond ``max_distance``.
@@ -84,14 +87,13 @@ class SurfaceLocator:
         hint_face : int
             A face likely to be near, e.g. the last answer of a moving robot; the answer does not depend on it.
         """
-        x, y, z = np.asarray(point, dtype=np.float64)
-        face, distance, v, w = closest_face(
-            *self._tree, float(x), float(y), float(z), float(max_distance), int(hint_face)
+        x, y, z = np.asarray(point, dtype=np.float64).tolist()
+        face, distance, v, w, px, py, pz = closest_surface_point(
+            *self._tree, x, y, z, float(max_distance), int(hint_face)
         )
         if face < 0:
             return None
-        barycentric = np.array([1.0 - v - w, v, w])
-        return SurfacePoint(face, barycentric, barycentric @ self._vertices[self._faces[face]], distance)
+        return SurfacePoint(face, np.array([1.0 - v - w, v, w]), np.array([px, py, pz]), distance)
 
     def cast_rays(
         self, origins: ArrayLike, directions: ArrayLike, max_distance: float = np.inf
@@ -113,3 +115,11 @@ class SurfaceLocator:
         starts = np.ascontiguousarray(origins, dtype=np.float64).reshape(-1, 3)
         headings = np.ascontiguousarray(np.broadcast_to(np.asarray(directions, dtype=np.float64), starts.shape))
         return first_hits(*self._tree, starts, headings, float(max_distance))
+
+
+def _locality_order(points: FloatArray) -> NDArray[np.int64]:
+    """Order of points (n, 3) along a Morton curve; points that are not finite come anywhere."""
+    known = np.where(np.isfinite(points), points, 0.0)
+    lower = known.min(axis=0)
+    cell = max(float((known.max(axis=0) - lower).max()), 1e-12) / (2**21 - 1)
+    return np.argsort(morton_codes(known, lower, cell))

@@ -36,13 +36,15 @@ def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, NDAr
     boxes = np.zeros((starts[levels], 6))
     boxes[:, :3] = np.inf
     boxes[:, 3:] = -np.inf
+    # Boxes are a hair larger than their faces, so that rounding loses no ray that runs along the side of one.
+    hair = 1e-12 * np.abs(vertices).max()
     for face in range(faces.shape[0]):
         leaf = face // BRANCHES
         for corner in range(3):
             for axis in range(3):
                 value = vertices[faces[face, corner], axis]
-                boxes[leaf, axis] = min(boxes[leaf, axis], value)
-                boxes[leaf, axis + 3] = max(boxes[leaf, axis + 3], value)
+                boxes[leaf, axis] = min(boxes[leaf, axis], value - hair)
+                boxes[leaf, axis + 3] = max(boxes[leaf, axis + 3], value + hair)
     for level in range(1, levels):
         for child in range(counts[level - 1]):
             parent = starts[level] + child // BRANCHES
@@ -160,16 +162,20 @@ def closest_faces(
     boxes: FloatArray,
     levels: NDArray[np.int64],
     points: FloatArray,
+    order: NDArray[np.int64],
     max_distance: float,
 ) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
-    """``closest_face`` of many points: faces (n,), barycentric (n, 3), surface points (n, 3), distances (n,)."""
+    """``closest_face`` of many points: faces (n,), barycentric (n, 3), surface points (n, 3), distances (n,).
+
+    ``order`` (n,) is the order to work them off; along a Morton curve each answer is a good hint for the next point.
+    """
     count = points.shape[0]
     found = np.full(count, -1, dtype=np.int32)
     weights = np.full((count, 3), np.nan)
     surface = np.full((count, 3), np.nan)
     distances = np.full(count, np.inf)
     hint = -1
-    for index in range(count):
+    for index in order:
         x, y, z = points[index, 0], points[index, 1], points[index, 2]
         face, distance, v, w = closest_face(vertices, faces, boxes, levels, x, y, z, max_distance, hint)
         hint = face
@@ -178,9 +184,35 @@ def closest_faces(
         found[index], distances[index] = face, distance
         weights[index, 0], weights[index, 1], weights[index, 2] = 1.0 - v - w, v, w
         for axis in range(3):
-            surface[index, axis] = (
-                weights[index, 0] * vertices[faces[face, 0], axis]
-                + v * vertices[faces[face, 1], axis]
-                + w * vertices[faces[face, 2], axis]
-            )
+            surface[index, axis] = blend(vertices, faces, face, v, w, axis)
     return found, weights, surface, distances
+
+
+@kernel
+def blend(vertices: FloatArray, faces: IntArray, face: int, v: float, w: float, axis: int) -> float:
+    """One coordinate of the point of a face with the weights ``v``, ``w`` of its corners 1 and 2."""
+    a, b, c = vertices[faces[face, 0], axis], vertices[faces[face, 1], axis], vertices[faces[face, 2], axis]
+    value: float = (1.0 - v - w) * a + v * b + w * c
+    return value
+
+
+@kernel
+def closest_surface_point(
+    vertices: FloatArray,
+    faces: IntArray,
+    boxes: FloatArray,
+    levels: NDArray[np.int64],
+    x: float,
+    y: float,
+    z: float,
+    max_distance: float,
+    hint_face: int,
+) -> tuple[int, float, float, float, float, float, float]:
+    """``closest_face`` with its point: (face or -1, distance, weight 1, weight 2, x, y, z)."""
+    face, distance, v, w = closest_face(vertices, faces, boxes, levels, x, y, z, max_distance, hint_face)
+    if face < 0:
+        return -1, np.inf, 0.0, 0.0, 0.0, 0.0, 0.0
+    px = blend(vertices, faces, face, v, w, 0)
+    py = blend(vertices, faces, face, v, w, 1)
+    pz = blend(vertices, faces, face, v, w, 2)
+    return face, distance, v, w, px, py, pz

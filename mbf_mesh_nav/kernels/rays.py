@@ -30,7 +30,7 @@ def distance_to_triangle(
     v = (tx * px + ty * py + tz * pz) / determinant
     qx, qy, qz = ty * uz - tz * uy, tz * ux - tx * uz, tx * uy - ty * ux
     w = (direction[0] * qx + direction[1] * qy + direction[2] * qz) / determinant
-    # A hair of tolerance, so that no ray slips through the edge between two faces.
+    # Some tolerance, so that no ray slips through the edge between two faces.
     if v < -1e-12 or w < -1e-12 or v + w > 1.0 + 1e-12:
         return np.inf
     distance = (wx * qx + wy * qy + wz * qz) / determinant
@@ -38,20 +38,31 @@ def distance_to_triangle(
 
 
 @kernel
-def distance_to_box(boxes: FloatArray, node: int, origin: FloatArray, inverse: FloatArray, limit: float) -> float:
-    """Distance along a ray at which it enters a box, inf if it misses it or enters beyond ``limit``."""
-    enter, leave = 0.0, limit
-    for axis in range(3):
-        if np.isinf(inverse[axis]):
-            if origin[axis] < boxes[node, axis] or origin[axis] > boxes[node, axis + 3]:
-                return np.inf
-            continue
-        near = (boxes[node, axis] - origin[axis]) * inverse[axis]
-        far = (boxes[node, axis + 3] - origin[axis]) * inverse[axis]
-        enter = max(enter, min(near, far))
-        leave = min(leave, max(near, far))
-    # Rounding must not lose a flat box that the ray crosses exactly.
-    return enter if enter <= leave * (1.0 + 1e-12) + 1e-12 else np.inf
+def distance_to_box(
+    boxes: FloatArray,
+    node: int,
+    x: float,
+    y: float,
+    z: float,
+    inverse_x: float,
+    inverse_y: float,
+    inverse_z: float,
+    limit: float,
+) -> float:
+    """Distance along a ray from (x, y, z) at which it enters a box, inf if it misses it or enters beyond ``limit``."""
+    near, far = (boxes[node, 0] - x) * inverse_x, (boxes[node, 3] - x) * inverse_x
+    enter, leave = max(0.0, min(near, far)), min(limit, max(near, far))
+    near, far = (boxes[node, 1] - y) * inverse_y, (boxes[node, 4] - y) * inverse_y
+    enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
+    near, far = (boxes[node, 2] - z) * inverse_z, (boxes[node, 5] - z) * inverse_z
+    enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
+    return enter if enter <= leave else np.inf
+
+
+@kernel
+def inverse_component(component: float) -> float:
+    """Inverse of a direction's component; a huge number for 0, so that no NaN arises at the side of a box."""
+    return 1.0 / component if component != 0.0 else 1e300
 
 
 @kernel
@@ -77,14 +88,17 @@ def first_hits(
     nodes = np.empty(STACK_SIZE, dtype=np.int64)
     depths = np.empty(STACK_SIZE, dtype=np.int64)
     enters = np.empty(STACK_SIZE)
-    inverse = np.empty(3)
     for index in range(count):
         origin, direction = origins[index], directions[index]
-        for axis in range(3):
-            inverse[axis] = 1.0 / direction[axis] if direction[axis] != 0.0 else np.inf
+        x, y, z = origin[0], origin[1], origin[2]
+        ix, iy, iz = (
+            inverse_component(direction[0]),
+            inverse_component(direction[1]),
+            inverse_component(direction[2]),
+        )
         best_face, best = -1, max_distance
         nodes[0], depths[0] = levels[-1] - 1, levels.shape[0] - 2
-        enters[0] = distance_to_box(boxes, nodes[0], origin, inverse, best)
+        enters[0] = distance_to_box(boxes, nodes[0], x, y, z, ix, iy, iz, best)
         top = 1 if enters[0] < np.inf else 0
         while top > 0:
             top -= 1
@@ -101,7 +115,7 @@ def first_hits(
             # Children on the stack with the one entered first on top.
             base = top
             for child in range(levels[depth - 1] + first, min(levels[depth - 1] + first + BRANCHES, levels[depth])):
-                enter = distance_to_box(boxes, child, origin, inverse, best)
+                enter = distance_to_box(boxes, child, x, y, z, ix, iy, iz, best)
                 if enter == np.inf:
                     continue
                 place = top

@@ -33,10 +33,11 @@ class ClearanceLayer(MeshLayer):
     cacheable = True
 
     def free_heights(self) -> NDArray[np.float64]:
-        """Free height [m] above every vertex (V,), inf under the open sky."""
+        """Free height [m] above every vertex (V,), inf where it is more than the robot and the ramp need."""
         normals = self.topology.vertex_normals
+        enough = self.parameters.robot_height + self.parameters.height_inflation
         starts = self.topology.vertices + RAY_OFFSET * normals
-        _, distances = self.locator.cast_rays(starts, normals)
+        _, distances = self.locator.cast_rays(starts, normals, enough)
         return distances + RAY_OFFSET
 
     def compute(self) -> tuple[CostArray, LethalArray]:

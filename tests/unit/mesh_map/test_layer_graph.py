@@ -1,0 +1,154 @@
+"""Order, refusals and updates of the layer graph, and the combinations."""
+
+import numpy as np
+import pytest
+
+from mbf_mesh_nav.layer import NOTHING_CHANGED, IntArray, LayerContext, LayerParameters, MeshLayer
+from mbf_mesh_nav.layer_graph import LayerGraph, LayerGraphError, dependency_order
+from mbf_mesh_nav.layers.max_combination import MaxCombinationLayer
+from mbf_mesh_nav.layers.mean import MeanLayer
+from mbf_mesh_nav.layers.weighted_sum import WeightedSumLayer
+from mbf_mesh_nav.mesh_map import MeshMap
+
+MESH = MeshMap.from_heights(np.zeros((4, 5)), 1.0, 1.0)
+EVERYTHING = np.arange(20, dtype=np.int32)
+
+
+class GivenLayer(MeshLayer):
+    """A layer whose values the test sets."""
+
+    def compute(self):
+        return self._costs.copy(), self._lethal.copy()
+
+    def give(self, costs, lethal=()) -> IntArray:
+        flags = np.zeros(20, dtype=np.bool_)
+        flags[list(lethal)] = True
+        return self.replace(np.full(20, costs, dtype=np.float32), flags)
+
+
+class CountingLayer(MaxCombinationLayer):
+    """Counts how often it is asked to follow its inputs."""
+
+    updates = 0
+
+    def update_from_inputs(self, changed):
+        self.updates += 1
+        return super().update_from_inputs(changed)
+
+
+def make(layer_class, name, *inputs, **parameters):
+    settings = layer_class.Parameters(**parameters)
+    layer = layer_class(LayerContext(name, MESH.topology, MESH.locator, settings, inputs))
+    layer.recompute()
+    return layer
+
+
+def diamond():
+    top = make(GivenLayer, "top")
+    left, right = make(MaxCombinationLayer, "left", top), make(MaxCombinationLayer, "right", top)
+    bottom = make(CountingLayer, "bottom", left, right)
+    return LayerGraph([top, left, right, bottom]), top, bottom
+
+
+def event_of(layer, event):
+    return lambda visited: event() if visited is layer else NOTHING_CHANGED
+
+
+def test_inputs_come_first_in_the_order():
+    order = dependency_order(
+        {"final": ["inflation", "obstacle"], "inflation": ["border"], "border": [], "obstacle": []}
+    )
+
+    assert order.index("border") < order.index("inflation") < order.index("final")
+    assert order.index("obstacle") < order.index("final")
+
+
+def test_all_unknown_inputs_are_named():
+    with pytest.raises(LayerGraphError, match=r"a reads unknown layer 'x'; b reads unknown layer 'y'.*a, b"):
+        dependency_order({"a": ["x"], "b": ["y", "a"]})
+
+
+@pytest.mark.parametrize(
+    ("inputs", "circle"),
+    [
+        ({"a": ["a"]}, "a -> a"),
+        ({"a": ["b"], "b": ["c"], "c": ["b"], "d": []}, "b -> c -> b"),
+        ({"end": ["a"], "a": ["b", "d"], "b": ["a"], "d": []}, "a -> b -> a"),
+    ],
+)
+def test_circle_is_refused_and_spelled_out(inputs, circle):
+    with pytest.raises(LayerGraphError, match=circle):
+        dependency_order(inputs)
+
+
+def test_layer_below_a_diamond_is_updated_once_per_event():
+    graph, top, bottom = diamond()
+
+    changed = graph.apply(event_of(top, lambda: top.give(0.7, lethal=[3])))
+
+    assert bottom.updates == 1
+    assert set(changed) == {"top", "left", "right", "bottom"}
+    np.testing.assert_allclose(bottom.costs, 0.7)
+    assert np.flatnonzero(bottom.lethal).tolist() == [3]
+
+
+def test_only_changed_vertices_are_handed_down():
+    graph, top, _ = diamond()
+
+    def one_vertex():
+        costs = top.costs.copy()
+        costs[5] = 2.0
+        return top.replace(costs, top.lethal.copy())
+
+    changed = graph.apply(event_of(top, one_vertex))
+
+    assert {name: vertices.tolist() for name, vertices in changed.items()} == {name: [5] for name in graph}
+
+
+def test_event_that_changes_nothing_visits_no_layer_below():
+    graph, top, bottom = diamond()
+
+    assert graph.apply(event_of(top, lambda: top.give(0.0))) == {}
+    assert bottom.updates == 0
+
+
+def test_combinations_merge_costs_and_unite_lethal_flags():
+    a, b = make(GivenLayer, "a", combination_weight=2.0), make(GivenLayer, "b", combination_weight=0.5)
+    a.give(0.25, lethal=[1])
+    b.give(0.5, lethal=[2])
+    expected = {MaxCombinationLayer: 0.5, WeightedSumLayer: 0.75, MeanLayer: 0.3}
+
+    for layer_class, cost in expected.items():
+        layer = make(layer_class, "merged", a, b)
+        np.testing.assert_allclose(layer.costs, cost)
+        assert np.flatnonzero(layer.lethal).tolist() == [1, 2]
+
+
+def test_input_of_weight_zero_plays_no_part_even_if_it_is_infinite():
+    a, b = make(GivenLayer, "a", combination_weight=0.0), make(GivenLayer, "b")
+    a.give(np.inf)
+    b.give(0.5)
+
+    for layer_class in (WeightedSumLayer, MeanLayer):
+        np.testing.assert_allclose(make(layer_class, "merged", a, b).costs, 0.5)
+
+
+def test_new_combination_weight_reaches_the_sum():
+    given = make(GivenLayer, "given")
+    given.give(1.0)
+    total = make(WeightedSumLayer, "total", given)
+    graph = LayerGraph([given, total])
+
+    changed = graph.set_parameters("given", LayerParameters(combination_weight=3.0))
+
+    np.testing.assert_allclose(total.costs, 3.0)
+    assert changed["total"].tolist() == EVERYTHING.tolist()
+
+
+def test_values_of_a_layer_cannot_be_written_from_outside():
+    layer = make(GivenLayer, "given")
+
+    with pytest.raises(ValueError, match="read-only"):
+        layer.costs[0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        layer.lethal[0] = True

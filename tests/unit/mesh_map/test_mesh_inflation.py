@@ -1,0 +1,156 @@
+"""Geodesic inflation: the reference's assertions, a heap-based twin, and repairs that equal a new start."""
+
+import heapq
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbf_mesh_nav.kernels.inflation import front_arrival
+from mbf_mesh_nav.layer import LayerContext
+from mbf_mesh_nav.layers.inflation import InflationLayer, InflationParameters
+from mbf_mesh_nav.layers.keep_out import KeepOutLayer, KeepOutParameters
+from mbf_mesh_nav.mesh_map import MeshMap
+
+
+def chain(mesh: MeshMap, lethal: np.ndarray, **parameters: float) -> tuple[KeepOutLayer, InflationLayer]:
+    source = KeepOutLayer(LayerContext("source", mesh.topology, mesh.locator, KeepOutParameters()))
+    source.replace(lethal.astype(np.float32), lethal.copy())
+    settings_ = InflationParameters(**{"inflation_radius": 1.0, **parameters})
+    inflation = InflationLayer(LayerContext("inflation", mesh.topology, mesh.locator, settings_, (source,)))
+    inflation.recompute()
+    return source, inflation
+
+
+def bumpy(seed: int) -> MeshMap:
+    rng = np.random.default_rng(seed)
+    return MeshMap.from_heights(rng.random((14, 12)) * 0.15, 0.1, 0.12)
+
+
+def naive_distances(mesh: MeshMap, lethal: np.ndarray, radius: float) -> np.ndarray:
+    """Fast marching with a heap: pop the nearest vertex, offer to the third corner of its faces and along edges."""
+    distances = np.where(lethal, 0.0, np.inf)
+    heap = [(0.0, int(v)) for v in np.flatnonzero(lethal)]
+    while heap:
+        d, v = heapq.heappop(heap)
+        if d > distances[v] or d > radius:
+            continue
+        for face in mesh.faces[(mesh.faces == v).any(axis=1)]:
+            for k in range(3):
+                other, v1, v2 = face[k], face[(k + 1) % 3], face[(k + 2) % 3]
+                if other == v:
+                    continue
+                e1, e2 = mesh.vertices[v1] - mesh.vertices[other], mesh.vertices[v2] - mesh.vertices[other]
+                d1, d2 = (x if x <= radius else np.inf for x in (distances[v1], distances[v2]))
+                offer = min(d1 + np.linalg.norm(e1), d2 + np.linalg.norm(e2))
+                if max(d1, d2) < np.inf:
+                    offer = min(offer, front_arrival.py_func(d1, d2, e1 @ e1, e2 @ e2, e1 @ e2))
+                if offer < distances[other]:
+                    distances[other] = offer
+                    heapq.heappush(heap, (offer, int(other)))
+    return distances
+
+
+def test_wave_front_reaches_the_third_corner_of_an_isosceles_triangle_at_its_leg():
+    # corners (0,0) d=0, (0.5,0) d=?, (0,0.5) d=0.5: legs 0.5
+    assert front_arrival(0.0, 0.5, 0.25, 0.5, 0.25) == np.inf  # the front does not cut the face; the edge counts
+
+    mesh = MeshMap.from_arrays([[0.0, 0, 0], [0.5, 0, 0], [0, 0.5, 0]], [[0, 1, 2]])
+    corner = mesh.input_to_internal[0]
+    _, inflation = chain(mesh, np.arange(3) == corner, inscribed_radius=0.5, inflation_radius=1.5, inscribed_value=0.9)
+
+    np.testing.assert_allclose(mesh.to_input_order(inflation.distances), [0.0, 0.5, 0.5])
+    np.testing.assert_allclose(mesh.to_input_order(inflation.costs), [1.0, 0.9, 0.9], rtol=1e-6)
+
+
+def test_fading_is_flat_up_to_the_inscribed_radius_and_ends_at_the_inflation_radius():
+    mesh = bumpy(0)
+    _, layer = chain(
+        mesh, np.zeros(len(mesh.vertices), bool), inscribed_radius=0.5, inflation_radius=1.5, inscribed_value=0.9
+    )
+
+    costs = layer.cost_of_distance(np.array([0.0, 0.2, 0.5, 0.6, 1.5, 2.0], np.float32))
+
+    assert costs[:3].tolist() == pytest.approx([1.0, 0.9, 0.9])
+    assert costs[3] == pytest.approx(0.9 * np.exp(-0.1))
+    assert costs[4] == pytest.approx(0.9 * np.exp(-1.0))
+    assert costs[5] == 0.0
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 10_000), st.floats(0.2, 1.5))
+def test_distances_equal_those_of_a_heap(seed, radius):
+    mesh = bumpy(seed)
+    lethal = np.random.default_rng(seed).random(len(mesh.vertices)) < 0.05
+
+    _, inflation = chain(mesh, lethal, inflation_radius=radius)
+
+    expected = naive_distances(mesh, lethal, radius)
+    np.testing.assert_allclose(inflation.distances, expected, rtol=1e-5)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 10_000))
+def test_repair_after_added_and_removed_obstacles_equals_a_new_start(seed):
+    rng = np.random.default_rng(seed)
+    mesh = bumpy(seed)
+    source, inflation = chain(mesh, rng.random(len(mesh.vertices)) < 0.06, inflation_radius=0.5)
+    for _ in range(4):
+        before = inflation.costs.copy(), inflation.lethal.copy()
+        lethal = source.lethal ^ (rng.random(len(mesh.vertices)) < 0.03)
+
+        changed = inflation.update_from_inputs(source.replace(lethal.astype(np.float32), lethal))
+
+        _, fresh = chain(mesh, lethal, inflation_radius=0.5)
+        np.testing.assert_allclose(inflation.distances, fresh.distances, rtol=1e-6)
+        np.testing.assert_allclose(inflation.costs, fresh.costs, rtol=1e-5)
+        np.testing.assert_array_equal(inflation.lethal, lethal)
+        differs = (inflation.costs != before[0]) | (inflation.lethal != before[1])
+        assert set(np.flatnonzero(differs)) <= set(changed)
+
+
+def test_isolated_lethal_vertex_spreads():
+    mesh = MeshMap.from_heights(np.zeros((21, 21)), 0.1, 0.1)
+    lethal = np.linalg.norm(mesh.vertices - [1.0, 1.0, 0.0], axis=1) < 0.01
+
+    _, inflation = chain(mesh, lethal, inflation_radius=0.55)
+
+    true = np.linalg.norm(mesh.vertices[:, :2] - 1.0, axis=1)
+    near = true < 0.5
+    assert lethal.sum() == 1
+    assert (inflation.distances[near] <= true[near] * 1.25 + 1e-6).all()
+    assert (inflation.distances[near] >= true[near] - 1e-6).all()
+
+
+def test_distance_of_a_straight_wall_is_exact():
+    mesh = MeshMap.from_heights(np.zeros((9, 40)), 0.1, 0.1)
+
+    _, inflation = chain(mesh, mesh.vertices[:, 0] < 0.05, inflation_radius=2.0)
+
+    np.testing.assert_allclose(
+        inflation.distances[mesh.vertices[:, 0] <= 2.0], mesh.vertices[mesh.vertices[:, 0] <= 2.0, 0], atol=1e-5
+    )
+
+
+def test_inflation_does_not_jump_to_the_other_storey():
+    flat = MeshMap.from_heights(np.zeros((9, 9)), 0.1, 0.1)
+    vertices = np.vstack([flat.vertices, flat.vertices + np.array([0.0, 0.0, 0.2])])
+    mesh = MeshMap.from_arrays(vertices, np.vstack([flat.faces, flat.faces + 81]))
+
+    _, inflation = chain(mesh, (mesh.vertices[:, 2] > 0.1) & (mesh.vertices[:, 0] < 0.3), inflation_radius=1.0)
+
+    assert (inflation.costs[mesh.vertices[:, 2] < 0.1] == 0.0).all()
+
+
+def test_costs_follow_new_parameters_at_run_time():
+    mesh = bumpy(1)
+    lethal = np.arange(len(mesh.vertices)) == 40
+    _, layer = chain(mesh, lethal, inflation_radius=0.3)
+
+    layer.parameters = InflationParameters(inflation_radius=0.8, lethal_value=np.inf)
+    layer.recompute()
+
+    _, fresh = chain(mesh, lethal, inflation_radius=0.8, lethal_value=np.inf)
+    np.testing.assert_array_equal(layer.costs, fresh.costs)
+    assert np.isinf(layer.costs[40])

@@ -1,0 +1,186 @@
+"""The analysis layers against naive twins and hand-made surfaces."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.layer import LayerContext, MeshLayer
+from mbf_mesh_nav.layers.border import BorderLayer
+from mbf_mesh_nav.layers.clearance import ClearanceLayer
+from mbf_mesh_nav.layers.height_diff import HeightDiffLayer
+from mbf_mesh_nav.layers.keep_out import KeepOutLayer
+from mbf_mesh_nav.layers.label import LabelLayer
+from mbf_mesh_nav.layers.ridge import RidgeLayer
+from mbf_mesh_nav.layers.roughness import RoughnessLayer
+from mbf_mesh_nav.layers.steepness import SteepnessLayer
+from mbf_mesh_nav.mesh_map import MeshMap
+
+
+def computed(mesh: MeshMap, layer_class: type[MeshLayer], **parameters: object) -> MeshLayer:
+    layer = layer_class(LayerContext("layer", mesh.topology, mesh.locator, layer_class.Parameters(**parameters)))
+    layer.recompute()
+    return layer
+
+
+def bumpy(seed: int) -> MeshMap:
+    return MeshMap.from_heights(np.random.default_rng(seed).random((9, 8)) * 0.2, 0.1, 0.1)
+
+
+def neighbours(mesh: MeshMap, vertex: int) -> np.ndarray:
+    return mesh.neighbours[mesh.neighbour_offsets[vertex] : mesh.neighbour_offsets[vertex + 1]]
+
+
+def neighbourhood(mesh: MeshMap, centre: int, radius: float, plane: bool) -> list[int]:
+    """Vertices reached over edges without leaving the radius; across the normal if ``plane``."""
+    members, stack = {centre}, [centre]
+    normal = mesh.vertex_normals[centre] if plane else np.zeros(3)
+    while stack:
+        for other in neighbours(mesh, stack.pop()):
+            apart = mesh.vertices[other] - mesh.vertices[centre]
+            apart = apart - normal * (normal @ apart)
+            if other not in members and np.linalg.norm(apart) < radius:
+                members.add(int(other))
+                stack.append(int(other))
+    return sorted(members - {centre})
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.integers(0, 10_000), st.floats(0.05, 0.35))
+def test_height_difference_equals_its_twin(seed, radius):
+    mesh = bumpy(seed)
+
+    layer = computed(mesh, HeightDiffLayer, radius=radius)
+
+    for v, normal in enumerate(mesh.vertex_normals):
+        heights = mesh.vertices[[v, *neighbourhood(mesh, v, radius, plane=True)]] @ normal
+        assert layer.costs[v] == pytest.approx(heights.max() - heights.min(), abs=1e-6)
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.integers(0, 10_000), st.floats(0.05, 0.35))
+def test_roughness_equals_its_twin(seed, radius):
+    mesh = bumpy(seed)
+    normals = mesh.vertex_normals
+    angles = [np.arccos(np.clip(normals[neighbours(mesh, v)] @ normals[v], -1, 1)).mean() for v in range(len(normals))]
+
+    layer = computed(mesh, RoughnessLayer, radius=radius)
+
+    for v in range(len(normals)):
+        members = [v, *neighbourhood(mesh, v, radius, plane=False)]
+        assert layer.costs[v] == pytest.approx(np.mean([angles[u] for u in members]), abs=1e-5)
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.integers(0, 10_000), st.floats(0.05, 0.35))
+def test_ridge_equals_its_twin(seed, radius):
+    mesh = bumpy(seed)
+    tips = mesh.vertices + mesh.vertex_normals
+
+    layer = computed(mesh, RidgeLayer, radius=radius, threshold=0.3)
+
+    for v in range(len(tips)):
+        members = neighbourhood(mesh, v, radius, plane=False)
+        expected = np.linalg.norm(tips[members] - tips[v], axis=1).mean() if members else 0.4
+        assert layer.costs[v] == pytest.approx(expected, abs=1e-6)
+
+
+def test_smooth_slope_costs_no_height_but_steepness():
+    x = np.arange(8) * 0.1
+    mesh = MeshMap.from_heights(np.tile(x * np.tan(0.4), (8, 1)), 0.1, 0.1)
+
+    height, steep = computed(mesh, HeightDiffLayer), computed(mesh, SteepnessLayer, threshold=0.39)
+
+    assert height.costs.max() < 1e-6
+    np.testing.assert_allclose(steep.costs, 0.4, atol=1e-6)
+    assert steep.lethal.all()
+    assert not computed(mesh, SteepnessLayer, threshold=0.41).lethal.any()
+
+
+def test_height_limit_keeps_the_cylinder_from_running_over_the_mesh():
+    mesh = bumpy(3)
+
+    assert computed(mesh, HeightDiffLayer, height_limit=0.05).costs.max() <= 0.1 + 1e-6
+    np.testing.assert_array_equal(
+        computed(mesh, HeightDiffLayer, height_limit=9.0).costs, computed(mesh, HeightDiffLayer).costs
+    )
+
+
+def test_border_marks_the_rim_and_its_threshold_decides_what_is_lethal():
+    mesh = MeshMap.from_heights(np.zeros((5, 6)), 1.0, 1.0)
+    x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
+    rim = (x == 0) | (x == 5) | (y == 0) | (y == 4)
+
+    layer = computed(mesh, BorderLayer, border_cost=0.4, threshold=0.5)
+
+    np.testing.assert_allclose(layer.costs, np.where(rim, 0.4, 0.0))
+    assert not layer.lethal.any()
+    np.testing.assert_array_equal(computed(mesh, BorderLayer).lethal, rim)
+
+
+@pytest.mark.parametrize(("ceiling", "cost", "lethal"), [(0.9, 1.0, True), (1.15, 0.5, False), (1.4, 0.0, False)])
+def test_clearance_falls_from_one_below_the_robots_height_to_zero(ceiling, cost, lethal):
+    vertices, faces = heightfield_mesh(np.zeros((4, 4)), 1.0, 1.0)
+    storeys = np.vstack([vertices, vertices + np.array([0.0, 0.0, ceiling])])
+    mesh = MeshMap.from_arrays(storeys, np.vstack([faces, faces + 16]))
+
+    layer = computed(mesh, ClearanceLayer, robot_height=1.0, height_inflation=0.3)
+
+    ground = mesh.vertices[:, 2] == 0.0
+    np.testing.assert_allclose(layer.costs[ground], cost, atol=1e-5)
+    assert (layer.lethal[ground] == lethal).all()
+    assert (layer.costs[~ground] == 0.0).all()
+
+
+def test_clearance_needs_the_robots_height():
+    with pytest.raises(ValidationError, match="robot_height"):
+        ClearanceLayer.Parameters()
+
+
+def test_keep_out_polygon_applies_to_its_storey_only():
+    vertices, faces = heightfield_mesh(np.zeros((5, 5)), 1.0, 1.0)
+    mesh = MeshMap.from_arrays(np.vstack([vertices, vertices + np.array([0, 0, 3.0])]), np.vstack([faces, faces + 25]))
+    square = ((0.5, 0.5), (2.5, 0.5), (2.5, 1.5), (0.5, 1.5))
+
+    layer = computed(mesh, KeepOutLayer, regions=[{"polygon": square, "z_max": 1.0}])
+
+    marked = {tuple(point) for point in mesh.vertices[layer.lethal].tolist()}
+    assert marked == {(1.0, 1.0, 0.0), (2.0, 1.0, 0.0)}
+
+
+def test_labels_give_costs_and_the_last_region_wins():
+    mesh = MeshMap.from_heights(np.zeros((5, 5)), 1.0, 1.0)
+    everything = ((-1.0, -1.0), (9.0, -1.0), (9.0, 9.0), (-1.0, 9.0))
+    corner = ((-1.0, -1.0), (0.5, -1.0), (0.5, 0.5), (-1.0, 0.5))
+    regions = [{"polygon": everything, "label": "lawn"}, {"polygon": corner, "label": "mud"}]
+
+    layer = computed(mesh, LabelLayer, regions=regions, label_costs={"lawn": 0.3}, lethal_labels=["mud"])
+
+    muddy = (mesh.vertices[:, :2] == 0.0).all(axis=1)
+    np.testing.assert_allclose(layer.costs[~muddy], 0.3)
+    np.testing.assert_array_equal(layer.lethal, muddy)
+
+
+def test_label_without_a_cost_and_polygon_without_inside_are_refused():
+    with pytest.raises(ValidationError, match="labels without a cost: sand"):
+        LabelLayer.Parameters(regions=[{"polygon": ((0, 0), (1, 0), (0, 1)), "label": "sand"}])
+    with pytest.raises(ValidationError, match="at least 3 corners"):
+        KeepOutLayer.Parameters(regions=[{"polygon": ((0, 0), (1, 0))}])
+
+
+@pytest.mark.parametrize(("scale", "offset"), [(1e-3, 0.0), (1.0, 1e4)])
+def test_layers_do_not_depend_on_scale_and_offset(scale, offset):
+    plain = bumpy(5)
+    moved = MeshMap.from_arrays(
+        plain.to_input_order(plain.vertices) * scale + offset, plain.internal_to_input[plain.faces]
+    )
+
+    for layer_class in (HeightDiffLayer, RoughnessLayer):
+        expected = computed(plain, layer_class, radius=0.25)
+        found = computed(moved, layer_class, radius=0.25 * scale)
+        unit = scale if layer_class is HeightDiffLayer else 1.0
+        np.testing.assert_allclose(
+            moved.to_input_order(found.costs), plain.to_input_order(expected.costs) * unit, rtol=1e-4, atol=1e-9
+        )

@@ -1,0 +1,217 @@
+"""Building a map from a configuration: all findings at once, cache, coarse-mesh warning, files in and out."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.layers.roughness import RoughnessLayer
+from mbf_mesh_nav.lvr2_io import read_lvr2_vertex_attributes, write_lvr2_mesh
+from mbf_mesh_nav.map_builder import (
+    LayerGraphError,
+    MeshMapParameters,
+    build_mesh_map,
+    default_layer_blocks,
+    default_layers,
+)
+from mbf_mesh_nav.mesh_io import read_mesh
+from mbf_mesh_nav.repair import MeshError
+
+VERTICES, FACES = heightfield_mesh(np.random.default_rng(0).random((12, 10)) * 0.1, 0.1, 0.1)
+
+
+def test_default_layers_leave_a_floor_free_inside_and_close_its_border():
+    vertices, faces = heightfield_mesh(np.zeros((30, 30)), 0.1, 0.1)
+
+    mesh = build_mesh_map(default_layers(0.3), default_layer_blocks(0.3), vertices=vertices, faces=faces)
+
+    snapshot = mesh.snapshot()
+    middle = np.linalg.norm(mesh.vertices[:, :2] - 1.45, axis=1) < 0.8
+    rim = (mesh.vertices[:, :2] == 0.0).any(axis=1)
+    assert (snapshot.costs[middle] == 0.0).all()
+    assert snapshot.lethal[rim].all()
+    assert np.isinf(snapshot.costs[rim]).all()
+
+
+def test_every_mistake_in_the_layers_is_reported_at_once():
+    parameters = MeshMapParameters(
+        layers=[
+            {"name": "a", "type": "nonsense"},
+            {"name": "b", "type": "steepness", "inputs": ["a"]},
+            {"name": "c", "type": "inflation", "inputs": ["c"]},
+            {"name": "c", "type": "border"},
+            {"name": "d", "type": "roughness"},
+        ],
+        default_layer="final",
+    )
+
+    with pytest.raises(LayerGraphError) as error:
+        build_mesh_map(parameters, {"d": {"radius": -1.0, "radios": 2}, "e": {}}, vertices=VERTICES, faces=FACES)
+
+    for part in (
+        "'c' is used twice",
+        "parameters for 'e', but no such layer",
+        "default_layer 'final' is no layer",
+        "unknown layer type 'nonsense'",
+        "'b' of type steepness takes 0 inputs, got 1",
+        "layer 'd': radius",
+        "layer 'd': radios",
+    ):
+        assert part in str(error.value)
+
+
+def test_layer_class_can_be_named_by_module():
+    path = f"{RoughnessLayer.__module__}:RoughnessLayer"
+    parameters = MeshMapParameters(layers=[{"name": "mine", "type": path}])
+
+    assert isinstance(build_mesh_map(parameters, vertices=VERTICES, faces=FACES).layers["mine"], RoughnessLayer)
+    wrong = MeshMapParameters(layers=[{"name": "mine", "type": "pathlib:Path"}])
+    with pytest.raises(LayerGraphError, match="no MeshLayer"):
+        build_mesh_map(wrong, vertices=VERTICES, faces=FACES)
+
+
+def test_cached_layer_is_reused_for_the_same_mesh_and_parameters_only(tmp_path, monkeypatch):
+    parameters = MeshMapParameters(layers=[{"name": "rough", "type": "roughness"}], cache_dir=str(tmp_path))
+
+    def build(radius: float, vertices: np.ndarray = VERTICES):
+        return build_mesh_map(parameters, {"rough": {"radius": radius}}, vertices=vertices, faces=FACES)
+
+    first = build(0.3)
+    assert len(list(tmp_path.iterdir())) == 1
+    other = build(0.15)
+    assert not np.array_equal(first.layers["rough"].costs, other.layers["rough"].costs)
+    build(0.3, VERTICES * [1.0, 1.0, 1.1])
+    assert len(list(tmp_path.iterdir())) == 3
+
+    monkeypatch.setattr(RoughnessLayer, "compute", lambda self: pytest.fail("computed although cached"))
+    np.testing.assert_array_equal(build(0.3).layers["rough"].costs, first.layers["rough"].costs)
+
+
+def test_damaged_cache_file_is_computed_anew(tmp_path):
+    parameters = MeshMapParameters(layers=[{"name": "rough", "type": "roughness"}], cache_dir=str(tmp_path))
+    first = build_mesh_map(parameters, vertices=VERTICES, faces=FACES)
+    next(tmp_path.iterdir()).write_bytes(b"PK damaged")
+
+    again = build_mesh_map(parameters, vertices=VERTICES, faces=FACES)
+
+    np.testing.assert_array_equal(again.layers["rough"].costs, first.layers["rough"].costs)
+
+
+def test_coarse_mesh_is_reported_and_densify_mends_it():
+    vertices, faces = heightfield_mesh(np.zeros((3, 3)), 2.0, 2.0)
+    coarse = MeshMapParameters(inscribed_radius=0.4)
+
+    assert "densify" in build_mesh_map(coarse, vertices=vertices, faces=faces).report["coarse"].text
+    fine = build_mesh_map(MeshMapParameters(inscribed_radius=0.4, densify=0.2), vertices=vertices, faces=faces)
+    assert "coarse" not in fine.report
+    np.testing.assert_array_equal(fine.vertices[fine.input_to_internal], vertices)
+
+
+@pytest.mark.parametrize("ending", ["ply", "obj", "stl", "off", "glb", "dae"])
+def test_mesh_survives_a_round_trip_through_every_format(tmp_path, ending):
+    file = tmp_path / f"mesh.{ending}"
+    trimesh.Trimesh(VERTICES, FACES, process=False).export(file)
+
+    mesh = build_mesh_map(MeshMapParameters(mesh_file=str(file)))
+
+    assert len(mesh.vertices) == len(VERTICES)
+    assert len(mesh.faces) == len(FACES)
+    np.testing.assert_allclose(np.sort(mesh.vertices, axis=0), np.sort(VERTICES, axis=0), atol=1e-5)
+
+
+def test_parts_of_a_scene_are_found_by_name_and_moved_into_place(tmp_path):
+    scene = trimesh.Scene()
+    plate = trimesh.Trimesh(VERTICES, FACES, process=False)
+    scene.add_geometry(plate, node_name="ground", geom_name="ground_mesh")
+    scene.add_geometry(
+        plate, node_name="roof", geom_name="roof_mesh", transform=trimesh.transformations.translation_matrix([0, 0, 5])
+    )
+    file = tmp_path / "house.glb"
+    scene.export(file)
+
+    roof, faces = read_mesh(file, "roof")
+
+    assert len(faces) == len(FACES)
+    assert roof[:, 2].min() >= 5.0
+    assert len(read_mesh(file)[1]) == 2 * len(FACES)
+    with pytest.raises(MeshError, match=r"no part 'cellar'.*ground.*roof"):
+        read_mesh(file, "cellar")
+
+
+def test_lvr2_file_round_trip_with_layer_costs(tmp_path):
+    file = tmp_path / "map.h5"
+    costs = np.arange(len(VERTICES), dtype=np.float32)
+
+    write_lvr2_mesh(file, VERTICES, FACES, {"height_diff": costs, "vertex_normals": VERTICES})
+
+    vertices, faces = read_mesh(file)
+    np.testing.assert_allclose(vertices, VERTICES, atol=1e-6)
+    np.testing.assert_array_equal(faces, FACES)
+    attributes = read_lvr2_vertex_attributes(file)
+    np.testing.assert_array_equal(attributes["height_diff"], costs)
+    assert attributes["vertex_normals"].shape == (len(VERTICES), 3)
+    with pytest.raises(MeshError, match="not overwritten"):
+        write_lvr2_mesh(file, VERTICES, FACES)
+
+
+def test_old_lvr2_layout_is_read(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    file = tmp_path / "old.h5"
+    with h5py.File(file, "w") as handle:
+        handle["mesh/channels/vertices"] = VERTICES.astype(np.float32)
+        handle["mesh/channels/face_indices"] = FACES.astype(np.uint32)
+        handle["mesh/channels/roughness"] = np.ones((len(VERTICES), 1), np.float32)
+
+    np.testing.assert_array_equal(read_mesh(file, "mesh")[1], FACES)
+    assert read_lvr2_vertex_attributes(file)["roughness"].shape == (len(VERTICES),)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "text"),
+    [
+        ("none.ply", None, "no such file"),
+        ("mesh.xyz", b"1 2 3", "unknown ending"),
+        ("empty.ply", b"", "cannot be read as ply"),
+        ("short.stl", b"solid nothing", "st|face"),
+        ("text.h5", b"not hdf5", "HDF5"),
+        (
+            "lying.ply",
+            b"ply\nformat binary_little_endian 1.0\nelement vertex 999999999999\nproperty float x\nend_header\n",
+            "lying",
+        ),
+        ("broken.glb", b"glTF\x02\x00\x00\x00", "glb"),
+    ],
+)
+def test_unreadable_file_is_one_error_that_names_it(tmp_path, name, content, text):
+    file = tmp_path / name
+    if content is not None:
+        file.write_bytes(content)
+
+    with pytest.raises(MeshError, match=text) as error:
+        read_mesh(file)
+
+    assert error.value.file == str(file)
+
+
+def test_too_many_faces_are_refused(tmp_path):
+    file = tmp_path / "mesh.ply"
+    trimesh.Trimesh(VERTICES, FACES, process=False).export(file)
+    write_lvr2_mesh(tmp_path / "mesh.h5", VERTICES, FACES)
+
+    for path in (file, tmp_path / "mesh.h5"):
+        with pytest.raises(MeshError, match="the limit is 10"):
+            read_mesh(path, max_faces=10)
+
+
+def test_hdf5_without_or_with_another_mesh_names_what_is_there(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    file = tmp_path / "odd.h5"
+    with h5py.File(file, "w") as handle:
+        handle["a/geometry/vertices"] = np.zeros((3, 3))
+        handle["a/geometry/face_indices"] = np.zeros((1, 4), np.uint32)
+        handle["a"].attrs["IO"] = "PointIO"
+
+    with pytest.raises(MeshError, match="no mesh 'b' The meshes in it are: a"):
+        read_mesh(file, "b")
+    with pytest.raises(MeshError, match=r"expected \(n, 3\).*expected 'MeshIO'"):
+        read_mesh(file)

@@ -1,0 +1,198 @@
+"""Sensed obstacles on the map: projection, storeys, decay, clearing, freshness, and the snapshots they lead to."""
+
+import numpy as np
+import pytest
+
+from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.range_image import RangeImage
+
+SENSOR = [0.0, 2.0, 0.5]
+
+
+def floor_map(storeys: int = 1, **obstacle: object) -> MeshMap:
+    vertices, faces = heightfield_mesh(np.zeros((21, 21)), 0.2, 0.2)
+    parameters = MeshMapParameters(
+        layers=[
+            {"name": "seen", "type": "obstacle"},
+            {"name": "inflation", "type": "inflation", "inputs": ["seen"]},
+        ],
+        edge_cost_factor=2.0,
+    )
+    lifted = [vertices + np.array([0.0, 0.0, 2.5 * storey]) for storey in range(storeys)]
+    corners = [faces + storey * len(vertices) for storey in range(storeys)]
+    inflation = {"inflation_radius": 0.5, "lethal_value": np.inf}
+    blocks = {"seen": obstacle, "inflation": inflation}
+    return build_mesh_map(parameters, blocks, vertices=np.vstack(lifted), faces=np.vstack(corners))
+
+
+def post(x: float, y: float, low: float = 0.1, high: float = 0.9) -> np.ndarray:
+    z = np.linspace(low, high, 9)
+    return np.column_stack([np.full(9, x), np.full(9, y), z])
+
+
+def test_post_makes_the_corners_of_the_face_below_lethal_and_inflates_them():
+    mesh = floor_map()
+
+    mesh.insert_points(post(2.05, 2.02), SENSOR, 1.0)
+
+    snapshot = mesh.snapshot()
+    lethal = mesh.vertices[snapshot.lethal]
+    assert len(lethal) == 3
+    assert (np.linalg.norm(lethal - [2.05, 2.02, 0.0], axis=1) < 0.3).all()
+    assert np.isinf(snapshot.costs[snapshot.lethal]).all()
+    near = np.linalg.norm(mesh.vertices - [2.05, 2.02, 0.0], axis=1) < 0.4
+    assert (snapshot.costs[near] > 0.0).all()
+
+
+def test_snapshot_taken_before_keeps_its_values():
+    mesh = floor_map()
+    before = mesh.snapshot()
+
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+
+    assert mesh.snapshot().version == before.version + 1
+    assert not before.lethal.any()
+    assert np.isfinite(before.edge_weights).all()
+
+
+def test_edge_weights_follow_costs_and_block_lethal_ends():
+    mesh = floor_map()
+    mesh.insert_points(post(2.05, 2.02), SENSOR, 1.0)
+    snapshot = mesh.snapshot()
+
+    for vertex in range(len(mesh.vertices)):
+        for entry in range(*mesh.neighbour_offsets[vertex : vertex + 2]):
+            other, length = mesh.neighbours[entry], mesh.neighbour_lengths[entry]
+            if snapshot.lethal[vertex] or snapshot.lethal[other]:
+                assert snapshot.edge_weights[entry] == np.inf
+            else:
+                mean = (snapshot.costs[vertex] + snapshot.costs[other]) / 2
+                assert snapshot.edge_weights[entry] == pytest.approx(length * (1 + 2.0 * mean), rel=1e-5)
+
+
+def test_points_of_the_ground_and_above_the_robot_mark_nothing():
+    mesh = floor_map(robot_height=1.0, ground_tolerance=0.05)
+    version = mesh.snapshot().version
+
+    mesh.insert_points([[1.0, 1.0, 0.03], [1.0, 1.0, -0.04], [2.0, 2.0, 1.2], [np.nan, 0.0, 0.0]], SENSOR, 1.0)
+
+    assert not mesh.layers["seen"].lethal.any()
+    assert mesh.snapshot().version == version
+
+
+def test_obstacle_stays_on_its_storey():
+    mesh = floor_map(storeys=2)
+
+    mesh.insert_points(post(2.0, 2.0, low=2.6, high=3.3), [0.0, 2.0, 3.0], 1.0)
+
+    assert set(mesh.vertices[mesh.layers["seen"].lethal][:, 2]) == {2.5}
+
+
+def test_points_beyond_the_range_limit_are_ignored():
+    mesh = floor_map(max_obstacle_dist=1.5)
+
+    mesh.insert_points(np.vstack([post(1.0, 2.0), post(3.0, 2.0)]), SENSOR, 1.0)
+
+    assert (mesh.vertices[mesh.layers["seen"].lethal][:, 0] < 1.5).all()
+    assert mesh.layers["seen"].lethal.any()
+
+
+def test_without_decay_only_the_newest_cloud_counts():
+    mesh = floor_map()
+    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0)
+
+    mesh.insert_points(post(3.0, 3.0), SENSOR, 2.0)
+
+    assert (mesh.vertices[mesh.layers["seen"].lethal][:, 0] > 2.0).all()
+
+
+def test_hits_are_kept_for_the_decay_time():
+    mesh = floor_map(decay_time=2.0)
+    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0)
+    mesh.insert_points(post(3.0, 3.0), SENSOR, 2.0)
+    assert len(np.unique(np.round(mesh.vertices[mesh.layers["seen"].lethal][:, 0]))) == 2
+
+    mesh.update(3.5)
+
+    assert (mesh.vertices[mesh.layers["seen"].lethal][:, 0] > 2.0).all()
+    mesh.update(4.5)
+    assert not mesh.snapshot().lethal.any()
+
+
+@pytest.mark.parametrize(("clearing", "left"), [(True, False), (False, True)])
+def test_kept_hit_is_cleared_when_rays_pass_through_it(clearing, left):
+    mesh = floor_map(decay_time=np.inf, clearing=clearing)
+    mesh.insert_points(post(1.0, 2.0, 0.45, 0.55), SENSOR, 1.0)
+    wall_y, wall_z = np.meshgrid(np.linspace(1.0, 3.0, 60), np.linspace(0.2, 0.8, 60))
+    wall = np.column_stack([np.full(3600, 3.0), wall_y.ravel(), wall_z.ravel()])
+
+    mesh.insert_points(wall, SENSOR, 2.0)
+
+    seen = mesh.vertices[mesh.layers["seen"].lethal]
+    assert bool((seen[:, 0] < 2.0).any()) is left
+    assert (seen[:, 0] > 2.5).any()
+
+
+def test_ray_that_ends_on_the_hit_does_not_clear_it():
+    image = RangeImage(np.array([[2.0, 0.0, 0.0]]), np.zeros(3))
+
+    seen = image.sees_through(np.array([[1.0, 0.0, 0.0], [1.95, 0.0, 0.0], [0.0, 1.0, 0.0]]))
+
+    assert seen.tolist() == [True, False, False]
+
+
+def test_clear_forgets_everything_and_frees_the_edges():
+    mesh = floor_map(decay_time=np.inf)
+    free = mesh.snapshot()
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+
+    mesh.clear()
+
+    np.testing.assert_array_equal(mesh.snapshot().edge_weights, free.edge_weights)
+    np.testing.assert_array_equal(mesh.snapshot().costs, free.costs)
+
+
+def test_map_is_stale_when_no_cloud_came_within_the_expected_rate():
+    mesh = floor_map(expected_update_rate=0.5)
+
+    assert not mesh.is_current(0.0)
+    mesh.insert_points(np.zeros((0, 3)), SENSOR, 10.0)
+    assert mesh.is_current(10.4)
+    assert not mesh.is_current(10.6)
+    assert floor_map().is_current(1e9)
+
+
+def test_changed_robot_height_applies_to_the_next_cloud():
+    mesh = floor_map(robot_height=0.3)
+    mesh.insert_points(post(2.0, 2.0, 0.5, 0.9), SENSOR, 1.0)
+    assert not mesh.snapshot().lethal.any()
+
+    layer = mesh.layers["seen"]
+    mesh.set_layer_parameters("seen", layer.parameters.model_copy(update={"robot_height": 1.0}))
+    mesh.insert_points(post(2.0, 2.0, 0.5, 0.9), SENSOR, 2.0)
+
+    assert mesh.snapshot().lethal.any()
+
+
+def test_changed_inflation_radius_reaches_the_snapshot():
+    mesh = floor_map()
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+    reach = (mesh.snapshot().costs > 0).sum()
+
+    layer = mesh.layers["inflation"]
+    mesh.set_layer_parameters("inflation", layer.parameters.model_copy(update={"inflation_radius": 1.0}))
+
+    assert (mesh.snapshot().costs > 0).sum() > reach
+
+
+def test_changed_edge_cost_factor_changes_the_weights():
+    mesh = floor_map()
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+
+    mesh.set_edge_cost_factor(0.0)
+
+    finite = np.isfinite(mesh.snapshot().edge_weights)
+    np.testing.assert_array_equal(mesh.snapshot().edge_weights[finite], mesh.neighbour_lengths[finite])
+    assert not finite.all()
