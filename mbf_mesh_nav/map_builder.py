@@ -174,8 +174,8 @@ def build_mesh_map(
     if parameters.densify > 0.0:
         mesh = densify(mesh, parameters.densify)
     topology = build_topology(mesh.vertices, mesh.faces, mesh.vertex_source, mesh.face_source, mesh.input_to_vertex)
-    mesh_map = MeshMap(topology, frame_id, report)
-    _warn_if_coarse(mesh_map, parameters.inscribed_radius)
+    mesh_map = MeshMap(topology, frame_id, report, parameters.inscribed_radius)
+    _warn_if_coarse(mesh_map)
     if plan:
         graph = _compute_layers(mesh_map, plan, parameters.cache_dir)
         default = parameters.default_layer or parameters.layers[-1].name
@@ -252,7 +252,8 @@ def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer], cache_dir: 
     return LayerGraph(list(layers.values()))
 
 
-def _warn_if_coarse(mesh_map: MeshMap, inscribed_radius: float) -> None:
+def _warn_if_coarse(mesh_map: MeshMap) -> None:
+    inscribed_radius = mesh_map.inscribed_radius
     mean_edge = float(mesh_map.neighbour_lengths.mean())
     if 0.0 < 0.5 * inscribed_radius < mean_edge:
         text = (

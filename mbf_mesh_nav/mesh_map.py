@@ -68,11 +68,20 @@ class MeshMap:
         What was found in, and done to, the mesh when it was loaded.
     frame_id : str
         Frame of all coordinates.
+    inscribed_radius : float
+        Radius [m] of the disc that stands for the robot when the server is asked where it fits.
     """
 
-    def __init__(self, topology: MeshTopology, frame_id: str = "map", report: MeshReport | None = None) -> None:
+    def __init__(
+        self,
+        topology: MeshTopology,
+        frame_id: str = "map",
+        report: MeshReport | None = None,
+        inscribed_radius: float = 0.0,
+    ) -> None:
         self.topology = topology
         self.frame_id = frame_id
+        self.inscribed_radius = inscribed_radius
         self.report = report if report is not None else MeshReport()
         self.locator = SurfaceLocator(topology)
         self.vertices = topology.vertices

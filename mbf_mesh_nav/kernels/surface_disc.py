@@ -1,0 +1,41 @@
+"""The part of the surface under a round robot."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.compiled import kernel
+
+IntArray = NDArray[np.int32]
+FloatArray = NDArray[np.float64]
+
+
+@kernel
+def vertices_in_disc(
+    vertices: FloatArray, offsets: IntArray, neighbours: IntArray, start: int, centre: FloatArray, radius: float
+) -> IntArray:
+    """Vertices reached from ``start`` over edges without leaving ``radius`` [m] of ``centre`` (3,); start included.
+
+    Being connected, they lie on one storey.
+    """
+    seen = np.zeros(vertices.shape[0], dtype=np.bool_)
+    members = np.zeros(vertices.shape[0], dtype=np.int32)
+    members[0] = start
+    seen[start] = True
+    size, head = 1, 0
+    while head < size:
+        vertex = members[head]
+        head += 1
+        for entry in range(offsets[vertex], offsets[vertex + 1]):
+            other = neighbours[entry]
+            if seen[other]:
+                continue
+            seen[other] = True
+            squared = 0.0
+            for axis in range(3):
+                squared += (vertices[other, axis] - centre[axis]) ** 2
+            if squared <= radius * radius:
+                members[size] = other
+                size += 1
+    return members[:size].copy()

@@ -1,0 +1,104 @@
+"""What a point, a pose or a path on a mesh costs, and where a round robot fits.
+
+The robot is a disc of its inscribed radius, grown by the safety distance, lying on the surface; its part of the map
+are the vertices below it that are connected to the place it stands on, so the storeys above and below do not count.
+
+- OUTSIDE: no surface within ``SURFACE_DISTANCE`` of the position.
+- LETHAL: the disc (of a point: the nearest vertex) touches a lethal vertex or one of infinite cost.
+- INSCRIBED: of a point only: a robot standing there would touch one.
+
+Deviation from the costmap's answers: a disc has no heading, hence ``angle_tolerance`` never matters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.map_queries import CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_mesh_nav.kernels.surface_disc import vertices_in_disc
+from mbf_mesh_nav.layer import IntArray
+from mbf_mesh_nav.locate import SurfacePoint
+from mbf_mesh_nav.mesh_map import MeshMap, MeshSnapshot
+
+SURFACE_DISTANCE = 0.5
+"""How far [m] a position may be off the surface to count as on it; less than a storey, more than a wheel."""
+
+OUTSIDE = PlaceAnswer(CellState.OUTSIDE, 0.0)
+
+
+def check_point(mesh_map: MeshMap, point: Pose) -> PlaceAnswer:
+    """State and interpolated cost of the surface at a point."""
+    place = mesh_map.locate_one(point.position, SURFACE_DISTANCE)
+    if place is None:
+        return OUTSIDE
+    snapshot = mesh_map.snapshot()
+    nearest = _nearest_vertex(mesh_map, place)
+    weights = place.barycentric > 1e-12
+    cost = float(place.barycentric[weights] @ snapshot.costs[mesh_map.faces[place.face][weights]])
+    if _blocked(snapshot, np.array([nearest])).any():
+        return PlaceAnswer(CellState.LETHAL, cost)
+    touched = _blocked(snapshot, _disc(mesh_map, place, mesh_map.inscribed_radius)).any()
+    return PlaceAnswer(CellState.INSCRIBED if touched else CellState.FREE, cost)
+
+
+def check_pose(mesh_map: MeshMap, pose: Pose, query: PlaceQuery) -> PlaceAnswer:
+    """State of the robot's disc at a pose and the sum of the costs of the vertices below it."""
+    place = mesh_map.locate_one(pose.position, SURFACE_DISTANCE)
+    if place is None:
+        return OUTSIDE
+    snapshot = mesh_map.snapshot()
+    vertices = _disc(mesh_map, place, mesh_map.inscribed_radius + query.safety_dist)
+    blocked = _blocked(snapshot, vertices)
+    costs = np.where(blocked, snapshot.costs[vertices] * query.lethal_cost_mult, snapshot.costs[vertices])
+    return PlaceAnswer(CellState.LETHAL if blocked.any() else CellState.FREE, float(costs.sum()))
+
+
+def check_path(
+    mesh_map: MeshMap,
+    path: Path,
+    query: PlaceQuery,
+    return_on: CellState | None = None,
+    skip_poses: int = 0,
+    path_cells_only: bool = False,
+) -> PathAnswer:
+    """Worst state and summed cost over every ``skip_poses + 1``-th pose; ends at a state of at least ``return_on``."""
+    state, cost, index = CellState.FREE, 0.0, 0
+    for index in range(0, len(path), skip_poses + 1):
+        answer = check_point(mesh_map, path[index]) if path_cells_only else check_pose(mesh_map, path[index], query)
+        state, cost = max(state, answer.state), cost + answer.cost
+        if return_on and state >= return_on:
+            break
+    return PathAnswer(index, state, cost)
+
+
+def find_valid_pose(mesh_map: MeshMap, pose: Pose, dist_tolerance: float, query: PlaceQuery) -> PoseAnswer:
+    """Nearest pose within ``dist_tolerance`` [m] where the disc fits: the pose itself, else a vertex near it."""
+    first = check_pose(mesh_map, pose, query)
+    if first.state < CellState.LETHAL:
+        return PoseAnswer(first.state, first.cost, pose)
+    distances = np.linalg.norm(mesh_map.vertices - np.array(pose.position), axis=1)
+    free = ~_blocked(mesh_map.snapshot(), np.arange(len(distances), dtype=np.int32))
+    candidates = np.flatnonzero(free & (distances <= dist_tolerance))
+    for vertex in candidates[np.argsort(distances[candidates], kind="stable")]:
+        x, y, z = mesh_map.vertices[vertex].tolist()
+        there = replace(pose, position=(x, y, z))
+        answer = check_pose(mesh_map, there, query)
+        if answer.state < CellState.LETHAL:
+            return PoseAnswer(answer.state, answer.cost, there)
+    return PoseAnswer(first.state, first.cost, None)
+
+
+def _nearest_vertex(mesh_map: MeshMap, place: SurfacePoint) -> int:
+    return int(mesh_map.faces[place.face][np.argmax(place.barycentric)])
+
+
+def _disc(mesh_map: MeshMap, place: SurfacePoint, radius: float) -> IntArray:
+    graph = (mesh_map.vertices, mesh_map.neighbour_offsets, mesh_map.neighbours)
+    return vertices_in_disc(*graph, _nearest_vertex(mesh_map, place), place.point, float(radius))
+
+
+def _blocked(snapshot: MeshSnapshot, vertices: IntArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    return np.asarray(snapshot.lethal[vertices] | np.isinf(snapshot.costs[vertices]))

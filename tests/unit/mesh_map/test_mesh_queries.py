@@ -1,0 +1,118 @@
+"""Points, poses and paths on a floor with one wall of lethal vertices at x = 2, and a storey above it."""
+
+import numpy as np
+import pytest
+
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.map_queries import CellState, PlaceQuery
+from mbf_abstract.transforms import TransformBuffer
+from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.queries import MeshQueries
+
+
+class StandingRobot:
+    """A robot that stands at one pose."""
+
+    def __init__(self, pose: Pose) -> None:
+        self._pose = pose
+
+    def pose(self) -> Pose:
+        return self._pose
+
+
+@pytest.fixture(scope="module")
+def walled_map() -> MeshMap:
+    vertices, faces = heightfield_mesh(np.zeros((21, 41)), 0.1, 0.1)
+    storeys = np.vstack([vertices, vertices + np.array([0.0, 0.0, 2.5])])
+    wall = {"polygon": ((1.95, -1.0), (2.05, -1.0), (2.05, 3.0), (1.95, 3.0)), "z_max": 1.0}
+    parameters = MeshMapParameters(
+        layers=[
+            {"name": "wall", "type": "keep_out"},
+            {"name": "lawn", "type": "label"},
+            {"name": "sum", "type": "weighted_sum", "inputs": ["wall", "lawn"]},
+        ],
+        inscribed_radius=0.25,
+    )
+    blocks = {"wall": {"regions": [wall]}, "lawn": {"default_cost": 0.5}}
+    return build_mesh_map(parameters, blocks, vertices=storeys, faces=np.vstack([faces, faces + len(vertices)]))
+
+
+@pytest.fixture
+def queries(walled_map: MeshMap) -> MeshQueries:
+    return MeshQueries(walled_map, StandingRobot(Pose.planar(1.0, 1.0)), TransformBuffer())
+
+
+@pytest.mark.parametrize(
+    ("x", "z", "state"),
+    [
+        (1.0, 0.0, CellState.FREE),
+        (1.82, 0.1, CellState.INSCRIBED),
+        (2.01, 0.0, CellState.LETHAL),
+        (2.01, 2.5, CellState.FREE),
+        (2.01, 1.2, CellState.OUTSIDE),
+        (9.0, 0.0, CellState.OUTSIDE),
+    ],
+)
+def test_state_of_a_point_depends_on_the_wall_and_the_storey(
+    queries: MeshQueries, x: float, z: float, state: CellState
+):
+    assert queries.check_point(Pose.planar(x, 1.0, z=z)).state == state
+
+
+def test_cost_of_a_point_is_interpolated(queries: MeshQueries):
+    assert queries.check_point(Pose.planar(1.03, 1.07)).cost == pytest.approx(0.5)
+    assert queries.check_point(Pose.planar(1.95, 1.0)).cost == pytest.approx(1.0)
+
+
+def test_robot_fits_until_its_disc_touches_the_wall(queries: MeshQueries):
+    assert queries.check_pose(Pose.planar(1.7, 1.0)).state == CellState.FREE
+    assert queries.check_pose(Pose.planar(1.8, 1.0)).state == CellState.LETHAL
+    assert queries.check_pose(Pose.planar(1.7, 1.0), PlaceQuery(safety_dist=0.1)).state == CellState.LETHAL
+
+
+def test_cost_of_a_pose_sums_the_vertices_below_it_with_multipliers(queries: MeshQueries):
+    below = sum(np.hypot(i, j) <= 2.5 for i in range(-3, 4) for j in range(-3, 4))
+
+    assert queries.check_pose(Pose.planar(1.0, 1.0)).cost == pytest.approx(0.5 * below)
+    plain = queries.check_pose(Pose.planar(2.0, 1.0)).cost
+    assert queries.check_pose(Pose.planar(2.0, 1.0), PlaceQuery(lethal_cost_mult=2.0)).cost > plain
+
+
+def test_pose_of_the_robot_is_taken_without_a_pose(queries: MeshQueries):
+    assert queries.check_pose(None) == queries.check_pose(Pose.planar(1.0, 1.0))
+
+
+def test_path_is_checked_pose_by_pose_up_to_the_wanted_state(queries: MeshQueries):
+    path = Path.from_poses([Pose.planar(x, 1.0) for x in np.arange(1.0, 3.01, 0.2)])
+
+    whole = queries.check_path(path)
+    stopped = queries.check_path(path, return_on=CellState.LETHAL)
+    centre_line = queries.check_path(path, return_on=CellState.LETHAL, path_cells_only=True)
+
+    assert (whole.last_checked, whole.state) == (10, CellState.LETHAL)
+    assert stopped.last_checked == 4
+    assert centre_line.last_checked == 5
+    assert queries.check_path(path, skip_poses=9).last_checked == 10
+    assert queries.check_path(path, skip_poses=9).state == CellState.FREE
+
+
+def test_nearest_valid_pose_is_beside_the_wall_on_the_same_storey(queries: MeshQueries):
+    wanted = Pose.planar(1.9, 1.0, yaw=0.3)
+
+    found = queries.find_valid_pose(wanted, 0.5, 0.0)
+
+    assert found.state == CellState.FREE
+    assert found.pose is not None
+    assert found.pose.position == pytest.approx((1.7, 1.0, 0.0))
+    assert found.pose.orientation == wanted.orientation
+
+
+def test_pose_that_fits_is_returned_as_it_is_and_none_where_nothing_fits(queries: MeshQueries):
+    wanted = Pose.planar(1.033, 1.0)
+
+    assert queries.find_valid_pose(wanted, 0.5, 0.0).pose == wanted
+    blocked = queries.find_valid_pose(Pose.planar(2.0, 1.0), 0.1, 0.0)
+    assert (blocked.state, blocked.pose) == (CellState.LETHAL, None)
+    assert queries.find_valid_pose(Pose.planar(9.0, 1.0), 0.1, 0.0).state == CellState.OUTSIDE
