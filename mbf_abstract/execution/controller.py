@@ -296,6 +296,8 @@ class ControllerExecution:
             return self._canceled(result.message)
         if self._run.patience_exceeded:  # by this very call: its command is as old as the pose it was made from
             return self._patience_end()
+        if self._run.canceled and self._graceful_stop is None:  # while it computed; a new command is not wanted
+            return self._handle_cancel()
         if result.success and result.command is not None:
             self._failures = 0
             self._run.patience_watch.restart()

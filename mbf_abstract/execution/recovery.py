@@ -18,6 +18,7 @@ class GatedMotion:
         self._run = run
         self._runtime = run.runtime
         self._lease: Lease | None = None
+        self._over = False
         self._condition = self._runtime.clock.condition()
         run.handle.on_wake(self._wake)
         run.handle.cancel_token.on_cancel(self._wake)
@@ -32,11 +33,13 @@ class GatedMotion:
 
     def send(self, command: Command) -> bool:
         """Send one command; False if another owner drives, the goal is paused or shall end."""
-        if self._run.abandoned or self._run.handle.paused:
+        if self._run.handle.paused:
             return False
-        if self._lease is None or not self._lease.active:
-            self._lease = self._runtime.gate.acquire(f"recovery {self._run.plugin.name}")
-        return self._lease is not None and self._lease.send(command)
+        with self._condition:
+            if self._lease is None and not self._over:
+                self._lease = self._runtime.gate.acquire(f"recovery {self._run.plugin.name}")
+            lease = self._lease
+        return lease is not None and lease.send(command)
 
     def sleep(self, seconds: float) -> bool:
         """Wait; False as soon as the behaviour shall end. Paused time does not count."""
@@ -50,9 +53,12 @@ class GatedMotion:
         return not token.cancelled
 
     def close(self, reason: str) -> None:
-        """Stop the robot if this behaviour moved it."""
-        if self._lease is not None:
-            self._lease.release(reason=reason)
+        """Stop the robot if this behaviour moved it, and let it drive no more."""
+        with self._condition:
+            self._over = True
+            lease = self._lease
+        if lease is not None:
+            lease.release(reason=reason)
 
     def _wake(self) -> None:
         if self._run.handle.paused and self._lease is not None:

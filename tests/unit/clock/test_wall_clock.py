@@ -1,0 +1,92 @@
+"""WallClock and Stopwatch. Nothing here waits for longer than a few milliseconds, and nothing asserts a duration."""
+
+import pytest
+
+from mbf_abstract.clock import Stopwatch, WallClock, wall_seconds
+from mbf_abstract.sim_clock import SimClock
+
+
+def test_the_wall_clock_starts_near_zero_and_never_runs_backwards():
+    clock = WallClock()
+    stamps = [clock.now() for _ in range(100)]
+    assert stamps == sorted(stamps)
+    assert 0.0 <= stamps[0]
+
+
+def test_sleeping_reaches_the_asked_stamp():
+    clock = WallClock()
+    clock.sleep_until(0.002)
+    assert clock.now() >= 0.002
+    clock.sleep(-1.0)
+    clock.sleep_until(0.0)
+
+
+def test_a_condition_hands_over_between_threads():
+    clock = WallClock()
+    condition, log = clock.condition(), []
+
+    def worker():
+        with condition:
+            log.append("worker")
+            condition.notify_all()
+
+    with condition:
+        thread = clock.spawn(worker, "worker")
+        while not log:
+            condition.wait()
+    assert thread.join()
+    assert not thread.is_alive()
+    assert thread.name == "worker"
+
+
+def test_a_wait_without_a_notification_times_out():
+    condition = WallClock().condition()
+    with condition:
+        assert condition.wait(0.001) is False
+
+
+def test_guarded_and_outside_change_nothing():
+    clock = WallClock()
+    with clock.guarded("plugin"), clock.outside():
+        assert clock.now() >= 0.0
+    assert wall_seconds() <= wall_seconds()
+
+
+@pytest.fixture
+def clock():
+    return SimClock()
+
+
+def test_a_stopwatch_counts_the_time_of_its_clock(clock):
+    watch = Stopwatch(clock)
+    clock.sleep(1.5)
+    assert watch.elapsed == 1.5
+    watch.restart()
+    assert watch.elapsed == 0.0
+
+
+def test_a_paused_stopwatch_stands_still(clock):
+    watch = Stopwatch(clock)
+    clock.sleep(1.0)
+    watch.pause()
+    watch.pause()
+    clock.sleep(10.0)
+    assert watch.paused
+    assert watch.elapsed == 1.0
+    watch.resume()
+    watch.resume()
+    clock.sleep(0.5)
+    assert not watch.paused
+    assert watch.elapsed == pytest.approx(1.5)
+
+
+def test_a_stopwatch_restarted_in_a_pause_counts_from_the_resume(clock):
+    watch = Stopwatch(clock)
+    watch.pause()
+    clock.sleep(3.0)
+    watch.restart()
+    clock.sleep(3.0)
+    assert watch.elapsed == 0.0
+    watch.resume()
+    clock.sleep(1.0)
+    assert watch.elapsed == pytest.approx(1.0)

@@ -1,0 +1,233 @@
+"""The machinery under the actions: a slot's worker, the supervisor of plugin calls, and the callback thread."""
+
+import pytest
+
+from mbf_abstract.events import EventBus, EventKind, MemorySink
+from mbf_abstract.execution.callbacks import CallbackThread
+from mbf_abstract.execution.supervisor import Supervisor
+from mbf_abstract.execution.worker import Worker
+from mbf_abstract.sim_clock import SimClock
+
+
+@pytest.fixture
+def clock():
+    return SimClock()
+
+
+class TimedJob:
+    """A job that takes ``seconds`` and ends at once when it is preempted, unless it is ``deaf``."""
+
+    def __init__(self, clock, name, seconds, log, deaf=False):
+        self.name, self.seconds, self.log, self.deaf = name, seconds, log, deaf
+        self.clock = clock
+        self.preempted = False
+
+    def run(self):
+        self.log.append(f"{self.name} starts at {self.clock.now():g}")
+        end = self.clock.now() + self.seconds
+        while self.clock.now() < end - 1e-9 and not (self.preempted and not self.deaf):
+            self.clock.sleep(min(0.1, end - self.clock.now()))
+        self.log.append(f"{self.name} ends at {round(self.clock.now(), 6):g}")
+
+    def preempt(self):
+        self.preempted = True
+
+
+@pytest.fixture
+def jobs(clock):
+    log = []
+
+    def make(name, seconds, **options):
+        return TimedJob(clock, name, seconds, log, **options)
+
+    make.log = log
+    return make
+
+
+def test_jobs_run_in_order_on_one_thread_that_is_reused(clock, jobs):
+    worker = Worker(clock, "slot 0")
+    for name in "abc":
+        worker.submit(jobs(name, 0.1))
+        clock.sleep(1.0)
+        assert not worker.busy
+    assert len(jobs.log) == 6
+    names = [who.name for who in clock._known]
+    assert names.count("slot 0") == 1
+
+
+def test_a_new_job_preempts_the_running_one_and_waits_for_its_end(clock, jobs):
+    worker = Worker(clock, "slot 0")
+    worker.submit(jobs("a", 10.0))
+    clock.sleep(0.05)
+    assert worker.submit(jobs("b", 1.0)) is None
+    assert worker.busy
+    clock.sleep(5.0)
+    assert jobs.log == ["a starts at 0", "a ends at 0.1", "b starts at 0.1", "b ends at 1.1"]
+
+
+def test_only_the_newest_job_waits(clock, jobs):
+    worker = Worker(clock, "slot 0")
+    worker.submit(jobs("a", 1.0, deaf=True))
+    clock.sleep(0.05)
+    second, third = jobs("b", 1.0), jobs("c", 1.0)
+    assert worker.submit(second) is None
+    assert worker.submit(third) is second
+    clock.sleep(5.0)
+    assert [line for line in jobs.log if "starts" in line] == ["a starts at 0", "c starts at 1"]
+
+
+def test_an_abandoned_job_frees_the_slot_and_its_thread_ends_with_it(clock, jobs):
+    worker = Worker(clock, "slot 0")
+    hung = jobs("a", 10.0, deaf=True)
+    worker.submit(hung)
+    clock.sleep(0.5)
+    worker.submit(jobs("b", 1.0))
+    worker.abandon(hung)
+    clock.sleep(2.0)
+    assert jobs.log == ["a starts at 0", "b starts at 0.5", "b ends at 1.5"]
+    clock.sleep(20.0)
+    assert [who.name for who in clock._known].count("slot 0") == 1
+    worker.abandon(hung)  # without effect: it is over
+    worker.submit(jobs("c", 0.1))
+    clock.sleep(1.0)
+    assert jobs.log[-1].startswith("c ends")
+
+
+def test_a_closed_worker_gives_its_waiting_job_back_and_takes_no_more(clock, jobs):
+    worker = Worker(clock, "slot 0")
+    worker.submit(jobs("a", 1.0, deaf=True))
+    clock.sleep(0.1)
+    waiting, late = jobs("b", 1.0), jobs("c", 1.0)
+    worker.submit(waiting)
+    assert worker.close() is waiting
+    assert worker.submit(late) is late
+    clock.sleep(5.0)
+    assert jobs.log == ["a starts at 0", "a ends at 1"]
+    assert "slot 0" not in {who.name for who in clock._known}
+
+
+# --------------------------------------------------------------------------------------------- supervisor
+def test_a_watch_is_asked_when_it_wants_to_be(clock):
+    supervisor, asked = Supervisor(clock), []
+
+    def check():
+        asked.append(round(clock.now(), 3))
+        return 0.5 if len(asked) < 3 else None
+
+    supervisor.watch(check, first_in=1.0)
+    clock.sleep(10.0)
+    assert asked == [1.0, 1.5, 2.0]
+
+
+def test_a_poked_watch_is_asked_at_once_also_when_it_is_poked_during_its_check(clock):
+    supervisor, asked = Supervisor(clock), []
+
+    def check():
+        asked.append(round(clock.now(), 3))
+        if len(asked) == 1:
+            supervisor.poke(watch)
+        return 100.0
+
+    watch = supervisor.watch(check, first_in=100.0)
+    clock.sleep(1.0)
+    supervisor.poke(watch)
+    clock.sleep(1.0)
+    assert asked == [1.0, 1.0]
+
+
+def test_a_stopped_watch_is_asked_no_more_and_a_closed_supervisor_asks_nobody(clock):
+    supervisor, asked = Supervisor(clock), []
+    watch = supervisor.watch(lambda: asked.append("stopped"), 0.5)
+    supervisor.stop(watch)
+    supervisor.stop(watch)
+    supervisor.poke(watch)
+    clock.sleep(1.0)
+    supervisor.watch(lambda: asked.append("closed"), 0.5)
+    supervisor.close()
+    clock.sleep(1.0)
+    assert asked == []
+
+
+def test_a_nearer_watch_is_not_delayed_by_a_farther_one(clock):
+    supervisor, asked = Supervisor(clock), []
+    supervisor.watch(lambda: asked.append(("far", clock.now())), 5.0)
+    clock.sleep(1.0)
+    supervisor.watch(lambda: asked.append(("near", clock.now())), 1.0)
+    clock.sleep(9.0)
+    assert asked == [("near", 2.0), ("far", 5.0)]
+
+
+# ---------------------------------------------------------------------------------------------- callbacks
+@pytest.fixture
+def memory():
+    return MemorySink()
+
+
+@pytest.fixture
+def make_callbacks(clock, memory):
+    def make(**options):
+        return CallbackThread(clock, EventBus(clock.now, [memory]), Supervisor(clock), **options)
+
+    return make
+
+
+def test_callbacks_run_in_order_and_not_on_the_callers_thread(clock, make_callbacks):
+    callbacks, log = make_callbacks(), []
+    for i in range(3):
+        callbacks.submit(lambda i=i: log.append(i))
+    assert log == []
+    clock.sleep(0.0)
+    assert log == [0, 1, 2]
+
+
+def test_a_callback_that_raises_harms_nobody(clock, make_callbacks, memory):
+    callbacks, log = make_callbacks(), []
+
+    def bad():
+        raise ValueError("my fault")
+
+    callbacks.submit(bad)
+    callbacks.submit(lambda: log.append("next"))
+    clock.sleep(0.1)
+    assert log == ["next"]
+    assert memory.of_kind(EventKind.FAULT)[0].data["message"] == "a user callback raised: my fault"
+
+
+def test_a_callback_that_blocks_is_left_alone_and_the_others_are_served(clock, make_callbacks, memory):
+    callbacks, log = make_callbacks(patience=5.0), []
+    callbacks.submit(lambda: clock.sleep(1e6))
+    callbacks.submit(lambda: log.append(clock.now()))
+    clock.sleep(20.0)
+    assert log == [5.0]
+    assert "blocked for over 5.0 s" in memory.of_kind(EventKind.FAULT)[0].data["message"]
+
+
+def test_after_too_many_blocked_callbacks_no_more_run(clock, make_callbacks):
+    callbacks, log = make_callbacks(patience=1.0, max_blocked=2), []
+    for _ in range(3):
+        callbacks.submit(lambda: clock.sleep(1e6))
+    callbacks.submit(lambda: log.append("never"))
+    clock.sleep(100.0)
+    callbacks.submit(lambda: log.append("never"))
+    clock.sleep(100.0)
+    assert log == []
+    assert [who.name for who in clock._known].count("callbacks") == 3
+
+
+def test_a_full_queue_loses_its_oldest_entry_and_says_so(clock, make_callbacks, memory):
+    callbacks, log = make_callbacks(max_queue=2), []
+    for i in range(4):
+        callbacks.submit(lambda i=i: log.append(i))
+    clock.sleep(0.1)
+    assert log == [2, 3]
+    assert len(memory.of_kind(EventKind.FAULT)) == 2
+
+
+def test_closing_runs_what_is_queued_and_then_ends(clock, make_callbacks):
+    callbacks, log = make_callbacks(), []
+    callbacks.submit(lambda: log.append("queued"))
+    callbacks.close()
+    callbacks.submit(lambda: log.append("too late"))
+    clock.sleep(0.1)
+    assert log == ["queued"]
+    assert "callbacks" not in {who.name for who in clock._known}
