@@ -1,0 +1,163 @@
+"""A four-wheeled footprint put down on the surface at every vertex and heading: roll, pitch and room under the belly.
+
+The heights under the wheels are found by walking over the faces, seen from above, from one wheel position to the
+next; the walk cannot leave the storey. The body takes the plane of least squares through its four wheels, which for a
+rectangle has the slope of the mean heights of its sides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.neighbourhood_layers import collect_neighbourhood
+
+IntArray = NDArray[np.int32]
+FloatArray = NDArray[np.float64]
+AngleArray = NDArray[np.float32]
+
+MAX_STEPS = 1000
+LEAST_UPWARD = 0.05
+"""z of the normal below which a face is a wall that carries no wheel."""
+
+
+@kernel
+def face_below(
+    vertices: FloatArray, faces: IntArray, normals: FloatArray, face_neighbours: IntArray, face: int, x: float, y: float
+) -> int:
+    """Face whose outline seen from above holds (x, y), reached from ``face``; -1 beyond a border or at a wall."""
+    for _ in range(MAX_STEPS):
+        if face < 0 or normals[face, 2] < LEAST_UPWARD:
+            return -1
+        following = face
+        for corner in range(3):
+            a, b = faces[face, corner], faces[face, (corner + 1) % 3]
+            across = (vertices[b, 0] - vertices[a, 0]) * (y - vertices[a, 1])
+            across -= (vertices[b, 1] - vertices[a, 1]) * (x - vertices[a, 0])
+            if across < 0.0:
+                following = face_neighbours[face, corner]
+                break
+        if following == face:
+            return face
+        face = following
+    return -1
+
+
+@kernel
+def wheel_heights(
+    vertices: FloatArray,
+    faces: IntArray,
+    normals: FloatArray,
+    face_neighbours: IntArray,
+    start_face: int,
+    centre: FloatArray,
+    angles: FloatArray,
+    radius: float,
+    heights: FloatArray,
+) -> None:
+    """Write the surface's z [m] at ``radius`` around ``centre`` in the directions ``angles`` (ascending); NaN = none."""
+    face = start_face
+    for index in range(angles.shape[0]):
+        x = centre[0] + radius * np.cos(angles[index])
+        y = centre[1] + radius * np.sin(angles[index])
+        found = face_below(vertices, faces, normals, face_neighbours, face, x, y)
+        if found < 0 and face != start_face:
+            found = face_below(vertices, faces, normals, face_neighbours, start_face, x, y)
+        if found < 0:
+            heights[index] = np.nan
+            face = start_face
+            continue
+        face = found
+        a = faces[face, 0]
+        slope = normals[face, 0] * (x - vertices[a, 0]) + normals[face, 1] * (y - vertices[a, 1])
+        heights[index] = vertices[a, 2] - slope / normals[face, 2]
+
+
+@kernel
+def upward_face(normals: FloatArray, offsets: IntArray, incident: IntArray, vertex: int) -> int:
+    """Face around a vertex that looks up most, -1 if it has none that carries a wheel."""
+    best, best_z = -1, LEAST_UPWARD
+    for position in range(offsets[vertex], offsets[vertex + 1]):
+        if normals[incident[position], 2] >= best_z:
+            best, best_z = incident[position], normals[incident[position], 2]
+    return best
+
+
+@kernel
+def settle_footprints(
+    vertices: FloatArray,
+    faces: IntArray,
+    face_normals: FloatArray,
+    face_neighbours: IntArray,
+    face_offsets: IntArray,
+    incident: IntArray,
+    offsets: IntArray,
+    neighbours: IntArray,
+    heading_count: int,
+    wheelbase: float,
+    track: float,
+) -> tuple[AngleArray, AngleArray, AngleArray]:
+    """Settle a robot at every vertex and heading ``h * 2 pi / heading_count``.
+
+    Returns
+    -------
+    roll, pitch : (V, heading_count) float32
+        Left side up and nose up are positive [rad]; inf where a wheel has no ground.
+    bump : (V, heading_count) float32
+        How far [m] the surface inside the footprint rises above the plane of the wheels; inf likewise.
+    """
+    count = vertices.shape[0]
+    roll = np.full((count, heading_count), np.inf, dtype=np.float32)
+    pitch = np.full((count, heading_count), np.inf, dtype=np.float32)
+    bump = np.full((count, heading_count), np.inf, dtype=np.float32)
+    radius = 0.5 * np.hypot(wheelbase, track)
+    spread = np.arctan2(track, wheelbase)
+    # Front left, rear left, rear right, front right of every heading, all on one circle, sorted by direction.
+    unsorted = np.zeros(4 * heading_count)
+    for heading in range(heading_count):
+        yaw = 2.0 * np.pi * heading / heading_count
+        unsorted[4 * heading] = (yaw + spread) % (2.0 * np.pi)
+        unsorted[4 * heading + 1] = (yaw + np.pi - spread) % (2.0 * np.pi)
+        unsorted[4 * heading + 2] = (yaw + np.pi + spread) % (2.0 * np.pi)
+        unsorted[4 * heading + 3] = (yaw - spread) % (2.0 * np.pi)
+    order = np.argsort(unsorted)
+    angles = unsorted[order]
+    ring = np.zeros(4 * heading_count)
+    wheels = np.zeros(4 * heading_count)
+    seen = np.full(count, -1, dtype=np.int32)
+    members = np.zeros(count, dtype=np.int32)
+    upward = np.array([0.0, 0.0, 1.0])
+    for vertex in range(count):
+        start_face = upward_face(face_normals, face_offsets, incident, vertex)
+        if start_face < 0:
+            continue
+        centre = vertices[vertex]
+        wheel_heights(vertices, faces, face_normals, face_neighbours, start_face, centre, angles, radius, ring)
+        for index in range(order.shape[0]):
+            wheels[order[index]] = ring[index]
+        # The vertices the belly could touch; neither a storey above nor one below is connected within the radius.
+        size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, upward, radius, seen, members)
+        for heading in range(heading_count):
+            front_left, rear_left = wheels[4 * heading], wheels[4 * heading + 1]
+            rear_right, front_right = wheels[4 * heading + 2], wheels[4 * heading + 3]
+            rise_forward = 0.5 * (front_left + front_right - rear_left - rear_right) / wheelbase
+            rise_left = 0.5 * (front_left + rear_left - front_right - rear_right) / track
+            middle = 0.25 * (front_left + front_right + rear_left + rear_right)
+            if np.isnan(middle):
+                continue
+            pitch[vertex, heading] = np.arctan(rise_forward)
+            roll[vertex, heading] = np.arctan(rise_left)
+            # The greatest height of the surface above the wheels' plane, at the vertices inside the footprint.
+            yaw = 2.0 * np.pi * heading / heading_count
+            cosine, sine = np.cos(yaw), np.sin(yaw)
+            highest = centre[2] - middle
+            for index in range(size):
+                other = members[index]
+                dx, dy = vertices[other, 0] - centre[0], vertices[other, 1] - centre[1]
+                forward, left = cosine * dx + sine * dy, cosine * dy - sine * dx
+                if abs(forward) <= 0.5 * wheelbase and abs(left) <= 0.5 * track:
+                    plane = middle + rise_forward * forward + rise_left * left
+                    highest = max(highest, vertices[other, 2] - plane)
+            bump[vertex, heading] = highest
+    return roll, pitch, bump

@@ -1,0 +1,145 @@
+"""The footprint on planes, steps and ditches, and against a twin that casts rays for the wheels."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.layer import LayerContext
+from mbf_mesh_nav.layers.tilt import HEADINGS, TiltLayer, TiltParameters, heading_index
+from mbf_mesh_nav.mesh_map import MeshMap
+
+CORNERS = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
+YAWS = 2.0 * np.pi * np.arange(HEADINGS) / HEADINGS
+
+
+def computed(mesh: MeshMap, **parameters: float) -> TiltLayer:
+    settings_ = TiltParameters(**{"center_of_mass_height": 0.0, **parameters})
+    layer = TiltLayer(LayerContext("tilt", mesh.topology, mesh.locator, settings_))
+    layer.recompute()
+    return layer
+
+
+def ramp(slope: float) -> MeshMap:
+    """A plane that rises along +x."""
+    return MeshMap.from_heights(np.tile(np.arange(21) * 0.1 * np.tan(slope), (21, 1)), 0.1, 0.1)
+
+
+def inside(mesh: MeshMap, margin: float = 0.4) -> np.ndarray:
+    low, high = mesh.vertices[:, :2].min(axis=0) + margin, mesh.vertices[:, :2].max(axis=0) - margin
+    return ((mesh.vertices[:, :2] > low) & (mesh.vertices[:, :2] < high)).all(axis=1)
+
+
+def test_roll_and_pitch_on_a_ramp_turn_with_the_heading():
+    mesh = ramp(0.3)
+
+    layer = computed(mesh)
+
+    middle = inside(mesh)
+    np.testing.assert_allclose(
+        layer.pitch[middle], np.tile(np.arctan(np.tan(0.3) * np.cos(YAWS)), (middle.sum(), 1)), atol=1e-5
+    )
+    np.testing.assert_allclose(
+        layer.roll[middle], np.tile(np.arctan(-np.tan(0.3) * np.sin(YAWS)), (middle.sum(), 1)), atol=1e-5
+    )
+
+
+def test_ramp_may_be_climbed_but_not_crossed():
+    mesh = ramp(0.4)
+
+    layer = computed(mesh, max_roll=0.2, max_pitch_up=0.45, max_pitch_down=0.35)
+
+    vertex = np.flatnonzero(inside(mesh))[0]
+    assert layer.allowed[vertex, heading_index(0.0)]
+    assert not layer.allowed[vertex, heading_index(np.pi / 2)]
+    assert not layer.allowed[vertex, heading_index(np.pi)]
+    assert not layer.lethal[vertex]
+    best = np.arctan(np.tan(0.4) * np.cos(np.pi / 8)) / 0.45  # the heading beside straight up
+    assert layer.costs[vertex] == pytest.approx(best, abs=1e-4)
+
+
+def test_place_without_an_allowed_heading_is_lethal():
+    mesh = ramp(0.6)
+
+    layer = computed(mesh)
+
+    assert layer.lethal.all()
+    np.testing.assert_array_equal(layer.costs, 1.0)
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.integers(0, 10_000))
+def test_angles_equal_those_of_wheels_found_by_rays(seed):
+    rng = np.random.default_rng(seed)
+    mesh = MeshMap.from_heights(rng.random((16, 16)) * 0.1, 0.1, 0.1)
+    wheelbase, track = rng.uniform(0.2, 0.6, 2)
+
+    layer = computed(mesh, wheelbase=wheelbase, track=track)
+
+    for vertex in np.flatnonzero(inside(mesh, 0.45))[::7]:
+        for h, yaw in enumerate(YAWS):
+            forward, left = np.array([np.cos(yaw), np.sin(yaw), 0]), np.array([-np.sin(yaw), np.cos(yaw), 0])
+            wheels = [
+                mesh.vertices[vertex] + sx * wheelbase / 2 * forward + sy * track / 2 * left for sx, sy in CORNERS
+            ]
+            faces, depths = mesh.locator.cast_rays(np.array(wheels) + np.array([0, 0, 5.0]), [0.0, 0.0, -1.0])
+            z = mesh.vertices[vertex, 2] + 5.0 - depths
+            assert (faces >= 0).all()
+            pitch = np.arctan((z[0] + z[1] - z[2] - z[3]) / 2 / wheelbase)
+            roll = np.arctan((z[0] - z[1] + z[2] - z[3]) / 2 / track)
+            assert layer.pitch[vertex, h] == pytest.approx(pitch, abs=1e-5)
+            assert layer.roll[vertex, h] == pytest.approx(roll, abs=1e-5)
+
+
+def test_wheel_beyond_the_border_has_no_ground():
+    mesh = MeshMap.from_heights(np.zeros((21, 21)), 0.1, 0.1)
+
+    layer = computed(mesh)
+
+    corner = np.argmin(mesh.vertices[:, 0] + mesh.vertices[:, 1])
+    assert layer.lethal[corner]
+    assert np.isinf(layer.roll[corner]).all()
+    assert not layer.lethal[inside(mesh)].any()
+
+
+def test_bump_between_the_wheels_must_stay_below_the_belly():
+    heights = np.zeros((21, 21))
+    heights[10, 10] = 0.15
+    mesh = MeshMap.from_heights(heights, 0.1, 0.1)
+    top = np.argmax(mesh.vertices[:, 2])
+
+    assert computed(mesh, ground_clearance=0.1).lethal[top]
+    assert not computed(mesh, ground_clearance=0.2).lethal[top]
+
+
+def test_low_wall_between_two_floors_carries_no_wheel():
+    heights = np.zeros((21, 40))
+    heights[:, 20:] = 1.0
+    vertices, faces = heightfield_mesh(heights, 0.05, 0.1)
+    vertices[vertices[:, 0] > 0.99, 0] -= 0.049
+
+    layer = computed(MeshMap.from_arrays(vertices, faces))
+
+    assert layer.lethal[np.abs(layer.topology.vertices[:, 0] - 0.95) < 0.1].all()
+
+
+def test_high_centre_of_mass_lowers_the_limits():
+    layer = computed(ramp(0.1), center_of_mass_height=0.5, tip_over_margin=0.1, center_of_mass_x=0.05)
+
+    roll, up, down = layer.limits()
+
+    assert roll == pytest.approx(np.arctan2(0.2, 0.5) - 0.1)
+    assert up == pytest.approx(min(0.45, np.arctan2(0.3, 0.5) - 0.1))
+    assert down == pytest.approx(np.arctan2(0.2, 0.5) - 0.1)
+
+
+def test_wheels_stay_on_their_storey():
+    vertices, faces = heightfield_mesh(np.zeros((21, 21)), 0.1, 0.1)
+    ceiling = np.vstack([vertices, vertices * np.array([1.0, 1.0, 0.0]) + np.array([0.0, 0.0, 0.3])])
+    mesh = MeshMap.from_arrays(ceiling, np.vstack([faces, faces + len(vertices)]))
+
+    layer = computed(mesh)
+
+    assert (layer.roll[inside(mesh)] == 0.0).all()
+    assert not layer.lethal[inside(mesh)].any()
