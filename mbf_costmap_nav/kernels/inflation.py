@@ -1,9 +1,13 @@
 """Exact Euclidean inflation in two separable passes.
 
-The squared distance to the nearest seed is min over dx of dx^2 + g(x + dx)^2, where g is the distance along the column
-(Meijster, Roerdink and Hesselink 2000, first phase). Only distances up to the inflation radius matter, so the second
-phase tries every dx of the radius on whole rows instead of building envelopes: one-dimensional loops over narrow
-integers, which the compiler turns into vector code. The cost grows linearly with the radius.
+The squared distance to the nearest seed is the smallest dx^2 + g(x + dx)^2, where g is the distance along the column
+(first phase of Meijster, Roerdink and Hesselink 2000). Only distances up to the inflation radius matter, so the second
+phase tries every dx of the radius on whole rows instead of building envelopes. Its cost grows with the radius.
+
+All of it runs on the narrowest unsigned integers that hold the squares, one row at a time, so that the compiler turns
+the loops into vector code. For the same reason distances are stored upside down, as closeness = top - distance^2 with
+the largest number of the type as ``top``: the sum then is a saturating subtraction, which is one instruction, and
+"too far" is 0. Loop counters are unsigned because numba checks signed ones for negative indices.
 """
 
 from __future__ import annotations
@@ -15,18 +19,21 @@ from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
 
-Row = NDArray[Any]
-"""One row of narrow unsigned integers; the width depends on the radius."""
+LARGEST_RADIUS = 253
+"""[cells] Column distances up to one more than the radius have to fit 8 bits."""
+LARGEST_NARROW_RADIUS = 14
+"""[cells] Up to here all squares fit 8 bits, beyond it 16."""
 
-LARGEST_NARROW_RADIUS = 180
-"""Up to this radius [cells] the sum of two squares fits 16 bits."""
+Cells = NDArray[np.uint8]
+Closeness = NDArray[Any]
+"""A row of uint8 or uint16, by the radius."""
 
 
 def inflate(
-    cells: NDArray[np.uint8],
-    seeds: NDArray[np.uint8],
+    cells: Cells,
+    seeds: Cells,
     box: tuple[int, int, int, int],
-    cost_of_square: NDArray[np.uint8],
+    cost_of_square: Cells,
     radius: int,
     unknown_from: int,
 ) -> None:
@@ -43,109 +50,124 @@ def inflate(
     cost_of_square : (radius^2 + 1,) uint8
         Cost by squared distance [cells^2].
     radius : int
-        Largest distance [cells] with a cost.
+        Largest distance [cells] with a cost, at most ``LARGEST_RADIUS``.
     unknown_from : int
         Smallest cost that replaces an unknown cell.
     """
-    narrow = radius <= LARGEST_NARROW_RADIUS
-    column_dtype, square_dtype = (np.uint8, np.uint16) if narrow else (np.uint16, np.uint32)
+    dtype = np.uint8 if radius <= LARGEST_NARROW_RADIUS else np.uint16
+    top = np.iinfo(dtype).max
+    cost_of_closeness = np.zeros(top + 1, dtype=np.uint8)
+    cost_of_closeness[top - radius * radius :] = cost_of_square[::-1]
     height, width = cells.shape
     x0, y0, x1, y1 = box
     left, right = max(0, x0 - radius), min(width, x1 + radius)
-    bottom, top = max(0, y0 - radius), min(height, y1 + radius)
-    columns = np.empty((top - bottom, right - left), dtype=column_dtype)
-    squares = np.empty(right - left, dtype=square_dtype)
-    nearest = np.empty(x1 - x0, dtype=square_dtype)
-    _column_distances(seeds[bottom:top, left:right], columns, column_dtype(radius + 1))
+    bottom, top_row = max(0, y0 - radius), min(height, y1 + radius)
+    columns = np.empty((top_row - bottom, right - left), dtype=np.uint8)
+    _column_distances(seeds[bottom:top_row, left:right], columns, np.uint8(radius + 1))
+    closeness = np.zeros(x1 - x0 + 2 * radius, dtype=dtype)
+    nearest = np.empty(x1 - x0, dtype=dtype)
     _spread_rows(
-        cells[y0:y1, x0:x1], columns[y0 - bottom : y1 - bottom], x0 - left, squares, nearest, cost_of_square, radius,
-        unknown_from,
-    )  # fmt: skip
+        cells[y0:y1, x0:x1],
+        columns[y0 - bottom : y1 - bottom],
+        radius,
+        radius - (x0 - left),
+        closeness,
+        nearest,
+        dtype(top),
+        cost_of_closeness,
+        np.uint8(unknown_from),
+    )
 
 
 @kernel
-def _mark_row(seeds: NDArray[np.uint8], row: Row, cap: np.unsignedinteger[Any]) -> None:
-    """Distance 0 at seeds, ``cap`` elsewhere."""
-    for x in range(row.size):
-        row[x] = row.dtype.type(0) if seeds[x] != 0 else cap
-
-
-@kernel
-def _grow_row(previous: Row, row: Row, cap: np.unsignedinteger[Any]) -> None:
-    """Set row = min(row, previous + 1), at most ``cap``: one step of a sweep along the columns."""
-    for x in range(row.size):
-        row[x] = min(row[x], min(row.dtype.type(previous[x] + row.dtype.type(1)), cap))
-
-
-@kernel
-def _column_distances(seeds: NDArray[np.uint8], columns: Row, cap: np.unsignedinteger[Any]) -> None:
-    """Distance of each cell to the nearest seed of its column, capped."""
+def _column_distances(seeds: Cells, columns: Cells, cap: np.uint8) -> None:
+    """Distance of each cell to the nearest seed of its column, at most ``cap``: one sweep up, one down."""
     rows = columns.shape[0]
     for y in range(rows):
         _mark_row(seeds[y], columns[y], cap)
         if y > 0:
-            _grow_row(columns[y - 1], columns[y], cap)
+            _sweep_row(columns[y - 1], columns[y], cap)
     for y in range(rows - 2, -1, -1):
-        _grow_row(columns[y + 1], columns[y], cap)
+        _sweep_row(columns[y + 1], columns[y], cap)
 
 
 @kernel
-def _square_row(row: Row, squares: Row) -> Any:
-    """Set squares = row^2; return the smallest."""
-    smallest = squares.dtype.type(0) - squares.dtype.type(1)
-    least = squares.dtype.type(smallest)
+def _mark_row(seeds: Cells, row: Cells, cap: np.uint8) -> None:
+    """Distance 0 at seeds, ``cap`` elsewhere."""
     for x in range(row.size):
-        value = squares.dtype.type(row[x])
-        square = squares.dtype.type(value * value)
-        squares[x] = square
-        least = min(least, square)
-    return least
+        row[x] = np.uint8(0) if seeds[x] != 0 else cap
 
 
 @kernel
-def _lower_row(nearest: Row, squares: Row, offset: np.unsignedinteger[Any]) -> None:
-    """Set nearest = min(nearest, squares + offset)."""
-    for x in range(nearest.size):
-        nearest[x] = min(nearest[x], nearest.dtype.type(squares[x] + offset))
-
-
-@kernel
-def _write_row(cells: Row, nearest: Row, cost_of_square: Row, unknown_from: int) -> None:
-    """Raise a row of cells to the cost of its squared distances; unknown cells only from ``unknown_from`` on."""
-    for x in range(cells.size):
-        square = nearest[x]
-        if square < cost_of_square.size:
-            cost = cost_of_square[square]
-            old = cells[x]
-            if (old == 255 and cost >= unknown_from) or cost > old:
-                cells[x] = cost
+def _sweep_row(previous: Cells, row: Cells, cap: np.uint8) -> None:
+    """Set row = min(row, previous + 1), at most ``cap``."""
+    for x in range(row.size):
+        row[x] = min(row[x], min(np.uint8(previous[x] + np.uint8(1)), cap))
 
 
 @kernel
 def _spread_rows(
-    cells: Row,
-    columns: Row,
-    margin: int,
-    squares: Row,
-    nearest: Row,
-    cost_of_square: Row,
+    cells: Cells,
+    columns: Cells,
     radius: int,
-    unknown_from: int,
+    first: int,
+    closeness: Closeness,
+    nearest: Closeness,
+    top: Any,
+    cost_of_closeness: Cells,
+    unknown_from: np.uint8,
 ) -> None:
-    """Second pass: combine the column distances of every row and write the costs.
+    """Second pass: combine the column distances along every row and write the costs.
 
-    ``columns`` holds ``margin`` more cells on the left than ``cells`` and possibly more on the right.
+    ``closeness`` has ``radius`` entries more than the row on each side; those that ``columns`` does not fill stay 0,
+    too far. ``first`` is where the columns begin in it. ``nearest`` holds one row of results.
     """
     height, width = cells.shape
+    costs = np.empty(width, dtype=np.uint8)
     for y in range(height):
-        if _square_row(columns[y], squares) >= cost_of_square.size:
+        closest = _closeness_row(columns[y], closeness, np.uint64(first), top)
+        if top - closest > radius * radius:
             continue  # no seed within the radius of this row
-        nearest[:] = squares[margin : margin + width]
+        nearest[:] = closeness[radius : radius + width]
         for dx in range(1, radius + 1):
-            offset = squares.dtype.type(dx * dx)
-            first = max(0, dx - margin)  # the left neighbour of earlier cells lies outside the array
-            _lower_row(nearest[first:], squares[first + margin - dx : width + margin - dx], offset)
-            last = min(width, squares.size - margin - dx)
-            if last > 0:
-                _lower_row(nearest[:last], squares[margin + dx : margin + dx + last], offset)
-        _write_row(cells[y], nearest, cost_of_square, unknown_from)
+            offset = nearest.dtype.type(dx * dx)
+            _raise_row(nearest, closeness, np.uint64(radius - dx), np.uint64(radius + dx), offset)
+        _look_up(nearest, cost_of_closeness, costs)
+        _raise_costs(cells[y], costs, unknown_from)
+
+
+@kernel
+def _closeness_row(row: Cells, closeness: Closeness, first: np.uint64, top: Any) -> Any:
+    """Fill closeness = top - row^2 from ``first`` on; return the largest."""
+    closest = closeness.dtype.type(0)
+    for x in range(np.uint64(row.size)):
+        distance = closeness.dtype.type(row[x])
+        close = closeness.dtype.type(top - closeness.dtype.type(distance * distance))
+        closeness[x + first] = close
+        closest = max(closest, close)
+    return closest
+
+
+@kernel
+def _raise_row(nearest: Closeness, closeness: Closeness, left: np.uint64, right: np.uint64, offset: Any) -> None:
+    """Set nearest = max(nearest, closeness of the neighbours dx cells to the left and right - dx^2)."""
+    zero = nearest.dtype.type(0)
+    for x in range(np.uint64(nearest.size)):
+        close = max(closeness[x + left], closeness[x + right])
+        close = nearest.dtype.type(close - offset) if close > offset else zero
+        nearest[x] = max(nearest[x], close)
+
+
+@kernel
+def _look_up(nearest: Closeness, cost_of_closeness: Cells, costs: Cells) -> None:
+    """Costs of a row; a loop of its own, as table look-ups do not vectorise and the rest does."""
+    for x in range(np.uint64(nearest.size)):
+        costs[x] = cost_of_closeness[nearest[x]]
+
+
+@kernel
+def _raise_costs(row: Cells, costs: Cells, unknown_from: np.uint8) -> None:
+    """Raise cells to the costs; unknown, the largest byte, is replaced by costs from ``unknown_from`` on."""
+    for x in range(np.uint64(row.size)):
+        old, cost = row[x], costs[x]
+        row[x] = cost if old == 255 and cost >= unknown_from else max(old, cost)

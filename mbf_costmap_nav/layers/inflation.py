@@ -5,8 +5,8 @@ whatever its heading); beyond it int(252 * exp(-cost_scaling_factor * (distance 
 the inflation radius, which is rounded up to whole cells. Distances are exact Euclidean ones between cell centres.
 
 When to use: after all layers that mark obstacles, in every map a planner works on. Layers listed after it are not
-inflated. When not: for pure length or any-angle tests, where a gradient of cost bends the paths. Cost: about 1.5 ns a
-cell at 11 cells of radius, growing with the radius; only the changed box, grown by the radius, is recomputed. Known
+inflated. When not: for pure length or any-angle tests, where a gradient of cost bends the paths. Cost: 1 to 2 ns a cell
+at 11 cells of radius, growing with the radius; only the changed box, grown by the radius, is recomputed. Known
 failure: a large ``cost_scaling_factor`` makes paths hug walls, a radius smaller than half the width of a corridor
 leaves its middle without a gradient.
 """
@@ -22,7 +22,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.costmap import FREE, INSCRIBED, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.kernels.inflation import inflate
+from mbf_costmap_nav.kernels.inflation import LARGEST_RADIUS, inflate
 from mbf_costmap_nav.layer import CostmapLayer, LayerContext, LayerParameters
 
 
@@ -60,7 +60,12 @@ class InflationLayer(CostmapLayer):
         self._tabulate()
 
     def _tabulate(self) -> None:
-        self._radius = max(0, math.ceil(self.parameters.inflation_radius / self.geometry.resolution))
+        self._radius = math.ceil(self.parameters.inflation_radius / self.geometry.resolution)
+        if self._radius > LARGEST_RADIUS:
+            raise ValueError(
+                f"layer {self.name!r}: inflation_radius is {self._radius} cells of {self.geometry.resolution:g} m, "
+                f"at most {LARGEST_RADIUS} are possible"
+            )
         self._cost_of_square = cost_table(
             self._radius, self.geometry.resolution, self._inscribed_radius, self.parameters.cost_scaling_factor
         )
