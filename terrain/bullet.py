@@ -65,7 +65,7 @@ def load_pybullet() -> Any:
     SimulatorMissingError
         It cannot be imported.
     """
-    if "pybullet" in sys.modules:
+    if sys.modules.get("pybullet") is not None:
         return sys.modules["pybullet"]
     try:
         with quiet_native_output():

@@ -110,6 +110,30 @@ def add_ruts(terrain: Heightfield, points: FloatArray, track: float, width: floa
     return terrain.with_heights(terrain.heights - depth * np.clip(1.0 - across**2, 0.0, 1.0))
 
 
+def add_road(terrain: Heightfield, points: FloatArray, width: float, shoulder: float) -> Heightfield:
+    """Cut and fill a road that is level across; hairpins make a switchback.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Middle of the road with its height, along a polyline [m].
+    width : float
+        Of the level part [m].
+    shoulder : float
+        Over which the road's height fades into the old ground's on both sides [m].
+    """
+    x, y = _grid(terrain)
+    nearest, road_height = np.full(x.shape, np.inf), np.zeros(x.shape)
+    for a, b in pairwise(np.asarray(points, dtype=float)):
+        along, length_squared = b - a, max(float(np.sum((b - a)[:2] ** 2)), 1e-12)
+        t = np.clip(((x - a[0]) * along[0] + (y - a[1]) * along[1]) / length_squared, 0.0, 1.0)
+        distance = np.hypot(x - a[0] - t * along[0], y - a[1] - t * along[1])
+        road_height = np.where(distance < nearest, a[2] + t * along[2], road_height)
+        nearest = np.minimum(nearest, distance)
+    share = np.clip(1.0 - (nearest - 0.5 * width) / shoulder, 0.0, 1.0)
+    return terrain.with_heights(terrain.heights + share * (road_height - terrain.heights))
+
+
 def add_boulders(
     terrain: Heightfield,
     rng: np.random.Generator,

@@ -56,3 +56,10 @@ def test_boulders_leave_start_and_goal_clear() -> None:
 def test_steps_rise_along_x() -> None:
     stairs = generate.add_steps(flat_terrain(10.0, 2.0, 0.1), 0.15, 1.0, 3.05, 4)
     assert stairs.height_at([2.5, 3.5, 4.5, 9.0], 1.0).tolist() == pytest.approx([0.0, 0.15, 0.3, 0.6], abs=1e-6)
+
+
+def test_a_road_has_its_own_heights_and_leaves_the_far_ground_alone() -> None:
+    hills = fractal_terrain(20.0, 20.0, 0.1, rng(), median_slope=15.0)
+    road = generate.add_road(hills, np.array([[2.0, 5.0, 0.0], [18.0, 5.0, 1.6]]), 2.0, 1.0)
+    assert road.height_at([6.0, 10.0], [4.6, 5.4]).tolist() == pytest.approx([0.4, 0.8], abs=1e-3)
+    assert np.allclose(road.height_at([5.0, 10.0], 15.0), hills.height_at([5.0, 10.0], 15.0))
