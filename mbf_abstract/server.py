@@ -13,6 +13,7 @@ import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,12 +30,14 @@ from mbf_abstract.execution.callbacks import CallbackThread
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.supervisor import Supervisor
+from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.map_queries import MapQueries
 from mbf_abstract.navigation_parameters import NavigationParameters
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugin_table import PluginTable
-from mbf_abstract.plugins import Plugin, PluginContext, PluginKind
+from mbf_abstract.plugins import ControlRequest, PlanRequest, Plugin, PluginContext, PluginKind
 from mbf_abstract.robot import Robot, RobotInformation
+from mbf_abstract.sensing import RangeScan
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.transforms import TransformBuffer
 from mbf_abstract.velocity_gate import VelocityGate, VelocityLimits
@@ -112,6 +115,15 @@ class AbstractNavigationServer(ABC):
     def queries(self) -> MapQueries:
         """The map-independent questions, answered by this server's map."""
 
+    @abstractmethod
+    def take_scan(self, scan: RangeScan) -> None:
+        """Feed what a sensor saw into the map; in any known frame, raises TransformError where it is not known."""
+
+    @classmethod
+    def config_for_map(cls, file: FilePath) -> str | None:
+        """YAML text of a sane configuration for a bare map file; None if this server does not read such files."""
+        return None
+
     def map_problem(self) -> str:
         """Why the map must not be driven on right now; empty = it is current."""
         return ""
@@ -178,6 +190,27 @@ class AbstractNavigationServer(ABC):
         self.runtime.parameters = new
         self.runtime.gate.limits = _limits(new)
         self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "server", **changes)
+
+    def warm_up(self, start: Pose, goal: Pose, on_step: Callable[[str], None] = lambda text: None) -> None:
+        """Call every planner and controller once, without moving, so that their kernels are compiled before a goal.
+
+        Parameters
+        ----------
+        start, goal : Pose
+            In the global frame; a plan between them is made with every planner.
+        on_step : callable
+            Told the name of each plugin before its turn.
+        """
+        path = Path.from_poses([start, goal])
+        for planner in self.plugins.all_of(PluginKind.PLANNER):
+            on_step(f"warming up planner {planner.name}")
+            result = planner.instance.make_plan(PlanRequest(start, goal))
+            path = result.path if result.success and result.path is not None else path
+        for controller in self.plugins.all_of(PluginKind.CONTROLLER):
+            on_step(f"warming up controller {controller.name}")
+            controller.instance.set_plan(path)
+            controller.instance.compute_velocity_commands(ControlRequest(start, Twist()))
+            controller.instance.is_goal_reached(start, self.runtime.parameters.dist_tolerance, 0.1)
 
     # --------------------------------------------------------------------------------------- life cycle
     def cancel_all(self, reason: str = "all goals canceled") -> None:

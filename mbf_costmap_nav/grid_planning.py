@@ -222,12 +222,19 @@ def _with_exact_ends(leg: Leg, start: Pose, goal: Pose, resolution: float) -> ND
     return np.concatenate([first, inner[clear], last])
 
 
+def _heights(points: NDArray[np.float64], request: PlanRequest) -> NDArray[np.float64]:
+    """Heights [m] of a path on a flat map: from the start's to the goal's in even measure, as no map knows better."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    share = along / along[-1] if along[-1] > 0.0 else along
+    return request.start.z + share * (request.goal.z - request.start.z)
+
+
 def _assemble(
     pieces: list[NDArray[np.float64]], request: PlanRequest, reached_goal: bool, frame_id: str, stamp: float
 ) -> Path:
     """Join the legs; inner poses head along the path, the first and the last keep the orientations asked for."""
     points = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
-    path = Path.from_points(np.column_stack([points, np.zeros(len(points))]), request.goal.orientation)
+    path = Path.from_points(np.column_stack([points, _heights(points, request)]), request.goal.orientation)
     assert path.orientations is not None
     orientations = path.orientations.copy()
     orientations[0] = request.start.orientation

@@ -1,0 +1,130 @@
+"""The costmap server: the actions of Move Base Flex on 2D layered costmaps.
+
+Two shared maps, made once and handed to all plugins: ``global_costmap`` (planners, refiners) and ``local_costmap``
+(controllers); recoveries get both, and ``costmap: local | global`` at a plugin's declaration binds it to the other one.
+Each map is updated at its own rate; before every control cycle the local one must be current.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, ClassVar, Literal, cast
+
+import numpy as np
+
+from mbf_abstract.config import Config, PluginDeclaration
+from mbf_abstract.map_queries import MapQueries
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.plugins import PluginContext, PluginKind
+from mbf_abstract.sensing import RangeScan
+from mbf_abstract.server import AbstractNavigationServer
+from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.plugins import CostmapContext
+from mbf_costmap_nav.queries import CostmapQueries
+from mbf_costmap_nav.served_costmap import ServedCostmap
+
+MAP_SUFFIXES = {".yaml", ".yml", ".pgm", ".png", ".bmp"}
+
+BARE_MAP = """\
+backend: costmap
+planners:
+  - {{name: astar, type: astar}}
+  - {{name: dijkstra, type: dijkstra}}
+  - {{name: theta_star, type: theta_star}}
+global_costmap:
+  robot_radius: 0.25
+  layers:
+    - {{name: walls, type: static}}
+    - {{name: inflation, type: inflation}}
+  walls: {{map_file: {file}}}
+  inflation: {{inflation_radius: 0.6, cost_scaling_factor: 5.0}}
+local_costmap: {{rolling_window: true, width: 5.0, height: 5.0, resolution: 0.05, robot_radius: 0.25}}
+"""
+
+
+class CostmapPluginDeclaration(PluginDeclaration):
+    """A plugin of the costmap server: it may be bound to the other map than its kind's own."""
+
+    costmap: Literal["", "local", "global"] = parameter("", "The map this plugin works on; empty = its kind's own.")
+
+
+class CostmapNavigationServer(AbstractNavigationServer):
+    """Navigation on a global and a local costmap."""
+
+    backend: ClassVar[str] = "costmap"
+    plugin_declaration: ClassVar[type[PluginDeclaration]] = CostmapPluginDeclaration
+    config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {
+        "global_costmap": CostmapParameters,
+        "local_costmap": CostmapParameters,
+    }
+
+    global_costmap: LayeredCostmap
+    local_costmap: LayeredCostmap
+
+    def load_map(self, config: Config) -> None:
+        """Build both costmaps and start updating them."""
+        self._global = self._serve(config, "global_costmap")
+        self._local = self._serve(config, "local_costmap")
+        self.global_costmap, self.local_costmap = self._global.costmap, self._local.costmap
+
+    def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
+        """Add both maps and the one this plugin is bound to."""
+        own = "global" if kind in (PluginKind.PLANNER, PluginKind.REFINER) else "local"
+        bound = self.global_costmap if (options.get("costmap") or own) == "global" else self.local_costmap
+        return CostmapContext(
+            **vars(base), global_costmap=self.global_costmap, local_costmap=self.local_costmap, costmap=bound
+        )
+
+    @property
+    def queries(self) -> MapQueries:
+        """The map-independent questions on the costmaps."""
+        return CostmapQueries(
+            self.global_costmap, self.local_costmap, self.runtime.robot, self.runtime.transforms, self.runtime.clock
+        )
+
+    def take_scan(self, scan: RangeScan) -> None:
+        """Feed a scan to every layer that listens to its source."""
+        for costmap in (self.global_costmap, self.local_costmap):
+            origin, ends = scan.origin, scan.ends
+            if scan.frame_id != costmap.frame_id:
+                transforms = self.runtime.transforms
+                ends = transforms.transform_points(ends, scan.frame_id, costmap.frame_id)
+                origin = transforms.transform_points(np.atleast_2d(origin), scan.frame_id, costmap.frame_id)[0]
+            if scan.source in costmap.source_names:
+                costmap.insert_scan(scan.source, origin, ends, scan.hits, scan.stamp)
+
+    @contextmanager
+    def using_map(self, kind: PluginKind) -> Iterator[None]:
+        """Keep both maps updated: a plugin of any kind may be bound to either of them."""
+        with self._global.in_use(), self._local.in_use():
+            yield
+
+    def map_problem(self) -> str:
+        """Why the local costmap is not current, if it is not."""
+        return self.local_costmap.currency_problem(self.runtime.clock.now())
+
+    def close_map(self) -> None:
+        """End the threads that update the maps."""
+        for name in ("_global", "_local"):
+            if hasattr(self, name):
+                getattr(self, name).close()
+
+    @classmethod
+    def config_for_map(cls, file: Path) -> str | None:
+        """Take every image format this package reads, and map_server's YAML."""
+        return BARE_MAP.format(file=str(file)) if file.suffix.lower() in MAP_SUFFIXES else None
+
+    def _serve(self, config: Config, key: str) -> ServedCostmap:
+        section = config.sections[key]
+        parameters = cast(CostmapParameters, section.parameters)
+        layer_classes: dict[str, Any] = {layer.type_name: layer.layer_class for layer in section.layers}
+        costmap = build_layered_costmap(
+            parameters,
+            {layer.name: cast(Any, layer.parameters) for layer in section.layers},
+            resolve_layer=layer_classes.__getitem__,
+            base_folder=config.path.parent,
+        )
+        return ServedCostmap(costmap, self.runtime, parameters.update_frequency, key)

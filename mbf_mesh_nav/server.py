@@ -1,0 +1,110 @@
+"""The mesh server: the actions of Move Base Flex on a 3D triangle mesh.
+
+One map for everything: planners, controllers and recoveries share it and work on its snapshots. The configuration has
+one section, ``mesh_map`` (see ``map_builder``); plugin types are looked for with the prefix ``mesh.``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, cast
+
+import numpy as np
+
+from mbf_abstract.config import Config
+from mbf_abstract.execution.ticker import Ticker
+from mbf_abstract.map_queries import MapQueries
+from mbf_abstract.parameters import ParameterModel
+from mbf_abstract.plugins import PluginContext, PluginKind
+from mbf_abstract.sensing import RangeScan
+from mbf_abstract.server import AbstractNavigationServer
+from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.mesh_io import HDF5_FORMATS, TRIMESH_FORMATS
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.plugins import MeshContext
+from mbf_mesh_nav.queries import MeshQueries
+
+DECAY_PERIOD = 0.5  # s; how often obstacles are checked for their age
+
+BARE_MESH = """\
+backend: mesh
+planners:
+  - {{name: dijkstra, type: dijkstra}}
+  - {{name: astar, type: astar}}
+  - {{name: cvp, type: cvp}}
+mesh_map:
+  mesh_file: {file}
+  repair: [zero_area, duplicate, unreferenced, non_manifold]
+  inscribed_radius: 0.3
+  edge_cost_factor: 1.0
+  default_layer: inflation
+  layers:
+    - {{name: border, type: border}}
+    - {{name: steepness, type: steepness}}
+    - {{name: height_diff, type: height_diff}}
+    - {{name: lethal, type: max_combination, inputs: [border, steepness, height_diff]}}
+    - {{name: inflation, type: inflation, inputs: [lethal]}}
+  border: {{threshold: 0.5}}
+  steepness: {{threshold: 0.7}}
+  height_diff: {{threshold: 0.2, height_limit: 1.0}}
+  inflation: {{inscribed_radius: 0.3, inflation_radius: 0.6, lethal_value: .inf}}
+"""
+
+
+class MeshNavigationServer(AbstractNavigationServer):
+    """Navigation on one triangle mesh."""
+
+    backend: ClassVar[str] = "mesh"
+    config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {"mesh_map": MeshMapParameters}
+
+    mesh_map: MeshMap
+
+    def load_map(self, config: Config) -> None:
+        """Read the mesh and compute its layers."""
+        section = config.sections["mesh_map"]
+        parameters = cast(MeshMapParameters, section.parameters)
+        mesh_file = config.path.parent / parameters.mesh_file
+        layer_classes: dict[str, Any] = {layer.type_name: layer.layer_class for layer in section.layers}
+        self.mesh_map = build_mesh_map(
+            parameters.model_copy(update={"mesh_file": str(mesh_file)}),
+            {layer.name: cast(Any, layer.parameters) for layer in section.layers},
+            frame_id=config.parameters.global_frame,
+            load_layer=layer_classes.__getitem__,
+        )
+        clock, events = self.runtime.clock, self.runtime.events
+        self._decay = Ticker(clock, events, lambda: self.mesh_map.update(clock.now()), DECAY_PERIOD, "mesh map decay")
+
+    def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
+        """Add the mesh map."""
+        return MeshContext(**vars(base), mesh_map=self.mesh_map)
+
+    @property
+    def queries(self) -> MapQueries:
+        """The map-independent questions on the mesh."""
+        return MeshQueries(self.mesh_map, self.runtime.robot, self.runtime.transforms)
+
+    def take_scan(self, scan: RangeScan) -> None:
+        """Feed the points that were hit to the obstacle layers."""
+        frame, transforms = self.mesh_map.frame_id, self.runtime.transforms
+        points, origin = scan.points, scan.origin
+        if scan.frame_id != frame:
+            points = transforms.transform_points(points, scan.frame_id, frame)
+            origin = transforms.transform_points(np.atleast_2d(origin), scan.frame_id, frame)[0]
+        self.mesh_map.insert_points(points, origin, scan.stamp)
+
+    def map_problem(self) -> str:
+        """Name the obstacle layer whose sensor is silent, if there is one."""
+        now = self.runtime.clock.now()
+        silent = [name for name, layer in self.mesh_map.layers.items() if not layer.is_current(now)]
+        return f"no recent sensor data for layer {', '.join(silent)}" if silent else ""
+
+    def close_map(self) -> None:
+        """End the map's own thread."""
+        if hasattr(self, "_decay"):
+            self._decay.stop()
+
+    @classmethod
+    def config_for_map(cls, file: Path) -> str | None:
+        """Take every mesh format this package reads."""
+        return BARE_MESH.format(file=str(file)) if file.suffix.lower() in TRIMESH_FORMATS | HDF5_FORMATS else None

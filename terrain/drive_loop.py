@@ -1,0 +1,111 @@
+"""The thread that steps a simulation on a clock and feeds what it yields to a server and a recorder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from mbf_abstract.clock import Priority
+from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import Command, Pose
+from mbf_abstract.robot import Odometry
+from mbf_abstract.sensing import RangeScan
+from mbf_abstract.server import AbstractNavigationServer
+from mbf_abstract.transform import Transform
+from terrain.recorder import Recorder
+from terrain.robots import WheeledRobot
+from terrain.simulation import Simulation
+
+PERIOD = 1.0 / 60.0  # s between two publications of the robot's pose
+TICKS_PER_SAMPLE = 6  # 10 samples a second are recorded and reported
+SCANS_PER_RECORDED = 10
+
+Report = Callable[[float, Pose, float], None]
+
+
+class ClockedRobot:
+    """The simulated robot as the server sees it: its odometry is stamped with the server's clock."""
+
+    def __init__(self, robot: WheeledRobot) -> None:
+        self._robot = robot
+        self.time_offset = 0.0
+
+    def send_command(self, command: Command) -> None:
+        """Hand the command to the simulated motors."""
+        self._robot.send_command(command)
+
+    def odometry(self) -> Odometry:
+        """Measured velocity; the stamp is the clock's time, not the simulation's."""
+        measured = self._robot.odometry()
+        return Odometry(measured.velocity, measured.stamp + self.time_offset)
+
+
+class DriveLoop:
+    """Steps the simulator up to the clock's time, 60 times a second; publishes pose and scans.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    robot : ClockedRobot
+    server : AbstractNavigationServer
+        Gets the scans; its clock drives the loop.
+    recorder : Recorder
+    """
+
+    def __init__(
+        self, simulation: Simulation, robot: ClockedRobot, server: AbstractNavigationServer, recorder: Recorder
+    ) -> None:
+        self._robot = robot
+        self._simulation = simulation
+        self._server = server
+        self._recorder = recorder
+        self._runtime = server.runtime
+        self._scans = 0
+        self._stopped = False
+        self._origin = self._runtime.clock.now()
+        simulation.on_measurement(self._take_measurement)
+
+    def start(self, report: Report) -> None:
+        """Start the thread; ``report(time, pose, speed)`` is called ten times a second."""
+        self._report = report
+        self._origin = self._robot.time_offset = self._runtime.clock.now()
+        self._runtime.clock.spawn(self._loop, "simulator", Priority.SIMULATOR)
+
+    def stop(self) -> None:
+        """Step no more."""
+        self._stopped = True
+
+    def publish(self) -> None:
+        """Publish the robot's present pose."""
+        pose, robot = self._simulation.robot.pose(), self._runtime.robot
+        self._runtime.transforms.set(
+            Transform(pose.position, pose.orientation, robot.global_frame, robot.robot_frame, self._runtime.clock.now())
+        )
+
+    def _loop(self) -> None:
+        clock, tick = self._runtime.clock, 0
+        while not self._stopped:
+            self._simulation.advance_to(clock.now() - self._origin)
+            self.publish()
+            if tick % TICKS_PER_SAMPLE == 0:
+                self._sample()
+            tick += 1
+            clock.sleep_until(self._origin + tick * PERIOD)
+
+    def _sample(self) -> None:
+        robot, time = self._simulation.robot, self._simulation.time
+        pose, velocity = robot.pose(), robot.velocity()
+        self._recorder.sample(time, pose, velocity, self._runtime.gate.last_command)
+        self._report(time, pose, velocity.speed)
+
+    def _take_measurement(self, name: str, measurement: Any) -> None:
+        if not isinstance(measurement, RangeScan):
+            return
+        try:
+            self._server.take_scan(replace(measurement, stamp=self._origin + measurement.stamp))
+        except Exception as error:  # a map that refuses a scan must not stop the physics
+            self._runtime.events.emit(EventKind.FAULT, name, type=type(error).__name__, message=str(error))
+        self._scans += 1
+        if self._scans % SCANS_PER_RECORDED == 1:
+            self._recorder.scan(measurement.stamp, measurement.points)
