@@ -56,7 +56,7 @@ def trace_descent(
     points : (n, 3) float64
         From start to goal, one point per crossed edge or visited vertex [m].
     point_faces : (n,) int32
-        A face each point lies in.
+        The face the way to each point lies in (or on an edge of); the start's own face first.
     """
     capacity = 256
     points = np.empty((capacity, 3))
@@ -69,9 +69,9 @@ def trace_descent(
         vertex = _best_corner(vertices, faces[face], distances, point)
     while True:
         # 1. In the goal's face, or at one of its corners, the rest is a straight line.
-        if face == goal_face or (vertex >= 0 and _has_corner(faces[goal_face], vertex)):
+        if (vertex < 0 and face == goal_face) or (vertex >= 0 and _has_corner(faces[goal_face], vertex)):
             if vertex >= 0:
-                points[count], point_faces[count] = vertices[vertex], goal_face
+                points[count], point_faces[count] = vertices[vertex], face
                 count += 1
             points[count], point_faces[count] = goal, goal_face
             return points[: count + 1].copy(), point_faces[: count + 1].copy()
@@ -84,10 +84,10 @@ def trace_descent(
         # 2. At a vertex: note it, then choose the steepest way on.
         if vertex >= 0:
             point = vertices[vertex].copy()
-            points[count], point_faces[count] = point, vertex_faces[vertex_face_offsets[vertex]]
+            points[count], point_faces[count] = point, face
             count += 1
             if count > max_crossings:
-                face, vertex = -1, predecessors[vertex]
+                face, vertex = vertex_faces[vertex_face_offsets[vertex]], predecessors[vertex]
                 continue
             face, vertex = _steepest_way(
                 vertices, faces, vertex_face_offsets, vertex_faces, distances, predecessors, vertex
@@ -99,7 +99,7 @@ def trace_descent(
         point, exit_corner, share = _leave_face(vertices, corners, distances, point)
         left, right = corners[(exit_corner + 1) % 3], corners[(exit_corner + 2) % 3]
         if share < _ON_VERTEX or share > 1.0 - _ON_VERTEX or count > max_crossings:
-            face, vertex = -1, (left if share < 0.5 else right)
+            vertex = left if share < 0.5 else right
             continue
         points[count], point_faces[count] = point, face
         count += 1
@@ -108,7 +108,7 @@ def trace_descent(
         if following >= 0 and _leads_away_from_edge(vertices, faces[following], distances, left, right):
             face = following
         else:
-            face, vertex = -1, (left if distances[left] < distances[right] else right)
+            vertex = left if distances[left] < distances[right] else right
 
 
 @kernel
@@ -216,8 +216,8 @@ def _steepest_way(
     predecessors: Int32Array,
     vertex: int,
 ) -> tuple[int, int]:
-    """Choose the way down from a vertex: (face, -1) into a face, or (-1, next vertex) along an edge."""
-    best_slope, best_face, best_vertex = 0.0, -1, predecessors[vertex]
+    """Choose the way down from a vertex: (face, -1) through a face, or (face, next vertex) along one of its edges."""
+    best_slope, best_face, best_vertex = 0.0, vertex_faces[vertex_face_offsets[vertex]], predecessors[vertex]
     for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
         face = vertex_faces[record]
         corners = faces[face]
@@ -233,7 +233,7 @@ def _steepest_way(
             fall = float(distances[vertex]) - float(distances[corners[corner]])
             slope = fall / math.sqrt(np.sum((vertices[corners[corner]] - vertices[vertex]) ** 2))
             if slope > best_slope:
-                best_slope, best_face, best_vertex = slope, -1, corners[corner]
+                best_slope, best_face, best_vertex = slope, face, corners[corner]
         slope = math.sqrt(np.sum(descent * descent))
         if inside and slope > best_slope:
             best_slope, best_face, best_vertex = slope, face, -1

@@ -8,12 +8,13 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
 from mbf_mesh_nav.planners.repairing import RepairingPlanner
 
-PLANNERS = [DijkstraPlanner, AStarPlanner, CVPPlanner, RepairingPlanner]
+PLANNERS = [DijkstraPlanner, AStarPlanner, CVPPlanner, RepairingPlanner, AnyAnglePlanner]
 
 
 @pytest.fixture(params=PLANNERS, ids=lambda planner: planner.__name__)

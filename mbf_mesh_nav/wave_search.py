@@ -1,0 +1,132 @@
+"""One continuous wave from a goal, and the exact way down its field: what planners over faces share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.corners import build_corner_slots
+from mbf_mesh_nav.kernels.cvp import propagate_wave
+from mbf_mesh_nav.kernels.descent import trace_descent
+from mbf_mesh_nav.kernels.wave_directions import wave_directions
+from mbf_mesh_nav.leg_search import LegQuery, mean_edge_length, seeded_arrays
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.vector_field import VectorField
+
+
+@dataclass(frozen=True, eq=False)
+class Wave:
+    """A wave that reached the start of its query.
+
+    Attributes
+    ----------
+    distances : (V,) float32
+        Weighted distance [m] to the goal, inf where the wave did not come.
+    predecessors, cut_records : (V,) int32
+        See ``kernels.cvp.propagate_wave``.
+    """
+
+    distances: NDArray[np.float32]
+    predecessors: NDArray[np.int32]
+    cut_records: NDArray[np.int32]
+
+
+class WaveSearch:
+    """Waves over one mesh; keeps the corner records, which depend on the mesh alone."""
+
+    def __init__(self, mesh_map: MeshMap) -> None:
+        self._mesh_map = mesh_map
+        self._corner_slots = build_corner_slots(
+            mesh_map.faces,
+            mesh_map.vertex_face_offsets,
+            mesh_map.vertex_faces,
+            mesh_map.neighbour_offsets,
+            mesh_map.neighbours,
+        )
+
+    def spread(self, query: LegQuery, overshoot: float) -> Wave | None:
+        """Spread a wave from the goal until it is ``overshoot`` [m] past the start; None: not reached, or cancelled."""
+        mesh_map = self._mesh_map
+        distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal)
+        if len(seeds) == 1:
+            seeds = self._seed_around(query, int(seeds[0]), distances, predecessors)
+        cut_records = np.full(len(distances), -1, dtype=np.int32)
+        corners = mesh_map.faces[query.start.face]
+        settled = propagate_wave(
+            mesh_map.neighbour_offsets,
+            mesh_map.neighbours,
+            query.snapshot.edge_weights,
+            mesh_map.vertex_face_offsets,
+            self._corner_slots,
+            query.blocked,
+            distances,
+            predecessors,
+            cut_records,
+            seeds,
+            np.ascontiguousarray(corners[~query.blocked[corners]]),
+            max(overshoot, 2.0 * mean_edge_length(mesh_map)),
+            query.cancel_flag,
+        )
+        if settled < 0 or not np.isfinite(distances[corners]).any():
+            return None
+        return Wave(distances, predecessors, cut_records)
+
+    def potential(self, query: LegQuery, wave: Wave) -> float:
+        """Cost of the way from the start to the goal [m]."""
+        mesh_map, start = self._mesh_map, query.start
+        corners = mesh_map.faces[start.face]
+        return float(np.min(wave.distances[corners] + np.linalg.norm(mesh_map.vertices[corners] - start.point, axis=1)))
+
+    def trace(self, query: LegQuery, wave: Wave) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Positions (n, 3) from start to goal down the field, and the face (n,) the way to each of them lies in."""
+        mesh_map, start, goal = self._mesh_map, query.start, query.goal
+        if start.face == goal.face:
+            return np.array([start.point, goal.point]), np.array([start.face, goal.face], dtype=np.int32)
+        return trace_descent(
+            mesh_map.vertices,
+            mesh_map.faces,
+            mesh_map.face_neighbours,
+            mesh_map.vertex_face_offsets,
+            mesh_map.vertex_faces,
+            wave.distances,
+            wave.predecessors,
+            start.face,
+            start.point,
+            goal.face,
+            goal.point,
+            4 * len(mesh_map.faces),
+        )
+
+    def field(self, query: LegQuery, wave: Wave) -> VectorField:
+        """Directions towards the goal wherever the wave came."""
+        mesh_map, goal = self._mesh_map, query.goal
+        directions = wave_directions(
+            mesh_map.vertices,
+            mesh_map.faces,
+            mesh_map.vertex_faces,
+            mesh_map.neighbours,
+            query.snapshot.edge_weights,
+            self._corner_slots,
+            wave.distances,
+            wave.predecessors,
+            wave.cut_records,
+        )
+        corners = mesh_map.faces[goal.face]
+        towards_goal = goal.point - mesh_map.vertices[corners]
+        directions[corners] = towards_goal / np.maximum(np.linalg.norm(towards_goal, axis=1, keepdims=True), 1e-9)
+        return VectorField(directions, wave.distances, goal.face, goal.point.copy(), query.snapshot.version)
+
+    def _seed_around(
+        self, query: LegQuery, center: int, distances: NDArray[np.float32], predecessors: NDArray[np.int32]
+    ) -> NDArray[np.int32]:
+        """Seed the ring of a goal face's only free corner too: a wave needs two known corners to enter a face."""
+        mesh_map = self._mesh_map
+        slots = slice(mesh_map.neighbour_offsets[center], mesh_map.neighbour_offsets[center + 1])
+        ring = mesh_map.neighbours[slots]
+        free = ~query.blocked[ring]
+        ring = ring[free]
+        distances[ring] = distances[center] + query.snapshot.edge_weights[slots][free]
+        predecessors[ring] = center
+        return np.concatenate([[center], ring]).astype(np.int32)
