@@ -2,8 +2,8 @@
 
 Strengths: the shortest paths of all planners here (the traced path's small zigzags and its error near the goal are
 gone), straight where the ground is, still through free faces only; where the taut line would cost more than the
-traced one (costs on the map), the traced one stays. Known failure: a local optimum, the strip itself is that of the wave;
-no vector field is handed on, it would not match the path. Cost: that of ``mesh.cvp`` plus about 2 us a crossed face.
+traced one (costs on the map), the traced one stays. Known failure: a local optimum, the strip itself is that of the
+wave; no vector field is handed on, it would not match the path. Cost: that of ``mesh.cvp`` plus about 2 us a face.
 """
 
 from __future__ import annotations

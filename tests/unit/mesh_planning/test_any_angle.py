@@ -1,6 +1,7 @@
 """Shortening over a strip of faces: against a numeric optimiser, exact geodesics of real terrain, and costs."""
 
 import csv
+import itertools
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ def random_strip(mesh_map, rng, length):
 
 def optimised_length(mesh_map, strip, start, goal):
     """The slow twin: minimise the length over the crossing shares numerically."""
-    edges = [np.intersect1d(mesh_map.faces[a], mesh_map.faces[b]) for a, b in zip(strip[:-1], strip[1:], strict=True)]
+    edges = [np.intersect1d(mesh_map.faces[a], mesh_map.faces[b]) for a, b in itertools.pairwise(strip)]
     a, b = (mesh_map.vertices[[edge[k] for edge in edges]] for k in (0, 1))
 
     def length(shares):
@@ -76,6 +77,6 @@ def test_where_costs_bend_the_path_it_is_not_pulled_straight(make_plugin, plain,
 def test_round_a_corner_the_path_is_taut_and_free(make_plugin, plain, paint):
     mesh_map = paint(plain(), lambda v: np.where((v[:, 0] > 1.9) & (v[:, 0] < 4.1) & (v[:, 1] < 4.1), np.inf, 0.0))
     path = make_plugin(AnyAnglePlanner, mesh_map).make_plan(PlanRequest(Pose.planar(1, 1), Pose.planar(5, 1))).path
-    corners = [(1, 1), (1.8, 4.2), (4.2, 4.2), (5, 1)]
-    shortest = sum(np.hypot(*np.subtract(a, b)) for a, b in zip(corners[:-1], corners[1:], strict=True))
-    assert path.length == pytest.approx(shortest, rel=0.01)
+    corners = [(1, 1), (1.8, 4.2), (4.0, 4.2), (4.2, 4.0), (5, 1)]  # the last but one: a free face cuts the corner
+    shortest = sum(np.hypot(*np.subtract(a, b)) for a, b in itertools.pairwise(corners))
+    assert path.length == pytest.approx(shortest, rel=1e-3)
