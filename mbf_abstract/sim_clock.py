@@ -25,36 +25,13 @@ from contextlib import contextmanager
 import numpy as np
 
 from mbf_abstract.clock import ClockThread, Condition, Priority, ThreadDetached
+from mbf_abstract.sim_thread import Participant, SimCondition, SimThread
 
 DEFAULT_HANG_GUARD = 30.0
 
 
 class ClockDeadlock(RuntimeError):
     """Every known thread waits for a notification that nobody is left to send."""
-
-
-class _Participant:
-    """One known (or, while it waits, one foreign) thread."""
-
-    __slots__ = (
-        "baton", "deadlock", "detached", "foreign", "guarded", "held_locks", "name", "notified", "outside_depth",
-        "priority", "resumed_at", "ticket", "waiting_on",
-    )  # fmt: skip
-
-    def __init__(self, name: str, priority: int, foreign: bool = False) -> None:
-        self.name = name
-        self.priority = priority
-        self.foreign = foreign
-        self.baton = threading.Semaphore(0)
-        self.ticket = 0  # grows with every wait: a timer entry of an older wait is stale
-        self.notified = False
-        self.detached = False
-        self.deadlock = False
-        self.held_locks = 0
-        self.outside_depth = 0  # coroutines of this thread that are outside the lockstep
-        self.guarded = ""
-        self.resumed_at = 0.0  # wall clock
-        self.waiting_on: _SimCondition | None = None
 
 
 class SimClock:
@@ -79,13 +56,13 @@ class SimClock:
         self._mutex = threading.Lock()
         self._now = 0.0
         self._sequence = 0
-        self._ready: list[tuple[int, int, _Participant]] = []
-        self._timers: list[tuple[float, int, int, int, _Participant]] = []
+        self._ready: list[tuple[int, int, Participant]] = []
+        self._timers: list[tuple[float, int, int, int, Participant]] = []
         self._local = threading.local()
-        self._founder = _Participant("main", Priority.CLIENT)
+        self._founder = Participant("main", Priority.CLIENT)
         self._local.participant = self._founder
-        self._running: _Participant | None = self._founder
-        self._known: set[_Participant] = {self._founder}
+        self._running: Participant | None = self._founder
+        self._known: set[Participant] = {self._founder}
         self._outside = 0
         self.hang_guard = hang_guard
         self._guarding = False
@@ -116,11 +93,11 @@ class SimClock:
 
     def condition(self) -> Condition:
         """Make a condition whose waiting moves virtual time."""
-        return _SimCondition(self)
+        return SimCondition(self)
 
     def spawn(self, target: Callable[[], None], name: str, priority: int = Priority.WORKER) -> ClockThread:
         """Start a daemon thread that joins the lockstep at the present instant."""
-        return _SimThread(self, target, name, priority)
+        return SimThread(self, target, name, priority)
 
     @contextmanager
     def guarded(self, label: str) -> Iterator[None]:
@@ -150,7 +127,7 @@ class SimClock:
         finally:
             self._join_lockstep(me)
 
-    def _leave_lockstep(self, me: _Participant) -> None:
+    def _leave_lockstep(self, me: Participant) -> None:
         with self._mutex:
             me.outside_depth += 1
             if me.outside_depth > 1 or me not in self._known:
@@ -160,7 +137,7 @@ class SimClock:
             self._running = None
             self._dispatch()
 
-    def _join_lockstep(self, me: _Participant) -> None:
+    def _join_lockstep(self, me: Participant) -> None:
         with self._mutex:
             me.outside_depth -= 1
             if me.outside_depth > 0 or me not in self._known:
@@ -173,7 +150,7 @@ class SimClock:
         self._await_baton(me)
 
     # -------------------------------------------------------------------------------- waiting and waking
-    def _wait(self, condition: _SimCondition, timeout: float | None) -> bool:
+    def _wait(self, condition: SimCondition, timeout: float | None) -> bool:
         me = self._current()
         self._forbid_waiting_with_lock(me, 1)
         with self._mutex:
@@ -192,7 +169,7 @@ class SimClock:
             condition.acquire(me)
         return me.notified
 
-    def _notify_all(self, condition: _SimCondition) -> None:
+    def _notify_all(self, condition: SimCondition) -> None:
         with self._mutex:
             waiters, condition.waiters = condition.waiters, []
             for waiter in waiters:
@@ -202,7 +179,7 @@ class SimClock:
             if waiters and self._running is None:
                 self._dispatch()
 
-    def _maybe_yield(self, me: _Participant) -> None:
+    def _maybe_yield(self, me: Participant) -> None:
         """Explore: let another ready thread run before a lock is taken."""
         if self._schedule is None or me.foreign or me.held_locks:
             return
@@ -214,33 +191,33 @@ class SimClock:
         self._await_baton(me)
 
     # ------------------------------------------------------------------------------ the scheduler itself
-    def _current(self) -> _Participant:
-        me: _Participant | None = getattr(self._local, "participant", None)
+    def _current(self) -> Participant:
+        me: Participant | None = getattr(self._local, "participant", None)
         if me is None:
-            me = _Participant(threading.current_thread().name, Priority.CLIENT, foreign=True)
+            me = Participant(threading.current_thread().name, Priority.CLIENT, foreign=True)
             self._local.participant = me
         if me.detached:
             raise ThreadDetached(me.name)
         return me
 
-    def _add_timer(self, me: _Participant, stamp: float) -> None:
+    def _add_timer(self, me: Participant, stamp: float) -> None:
         me.ticket += 1
         self._sequence += 1
         heapq.heappush(self._timers, (stamp, me.priority, self._sequence, me.ticket, me))
 
-    def _make_ready(self, who: _Participant) -> None:
+    def _make_ready(self, who: Participant) -> None:
         who.ticket += 1
         self._sequence += 1
         heapq.heappush(self._ready, (who.priority, self._sequence, who))
 
-    def _release_baton(self, me: _Participant) -> None:
+    def _release_baton(self, me: Participant) -> None:
         """Pass the baton on, mutex held; a foreign thread has none but may have to start an idle clock."""
         if not me.foreign:
             self._running = None
         if self._running is None:
             self._dispatch()
 
-    def _await_baton(self, me: _Participant) -> None:
+    def _await_baton(self, me: Participant) -> None:
         me.baton.acquire()
         if me.guarded:
             me.resumed_at = time.monotonic()
@@ -266,7 +243,7 @@ class SimClock:
                 return
             nxt.baton.release()  # a foreign thread goes its way beside the lockstep
 
-    def _pop_ready(self) -> _Participant:
+    def _pop_ready(self) -> Participant:
         if self._schedule is not None and len(self._ready) > 1:
             index = int(self._schedule.integers(len(self._ready)))
             entry = self._ready.pop(index)
@@ -304,16 +281,16 @@ class SimClock:
         names = sorted(p.name for p in self._known if p is not self._founder)
         return f"at t={self._now:.3f} s every thread waits for another one: main, {', '.join(names) or 'nobody else'}"
 
-    def _forbid_waiting_with_lock(self, me: _Participant, allowed: int) -> None:
+    def _forbid_waiting_with_lock(self, me: Participant, allowed: int) -> None:
         if me.held_locks > allowed:
             raise RuntimeError(f"thread {me.name!r} waits while it holds {me.held_locks - allowed} more condition(s)")
 
     # ----------------------------------------------------------------------------------- threads, guard
-    def _enter_thread(self, me: _Participant) -> None:
+    def _enter_thread(self, me: Participant) -> None:
         self._local.participant = me
         self._await_baton(me)
 
-    def _leave_thread(self, me: _Participant) -> None:
+    def _leave_thread(self, me: Participant) -> None:
         with self._mutex:
             self._known.discard(me)
             if self._known <= {self._founder}:
@@ -348,87 +325,3 @@ class SimClock:
             self._running = None
             self._dispatch()
             return suspect.guarded
-
-
-class _SimCondition:
-    """A condition of a SimClock; the real lock inside is contended only by foreign threads."""
-
-    __slots__ = ("_clock", "_lock", "waiters")
-
-    def __init__(self, clock: SimClock) -> None:
-        self._clock = clock
-        self._lock = threading.Lock()
-        self.waiters: list[_Participant] = []
-
-    def __enter__(self) -> _SimCondition:
-        me = self._clock._current()
-        self._clock._maybe_yield(me)
-        self.acquire(me)
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.release(self._clock._local.participant)
-
-    def acquire(self, me: _Participant) -> None:
-        self._lock.acquire()
-        me.held_locks += 1
-
-    def release(self, me: _Participant) -> None:
-        me.held_locks -= 1
-        self._lock.release()
-
-    def wait(self, timeout: float | None = None) -> bool:
-        return self._clock._wait(self, timeout)
-
-    def notify_all(self) -> None:
-        self._clock._notify_all(self)
-
-
-class _SimThread:
-    """A thread in lockstep."""
-
-    def __init__(self, clock: SimClock, target: Callable[[], None], name: str, priority: int) -> None:
-        self._clock = clock
-        self._ended = clock.condition()
-        self._alive = True
-        self._me = _Participant(name, priority)
-        self._target = target
-        thread = threading.Thread(target=self._run, name=name, daemon=True)
-        with clock._mutex:
-            clock._known.add(self._me)
-            clock._make_ready(self._me)
-            if clock._running is None:
-                clock._dispatch()
-        thread.start()
-
-    @property
-    def name(self) -> str:
-        return self._me.name
-
-    def is_alive(self) -> bool:
-        return self._alive
-
-    def join(self, timeout: float | None = None) -> bool:
-        deadline = None if timeout is None else self._clock.now() + timeout
-        with self._ended:
-            while self._alive:
-                remaining = None if deadline is None else deadline - self._clock.now()
-                if remaining is not None and remaining <= 0.0:
-                    break
-                self._ended.wait(remaining)
-        return not self._alive
-
-    def _run(self) -> None:
-        clock = self._clock
-        try:
-            clock._enter_thread(self._me)
-            self._target()
-        except ThreadDetached:
-            pass
-        finally:
-            if self._me.detached:
-                clock._local.participant = _Participant(self._me.name, self._me.priority, foreign=True)
-            with self._ended:
-                self._alive = False
-                self._ended.notify_all()
-            clock._leave_thread(self._me)
