@@ -1,8 +1,8 @@
 """Runs a controller: the loop that drives (reference: ``mbf.md`` 4.4, with the safe default everywhere).
 
-Each period, in this order: a new plan? canceled? paused? map current, pose and velocity fresh? arrived? then the
-plugin is asked for a command, the command is judged and sent, and feedback is published. Whatever ends the loop, the
-lease is given back and the robot stands. What differs from upstream is marked *ours* in ``docs/decisions``.
+Each period, in this order: a new plan? canceled? paused? map current, pose and velocity fresh? arrived? stuck or
+oscillating? then the plugin is asked for a command, the command is judged and sent, and feedback is published.
+Whatever ends the loop, the lease is given back and the robot stands. ``docs/decisions`` says what differs from upstream.
 """
 
 from __future__ import annotations
@@ -164,8 +164,11 @@ class ControllerExecution:
         pose, velocity = state
         if self._is_arrived(pose):
             return self._come_to_rest(velocity, lease)
+        end = self._watch_motion(pose, velocity)
+        if end is not None:
+            return end
         result = self._compute(pose, velocity)
-        end = self._judge(result, lease) or self._watch_motion(pose, velocity, result)
+        end = self._judge(result, lease)
         self._on_cycle(Cycle(pose, velocity, result))
         return end
 
@@ -302,6 +305,8 @@ class ControllerExecution:
             self._failures = 0
             self._run.patience_watch.restart()
             self._enter(ControllerState.GOT_LOCAL_CMD)
+            if self._runtime.gate.last_command.is_stopped():
+                self._ignored.restart()  # it stood because it was told to, e.g. by the watchdog in a long call
             lease.send(result.command)
             return None
         parameters = self._runtime.parameters
@@ -318,11 +323,11 @@ class ControllerExecution:
         self._enter(ControllerState.NO_LOCAL_CMD)
         return None
 
-    def _watch_motion(self, pose: Pose, velocity: Twist, result: ControlResult) -> ControllerEnd | None:
+    def _watch_motion(self, pose: Pose, velocity: Twist) -> ControllerEnd | None:
         """Find a robot that ignores its commands, or one that moves without getting anywhere."""
         parameters = self._runtime.parameters
-        moving_command = result.success and result.command is not None and not result.command.is_stopped()
-        if not (moving_command and self._runtime.robot.has_odometry and velocity.is_stopped()):
+        told_to_move = not self._runtime.gate.last_command.is_stopped()
+        if not (told_to_move and self._runtime.robot.has_odometry and velocity.is_stopped()):
             self._ignored.restart()
         elif 0.0 < parameters.cmd_vel_ignored_tolerance < self._ignored.elapsed:
             text = f"the robot has ignored its commands for {self._ignored.elapsed:.1f} s"

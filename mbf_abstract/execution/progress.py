@@ -28,13 +28,15 @@ class PathProgress:
         self._watch.restart()
 
     def distance_along_path(self, pose: Pose) -> float:
-        """Distance to go [m]: from the robot to the nearest pose ahead, then along the path."""
+        """Distance to go [m]: straight to the nearest pose or the one after it, then along the path."""
         horizon = self._remaining[self._index] - SEARCH_AHEAD
         end = int(np.searchsorted(-self._remaining, -horizon, side="right")) + 1
         window = self.path.positions[self._index : max(end, self._index + 2)]
         distances = np.linalg.norm(window - np.asarray(pose.position), axis=1)
-        self._index += int(np.argmin(distances))
-        return float(self._remaining[self._index] + distances.min())
+        nearest = int(np.argmin(distances))
+        to_go = distances[nearest : nearest + 2] + self._remaining[self._index + nearest :][:2]
+        self._index += nearest
+        return float(to_go.min())
 
     def feedback(self, pose: Pose, result: ControlResult) -> ExePathFeedback:
         """Feedback of one control cycle."""

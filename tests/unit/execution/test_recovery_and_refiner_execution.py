@@ -1,0 +1,273 @@
+"""The recovery and refiner executions with their actions."""
+
+import pytest
+
+from mbf_abstract.actions.goals import RecoveryGoal, RefinePathGoal
+from mbf_abstract.actions.handle import GoalStatus
+from mbf_abstract.geometry import Path, Twist
+from mbf_abstract.outcomes import RecoveryOutcome, RefinePathOutcome
+from mbf_abstract.plugins import RecoveryResult, RefineResult
+from mbf_abstract.testing.faulty import Hang, obedient, slow
+
+DONE = RecoveryResult(RecoveryOutcome.SUCCESS, "")
+
+
+def wait_for(seconds):
+    """A behaviour that waits as a good one does: through its motion."""
+    return lambda request: DONE if request.motion.sleep(seconds) else RecoveryResult(RecoveryOutcome.CANCELED, "ended")
+
+
+def drive_for(seconds, speed=0.3):
+    def run(request):
+        for _ in range(round(seconds / 0.1)):
+            request.motion.send(Twist.planar(speed))
+            if not request.motion.sleep(0.1):
+                return RecoveryResult(RecoveryOutcome.CANCELED, "ended")
+        return DONE
+
+    return run
+
+
+def test_a_behaviour_that_succeeds_names_itself_also_as_the_default(make_bench):
+    bench = make_bench()
+    bench.recovery.play(DONE)
+    handle = bench.navigator.send(RecoveryGoal())
+    result = handle.wait()
+    assert handle.status is GoalStatus.SUCCEEDED
+    assert (result.used_plugin, result.message) == ("recovery", "recovery 'recovery' done")
+
+
+def test_a_behaviour_that_fails_aborts_its_goal_with_its_own_code(make_bench):
+    bench = make_bench()
+    bench.recovery.play(RecoveryResult(RecoveryOutcome.IMPASSABLE, ""))
+    handle = bench.navigator.send(RecoveryGoal())
+    result = handle.wait()
+    assert (handle.status, result.outcome) == (GoalStatus.ABORTED, RecoveryOutcome.IMPASSABLE)
+    assert result.message == "recovery 'recovery' failed"
+
+
+def test_a_behaviour_is_called_once_whatever_it_says(make_bench):
+    bench = make_bench(planner_max_retries=5)
+    bench.recovery.play(RecoveryResult(RecoveryOutcome.FAILURE, "no"))
+    assert bench.navigator.recover().outcome == RecoveryOutcome.FAILURE
+    assert len(bench.recovery.requests) == 1
+
+
+def test_a_canceled_behaviour_ends_canceled(make_bench):
+    bench = make_bench()
+    bench.recovery.play(wait_for(10.0))
+    handle = bench.navigator.send(RecoveryGoal())
+    bench.clock.sleep(1.0)
+    handle.cancel()
+    assert handle.wait().outcome == RecoveryOutcome.CANCELED
+    assert handle.status is GoalStatus.CANCELED
+    assert bench.clock.now() == pytest.approx(1.0)
+
+
+def test_a_behaviour_that_outlasts_its_patience_ends_with_pat_exceeded(make_bench):
+    bench = make_bench(recovery_patience=2.0)
+    bench.recovery.play(wait_for(10.0))
+    handle = bench.navigator.send(RecoveryGoal())
+    result = handle.wait()
+    assert (handle.status, result.outcome) == (GoalStatus.ABORTED, RecoveryOutcome.PAT_EXCEEDED)
+    assert "over 2 s; it said: ended" in result.message
+    assert bench.clock.now() == pytest.approx(2.0, abs=0.01)
+
+
+def test_a_behaviour_without_patience_limit_may_take_for_ever(make_bench):
+    bench = make_bench(recovery_patience=0.0)
+    bench.recovery.play(wait_for(100.0))
+    assert bench.navigator.recover().success
+
+
+def test_a_behaviour_that_raises_is_an_internal_error_and_the_robot_stands(make_bench):
+    bench = make_bench()
+
+    def drives_and_raises(request):
+        request.motion.send(Twist.planar(0.5))
+        raise RuntimeError("lost my way")
+
+    bench.recovery.play(drives_and_raises)
+    result = bench.navigator.recover()
+    assert result.outcome == RecoveryOutcome.INTERNAL_ERROR
+    assert "RuntimeError in run_behavior: lost my way" in result.message
+    assert bench.robot.command == Twist()
+
+
+def test_a_behaviour_that_hangs_is_stopped_and_its_goal_ended(make_bench):
+    bench = make_bench(recovery_patience=1.0, cancel_grace=0.5)
+    hang = Hang(bench.clock, then=DONE)
+
+    def drives_and_hangs(request):
+        request.motion.send(Twist.planar(0.5))
+        return hang(request)
+
+    bench.recovery.play(drives_and_hangs)
+    result = bench.navigator.recover()
+    assert result.outcome == RecoveryOutcome.PAT_EXCEEDED
+    assert bench.robot.command == Twist()
+    assert bench.clock.now() == pytest.approx(1.5, abs=0.01)
+    assert bench.navigator.recover().outcome == RecoveryOutcome.INVALID_PLUGIN  # quarantined
+    hang.release()
+    bench.clock.sleep(0.1)
+    bench.recovery.play(DONE)
+    assert bench.navigator.recover().success
+
+
+def test_a_canceled_behaviour_that_hangs_ends_canceled_after_the_grace(make_bench):
+    bench = make_bench(cancel_grace=0.5)
+    hang = Hang(bench.clock, then=DONE)
+    bench.recovery.play(hang)
+    handle = bench.navigator.send(RecoveryGoal())
+    bench.clock.sleep(1.0)
+    handle.cancel()
+    assert handle.wait().outcome == RecoveryOutcome.CANCELED
+    assert bench.clock.now() == pytest.approx(1.5)
+    hang.release()
+
+
+def test_a_behaviour_that_ignores_patience_but_succeeds_within_the_grace_succeeds(make_bench):
+    bench = make_bench(recovery_patience=1.0, cancel_grace=1.0)
+    bench.recovery.play(slow(bench.clock, 1.5, DONE))
+    assert bench.navigator.recover().success
+
+
+def test_a_pause_stops_the_robot_at_once_and_does_not_use_up_patience(make_bench):
+    bench = make_bench(recovery_patience=3.0)
+    bench.recovery.play(drive_for(2.0))
+    handle = bench.navigator.send(RecoveryGoal())
+    bench.clock.sleep(1.05)
+    handle.pause()
+    assert bench.robot.command == Twist()
+    assert handle.status is GoalStatus.PAUSED
+    paused_at = bench.robot.pose.x
+    bench.clock.sleep(100.0)
+    assert bench.robot.pose.x == paused_at
+    handle.resume()
+    assert handle.wait().success
+    assert bench.robot.pose.x == pytest.approx(0.6, abs=0.05)
+
+
+def test_an_unknown_behaviour_is_rejected(make_bench):
+    bench = make_bench()
+    handle = bench.navigator.send(RecoveryGoal("dance"))
+    assert handle.status is GoalStatus.REJECTED
+    assert handle.result.outcome == RecoveryOutcome.INVALID_PLUGIN
+    assert "no recovery behavior named 'dance'; loaded: recovery" in handle.result.message
+
+
+def test_a_behaviour_that_returns_no_recovery_result_is_an_internal_error(make_bench):
+    bench = make_bench()
+    bench.recovery.play(None)
+    assert "returned NoneType" in bench.navigator.recover().message
+
+
+def test_a_motion_reads_the_robot(make_bench):
+    bench = make_bench()
+    seen = []
+
+    def look(request):
+        seen.append((request.motion.pose().x, request.motion.velocity()))
+        return DONE
+
+    bench.recovery.play(look)
+    bench.navigator.recover()
+    assert seen == [(0.0, Twist())]
+
+
+# ---------------------------------------------------------------------------------------------- refine_path
+BENT = Path.from_points([(0, 0, 0), (1, 1, 0), (2, 0, 0)])
+STRAIGHT = Path.from_points([(0, 0, 0), (1, 0, 0), (2, 0, 0)])
+NO = RefineResult(RefinePathOutcome.FAILURE, "too bent")
+
+
+def test_a_refined_path_comes_with_its_three_measures(make_bench):
+    bench = make_bench()
+    bench.refiner.play(RefineResult(0, "smooth", STRAIGHT))
+    result = bench.navigator.refine_path(BENT)
+    assert result.success
+    assert result.refined_path is STRAIGHT
+    assert result.final_position_error == 0.0
+    assert result.final_orientation_error == pytest.approx(0.785, abs=1e-3)
+    assert result.path_length_ratio == pytest.approx(2.0 / BENT.length)
+    assert result.refiner == "refiner"
+
+
+def test_success_after_five_failures_of_a_refiner(make_bench):
+    bench = make_bench(refiner_max_retries=5)
+    bench.refiner.play(*[NO] * 5, RefineResult(0, "", STRAIGHT))
+    assert bench.navigator.refine_path(BENT).success
+    assert len(bench.refiner.requests) == 6
+
+
+def test_a_refiner_that_uses_up_its_five_retries_is_depleted_after_six_calls(make_bench):
+    bench = make_bench(refiner_max_retries=5)
+    bench.refiner.play(NO)
+    result = bench.navigator.refine_path(BENT)
+    assert len(bench.refiner.requests) == 6
+    assert result.outcome == RefinePathOutcome.DEPLETED
+    assert result.message == "6 attempts failed, the last with: too bent"
+
+
+def test_without_retries_the_refiners_own_code_is_the_end(make_bench):
+    bench = make_bench()
+    bench.refiner.play(NO)
+    assert bench.navigator.refine_path(BENT).outcome == RefinePathOutcome.FAILURE
+    assert len(bench.refiner.requests) == 1
+
+
+def test_a_refiner_that_never_succeeds_is_stopped_by_patience(make_bench):
+    bench = make_bench(refiner_max_retries=-1, planner_patience=1.0)
+    bench.refiner.play(NO)
+    assert bench.navigator.refine_path(BENT).outcome == RefinePathOutcome.STOPPED
+
+
+def test_a_refiner_that_raises_is_an_internal_error(make_bench):
+    bench = make_bench()
+    bench.refiner.play(ZeroDivisionError("oops"))
+    assert bench.navigator.refine_path(BENT).outcome == RefinePathOutcome.INTERNAL_ERROR
+
+
+@pytest.mark.parametrize("path", [None, Path.from_poses([])])
+def test_a_refiner_that_succeeds_without_poses_is_an_internal_error(make_bench, path):
+    bench = make_bench()
+    bench.refiner.play(RefineResult(0, "done", path))
+    assert bench.navigator.refine_path(BENT).outcome == RefinePathOutcome.INTERNAL_ERROR
+
+
+def test_a_canceled_refiner_ends_canceled(make_bench):
+    bench = make_bench()
+    bench.refiner.play(slow(bench.clock, 0.5, RefineResult(0, "", STRAIGHT)))
+    handle = bench.navigator.send(RefinePathGoal(BENT))
+    bench.clock.sleep(0.1)
+    handle.cancel()
+    assert handle.wait().outcome == RefinePathOutcome.CANCELED
+
+
+def test_a_refiner_that_hangs_is_given_up(make_bench):
+    bench = make_bench(planner_patience=1.0, cancel_grace=0.5)
+    hang = Hang(bench.clock, then=NO)
+    bench.refiner.play(hang)
+    assert bench.navigator.refine_path(BENT).outcome == RefinePathOutcome.STOPPED
+    hang.release()
+
+
+@pytest.mark.parametrize(
+    ("goal", "words"),
+    [
+        (RefinePathGoal(BENT, refiner="polish"), "no refiner named 'polish'"),
+        (RefinePathGoal(Path.from_poses([])), "the path has no poses"),
+    ],
+)
+def test_a_refine_goal_that_can_not_be_served_is_rejected(make_bench, goal, words):
+    bench = make_bench()
+    handle = bench.navigator.send(goal)
+    assert handle.status is GoalStatus.REJECTED
+    assert words in handle.result.message
+
+
+def test_an_obedient_behaviour_returns_soon_after_its_token_is_set(make_bench):
+    bench = make_bench(recovery_patience=0.5)
+    bench.recovery.play(obedient(bench.clock, 9.0, DONE, RecoveryResult(RecoveryOutcome.CANCELED, "as told")))
+    assert bench.navigator.recover().outcome == RecoveryOutcome.PAT_EXCEEDED
+    assert bench.clock.now() < 0.6
