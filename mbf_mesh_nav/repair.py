@@ -15,14 +15,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbf_mesh_nav.kernels.defects import faces_without_area, repeated_faces, surplus_faces, winding_flips
-from mbf_mesh_nav.kernels.topology import (
-    connected_components,
-    faces_across_edges,
-    faces_of_vertices,
-    neighbours_of_vertices,
-    unit_face_normals,
+from mbf_mesh_nav.kernels.defects import (
+    component_roots,
+    face_area_vectors,
+    faces_without_area,
+    repeated_faces,
+    surplus_faces,
+    winding_flips,
 )
+from mbf_mesh_nav.kernels.topology import faces_across_edges, faces_of_vertices
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -200,6 +201,14 @@ class _Check:
     def __init__(self, repair: Sequence[str]) -> None:
         self.repair = frozenset(repair)
         self.report = MeshReport()
+        self._faces: IntArray | None = None
+
+    def incidence(self, mesh: CheckedMesh) -> tuple[IntArray, IntArray]:
+        """Faces of every vertex as CSR, computed once per face list."""
+        if mesh.faces is not self._faces:
+            self._faces = mesh.faces
+            self._incidence = faces_of_vertices(mesh.faces, len(mesh.vertices))
+        return self._incidence
 
     def found(self, name: str, text: str, indices: NDArray[np.integer]) -> None:
         if len(indices):
@@ -236,41 +245,42 @@ class _Check:
         return mesh.without_faces(flat) if flat.any() else mesh
 
     def edges(self, mesh: CheckedMesh) -> CheckedMesh:
-        repeated = repeated_faces(mesh.faces, *faces_of_vertices(mesh.faces, len(mesh.vertices)))
+        repeated = repeated_faces(mesh.faces, *self.incidence(mesh))
         self.found("duplicate_faces", "{count} faces have the corners of an earlier face", mesh.face_source[repeated])
         mesh = mesh.without_faces(repeated) if repeated.any() else mesh
-        surplus = surplus_faces(mesh.faces, *faces_of_vertices(mesh.faces, len(mesh.vertices)))
+        surplus = surplus_faces(mesh.faces, *self.incidence(mesh))
         self.found("non_manifold", "{count} faces are the third or later at an edge", mesh.face_source[surplus])
         return mesh.without_faces(surplus) if surplus.any() else mesh
 
     def winding(self, mesh: CheckedMesh) -> CheckedMesh:
-        across = faces_across_edges(mesh.faces, *faces_of_vertices(mesh.faces, len(mesh.vertices)))
-        areas = _face_areas(mesh)
-        flips, contradictions = winding_flips(mesh.faces, across, areas)
+        across = faces_across_edges(mesh.faces, *self.incidence(mesh))
+        areas = face_area_vectors(mesh.vertices, mesh.faces)
+        flips, contradictions = winding_flips(mesh.faces, across, areas[:, 3])
         text = "{count} faces are wound against their neighbours"
         if contradictions:
             text += f", and {contradictions} edges of a one-sided surface cannot agree"
         self.found("flipped_winding", text, mesh.face_source[flips])
         if flips.any():
             mesh = replace(mesh, faces=np.where(flips[:, None], mesh.faces[:, ::-1], mesh.faces))
-        upward = float(unit_face_normals(mesh.vertices, mesh.faces)[:, 2] @ areas)
-        if upward >= -FACING_DOWN_SHARE * float(areas.sum()):
+        upward = float(np.where(flips, -areas[:, 2], areas[:, 2]).sum())
+        if upward >= -FACING_DOWN_SHARE * float(areas[:, 3].sum()):
             return mesh
         self.found("facing_down", "the mesh as a whole ({count} faces) faces down", mesh.face_source)
         return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]))
 
     def components(self, mesh: CheckedMesh) -> CheckedMesh:
-        offsets, incident = faces_of_vertices(mesh.faces, len(mesh.vertices))
-        components = connected_components(*neighbours_of_vertices(mesh.faces, offsets, incident))
-        used = np.diff(offsets) > 0
-        names, first, sizes = np.unique(components[used], return_index=True, return_counts=True)
+        roots = component_roots(mesh.faces, len(mesh.vertices))
+        used = roots >= 0
+        if used.any() and (roots[used] == roots[used][0]).all():
+            return mesh
+        names, first, sizes = np.unique(roots[used], return_index=True, return_counts=True)
         if len(names) < 2:
             return mesh
         text = f"{{count}} components, the largest with {sizes.max()} of {sizes.sum()} vertices"
         self.found("components", text, mesh.vertex_source[np.flatnonzero(used)[first]])
         if "small_components" not in self.repair:
             return mesh
-        small = used & (components != names[np.argmax(sizes)])
+        small = used & (roots != names[np.argmax(sizes)])
         self.found("small_components", "{count} vertices belong to smaller components", mesh.vertex_source[small])
         return mesh.without_faces(small[mesh.faces[:, 0]]).without_vertices(small)
 
@@ -279,8 +289,3 @@ class _Check:
         unused[mesh.faces] = False
         self.found("unreferenced", "{count} vertices belong to no face", mesh.vertex_source[unused])
         return mesh.without_vertices(unused) if unused.any() and "unreferenced" in self.repair else mesh
-
-
-def _face_areas(mesh: CheckedMesh) -> FloatArray:
-    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
-    return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), dtype=np.float64)

@@ -139,7 +139,7 @@ def _locality_order(vertices: FloatArray, faces: IntArray) -> tuple[NDArray[np.i
     """Orders of vertices and of faces (by centroid) along the Morton curve of the bounding cube."""
     lower = vertices.min(axis=0)
     cell = max(float((vertices.max(axis=0) - lower).max()), 1e-12) / (2**21 - 1)
-    centroids = (vertices[faces[:, 0]] + vertices[faces[:, 1]] + vertices[faces[:, 2]]) / 3.0
+    centroids = kernels.face_centroids(vertices, faces)
     vertex_order = np.argsort(kernels.morton_codes(vertices, lower, cell), kind="stable")
     face_order = np.argsort(kernels.morton_codes(centroids, lower, cell), kind="stable")
     return vertex_order, face_order

@@ -122,3 +122,46 @@ def winding_flips(faces: IntArray, face_neighbours: IntArray, areas: FloatArray)
             for index in range(size):
                 flip[patch[index]] = not flip[patch[index]]
     return flip, contradictions
+
+
+@kernel
+def face_area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Area vectors (x, y, z) and areas of faces, (F, 4) [m^2]; the vector points where the face looks."""
+    areas = np.zeros((faces.shape[0], 4))
+    for face in range(faces.shape[0]):
+        a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
+        ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
+        wx, wy, wz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        areas[face, 0], areas[face, 1], areas[face, 2] = 0.5 * nx, 0.5 * ny, 0.5 * nz
+        areas[face, 3] = 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
+    return areas
+
+
+@kernel
+def component_roots(faces: IntArray, vertex_count: int) -> IntArray:
+    """For every vertex the least vertex of its component (V,), -1 without a face; union-find over the faces."""
+    roots = np.full(vertex_count, -1, dtype=np.int32)
+    for face in range(faces.shape[0]):
+        for corner in range(3):
+            vertex = faces[face, corner]
+            if roots[vertex] < 0:
+                roots[vertex] = vertex
+    for face in range(faces.shape[0]):
+        for corner in range(2):
+            first, second = faces[face, corner], faces[face, corner + 1]
+            while roots[first] != first:
+                roots[first] = roots[roots[first]]
+                first = roots[first]
+            while roots[second] != second:
+                roots[second] = roots[roots[second]]
+                second = roots[second]
+            if first < second:
+                roots[second] = first
+            else:
+                roots[first] = second
+    # Links point to smaller vertices, so one ascending pass flattens them.
+    for vertex in range(vertex_count):
+        if roots[vertex] >= 0:
+            roots[vertex] = roots[roots[vertex]]
+    return roots

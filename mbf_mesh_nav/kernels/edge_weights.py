@@ -27,6 +27,7 @@ def set_edge_weights(
     ``w = L + factor * L * (c_i + c_j) / 2``, infinite if an end is lethal or has an infinite or NaN cost
     (mesh_navigation's rule; adding keeps ``w >= L``, so a straight-line bound stays admissible).
     """
+    everything = changed.shape[0] == offsets.shape[0] - 1
     for index in range(changed.shape[0]):
         vertex = changed[index]
         blocked = lethal[vertex] or not np.isfinite(costs[vertex])
@@ -37,6 +38,8 @@ def set_edge_weights(
                 mean_cost = 0.5 * (costs[vertex] + costs[other])
                 weight = np.float32(lengths[entry] * (1.0 + edge_cost_factor * mean_cost))
             weights[entry] = weight
+            if everything:
+                continue  # the other end writes its own entry
             # The twin entry of the other end: a binary search in its ascending list.
             low, high = offsets[other], offsets[other + 1]
             while low < high:

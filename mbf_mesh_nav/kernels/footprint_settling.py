@@ -56,7 +56,7 @@ def wheel_heights(
     radius: float,
     heights: FloatArray,
 ) -> None:
-    """Write the surface's z [m] at ``radius`` around ``centre`` in the directions ``angles`` (ascending); NaN = none."""
+    """Write the surface's z [m] at ``radius`` around ``centre`` in the ascending directions ``angles``; NaN = none."""
     face = start_face
     for index in range(angles.shape[0]):
         x = centre[0] + radius * np.cos(angles[index])

@@ -196,3 +196,14 @@ def morton_codes(points: FloatArray, lower: FloatArray, cell: float) -> NDArray[
             code |= bits << np.uint64(axis)
         codes[index] = code
     return codes
+
+
+@kernel
+def face_centroids(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Centroids (F, 3) of the faces."""
+    centroids = np.zeros((faces.shape[0], 3))
+    for face in range(faces.shape[0]):
+        for axis in range(3):
+            total = vertices[faces[face, 0], axis] + vertices[faces[face, 1], axis] + vertices[faces[face, 2], axis]
+            centroids[face, axis] = total / 3.0
+    return centroids

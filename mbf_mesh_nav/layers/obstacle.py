@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import field_validator
 
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.layer import (
@@ -44,6 +45,13 @@ class ObstacleParameters(LayerParameters):
         0.0, "Longest time between clouds before the map is stale; 0 = off.", unit="s", ge=0.0
     )
     down_axis: tuple[float, float, float] = parameter((0.0, 0.0, -1.0), "Direction of projection in the map's frame.")
+
+    @field_validator("down_axis")
+    @classmethod
+    def _points_somewhere(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
+        if axis == (0.0, 0.0, 0.0):
+            raise ValueError("the axis must have a direction")
+        return axis
 
 
 class ObstacleLayer(MeshLayer):

@@ -79,7 +79,7 @@ class TiltLayer(MeshLayer):
         usage = self._usage()
         self.allowed = (usage <= 1.0) & (bump < settings.ground_clearance)
         costs = np.where(self.allowed, usage, 1.0).min(axis=1).astype(np.float32)
-        return costs, ~self.allowed.any(axis=1)
+        return costs, np.asarray(~self.allowed.any(axis=1))
 
     def _usage(self) -> NDArray[np.float32]:
         """Greatest ratio (V, 16) of an angle to its limit."""

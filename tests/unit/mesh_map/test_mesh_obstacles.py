@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.layer_graph import LayerGraphError
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.range_image import RangeImage
@@ -152,6 +153,16 @@ def test_clear_forgets_everything_and_frees_the_edges():
 
     np.testing.assert_array_equal(mesh.snapshot().edge_weights, free.edge_weights)
     np.testing.assert_array_equal(mesh.snapshot().costs, free.costs)
+
+
+def test_points_are_projected_along_the_configured_axis():
+    slanted = floor_map(down_axis=(1.0, 0.0, -1.0), robot_height=2.0)
+
+    slanted.insert_points([[2.0, 2.0, 0.6]], SENSOR, 1.0)
+
+    np.testing.assert_allclose(slanted.vertices[slanted.layers["seen"].lethal][:, 0].mean(), 2.6, atol=0.2)
+    with pytest.raises(LayerGraphError, match="must have a direction"):
+        floor_map(down_axis=(0.0, 0.0, 0.0))
 
 
 def test_map_is_stale_when_no_cloud_came_within_the_expected_rate():
