@@ -22,11 +22,12 @@ from mbf_abstract.geometry import (
 )
 from mbf_abstract.robot import Odometry
 from terrain.bullet import quiet_native_output
-from terrain.drive import WheelTargets, commanded_twist, twist_from_wheels, wheel_targets
+from terrain.drive import commanded_twist, twist_from_wheels, wheel_targets
 from terrain.mishaps import MotionSample
 from terrain.robot_models import Drive, RobotSpec
-from terrain.world import ROBOT, TIME_STEP, BulletWorld
+from terrain.world import ROBOT, BulletWorld
 
+STANDSTILL = Twist()
 STEERING_TORQUE = 40.0  # N m
 STEERING_SPEED = 3.0  # rad/s
 TOUCHING_DISTANCE = 1e-3  # m; Bullet reports contacts up to 2 cm apart
@@ -52,9 +53,9 @@ class WheeledRobot:
         self.spec = spec
         self.command_timeout = command_timeout
         self._bullet: Any = world.bullet
-        self._command: Command = Twist()
+        self._command: Command = STANDSTILL
         self._command_stamp = world.time
-        self._applied: WheelTargets | None = None
+        self._applied: Command | None = None
         self._last_state: tuple[int, Pose, Twist] | None = None
         drop = max(0.05, 1.5 * spec.wheel_radius) * pose.rotation[:, 2]
         with quiet_native_output():
@@ -112,11 +113,11 @@ class WheeledRobot:
 
     def stop(self) -> None:
         """Brake: hold all driven wheels at speed zero."""
-        self.send_command(Twist())
+        self.send_command(STANDSTILL)
 
     def settle(self, seconds: float = SETTLING_TIME) -> None:
         """Let the robot fall onto its wheels, then let this instant be time 0."""
-        for _ in range(round(seconds / TIME_STEP)):
+        for _ in range(round(seconds / self.world.time_step)):
             self.world.step()
         self.world.restart_clock()
         self._command_stamp, self._last_state = 0.0, None
@@ -124,11 +125,11 @@ class WheeledRobot:
     def _drive_motors(self) -> None:
         """Hand new targets to the motors before a step; Bullet keeps them by itself."""
         if self.world.time - self._command_stamp > self.command_timeout:
-            self._command = Twist()
-        targets = wheel_targets(self.spec, self._command)
-        if targets == self._applied:
+            self._command = STANDSTILL
+        if self._command is self._applied:
             return
-        self._applied = targets
+        self._applied = self._command
+        targets = wheel_targets(self.spec, self._command)
         lefts, rights = len(self.spec.left_wheels), len(self.spec.right_wheels)
         self._bullet.setJointMotorControlArray(
             self.body,

@@ -174,3 +174,27 @@ def ring_directions(rings: int = 16, rays: int = 360, elevation: float = np.radi
     """Rays (rings * rays, 3) of a turning multi-beam lidar, rings from -``elevation`` to +``elevation`` [rad]."""
     azimuths = (np.arange(rays) + 0.5) / rays * 2.0 * np.pi - np.pi
     return ray_fan(azimuths, np.linspace(-elevation, elevation, rings))
+
+
+def camera_directions(width: int = 160, height: int = 120, field_of_view: float = np.radians(70.0)) -> FloatArray:
+    """Rays (height * width, 3) of a depth camera that looks ahead, row by row from the top left pixel.
+
+    A depth camera is a ``Lidar`` with these rays; its ranges are along the rays, not along the optical axis.
+
+    Parameters
+    ----------
+    field_of_view : float
+        Horizontal [rad]; pixels are square.
+    """
+    pixel = 2.0 * np.tan(0.5 * field_of_view) / width
+    left = 0.5 * (width - 1) - np.arange(width)
+    up = 0.5 * (height - 1) - np.arange(height)
+    rays = np.stack(
+        [
+            np.ones((height, width)),
+            np.broadcast_to(pixel * left, (height, width)),
+            np.broadcast_to(pixel * up[:, None], (height, width)),
+        ],
+        axis=-1,
+    ).reshape(-1, 3)
+    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))

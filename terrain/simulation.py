@@ -29,7 +29,9 @@ Listener = Callable[[str, Any], None]
 class SteppedWorld(Protocol):
     """A world that moves in fixed steps: ``BulletWorld`` or ``KinematicWorld``."""
 
-    time_step: float
+    @property
+    def time_step(self) -> float:
+        """Length of a step [s]."""
 
     @property
     def time(self) -> float:
@@ -87,6 +89,8 @@ class Simulation:
         self.mishaps: list[Mishap] = []
         self.track: list[Pose] = []
         self._listeners: list[Listener] = []
+        self._monitor_period = self._steps_per(MONITOR_RATE)
+        self._schedule = [(name, sensor, self._steps_per(sensor.rate)) for name, sensor in self.sensors.items()]
         self._steps = 0
         self._observe()
 
@@ -108,18 +112,18 @@ class Simulation:
 
     def _observe(self) -> None:
         """Let everything that is due at this step look at the world."""
-        if self._is_due(MONITOR_RATE):
+        if self._steps % self._monitor_period == 0:
             sample = self.robot.motion_sample()
             self.track.append(sample.pose)
             self.mishaps += self.monitor.update(sample)
-        for name, sensor in self.sensors.items():
-            if self._is_due(sensor.rate):
+        for name, sensor, period in self._schedule:
+            if self._steps % period == 0:
                 measurement = sensor.measure(self.world.time)
                 if measurement is not None:
                     self._deliver(name, measurement)
 
-    def _is_due(self, rate: float) -> bool:
-        return self._steps % max(1, round(1.0 / (rate * self.world.time_step))) == 0
+    def _steps_per(self, rate: float) -> int:
+        return max(1, round(1.0 / (rate * self.world.time_step)))
 
     def _deliver(self, name: str, measurement: Any) -> None:
         self.latest[name] = measurement

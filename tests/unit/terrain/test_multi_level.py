@@ -55,7 +55,7 @@ def test_the_garage_has_a_floor_per_level_and_refuses_less_than_two() -> None:
 
 def test_the_husky_drives_up_the_first_ramp_of_the_garage() -> None:
     garage, route = parking_garage(), [(6.0, 4.0), (7.5, 2.5), (29.5, 2.5), (31.0, 6.0)]
-    with BulletWorld() as world:
+    with BulletWorld(time_step=1.0 / 120.0) as world:
         garage.add_to(world)
         robot = WheeledRobot(world, HUSKY, garage.places["entrance"])
         robot.settle()

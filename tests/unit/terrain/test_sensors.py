@@ -12,7 +12,7 @@ from terrain.kinematic_robot import KinematicWorld
 from terrain.rays import MovingRays, StaticRays
 from terrain.robot_models import TURTLEBOT
 from terrain.robots import WheeledRobot
-from terrain.sensors import Lidar, planar_directions, ring_directions
+from terrain.sensors import Lidar, camera_directions, planar_directions, ring_directions
 from terrain.world import BulletWorld
 
 
@@ -143,3 +143,11 @@ def test_localisation_jumps_when_told_to() -> None:
     after = localization.measure(0.1)
     assert before == Pose.planar(1.0, 2.0, 0.5) and after is not None
     assert (after.x, after.y, after.yaw) == pytest.approx((1.5, 2.0, 0.6)) and after.stamp == 0.1
+
+
+def test_a_depth_camera_looks_ahead_from_the_top_left() -> None:
+    rays = camera_directions(40, 30, math.radians(90.0))
+    assert rays.shape == (1200, 3) and np.allclose(np.linalg.norm(rays, axis=1), 1.0)
+    assert rays[0, 1] > 0.0 and rays[0, 2] > 0.0 and (rays[:, 0] > 0.5).all()
+    widest = math.atan2(rays[0, 1], rays[0, 0])
+    assert math.radians(43.0) < widest < math.radians(45.0)
