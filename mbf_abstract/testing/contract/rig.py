@@ -1,0 +1,112 @@
+"""What a plugin under test is put into: a simulated clock, a loopback robot and a context of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from mbf_abstract.cancel import CancelToken
+from mbf_abstract.clock import WallClock, wall_seconds
+from mbf_abstract.geometry import Pose
+from mbf_abstract.parameters import PluginParameters
+from mbf_abstract.plugins import Plugin, PluginContext
+from mbf_abstract.robot import RobotInformation
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.transforms import TransformBuffer
+
+P = TypeVar("P", bound=Plugin)
+ContextMaker = Callable[[PluginContext], PluginContext]
+
+SHORTEST_CANCELED_RUN = 0.005  # s of wall time; a faster call needs no look at its token
+CANCEL_MOMENTS = (0.1, 0.5, 0.9)  # as a share of the time of a whole call
+
+
+def same_context(base: PluginContext) -> PluginContext:
+    """Give a plugin that needs no map the context as it is."""
+    return base
+
+
+@dataclass(frozen=True)
+class Rig(Generic[P]):
+    """A plugin with its clock and robot."""
+
+    plugin: P
+    clock: SimClock
+    robot: LoopbackRobot
+    information: RobotInformation
+
+
+@contextmanager
+def rig(
+    plugin_class: type[P], make_context: ContextMaker, parameters: PluginParameters | None, start: Pose
+) -> Iterator[Rig[P]]:
+    """Make a fresh plugin, always with the same seed, and end the robot's thread afterwards."""
+    clock, transforms = SimClock(), TransformBuffer()
+    robot = LoopbackRobot(clock, transforms, start)
+    information = RobotInformation(robot, transforms, clock, start.frame_id)
+    chosen = plugin_class.Parameters() if parameters is None else parameters
+    base = PluginContext("dut", chosen, clock, np.random.default_rng(0), information)
+    try:
+        yield Rig(plugin_class(make_context(base)), clock, robot, information)
+    finally:
+        robot.close()
+        clock.sleep(0.1)
+
+
+def cancel_latency(call: Callable[[CancelToken], Any], after: float) -> tuple[float, Any]:
+    """Set the token of a call that runs, from another thread.
+
+    Parameters
+    ----------
+    call : callable
+        Runs the plugin with the token it is given.
+    after : float
+        When the token is set [s of wall time].
+
+    Returns
+    -------
+    latency : float
+        Wall time [s] from the cancel to the return; 0 if the call was over before.
+    result : object
+    """
+    token, wall, times = CancelToken(), WallClock(), []
+
+    def cancel() -> None:
+        wall.sleep(after)
+        times.append(wall_seconds())
+        token.cancel()
+
+    thread = wall.spawn(cancel, "contract cancel")
+    result = call(token)
+    returned = wall_seconds()
+    thread.join()
+    return max(0.0, returned - times[0]), result
+
+
+def canceled_token() -> CancelToken:
+    """Return a token that is set already."""
+    token = CancelToken()
+    token.cancel("set before the call")
+    return token
+
+
+def expect_idle_cancel_is_harmless(plugin: Plugin) -> str:
+    """Call ``cancel`` often, from two threads, while nothing runs; return what is wrong, or an empty text."""
+    answers: list[Any] = []
+
+    def cancel_often() -> None:
+        try:
+            answers.extend(plugin.cancel() for _ in range(20))
+        except Exception as error:
+            answers.append(error)
+
+    thread = WallClock().spawn(cancel_often, "contract cancel")
+    cancel_often()
+    thread.join()
+    wrong = [answer for answer in answers if not isinstance(answer, bool)]
+    return f"cancel() while idle gave {wrong[0]!r}, not a bool" if wrong else ""
