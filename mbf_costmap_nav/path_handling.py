@@ -130,12 +130,13 @@ def to_base_frame(points: FloatArray, pose: Pose) -> FloatArray:
 
 @dataclass(frozen=True)
 class ControlCycle:
-    """What a controller works on in one cycle: the request, the plan with fresh progress, the map, the footprint."""
+    """What a controller works on in one cycle: request, plan, map, footprint, goal tolerance [m]."""
 
     request: ControlRequest
     tracker: PathTracker
     costmap: Costmap
     footprint: FootprintCheck
+    goal_tolerance: float
 
 
 class PathFollower(CostmapController):
@@ -180,4 +181,4 @@ class PathFollower(CostmapController):
         if self._footprint.collides(costmap, pose.x, pose.y, pose.yaw):
             text = f"the footprint at ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad) touches a lethal cell"
             return ControlResult(ExePathOutcome.COLLISION, text)
-        return ControlCycle(request, self.tracker, costmap, self._footprint)
+        return ControlCycle(request, self.tracker, costmap, self._footprint, self.goal_dist_tolerance)

@@ -1,0 +1,122 @@
+"""Dynamic window approach: try all velocities the robot can reach in one step, keep the one with the best arc.
+
+When to use: robots that must get around obstacles that are not in the path, with little computing time (under 1 ms).
+When not: it only thinks in arcs of constant velocity, so it stalls where a turn and a counter-turn are needed (narrow
+S-shaped gaps, parking); ``costmap.mppi`` plans those. It does not follow a path exactly (``regulated_pure_pursuit``).
+
+Formula: Fox, Burgard, Thrun 1997; the objective is the weighted sum of the trajectory critics instead of the paper's
+three terms, and velocities are held for ``sim_time``.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Twist
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_costmap_nav.critics import CriticParameters
+from mbf_costmap_nav.critics.obstacle import COLLISION
+from mbf_costmap_nav.kernels.rollout import clip_velocities
+from mbf_costmap_nav.path_handling import ControlCycle, PathFollower
+from mbf_costmap_nav.plugins import CostmapContext
+from mbf_costmap_nav.trajectory_scoring import build_critics, is_free, roll_out, score
+
+FloatArray = NDArray[np.float64]
+Float32Array = NDArray[np.float32]
+
+
+class DwaParameters(PluginParameters):
+    """Parameters of ``costmap.dwa``."""
+
+    max_vel_x: float = parameter(0.5, "Largest forward speed.", unit="m/s", gt=0.0, le=20.0)
+    min_vel_x: float = parameter(-0.1, "Least speed; negative = may drive back.", unit="m/s", ge=-20.0, le=0.0)
+    max_vel_y: float = parameter(0.0, "Largest sideways speed; 0 = not holonomic.", unit="m/s", ge=0.0, le=20.0)
+    max_vel_theta: float = parameter(1.6, "Largest yaw rate.", unit="rad/s", gt=0.0, le=20.0)
+    acc_lim_x: float = parameter(2.5, "Largest forward acceleration.", unit="m/s^2", gt=0.0, le=100.0)
+    acc_lim_y: float = parameter(2.5, "Largest sideways acceleration.", unit="m/s^2", gt=0.0, le=100.0)
+    acc_lim_theta: float = parameter(3.2, "Largest yaw acceleration.", unit="rad/s^2", gt=0.0, le=100.0)
+    window_time: float = parameter(0.2, "Time in which a sampled velocity must be reachable.", unit="s", gt=0.0, le=5.0)
+    sim_time: float = parameter(1.7, "How long a velocity is held in the simulation.", unit="s", gt=0.0, le=10.0)
+    sim_step: float = parameter(0.05, "Step of the simulation.", unit="s", gt=0.0, le=0.5)
+    vx_samples: int = parameter(15, "Samples of the forward speed.", ge=1, le=200)
+    vy_samples: int = parameter(5, "Samples of the sideways speed.", ge=1, le=200)
+    vtheta_samples: int = parameter(25, "Samples of the yaw rate.", ge=1, le=200)
+    footprint_check_time: float = parameter(1.0, "How far the full footprint is checked.", unit="s", ge=0.0, le=10.0)
+    critics: CriticParameters = parameter(
+        CriticParameters(path_align=6.0, path_follow=8.0, obstacle=3.0), "Weights of the trajectory critics."
+    )
+
+
+class DwaController(PathFollower):
+    """Samples the dynamic window and scores the arcs."""
+
+    Parameters: ClassVar[type[PluginParameters]] = DwaParameters
+    parameters: DwaParameters
+
+    def __init__(self, context: CostmapContext) -> None:
+        super().__init__(context)
+        self._critics = build_critics(self.parameters.critics)
+
+    def parameters_changed(self) -> None:
+        """Take over new weights."""
+        self._critics = build_critics(self.parameters.critics)
+
+    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+        """Sample, roll out, score, and take the cheapest arc that the full footprint can drive."""
+        cycle = self.begin_cycle(request)
+        if isinstance(cycle, ControlResult):
+            return cycle
+        p = self.parameters
+        candidates = self._window(cycle)
+        steps = max(2, round(p.sim_time / p.sim_step))
+        velocities = self._ramps(cycle, candidates, steps)
+        rollouts = roll_out(cycle, velocities, p.sim_step, p.max_vel_x * p.sim_time)
+        costs = score(self._critics, rollouts, cycle.tracker.driving_backward)
+        checked_steps = round(p.footprint_check_time / p.sim_step)
+        for sample in np.argsort(costs, kind="stable").tolist():
+            if costs[sample] >= COLLISION:
+                break
+            if is_free(cycle, rollouts.poses[:, :checked_steps, sample]):
+                return ControlResult(ExePathOutcome.SUCCESS, "", Twist.planar(*candidates[sample].tolist()))
+        text = f"all {len(candidates)} reachable velocities lead into an obstacle within {p.sim_time:g} s"
+        return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
+
+    def _ramps(self, cycle: ControlCycle, candidates: FloatArray, steps: int) -> Float32Array:
+        """Velocities (3, steps, n): from the measured one to each candidate at the accelerations allowed, then held."""
+        p, now = self.parameters, cycle.request.velocity
+        velocities = np.repeat(candidates.T.astype(np.float32)[:, None, :], steps, axis=1)
+        change = np.array([p.acc_lim_x, p.acc_lim_y, p.acc_lim_theta], dtype=np.float32) * np.float32(p.sim_step)
+        limit = np.full(3, np.inf, dtype=np.float32)
+        measured = np.array([now.vx, now.vy, now.wz], dtype=np.float32)
+        clip_velocities(velocities, measured, -limit, limit, change, 0.0)
+        return velocities
+
+    def _window(self, cycle: ControlCycle) -> FloatArray:
+        """Velocities (n, 3) the robot can reach within the window time."""
+        p, now = self.parameters, cycle.request.velocity
+        vx = sample_window(now.vx, p.min_vel_x, p.max_vel_x, p.acc_lim_x * p.window_time, p.vx_samples)
+        vy = np.zeros(1)
+        if p.max_vel_y > 0.0:
+            vy = sample_window(now.vy, -p.max_vel_y, p.max_vel_y, p.acc_lim_y * p.window_time, p.vy_samples)
+        wz = sample_window(now.wz, -p.max_vel_theta, p.max_vel_theta, p.acc_lim_theta * p.window_time, p.vtheta_samples)
+        return np.stack(np.meshgrid(vx, vy, wz, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def sample_velocities(low: float, high: float, count: int) -> FloatArray:
+    """At least two evenly spaced velocities from ``low`` to ``high``, and zero if it lies strictly between them."""
+    samples = np.linspace(low, high, max(2, count))
+    if low < 0.0 < high and not (samples == 0.0).any():
+        samples = np.sort(np.append(samples, 0.0))
+    return samples if high > low else samples[:1]
+
+
+def sample_window(current: float, low: float, high: float, change: float, count: int) -> FloatArray:
+    """Velocities within ``change`` of the current one and within the limits; a robot beyond a limit comes back."""
+    return sample_velocities(
+        float(np.clip(current - change, low, high)), float(np.clip(current + change, low, high)), count
+    )

@@ -1,0 +1,183 @@
+"""MPPI: sample thousands of noisy velocity sequences, weigh them by their cost, drive the mean.
+
+When to use: the best of our controllers among obstacles; it swerves, backs up and threads gaps because every sample is
+a whole manoeuvre of ``time_steps``, not an arc. Differential, omnidirectional and Ackermann robots. When not: very
+small computers (a cycle of 2000 x 56 takes about 1 ms), or when the path must be followed to the centimetre.
+Known failure: two equally good ways around an obstacle can average to neither; the footprint check then falls back to
+the best single sample.
+
+Formula: information-theoretic MPPI (Williams et al. 2018, algorithm 2), with Nav2's structure of critics; the noise
+comes from a pool drawn once from the plugin's generator, so that a cycle draws only an index. Deviation: the noise is
+correlated in time (Vlahov et al. 2024, coloured noise), because independent noise hardly moves a standing robot.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import AckermannCommand, Command, Path, Twist
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_costmap_nav.critics import CriticParameters
+from mbf_costmap_nav.critics.obstacle import COLLISION
+from mbf_costmap_nav.kernels.rollout import add_noise, clip_velocities, integrate
+from mbf_costmap_nav.path_handling import ControlCycle, PathFollower
+from mbf_costmap_nav.plugins import CostmapContext
+from mbf_costmap_nav.trajectory_scoring import build_critics, is_free, roll_out, score
+
+Float32Array = NDArray[np.float32]
+
+NOISE_POOL = 4
+"""Sets of noise drawn at start; each cycle uses one of them."""
+SMOOTHING = np.array([-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0]) / 231.0
+"""Savitzky-Golay filter of 9 points, quadratic (Savitzky and Golay 1964, table I)."""
+FALLBACK_SAMPLES = 30
+"""How many of the best single samples are tried when the mean does not fit."""
+
+
+class MppiParameters(PluginParameters):
+    """Parameters of ``costmap.mppi``."""
+
+    motion_model: Literal["diff", "omni", "ackermann"] = parameter("diff", "How the robot moves.", dynamic=False)
+    batch_size: int = parameter(2000, "Sampled trajectories a cycle.", ge=10, le=100000, dynamic=False)
+    time_steps: int = parameter(56, "Steps of a trajectory.", ge=9, le=500, dynamic=False)
+    model_dt: float = parameter(0.05, "Length of a step; also the control period.", unit="s", gt=0.0, le=0.5)
+    vx_max: float = parameter(0.5, "Largest forward speed.", unit="m/s", gt=0.0, le=20.0)
+    vx_min: float = parameter(-0.35, "Least speed; negative = may drive back.", unit="m/s", ge=-20.0, le=0.0)
+    vy_max: float = parameter(0.5, "Largest sideways speed (omni).", unit="m/s", ge=0.0, le=20.0)
+    wz_max: float = parameter(1.9, "Largest yaw rate.", unit="rad/s", gt=0.0, le=20.0)
+    ax_max: float = parameter(3.0, "Largest forward acceleration.", unit="m/s^2", gt=0.0, le=100.0)
+    ay_max: float = parameter(3.0, "Largest sideways acceleration.", unit="m/s^2", gt=0.0, le=100.0)
+    az_max: float = parameter(3.5, "Largest yaw acceleration.", unit="rad/s^2", gt=0.0, le=100.0)
+    vx_std: float = parameter(0.2, "Noise of the forward speed.", unit="m/s", gt=0.0, le=10.0)
+    vy_std: float = parameter(0.2, "Noise of the sideways speed.", unit="m/s", gt=0.0, le=10.0)
+    wz_std: float = parameter(0.4, "Noise of the yaw rate.", unit="rad/s", gt=0.0, le=10.0)
+    noise_correlation_time: float = parameter(
+        0.5, "How long noise keeps its direction.", unit="s", gt=0.0, le=10.0, dynamic=False
+    )
+    min_turning_radius: float = parameter(0.5, "Turning circle of an Ackermann robot.", unit="m", ge=0.0, le=100.0)
+    wheelbase: float = parameter(
+        0.0, "Above 0: answer Ackermann commands for this wheelbase.", unit="m", ge=0.0, le=20.0
+    )
+    temperature: float = parameter(0.3, "Small = only the best samples count.", gt=0.0, le=100.0)
+    gamma: float = parameter(0.015, "Cost of leaving the nominal sequence.", ge=0.0, le=10.0)
+    footprint_check_time: float = parameter(1.0, "How far the full footprint is checked.", unit="s", ge=0.0, le=10.0)
+    critics: CriticParameters = parameter(CriticParameters(), "Weights of the trajectory critics.")
+
+
+class MppiController(PathFollower):
+    """Model predictive path integral control."""
+
+    Parameters: ClassVar[type[PluginParameters]] = MppiParameters
+    parameters: MppiParameters
+
+    def __init__(self, context: CostmapContext) -> None:
+        super().__init__(context)
+        p = self.parameters
+        shape = (NOISE_POOL, 3, p.time_steps, p.batch_size)
+        self._noise = correlated_noise(self.rng, shape, math.exp(-p.model_dt / p.noise_correlation_time))
+        self._velocities = np.empty(shape[1:], dtype=np.float32)
+        self._poses = np.empty(shape[1:], dtype=np.float32)
+        self._nominal: Float32Array = np.zeros((3, p.time_steps), dtype=np.float32)
+        self.parameters_changed()
+
+    def parameters_changed(self) -> None:
+        """Take over new weights and limits."""
+        p = self.parameters
+        self._critics = build_critics(p.critics)
+        sideways = p.vy_max if p.motion_model == "omni" else 0.0
+        self._low = np.array([p.vx_min, -sideways, -p.wz_max], dtype=np.float32)
+        self._high = np.array([p.vx_max, sideways, p.wz_max], dtype=np.float32)
+        self._change = np.array([p.ax_max, p.ay_max, p.az_max], dtype=np.float32) * np.float32(p.model_dt)
+        deviation = [p.vx_std, p.vy_std if p.motion_model == "omni" else 0.0, p.wz_std]
+        self._deviation = np.array(deviation, dtype=np.float32)
+        self._radius = p.min_turning_radius if p.motion_model == "ackermann" else 0.0
+
+    def set_plan(self, path: Path) -> bool:
+        """Take over a path; the nominal sequence is kept while driving, so that a new plan does not jerk."""
+        if self.tracker is None:
+            self._nominal[:] = 0.0
+        return super().set_plan(path)
+
+    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+        """One cycle: sample around the nominal sequence, score, average, check, shift."""
+        cycle = self.begin_cycle(request)
+        if isinstance(cycle, ControlResult):
+            return cycle
+        for attempt in range(2):
+            controls = self._optimise(cycle)
+            if controls is not None:
+                command = controls[:, 0].copy()
+                self._nominal = np.column_stack([controls[:, 1:], controls[:, -1]])
+                return ControlResult(ExePathOutcome.SUCCESS, "", self._command(command))
+            if attempt == 0:
+                self._nominal[:] = 0.0  # start over from standing still: the old sequence may be what collides
+        text = f"none of {self.parameters.batch_size} sampled trajectories is free of collision"
+        return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
+
+    # -------------------------------------------------------------------------------------------- optimisation
+    def _optimise(self, cycle: ControlCycle) -> Float32Array | None:
+        """Best velocities (3, steps) around the nominal ones, or None if nothing fits."""
+        p = self.parameters
+        noise = self._noise[int(self.rng.integers(NOISE_POOL))]
+        velocities = self._velocities
+        add_noise(self._nominal, noise, self._deviation, velocities)
+        self._clip(cycle, velocities)
+        reach = p.vx_max * p.model_dt * p.time_steps
+        rollouts = roll_out(cycle, velocities, p.model_dt, reach, self._poses)
+        costs = score(self._critics, rollouts, cycle.tracker.driving_backward)
+        if rollouts.collided.all():
+            return None
+        weights = np.exp(-(costs + self._control_cost(velocities) - costs.min()) / p.temperature)
+        controls = self._smoothed(velocities @ (weights / weights.sum()).astype(np.float32))[:, :, None]
+        self._clip(cycle, controls)
+        checked_steps = max(1, round(p.footprint_check_time / p.model_dt))
+        trajectory = np.empty_like(controls)
+        integrate(controls, cycle.request.pose.yaw, p.model_dt, trajectory)
+        if is_free(cycle, trajectory[:, :checked_steps, 0]):
+            return np.asarray(controls[:, :, 0])
+        for sample in np.argsort(costs, kind="stable")[:FALLBACK_SAMPLES].tolist():
+            if costs[sample] < COLLISION and is_free(cycle, rollouts.poses[:, :checked_steps, sample]):
+                return np.ascontiguousarray(velocities[:, :, sample])
+        return None
+
+    def _clip(self, cycle: ControlCycle, velocities: Float32Array) -> None:
+        measured = cycle.request.velocity
+        now = np.array([measured.vx, measured.vy, measured.wz], dtype=np.float32)
+        clip_velocities(velocities, now, self._low, self._high, self._change, self._radius)
+
+    def _control_cost(self, velocities: Float32Array) -> Float32Array:
+        """(samples,) price of the first step's distance from the nominal one, per variance (Williams 2018, eq. 29)."""
+        active = self._deviation > 0.0
+        offset = velocities[active, 0] - self._nominal[active, :1]
+        price = self._nominal[active, :1] * offset / self._deviation[active, None] ** 2
+        return np.asarray(np.float32(self.parameters.gamma) * price.sum(axis=0))
+
+    def _smoothed(self, controls: Float32Array) -> Float32Array:
+        """Controls (3, steps) through the Savitzky-Golay filter, held at both ends."""
+        reach = len(SMOOTHING) // 2
+        padded = np.pad(controls, ((0, 0), (reach, reach)), mode="edge")
+        rows = [np.convolve(row, SMOOTHING, mode="valid") for row in padded]
+        return np.array(rows, dtype=np.float32)
+
+    def _command(self, velocity: Float32Array) -> Command:
+        """Twist, or steering angle by the single-track model for a robot with a wheelbase."""
+        vx, vy, wz = (float(component) for component in velocity)
+        if self.parameters.wheelbase <= 0.0:
+            return Twist.planar(vx, vy, wz)
+        angle = math.atan(self.parameters.wheelbase * wz / vx) if abs(vx) > 1e-3 else 0.0
+        return AckermannCommand(vx, angle)
+
+
+def correlated_noise(rng: np.random.Generator, shape: tuple[int, int, int, int], correlation: float) -> Float32Array:
+    """Unit normal noise (sets, components, steps, samples) whose steps follow each other as an AR(1) process."""
+    noise = rng.standard_normal(shape, dtype=np.float32)
+    fresh = math.sqrt(1.0 - correlation * correlation)
+    for t in range(1, shape[2]):
+        noise[:, :, t] = correlation * noise[:, :, t - 1] + fresh * noise[:, :, t]
+    return noise

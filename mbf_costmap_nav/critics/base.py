@@ -1,0 +1,94 @@
+"""What a critic sees and what it must do."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.kernels.critics import furthest_reached
+
+Float32Array = NDArray[np.float32]
+
+
+class CriticParameters(ParameterModel):
+    """Weights of the critics; a weight of 0 switches a critic off (obstacles still count as collisions)."""
+
+    obstacle: float = parameter(4.0, "Weight of the mean cell cost along the way (0..1).", ge=0.0, le=1e4)
+    goal: float = parameter(5.0, "Weight of the distance to a near goal.", unit="1/m", ge=0.0, le=1e4)
+    goal_angle: float = parameter(3.0, "Weight of the heading at a near goal.", unit="1/rad", ge=0.0, le=1e4)
+    path_align: float = parameter(10.0, "Weight of the distance from the path.", unit="1/m", ge=0.0, le=1e4)
+    path_follow: float = parameter(5.0, "Weight of the way still left on the path.", unit="1/m", ge=0.0, le=1e4)
+    path_angle: float = parameter(2.0, "Weight of the heading towards the path.", unit="1/rad", ge=0.0, le=1e4)
+    prefer_forward: float = parameter(5.0, "Weight of driving backward.", unit="s/m", ge=0.0, le=1e4)
+    twirling: float = parameter(0.0, "Weight of turning; for omnidirectional robots.", unit="s/rad", ge=0.0, le=1e4)
+
+
+@dataclass
+class Rollouts:
+    """Sampled trajectories and all a critic may want to know; positions are relative to the robot, axes of the map.
+
+    Attributes
+    ----------
+    poses : (3, steps, samples) float32
+        x, y [m], yaw [rad] after each step.
+    velocities : (3, steps, samples) float32
+        vx, vy [m/s], wz [rad/s] of each step.
+    path : (m, 2) float32
+        Points of the path ahead [m], ``path_spacing`` apart; the first is the robot's nearest point.
+    path_free : (m,) bool
+        Whether the cell of each path point is below the inscribed cost.
+    path_spacing : float
+        Distance of two path points [m].
+    remaining : float
+        Length [m] left to the end of the plan.
+    goal : (x, y, yaw)
+        End of the plan.
+    goal_tolerance : float
+        How near [m] to the goal is near enough.
+    costmap : Costmap
+    robot : (x, y)
+        The robot's position [m] in the map, to look cells up.
+    discs : (k,) float32
+        Offsets [m] along the robot's x axis of the discs of its inscribed radius that stand for its footprint.
+    collided : (samples,) bool
+        Set by the obstacle critic.
+    """
+
+    poses: Float32Array
+    velocities: Float32Array
+    path: Float32Array
+    path_free: NDArray[np.bool_]
+    path_spacing: float
+    remaining: float
+    goal: tuple[float, float, float]
+    goal_tolerance: float
+    costmap: Costmap
+    robot: tuple[float, float]
+    discs: Float32Array
+    collided: NDArray[np.bool_] = field(init=False)
+    furthest: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.collided = np.zeros(self.poses.shape[2], dtype=bool)
+        self.furthest = int(furthest_reached(self.poses, self.path, 4))
+
+    @property
+    def samples(self) -> int:
+        """Number of trajectories."""
+        return int(self.poses.shape[2])
+
+
+class Critic(ABC):
+    """One term of a trajectory's cost."""
+
+    def __init__(self, weight: float) -> None:
+        self.weight = weight
+
+    @abstractmethod
+    def score(self, rollouts: Rollouts) -> Float32Array | None:
+        """Cost (samples,) without the weight; None where the critic has nothing to say (e.g. the goal is far)."""

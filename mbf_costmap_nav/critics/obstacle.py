@@ -1,0 +1,43 @@
+"""Keeps away from obstacles: mean cell cost along the way, and the mark of those that collide.
+
+The footprint stands as a row of discs of the inscribed radius along the robot's x axis, each looked up as one cell of
+the inflated map. Corners stick out of the discs by up to 0.41 inscribed radii; the controllers check the chosen
+trajectory with the full footprint afterwards.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbf_costmap_nav.costmap import INSCRIBED, UNKNOWN
+from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
+from mbf_costmap_nav.kernels.critics import map_costs
+
+STRIDE = 2
+"""Every how many steps the map is looked up: at 0.05 s and 0.5 m/s every 5 cm, one cell."""
+COLLISION = 1.0e6
+"""Cost of a collision, beyond the reach of all other terms."""
+
+_VALUES = np.concatenate([np.arange(INSCRIBED) / 252.0, np.full(UNKNOWN - INSCRIBED, COLLISION), [0.0]])
+VALUE_OF_COST = _VALUES.astype(np.float32)
+"""(256,) what a cell adds: 0..1 by its cost, COLLISION from the inscribed one on, nothing if unknown."""
+
+
+class ObstacleCritic(Critic):
+    """Cost of the cells on the way."""
+
+    def score(self, rollouts: Rollouts) -> Float32Array:
+        """Mean value of the dearest disc; marks ``rollouts.collided``."""
+        grid = rollouts.costmap
+        total = map_costs(
+            grid.cells,
+            grid.resolution,
+            grid.origin_x - rollouts.robot[0],
+            grid.origin_y - rollouts.robot[1],
+            rollouts.poses,
+            rollouts.discs,
+            STRIDE,
+            VALUE_OF_COST,
+        )
+        np.greater_equal(total, np.float32(COLLISION), out=rollouts.collided)
+        return np.asarray(total / np.float32(rollouts.poses.shape[1] / STRIDE))

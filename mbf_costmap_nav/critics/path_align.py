@@ -1,0 +1,27 @@
+"""Keeps on the path: distance between the trajectory and the path after the same length travelled.
+
+Silent near the goal, where the path is too short to compare with, and where the path itself is blocked: a robot that
+is to drive around an obstacle must be allowed to leave the path.
+"""
+
+from __future__ import annotations
+
+from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
+from mbf_costmap_nav.kernels.critics import alignment
+
+ACTIVE_BEYOND = 0.5
+"""Length [m] left on the path below which the goal critics take over."""
+LEAST_FREE = 0.93
+"""Share of free path points below which the path counts as blocked."""
+STRIDE = 4
+"""Every how many steps trajectory and path are compared."""
+
+
+class PathAlignCritic(Critic):
+    """Distance from the path."""
+
+    def score(self, rollouts: Rollouts) -> Float32Array | None:
+        """Mean distance [m] over the steps."""
+        if rollouts.remaining <= ACTIVE_BEYOND or rollouts.path_free.mean() < LEAST_FREE:
+            return None
+        return alignment(rollouts.poses, rollouts.path, rollouts.path_spacing, STRIDE)

@@ -1,0 +1,108 @@
+"""From sampled velocities to scored trajectories: what the sampling controllers (DWA, MPPI) share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_costmap_nav.costmap import INSCRIBED, LETHAL
+from mbf_costmap_nav.critics import ALL_CRITICS, Critic, CriticParameters, Rollouts
+from mbf_costmap_nav.critics.obstacle import COLLISION
+from mbf_costmap_nav.footprint import Footprint
+from mbf_costmap_nav.kernels.rollout import integrate
+from mbf_costmap_nav.path_handling import CUSP_REACHED, ControlCycle
+
+Float32Array = NDArray[np.float32]
+
+PATH_SPACING = 0.1
+"""Distance [m] of the path points the critics compare with."""
+
+
+def build_critics(weights: CriticParameters) -> Mapping[str, Critic]:
+    """All critics that have a weight; the obstacle critic always, because it marks collisions."""
+    chosen = {name: getattr(weights, name) for name in ALL_CRITICS}
+    return {name: ALL_CRITICS[name](weight) for name, weight in chosen.items() if weight > 0.0 or name == "obstacle"}
+
+
+def roll_out(
+    cycle: ControlCycle, velocities: Float32Array, dt: float, reach: float, poses: Float32Array | None = None
+) -> Rollouts:
+    """Integrate velocities (3, steps, samples) and lay out the path ahead for the critics.
+
+    Parameters
+    ----------
+    poses : (3, steps, samples) float32, optional
+        Buffer for the trajectories, overwritten.
+    dt : float
+        Length of a step [s].
+    reach : float
+        Farthest a sample can get [m]; the path is laid out a little beyond, but not past a change of direction.
+    """
+    pose, tracker = cycle.request.pose, cycle.tracker
+    to_cusp = tracker.to_cusp if tracker.to_cusp > CUSP_REACHED else tracker.remaining
+    length = min(1.3 * reach + 6 * PATH_SPACING, to_cusp)
+    lengths = tracker.progress + np.append(np.arange(0.0, length, PATH_SPACING), length)
+    points = np.column_stack([np.interp(lengths, tracker.lengths, tracker.points[:, axis]) for axis in range(2)])
+    goal = tracker.goal
+    poses = np.empty_like(velocities) if poses is None else poses
+    integrate(velocities, pose.yaw, dt, poses)
+    return Rollouts(
+        poses,
+        velocities,
+        (points - (pose.x, pose.y)).astype(np.float32),
+        _free_points(cycle, points),
+        PATH_SPACING,
+        tracker.remaining,
+        (goal.x - pose.x, goal.y - pose.y, goal.yaw),
+        cycle.goal_tolerance,
+        cycle.costmap,
+        (pose.x, pose.y),
+        footprint_discs(cycle.footprint.footprint),
+    )
+
+
+def _free_points(cycle: ControlCycle, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(m,) bool: whether path points lie in cells below the inscribed cost; unknown and outside are free."""
+    cells, inside = cycle.costmap.world_to_cells(points)
+    free = np.ones(len(points), dtype=bool)
+    costs = cycle.costmap.cells[cells[inside, 1], cells[inside, 0]]
+    free[inside] = (costs < INSCRIBED) | (costs > LETHAL)
+    return free
+
+
+def score(critics: Mapping[str, Critic], rollouts: Rollouts, driving_backward: bool) -> Float32Array:
+    """Sum (samples,) of the weighted critics; a collision costs ``COLLISION``.
+
+    Driving backward is not held against a robot on a part of the path that leads backward.
+    """
+    total = np.zeros(rollouts.samples, dtype=np.float32)
+    for name, critic in critics.items():
+        if name == "prefer_forward" and driving_backward:
+            continue
+        cost = critic.score(rollouts)
+        if cost is not None:
+            total += np.float32(critic.weight) * cost
+    total[rollouts.collided] += np.float32(COLLISION)
+    return total
+
+
+def footprint_discs(footprint: Footprint) -> Float32Array:
+    """Offsets (k,) [m] along x of discs of the inscribed radius that cover the footprint's middle line."""
+    if len(footprint.vertices) < 3:
+        return np.zeros(1, dtype=np.float32)
+    front, back = footprint.vertices[:, 0].max(), footprint.vertices[:, 0].min()
+    first, last = back + footprint.inscribed_radius, front - footprint.inscribed_radius
+    if last - first < 0.25 * footprint.inscribed_radius:
+        return np.zeros(1, dtype=np.float32)
+    count = 1 + math.ceil((last - first) / footprint.inscribed_radius)
+    return np.linspace(first, last, count).astype(np.float32)
+
+
+def is_free(cycle: ControlCycle, trajectory: Float32Array) -> bool:
+    """Whether the full footprint is free of lethal cells along a trajectory (3, steps) relative to the robot."""
+    poses = np.ascontiguousarray(trajectory.T, dtype=np.float64)
+    poses[:, :2] += (cycle.request.pose.x, cycle.request.pose.y)
+    return cycle.footprint.first_collision(cycle.costmap, poses) < 0

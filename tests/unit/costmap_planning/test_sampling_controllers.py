@@ -1,0 +1,212 @@
+"""DWA and MPPI: their kernels against naive twins, their sampling rules, and closed loops in a room."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.plugins import ControlRequest, PlanRequest
+from mbf_costmap_nav.controllers.dwa import DwaController, sample_velocities, sample_window
+from mbf_costmap_nav.controllers.mppi import MppiController
+from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.critics.obstacle import VALUE_OF_COST
+from mbf_costmap_nav.kernels.critics import alignment, furthest_reached, map_costs, mean_angle_to
+from mbf_costmap_nav.kernels.rollout import add_noise, clip_velocities, integrate
+from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
+from mbf_costmap_nav.trajectory_scoring import footprint_discs
+
+CONTROLLERS = [DwaController, MppiController]
+FREE_MAP = Costmap(np.zeros((200, 200), dtype=np.uint8), 0.05, -5.0, -5.0)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def random_velocities(seed, steps=12, samples=7, spread=1.0):
+    return (np.random.default_rng(seed).standard_normal((3, steps, samples)) * spread).astype(np.float32)
+
+
+# ------------------------------------------------------------------------------------------------ kernels
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds, yaw=st.floats(-3, 3))
+def test_integrated_poses_equal_step_by_step_rotation(seed, yaw):
+    velocities = random_velocities(seed)
+    poses = np.empty_like(velocities)
+    integrate(velocities, yaw, 0.05, poses)
+    x, y, heading = np.zeros(7), np.zeros(7), np.full(7, yaw)
+    for t in range(12):
+        vx, vy, wz = velocities[:, t].astype(float)
+        x += (vx * np.cos(heading) - vy * np.sin(heading)) * 0.05
+        y += (vx * np.sin(heading) + vy * np.cos(heading)) * 0.05
+        heading += wz * 0.05
+    np.testing.assert_allclose(poses[:, -1], [x, y, heading], atol=1e-5)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds, radius=st.sampled_from([0.0, 0.5]))
+def test_clipped_velocities_keep_all_limits(seed, radius):
+    velocities = random_velocities(seed, spread=3.0)
+    now, low, high = np.zeros(3), np.array([-0.3, -0.2, -1.0]), np.array([0.5, 0.2, 1.0])
+    change = np.array([0.15, 0.15, 0.2])
+    clip_velocities(velocities, *(a.astype(np.float32) for a in (now, low, high, change)), radius)
+    steps = np.diff(np.concatenate([np.zeros((3, 1, 7)), velocities], axis=1), axis=1)
+    assert (velocities >= low[:, None, None] - 1e-6).all() and (velocities <= high[:, None, None] + 1e-6).all()
+    assert (abs(steps[:2]) <= change[:2, None, None] + 1e-6).all()
+    if radius:
+        assert (abs(velocities[2]) * radius <= abs(velocities[0]) + 1e-6).all()
+
+
+def test_noise_is_scaled_and_added_to_the_nominal_sequence():
+    nominal, noise = random_velocities(0)[:, :, 0], random_velocities(1, samples=5)
+    velocities, deviation = np.empty_like(noise), np.array([1.0, 0.0, 2.0], dtype=np.float32)
+    add_noise(nominal, noise, deviation, velocities)
+    np.testing.assert_allclose(velocities, nominal[:, :, None] + deviation[:, None, None] * noise, rtol=1e-6)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds, disc=st.sampled_from([0.0, 0.2]))
+def test_map_costs_equal_single_look_ups(seed, disc):
+    rng = np.random.default_rng(seed)
+    grid = Costmap(rng.choice([0, 50, 252, 253, 254, 255], (20, 20)).astype(np.uint8), 0.1, -1.0, -1.0)
+    poses = random_velocities(seed, spread=0.6)
+    total = map_costs(grid.cells, 0.1, -1.0, -1.0, poses, np.array([disc], dtype=np.float32), 2, VALUE_OF_COST)
+    expected = np.zeros(7)
+    for t in range(1, 12, 2):
+        for n in range(7):
+            x, y, yaw = poses[:, t, n].astype(float)
+            cost = grid.cost_at(x + disc * math.cos(yaw), y + disc * math.sin(yaw))
+            expected[n] += 0.0 if cost is None else VALUE_OF_COST[cost]
+    np.testing.assert_allclose(total, expected, rtol=1e-4)
+
+
+def test_alignment_of_a_trajectory_on_the_path_is_zero_and_beside_it_the_distance():
+    path = np.column_stack([np.arange(0, 2, 0.1), np.zeros(20)]).astype(np.float32)
+    poses = np.zeros((3, 12, 2), dtype=np.float32)
+    poses[0] = 0.1 * np.arange(1, 13)[:, None]
+    poses[1, :, 1] = 0.3
+    off = alignment(poses, path, 0.1, 1)
+    assert off[0] == pytest.approx(0.0, abs=1e-5) and off[1] == pytest.approx(0.36, abs=0.1)
+    assert furthest_reached(poses, path, 1) == 12
+
+
+def test_angles_are_wrapped_in_the_heading_term():
+    poses = np.full((3, 4, 1), math.pi - 0.1, dtype=np.float32)
+    assert mean_angle_to(poses, -math.pi + 0.1)[0] == pytest.approx(0.2, abs=1e-5)
+
+
+# ----------------------------------------------------------------------------------------------- sampling
+@pytest.mark.parametrize(
+    ("low", "high", "count", "expected"),
+    [
+        pytest.param(-30, 30, 1, [-30, 0, 30], id="F075"),
+        pytest.param(10, 30, 1, [10, 30], id="F076"),
+        pytest.param(-30, 30, 4, [-30, -10, 0, 10, 30], id="F077"),
+        pytest.param(-10, 50, 4, [-10, 0, 10, 30, 50], id="F078"),
+    ],
+)
+def test_velocity_samples(low, high, count, expected):
+    assert sample_velocities(low, high, count).tolist() == pytest.approx(expected)
+
+
+def test_f079_a_tiny_asymmetry_adds_zero():
+    assert len(sample_velocities(-10.00001, 10, 3)) == 4
+
+
+@pytest.mark.parametrize(
+    ("current", "low", "high", "change", "count", "expected"),
+    [
+        pytest.param(2, 0, 5, 1, 2, [1, 3], id="F080"),
+        pytest.param(2, 1.5, 2.5, 1, 2, [1.5, 2.5], id="F081"),
+        pytest.param(2, 0, 5, 0.5, 2, [1.5, 2.5], id="F082"),
+        pytest.param(2, 0, 5, 1, 3, [1, 2, 3], id="F083-three"),
+        pytest.param(2, 0, 5, 1, 5, [1, 1.5, 2, 2.5, 3], id="F083-five"),
+        pytest.param(0, -5, 5, 1, 2, [-1, 0, 1], id="F084"),
+        pytest.param(0, -5, 5, 1, 4, [-1, -1 / 3, 0, 1 / 3, 1], id="F085"),
+    ],
+)
+def test_dynamic_window(current, low, high, change, count, expected):
+    assert sample_window(current, low, high, change, count).tolist() == pytest.approx(expected)
+
+
+def test_discs_cover_a_long_robot_and_one_disc_a_square_one(make_plugin):
+    from mbf_costmap_nav.footprint import Footprint
+
+    square = Footprint([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]])
+    long = Footprint([[0.6, 0.2], [-0.4, 0.2], [-0.4, -0.2], [0.6, -0.2]])
+    assert footprint_discs(square).tolist() == [0.0]
+    assert footprint_discs(long)[[0, -1]].tolist() == pytest.approx([-0.2, 0.4])
+
+
+# --------------------------------------------------------------------------------------------- controllers
+def straight(length=3.0):
+    return Path.from_points([(x, 0.0, 0.0) for x in np.linspace(0.0, length, 31)])
+
+
+@pytest.mark.parametrize("controller_class", CONTROLLERS)
+def test_a_straight_path_is_driven_forward(make_plugin, controller_class):
+    controller = make_plugin(controller_class, FREE_MAP)
+    controller.set_plan(straight())
+    for _ in range(5):
+        result = controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist.planar(0.2)))
+    assert result.command.vx > 0.2 and abs(result.command.wz) < 0.3
+
+
+@pytest.mark.parametrize("controller_class", CONTROLLERS)
+def test_a_robot_walled_in_has_no_valid_command_and_stands(make_plugin, controller_class):
+    cells = np.full((200, 200), 253, dtype=np.uint8)
+    controller = make_plugin(controller_class, Costmap(cells, 0.05, -5.0, -5.0))
+    controller.set_plan(straight())
+    result = controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist()))
+    assert result.outcome == ExePathOutcome.NO_VALID_CMD and result.command is None
+
+
+@pytest.mark.parametrize("controller_class", CONTROLLERS)
+def test_the_same_seed_gives_the_same_commands(make_plugin, room, controller_class):
+    def commands():
+        controller = make_plugin(controller_class, room, seed=7)
+        controller.set_plan(Path.from_points([(x, 1.0, 0.0) for x in np.linspace(1, 3, 21)]))
+        request = ControlRequest(Pose.planar(1.0, 1.1, 0.3), Twist.planar(0.2))
+        return [controller.compute_velocity_commands(request).command for _ in range(3)]
+
+    assert commands() == commands()
+
+
+@pytest.mark.parametrize("controller_class", CONTROLLERS)
+def test_it_drives_through_the_room_without_touching_anything(make_plugin, room, closed_loop, controller_class):
+    planner = make_plugin(ThetaStarPlanner, room, cost_factor=10.0)
+    plan = planner.make_plan(PlanRequest(Pose.planar(1, 1), Pose.planar(7, 1, math.pi / 2)))
+    controller = make_plugin(controller_class, room)
+    robot, outcome, _ = closed_loop.follow(controller, plan.path, room, start=(1, 1, 0), angle_tolerance=0.4)
+    assert outcome == 0
+    vertices = np.array([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]])
+    assert not any(closed_loop.lethal_under(room, vertices, state) for state in robot.trace[::5])
+
+
+def test_mppi_drives_around_an_obstacle_that_is_on_the_path(make_plugin, closed_loop):
+    cells = np.zeros((200, 200), dtype=np.uint8)
+    cells[97:104, 128:134] = 254
+    costmap = Costmap(closed_loop.inflated(cells, 0.05, decay=4.0), 0.05, -5.0, -5.0)
+    robot, outcome, _ = closed_loop.follow(make_plugin(MppiController, costmap), straight(), costmap, start=(0, 0, 0))
+    assert outcome == 0 and max(abs(state[1]) for state in robot.trace) > 0.3
+
+
+def test_an_ackermann_robot_gets_steering_angles_within_its_turning_circle(make_plugin):
+    controller = make_plugin(
+        MppiController, FREE_MAP, motion_model="ackermann", wheelbase=0.4, min_turning_radius=0.8, batch_size=500
+    )
+    controller.set_plan(Path.from_points([(0, y, 0.0) for y in np.linspace(0, 3, 31)]))
+    for _ in range(5):
+        command = controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist.planar(0.3))).command
+    assert isinstance(command, AckermannCommand)
+    assert 0.0 < command.steering_angle <= math.atan(0.4 / 0.8) + 1e-3
+
+
+def test_an_omnidirectional_robot_drives_sideways(make_plugin):
+    weights = {"twirling": 20.0, "path_angle": 0.0}
+    controller = make_plugin(MppiController, FREE_MAP, motion_model="omni", batch_size=1000, critics=weights)
+    controller.set_plan(Path.from_points([(0, y, 0.0) for y in np.linspace(0, 3, 31)]))
+    for _ in range(10):
+        command = controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist())).command
+    assert command.vy > 0.05
