@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.repair import MeshError
 
 FloatArray = NDArray[np.float64]
@@ -91,6 +92,19 @@ def write_lvr2_mesh(
         group["geometry/face_indices"] = np.asarray(faces, dtype=np.uint32)
         for name, values in (vertex_attributes or {}).items():
             group[f"vertex_attributes/{name}"] = np.asarray(values, dtype=np.float32).reshape(len(vertices), -1)
+
+
+def write_lvr2_map(path: Path, mesh_map: MeshMap, part: str = "mesh") -> None:
+    """Write a map with the costs of all its layers, in the caller's numbering as far as vertices come from the caller.
+
+    Vertices that densifying added follow after them; merged and dropped ones are not in the file.
+    """
+    source = mesh_map.internal_to_input.astype(np.int64)
+    order = np.argsort(np.where(source >= 0, source, np.iinfo(np.int64).max), kind="stable")
+    position = np.argsort(order)
+    attributes: dict[str, NDArray[Any]] = {name: layer.costs[order] for name, layer in mesh_map.layers.items()}
+    attributes["vertex_normals"] = mesh_map.vertex_normals[order]
+    write_lvr2_mesh(path, mesh_map.vertices[order], position[mesh_map.faces], attributes, part)
 
 
 def _geometry(file: h5py.File, path: Path, part: str) -> Any:

@@ -6,7 +6,7 @@ import trimesh
 
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.layers.roughness import RoughnessLayer
-from mbf_mesh_nav.lvr2_io import read_lvr2_vertex_attributes, write_lvr2_mesh
+from mbf_mesh_nav.lvr2_io import read_lvr2_vertex_attributes, write_lvr2_map, write_lvr2_mesh
 from mbf_mesh_nav.map_builder import (
     LayerGraphError,
     MeshMapParameters,
@@ -152,6 +152,21 @@ def test_lvr2_file_round_trip_with_layer_costs(tmp_path):
     assert attributes["vertex_normals"].shape == (len(VERTICES), 3)
     with pytest.raises(MeshError, match="not overwritten"):
         write_lvr2_mesh(file, VERTICES, FACES)
+
+
+def test_map_is_saved_with_its_layers_in_the_callers_numbering(tmp_path):
+    order = np.random.default_rng(1).permutation(len(VERTICES))
+    shuffled, corners = VERTICES[order], np.argsort(order)[FACES]
+    parameters = MeshMapParameters(layers=[{"name": "rough", "type": "roughness"}])
+    mesh = build_mesh_map(parameters, vertices=shuffled, faces=corners)
+
+    write_lvr2_map(tmp_path / "map.h5", mesh)
+
+    vertices, faces = read_mesh(tmp_path / "map.h5")
+    np.testing.assert_allclose(vertices, shuffled, atol=1e-6)
+    assert {tuple(sorted(face)) for face in faces.tolist()} == {tuple(sorted(face)) for face in corners.tolist()}
+    stored = read_lvr2_vertex_attributes(tmp_path / "map.h5")["rough"]
+    np.testing.assert_array_equal(stored, mesh.to_input_order(mesh.layers["rough"].costs).astype(np.float32))
 
 
 def test_old_lvr2_layout_is_read(tmp_path):
