@@ -1,0 +1,379 @@
+"""The layered costmap: update windows, the rolling window, snapshots, currency, clearing, filters, sensors."""
+
+import math
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from mbf_abstract.geometry import Pose
+from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, CellBox, Costmap
+from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.map_io import MapError, MapMode, OccupancyMap, save_map
+
+HERE = Pose.planar(5.0, 5.0)
+
+
+def lethal_cells(costmap):
+    return {(int(ix), int(iy)) for iy, ix in np.argwhere(costmap.snapshot().cells == LETHAL)}
+
+
+# --------------------------------------------------------------------------------------------- update windows
+LAYERS = ("obstacle", "denoise", "inflation", "keepout")
+
+
+def with_windows(seeing):
+    """A map whose last layer comes after the inflation and so must not be inflated."""
+    laser = seeing["sources"]["laser"] | {"observation_persistence": 0.0}
+    parameters = CostmapParameters.model_validate(
+        {
+            "resolution": 1.0,
+            "width": 20.0,
+            "height": 15.0,
+            "robot_radius": 0.0,
+            "footprint_padding": 0.0,
+            "layers": [{"name": name, "type": name} for name in LAYERS],
+        }
+    )
+    blocks = {
+        "obstacle": seeing | {"sources": {"laser": laser}},
+        "denoise": {"minimal_group_size": 3, "group_connectivity_type": 4},
+        "inflation": {"inflation_radius": 2.0, "cost_scaling_factor": 0.5},
+        "keepout": {"zones": [{"name": "door", "polygon": [[15.5, 3.5], [16.5, 3.5], [16.5, 4.5]]}]},
+    }
+    return build_layered_costmap(parameters, blocks)
+
+
+SCANS = st.lists(
+    st.lists(st.tuples(st.floats(0.1, 19.9), st.floats(0.1, 14.9)), min_size=1, max_size=8), min_size=1, max_size=5
+)
+
+
+@given(SCANS)
+@settings(max_examples=30, deadline=None)
+def test_updating_changed_boxes_gives_the_same_map_as_updating_everything(scans):
+    laser = {"obstacle_max_range": 50.0, "raytrace_max_range": 50.0, "expected_update_rate": 0.0}
+    by_boxes, at_once = (
+        with_windows({"footprint_clearing_enabled": False, "sources": {"laser": laser}}) for _ in range(2)
+    )
+    by_boxes.update(None, 0.0)
+    for stamp, points in enumerate(scans):
+        for costmap in (by_boxes, at_once):
+            costmap.insert_points("laser", [(*p, 0.0) for p in points], (10.0, 7.0, 0.0), float(stamp))
+        box = by_boxes.update(None, float(stamp))
+        at_once.set_footprint(at_once.unpadded_footprint)  # recomputes every cell
+        assert at_once.update(None, float(stamp)) == at_once.geometry.box
+        assert np.array_equal(by_boxes.snapshot().cells, at_once.snapshot().cells), box
+
+
+def test_only_the_box_around_a_change_is_recomputed(build, seeing):
+    costmap = build("obstacle", obstacle=seeing, width=50.0, height=50.0)
+    costmap.update(None, 0.0)
+    costmap.insert_points("laser", [(12.5, 10.5, 0.0)], (10.5, 10.5, 0.0), 0.0)
+    assert costmap.update(None, 0.1) == CellBox(10, 10, 13, 11)
+
+
+def test_nothing_new_recomputes_nothing_and_keeps_the_snapshot(build):
+    costmap = build("static", "inflation")
+    assert costmap.update(None, 0.0) == costmap.geometry.box
+    snapshot = costmap.snapshot()
+    assert costmap.update(None, 1.0).empty
+    assert costmap.snapshot() is snapshot
+
+
+def test_a_snapshot_is_read_only_and_keeps_its_content(build, seeing):
+    costmap = build("obstacle", obstacle=seeing)
+    before = costmap.snapshot()
+    costmap.insert_points("laser", [(5.0, 5.0, 0.0)], (0.0, 0.0, 0.0), 0.0)
+    costmap.update(None, 0.0)
+    assert before.cost(5, 5) == FREE and costmap.snapshot().cost(5, 5) == LETHAL
+    assert costmap.snapshot().version > before.version
+    with pytest.raises(ValueError, match="read-only"):
+        before.cells[0, 0] = 1
+
+
+# --------------------------------------------------------------------------------------------- rolling window
+@pytest.fixture
+def rolling(build, seeing):
+    seeing["sources"]["laser"]["observation_persistence"] = 0.0
+    return build("obstacle", obstacle=seeing, rolling_window=True, width=10.0, height=6.0, track_unknown_space=True)
+
+
+def test_a_rolling_window_keeps_the_robot_in_its_middle(rolling):
+    rolling.update(Pose.planar(103.2, -7.9), 0.0)
+    snapshot = rolling.snapshot()
+    assert (snapshot.origin_x, snapshot.origin_y) == (98.0, -11.0)
+    assert snapshot.world_to_cell(103.2, -7.9) == (5, 3)
+
+
+def test_marks_stay_where_they_are_in_the_world_while_the_window_moves(rolling):
+    rolling.update(Pose.planar(0.0, 0.0), 0.0)
+    rolling.insert_points("laser", [(2.5, 1.5, 0.0)], (0.0, 0.0, 0.0), 0.0)
+    rolling.update(Pose.planar(0.0, 0.0), 0.0)
+    rolling.insert_points("laser", [(0.5, -2.5, 0.0)], (0.5, -1.5, 0.0), 1.0)
+    for step in range(1, 4):
+        rolling.update(Pose.planar(float(step), 0.0), float(step))
+        assert rolling.snapshot().cost_at(2.5, 1.5) == LETHAL
+    assert rolling.snapshot().cost_at(7.5, 0.5) == UNKNOWN, "new ground comes in unknown"
+
+
+def test_what_leaves_the_window_is_forgotten(rolling):
+    rolling.insert_points("laser", [(2.5, 1.5, 0.0)], (0.0, 0.0, 0.0), 0.0)
+    rolling.update(Pose.planar(0.0, 0.0), 0.0)
+    rolling.insert_points("laser", np.zeros((0, 3)), (50.0, 0.0, 0.0), 1.0)
+    rolling.update(Pose.planar(50.0, 0.0), 1.0)
+    rolling.update(Pose.planar(0.0, 0.0), 2.0)
+    assert rolling.snapshot().cost_at(2.5, 1.5) == UNKNOWN
+
+
+def test_without_a_pose_a_rolling_window_stays(rolling):
+    rolling.update(Pose.planar(20.0, 0.0), 0.0)
+    rolling.update(None, 1.0)
+    assert rolling.snapshot().contains(20.0, 0.0)
+
+
+@given(st.lists(st.tuples(st.integers(-12, 12), st.integers(-12, 12)), min_size=1, max_size=6))
+@settings(max_examples=25, deadline=None)
+def test_a_static_map_under_a_rolling_window_is_the_same_as_sampled_anew(moves):
+    world = Costmap(np.random.default_rng(3).integers(0, 255, (20, 20)).astype(np.uint8), 1.0, -10.0, -10.0)
+    parameters = CostmapParameters.model_validate(
+        {"resolution": 1.0, "width": 8.0, "height": 6.0, "rolling_window": True, "track_unknown_space": True}
+        | {"layers": [{"name": "walls", "type": "static"}]}
+    )
+    rolled = build_layered_costmap(parameters, static_map=world)
+    x = y = 0
+    for dx, dy in moves:
+        x, y = x + dx, y + dy
+        rolled.update(Pose.planar(x, y), 0.0)
+        fresh = build_layered_costmap(parameters, static_map=world)
+        fresh.update(Pose.planar(x, y), 0.0)
+        assert np.array_equal(rolled.snapshot().cells, fresh.snapshot().cells)
+
+
+def test_a_pose_in_another_frame_is_refused(build):
+    with pytest.raises(ValueError, match="'odom'"):
+        build("static").update(Pose.planar(0.0, 0.0, frame_id="odom"), 0.0)
+
+
+# ---------------------------------------------------------------------------------------------------- currency
+def test_a_map_is_not_current_before_its_first_update_nor_long_after_the_last(build):
+    costmap = build("static", max_age=2.0)
+    assert costmap.currency_problem(0.0) == "the costmap has not been updated yet"
+    costmap.update(None, 10.0)
+    assert costmap.is_current(12.0)
+    assert "2.50 s old" in costmap.currency_problem(12.5)
+
+
+def test_a_silent_sensor_makes_the_map_not_current_by_default(build):
+    costmap = build("obstacle", obstacle={"sources": {"laser": {}}})
+    costmap.update(None, 0.0)
+    assert "'laser' has not sent anything" in costmap.currency_problem(0.0)
+    costmap.insert_points("laser", [(1.0, 1.0, 0.0)], (0.0, 0.0, 0.0), 0.0)
+    costmap.update(None, 1.0)
+    assert costmap.is_current(1.0)
+    costmap.update(None, 1.5)
+    assert "layer 'obstacle': observation source 'laser' is silent for 1.50 s" in costmap.currency_problem(1.5)
+
+
+def test_an_unknown_source_is_refused_with_the_known_ones(build, seeing):
+    costmap = build("obstacle", obstacle=seeing)
+    with pytest.raises(ValueError, match=r"'lidar', known are \['laser'\]"):
+        costmap.insert_points("lidar", [(1.0, 1.0, 0.0)], (0.0, 0.0, 0.0), 0.0)
+
+
+# ----------------------------------------------------------------------------------------------------- sensors
+def test_a_scan_clears_along_misses_and_marks_only_hits(build, seeing):
+    seeing["sources"]["laser"]["observation_persistence"] = 0.0
+    costmap = build("obstacle", obstacle=seeing)
+    costmap.insert_points("laser", [(3.5, 5.5, 0.0), (3.5, 3.5, 0.0)], (0.5, 5.5, 0.0), 0.0)
+    costmap.update(None, 0.0)
+    costmap.insert_scan("laser", (0.5, 5.5, 0.0), [(9.5, 5.5, 0.0), (0.5, 8.5, 0.0)], [False, True], 1.0)
+    costmap.update(None, 1.0)
+    assert lethal_cells(costmap) == {(3, 3), (0, 8)}
+
+
+def test_rays_with_ends_that_are_not_finite_are_dropped(build, seeing):
+    costmap = build("obstacle", obstacle=seeing)
+    costmap.insert_scan("laser", (0.5, 0.5, 0.0), [(np.inf, 0.0, 0.0), (np.nan, 0.0, 0.0)], [True, True], 0.0)
+    costmap.update(None, 0.0)
+    assert lethal_cells(costmap) == set()
+
+
+def test_the_ground_under_the_robot_is_freed(build, seeing):
+    outline = [(1.4, 1.4), (-1.4, 1.4), (-1.4, -1.4), (1.4, -1.4)]
+    seeing |= {"footprint_clearing_enabled": True}
+    costmap = build("obstacle", obstacle=seeing, outline=outline)
+    costmap.insert_points("laser", [(5.5, 5.5, 0.0), (8.5, 5.5, 0.0)], (9.5, 5.5, 0.0), 0.0)
+    costmap.update(Pose.planar(5.5, 5.5), 0.0)
+    assert lethal_cells(costmap) == {(8, 5)}
+
+
+def test_persistent_observations_come_back_after_a_ray_cleared_them(build, seeing):
+    seeing["sources"]["laser"]["observation_persistence"] = 1.0
+    costmap = build("obstacle", obstacle=seeing)
+    costmap.insert_points("laser", [(3.5, 5.5, 0.0)], (0.5, 5.5, 0.0), 0.0)
+    costmap.insert_scan("laser", (0.5, 5.5, 0.0), [(9.5, 5.5, 0.0)], [False], 0.5)
+    costmap.update(None, 0.5)
+    assert lethal_cells(costmap) == {(3, 5)}
+    costmap.update(None, 1.2)
+    assert lethal_cells(costmap) == set(), "the older one is out of use"
+
+
+def test_a_voxel_column_keeps_what_a_higher_ray_passes_over(build, seeing):
+    seeing["sources"]["laser"]["observation_persistence"] = 0.0
+    costmap = build("voxel", voxel=seeing)
+    costmap.insert_points("laser", [(5.5, 5.5, 0.1)], (0.5, 5.5, 0.1), 0.0)
+    costmap.update(None, 0.0)
+    costmap.insert_scan("laser", (0.5, 5.5, 1.5), [(9.5, 5.5, 1.5)], [False], 1.0)
+    costmap.update(None, 1.0)
+    assert lethal_cells(costmap) == {(5, 5)}
+    costmap.insert_scan("laser", (0.5, 5.5, 0.1), [(9.5, 5.5, 0.1)], [False], 2.0)
+    costmap.update(None, 2.0)
+    assert lethal_cells(costmap) == set()
+
+
+def test_voxels_move_with_the_window_and_are_cleared_by_area(build, seeing):
+    seeing["sources"]["laser"]["observation_persistence"] = 0.0
+    costmap = build("voxel", voxel=seeing, rolling_window=True)
+    costmap.insert_points("laser", [(2.5, 1.5, 0.5)], (0.0, 0.0, 0.5), 0.0)
+    costmap.update(Pose.planar(0.0, 0.0), 0.0)
+    costmap.insert_points("laser", np.zeros((0, 3)), (2.0, 0.0, 0.5), 1.0)
+    costmap.update(Pose.planar(2.0, 0.0), 1.0)
+    assert costmap.snapshot().cost_at(2.5, 1.5) == LETHAL
+    costmap.clear_area(2.5, 1.5, 6.0, inside=True)
+    costmap.update(Pose.planar(2.0, 0.0), 2.0)
+    assert lethal_cells(costmap) == set()
+
+
+def test_a_sonar_that_is_cleared_forgets_its_readings(build):
+    block = {"sources": {"sonar": {"field_of_view": math.radians(20.0)}}}
+    costmap = build("range_sensor", range_sensor=block)
+    costmap.insert_scan("sonar", (2.0, 5.5, 0.0), [(5.5, 5.5, 0.0)], [True], 0.0)
+    costmap.update(None, 0.0)
+    assert lethal_cells(costmap) == {(5, 5)} and costmap.is_current(0.5) and not costmap.is_current(1.5)
+    costmap.clear()
+    costmap.update(None, 0.1)
+    assert lethal_cells(costmap) == set()
+
+
+# ---------------------------------------------------------------------------------------------------- clearing
+def test_clearing_everything_returns_to_the_static_map(build, seeing):
+    costmap = build("static", "obstacle", obstacle=seeing)
+    costmap.update(None, 0.0)
+    walls = lethal_cells(costmap)
+    costmap.insert_points("laser", [(1.5, 5.5, 0.0)], (0.5, 5.5, 0.0), 0.0)
+    costmap.update(None, 0.0)
+    costmap.clear_area(5.0, 5.0, 30.0, inside=True)
+    costmap.update(None, 0.1)
+    assert lethal_cells(costmap) == set()
+    assert costmap.clear() == ["static", "obstacle"]
+    costmap.update(None, 0.2)
+    assert lethal_cells(costmap) == walls
+
+
+def test_clearing_an_unknown_layer_names_the_known_ones(build):
+    with pytest.raises(KeyError, match="no layer 'laser', only"):
+        build("static").clear(["laser"])
+
+
+# ----------------------------------------------------------------------------------------------------- filters
+ZONE = {"name": "stairs", "polygon": [[2.5, 2.5], [4.5, 2.5], [4.5, 3.5], [2.5, 3.5]], "speed_limit": 0.3}
+
+
+def test_a_keep_out_polygon_is_lethal_and_survives_clearing(build, tmp_path):
+    (tmp_path / "zones.yaml").write_text(yaml.safe_dump({"zones": [ZONE]}))
+    costmap = build("keepout", keepout={"zones_file": str(tmp_path / "zones.yaml")})
+    costmap.clear()
+    costmap.update(None, 0.0)
+    assert lethal_cells(costmap) == {(x, y) for x in (2, 3, 4) for y in (2, 3)}
+
+
+def test_a_keep_out_mask_of_another_resolution_raises_costs(build, tmp_path):
+    occupancy = np.zeros((20, 20), dtype=np.uint8)
+    occupancy[4:6, 6:8], occupancy[8:10, 8:10] = 100, 50
+    save_map(tmp_path / "mask.yaml", OccupancyMap(occupancy, 0.5), mode=MapMode.SCALE, occupied_thresh=0.6)
+    costmap = build("keepout", keepout={"mask_file": str(tmp_path / "mask.yaml")}, rolling_window=True)
+    costmap.update(HERE, 0.0)
+    snapshot = costmap.snapshot()
+    assert (snapshot.cost_at(3.5, 2.5), snapshot.cost_at(4.5, 4.5), snapshot.cost_at(0.5, 0.5)) == (254, 127, 0)
+
+
+def test_speed_limits_come_from_zones_and_masks(build, tmp_path):
+    occupancy = np.full((10, 10), 0, dtype=np.uint8)
+    occupancy[8, 8] = 75
+    save_map(tmp_path / "mask.yaml", OccupancyMap(occupancy, 1.0), mode=MapMode.SCALE)
+    block = {"zones": [ZONE], "mask_file": str(tmp_path / "mask.yaml"), "base": 1.0, "multiplier": -0.01}
+    costmap = build("speed_limit", speed_limit=block)
+    limits = [costmap.speed_limit(x, y, 1.5) for x, y in ((3.5, 3.0), (8.5, 8.5), (6.5, 6.5), (50.0, 50.0))]
+    assert limits == pytest.approx([0.3, 0.25, 1.5, 1.5])
+    percent = build("speed_limit", speed_limit={"zones": [ZONE | {"speed_limit": 40.0}], "limit_type": "percent"})
+    assert percent.speed_limit(3.5, 3.0, 1.5) == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize("text", ["zones: [{name: a, polygon: [[0, 0], [1, 1]]}]", "zones: 3", "[", "area: []"])
+def test_a_bad_zones_file_is_refused_by_name(build, tmp_path, text):
+    (tmp_path / "zones.yaml").write_text(text)
+    with pytest.raises(MapError, match=r"zones\.yaml"):
+        build("keepout", keepout={"zones_file": str(tmp_path / "zones.yaml")})
+
+
+# ------------------------------------------------------------------------------------------------ configuration
+def test_bad_configurations_are_refused():
+    def layers(*entries):
+        return CostmapParameters.model_validate({"layers": list(entries)})
+
+    inflation = {"name": "a", "type": "inflation"}
+    with pytest.raises(ValueError, match="need different names"):
+        build_layered_costmap(layers(inflation, inflation))
+    with pytest.raises(ValueError, match="unknown layer type 'inflatoin'"):
+        build_layered_costmap(layers({"name": "a", "type": "inflatoin"}))
+    with pytest.raises(ValueError, match="belong to no layer"):
+        build_layered_costmap(layers(inflation), {"b": {}})
+    with pytest.raises(ValidationError, match="inflation_radius"):
+        build_layered_costmap(layers(inflation), {"a": {"inflation_radius": -1.0}})
+    with pytest.raises(ValueError, match="2000 cells"):
+        build_layered_costmap(
+            CostmapParameters.model_validate({"resolution": 0.05, "layers": [inflation]}),
+            {"a": {"inflation_radius": 100.0}},
+        )
+    with pytest.raises(ValueError, match="needs map_file"):
+        build_layered_costmap(layers({"name": "s", "type": "static"}))
+    with pytest.raises(ValueError, match="is no CostmapLayer"):
+        build_layered_costmap(layers({"name": "a", "type": "pathlib:Path"}))
+
+
+def test_a_disabled_layer_takes_no_part(build):
+    costmap = build("static", static={"enabled": False})
+    costmap.update(None, 0.0)
+    assert lethal_cells(costmap) == set()
+
+
+def test_a_larger_footprint_is_inflated_from_the_next_update_on(build):
+    costmap = build("static", "inflation", inflation={"inflation_radius": 2.0})
+    costmap.update(None, 0.0)
+    before = np.count_nonzero(costmap.snapshot().cells == 253)
+    costmap.set_footprint(type(costmap.footprint).circle(1.5))
+    costmap.update(None, 0.1)
+    assert np.count_nonzero(costmap.snapshot().cells == 253) > before
+    assert costmap.inscribed_radius == pytest.approx(1.5 * math.cos(math.pi / 16))
+
+
+def test_unknown_cells_are_inflated_only_where_told(build):
+    edge = Costmap(np.array([[254, 255, 0, 0, 0, 0]], dtype=np.uint8), 1.0)
+    results = []
+    for block in ({}, {"inflate_unknown": True}, {"inflate_around_unknown": True}):
+        parameters = CostmapParameters.model_validate(
+            {"robot_radius": 0.0, "footprint_padding": 0.0, "track_unknown_space": True}
+            | {"layers": [{"name": n, "type": n} for n in ("static", "inflation")]}
+        )
+        block |= {"inflation_radius": 2.0, "cost_scaling_factor": 1.0}
+        costmap = build_layered_costmap(parameters, {"inflation": block}, static_map=edge)
+        costmap.update(None, 0.0)
+        results.append(costmap.snapshot().cells[0].tolist())
+    e1, e2 = int(252 * math.exp(-1)), int(252 * math.exp(-2))
+    assert results[0] == [254, 255, e2, 0, 0, 0]
+    assert results[1] == [254, e1, e2, 0, 0, 0]
+    assert results[2][2:] == [e1, e2, 0, 0]
