@@ -1,0 +1,214 @@
+"""The three-dimensional scene of a run in viser: ground, walls, goals, and a robot that can be placed.
+
+Shared by the replay and the live view. Lines have a width in pixels, so they can be seen from any distance; walls are
+cut low, as in a doll's house, so that one can look into rooms.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Pose
+from terrain.recording import Recording, RobotShape, Surface
+from terrain.viewer.colours import (
+    BODY,
+    DRIVEN,
+    GOAL,
+    OBSTACLE,
+    PLANNED,
+    SCAN,
+    START,
+    WALL,
+    WHEEL,
+    Colour,
+    linear_for_viewer,
+)
+from terrain.viewer.shading import LIGHT, vertex_colours
+
+FloatArray = NDArray[np.float64]
+Scene = Any  # viser.SceneApi; viser is imported only where a server is started
+
+WALL_CUT = 0.9  # m above the lowest point of the walls
+PIN_HEIGHT = 0.03  # of the length of the route
+LINE_LIFT = 0.12  # m that lines float above the ground, so that bumps do not hide them
+LINE_WIDTH = 4.0  # pixels
+SCAN_POINT = 0.06  # m
+CAMERA_FIELD_OF_VIEW = 0.8  # rad, vertical
+CAMERA_HEIGHT = 0.8  # of the length of the route
+CAMERA_SETBACK = 0.85
+
+
+def add_world(scene: Scene, recording: Recording) -> None:
+    """Add what does not move: light, ground, walls, obstacles, start and goals."""
+    scene.set_up_direction("+z")
+    _add_light(scene)
+    if recording.ground is not None:
+        _add_ground(scene, recording.ground)
+    if recording.walls is not None:
+        _add_solid(scene, "/walls", _cut(recording.walls), WALL)
+    if recording.obstacles is not None:
+        _add_solid(scene, "/obstacles", recording.obstacles, OBSTACLE)
+    height = pin_height(recording)
+    _add_pin(scene, "/start", recording.start, START, "start", height)
+    for index, goal in enumerate(recording.goals):
+        label = "goal" if len(recording.goals) == 1 else f"goal {index + 1}"
+        _add_pin(scene, f"/goal_{index}", goal, GOAL, label, height)
+
+
+def _add_light(scene: Scene) -> None:
+    """A sun in the north-west, as on maps, and enough sky that no wall is black."""
+    scene.configure_environment_map(hdri=None)
+    scene.configure_default_lights(False)
+    scene.add_light_hemisphere("/light/sky", sky_color=(255, 255, 255), ground_color=(190, 180, 165), intensity=2.6)
+    scene.add_light_directional("/light/sun", color=(255, 250, 240), intensity=3.2, position=tuple(100.0 * LIGHT))
+
+
+def _add_ground(scene: Scene, ground: Surface) -> None:
+    import trimesh
+
+    colours = linear_for_viewer(vertex_colours(ground))
+    mesh = trimesh.Trimesh(ground.vertices, ground.faces, vertex_colors=colours, process=False)
+    mesh.vertex_normals  # noqa: B018 - computing them makes the export carry them, else the viewer shades it flat
+    scene.add_mesh_trimesh("/ground", mesh, cast_shadow=False, receive_shadow=False)
+
+
+def _cut(walls: Surface) -> Surface:
+    vertices = walls.vertices.copy()
+    vertices[:, 2] = np.minimum(vertices[:, 2], vertices[:, 2].min(initial=0.0) + WALL_CUT)
+    return Surface(vertices, walls.faces)
+
+
+def _add_solid(scene: Scene, name: str, surface: Surface, colour: Colour) -> None:
+    scene.add_mesh_simple(
+        name, surface.vertices, surface.faces, color=colour, flat_shading=True, side="double",
+        cast_shadow=False, receive_shadow=False,
+    )  # fmt: skip
+
+
+def _add_pin(scene: Scene, name: str, pose: Pose, colour: Colour, label: str, height: float) -> None:
+    """A stick with a ball, and its name."""
+    x, y, z = pose.position
+    ball = (x, y, z + height)
+    segment = np.array([[pose.position, ball]])
+    scene.add_line_segments(f"{name}/stick", segment, colour, thickness=LINE_WIDTH, thickness_units="screen")
+    scene.add_icosphere(f"{name}/ball", radius=0.14 * height, color=colour, position=ball, cast_shadow=False)
+    scene.add_label(f"{name}/label", label, position=(x, y, z + 1.25 * height), anchor="bottom-center")
+
+
+def add_path(scene: Scene, name: str, points: FloatArray, colour: Colour = PLANNED) -> Any:
+    """Add a line through points (m, 3) [m] a little above the ground; None for less than two points."""
+    if len(points) < 2:
+        return None
+    lifted = points + np.array([0.0, 0.0, LINE_LIFT])
+    segments = np.stack([lifted[:-1], lifted[1:]], axis=1).astype(np.float32)
+    return scene.add_line_segments(name, segments, colour, thickness=LINE_WIDTH, thickness_units="screen")
+
+
+def add_track_piece(scene: Scene, name: str, points: FloatArray) -> Any:
+    """Add a piece of the driven track, a hand above the plan so that it covers it."""
+    return add_path(scene, name, points + np.array([0.0, 0.0, 0.05]), DRIVEN)
+
+
+def add_scan(scene: Scene, name: str, points: FloatArray) -> Any:
+    """Add the points a range sensor hit, replacing a node of the same name."""
+    return scene.add_point_cloud(name, points.astype(np.float32), SCAN, point_size=SCAN_POINT, point_shape="circle")
+
+
+def pin_height(recording: Recording) -> float:
+    """Height [m] of markers that can be seen from where the whole route is in the picture."""
+    _, lower, upper = _route(recording)
+    return max(1.2, PIN_HEIGHT * float(np.linalg.norm(upper - lower)))
+
+
+def _route(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Start and goals (k, 3), and the lower and upper corner (3,) of the box around them and the track."""
+    ends = np.array([pose.position for pose in (recording.start, *recording.goals)])
+    points = np.concatenate([ends, recording.poses[:, :3]])
+    return ends, points.min(axis=0), points.max(axis=0)
+
+
+def look_at_route(camera: Any, recording: Recording) -> None:
+    """Put the first camera where start, goals and track are all in the picture, seen slantwise from the side."""
+    ends, lower, upper = _route(recording)
+    middle, length = (lower + upper) / 2.0, max(float(np.linalg.norm(upper - lower)), 6.0)
+    along = ends[-1, :2] - ends[0, :2]
+    side = np.array([along[1], -along[0]]) / max(float(np.linalg.norm(along)), 1e-9)
+    if not side.any():
+        side = np.array([0.0, -1.0])
+    camera.fov = CAMERA_FIELD_OF_VIEW
+    camera.position = (*(middle[:2] + CAMERA_SETBACK * length * side), middle[2] + CAMERA_HEIGHT * length)
+    camera.look_at = tuple(middle)
+
+
+class RobotModel:
+    """Body and wheels of a robot in the scene, and a label on a stick that tells how it does.
+
+    Parameters
+    ----------
+    scene : viser.SceneApi
+    shape : RobotShape
+    label_height : float
+        Where the label floats [m].
+    """
+
+    def __init__(self, scene: Scene, shape: RobotShape, label_height: float) -> None:
+        self._shape = shape
+        self._frame = scene.add_frame("/robot", show_axes=False)
+        top = shape.height
+        body = _prism(shape.footprint * np.array([0.98, 0.78]), 0.6 * shape.wheel_radius, top)
+        _add_solid(scene, "/robot/body", body, BODY)
+        forward = np.array([0.6 * shape.footprint[:, 0].max(), 0.0])
+        nose = _prism(shape.footprint * np.array([0.25, 0.5]) + forward, top, top + 0.03)
+        _add_solid(scene, "/robot/nose", nose, WHEEL)
+        width = 0.64 * shape.wheel_radius
+        self._wheels = [_add_wheel(scene, k, wheel, shape, width) for k, wheel in enumerate(shape.wheels)]
+        stick = np.array([[[0.0, 0.0, shape.height], [0.0, 0.0, label_height]]])
+        scene.add_line_segments("/robot/stick", stick, BODY, thickness=LINE_WIDTH, thickness_units="screen")
+        place = (0.0, 0.0, 1.05 * label_height)
+        self._label = scene.add_label("/robot/label", "", position=place, anchor="bottom-center")
+
+    def place(self, pose: FloatArray, wheel_angles: FloatArray, text: str) -> None:
+        """Move to a pose (7,) x y z qx qy qz qw, turn the wheels to angles (k,) [rad], write the label."""
+        x, y, z, qx, qy, qz, qw = pose.tolist()
+        self._frame.position = (x, y, z)
+        self._frame.wxyz = (qw, qx, qy, qz)
+        for wheel, angle in zip(self._wheels, wheel_angles.tolist(), strict=True):
+            wheel.wxyz = (np.cos(angle / 2.0), 0.0, np.sin(angle / 2.0), 0.0)
+        if self._label.text != text:
+            self._label.text = text
+
+
+def wheel_angles(shape: RobotShape, times: FloatArray, twists: FloatArray) -> FloatArray:
+    """Angles (n, k) [rad] of wheels that roll without slipping, from motion (n, 3) in the base frame."""
+    forward = twists[:, :1] - twists[:, 2:] * shape.wheels[:, 1]
+    steps = np.diff(times, prepend=times[:1])[:, None]
+    return np.asarray(np.cumsum(forward * steps, axis=0) / shape.wheel_radius)
+
+
+def _add_wheel(scene: Scene, index: int, centre: FloatArray, shape: RobotShape, width: float) -> Any:
+    """A frame that turns about y, with a drum in it that has a light spoke, so that one sees it turn."""
+    frame = scene.add_frame(f"/robot/wheel_{index}", show_axes=False, position=tuple(centre))
+    half = np.sqrt(0.5)  # a quarter turn about x lays the drum's axis along y
+    scene.add_cylinder(
+        f"/robot/wheel_{index}/drum", shape.wheel_radius, width, color=WHEEL, wxyz=(half, half, 0.0, 0.0),
+        cast_shadow=False, receive_shadow=False,
+    )  # fmt: skip
+    spoke = (1.5 * shape.wheel_radius, 1.04 * width, 0.3 * shape.wheel_radius)
+    scene.add_box(f"/robot/wheel_{index}/spoke", dimensions=spoke, color=(170, 170, 175), cast_shadow=False)
+    return frame
+
+
+def _prism(outline: FloatArray, z_min: float, z_max: float) -> Surface:
+    """An upright prism over a convex outline (n, 2), counter-clockwise."""
+    count = len(outline)
+    bottom = np.column_stack([outline, np.full(count, z_min)])
+    top = np.column_stack([outline, np.full(count, z_max)])
+    near = np.arange(count)
+    far = (near + 1) % count
+    sides = np.concatenate([np.stack([near, far, far + count], 1), np.stack([near, far + count, near + count], 1)])
+    fan = np.stack([np.zeros(count - 2, int), near[1:-1], near[2:]], axis=1)
+    faces = np.concatenate([sides, fan + count, fan[:, ::-1]])
+    return Surface(np.concatenate([bottom, top]), faces.astype(np.int32))

@@ -1,0 +1,119 @@
+"""A real browser: headless Chromium, driven over its DevTools port."""
+
+import asyncio
+import base64
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+FLAGS = (
+    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+    "--disable-component-update --disable-sync --use-gl=angle --use-angle=swiftshader "
+    "--enable-unsafe-swiftshader --window-size=1280,800 --remote-debugging-port=0"
+).split()
+START_TIMEOUT = 60.0
+
+
+class Page:
+    """One page: call its methods from a test; what the console says is kept in ``errors`` and ``requests``."""
+
+    def __init__(self, websocket):
+        self._websocket = websocket
+        self._next_id = 0
+        self.errors = []
+        self.requests = []
+
+    async def command(self, method, **params):
+        """Send one DevTools command and return its result, noting events that come meanwhile."""
+        self._next_id += 1
+        await self._websocket.send(json.dumps({"id": self._next_id, "method": method, "params": params}))
+        while True:
+            message = json.loads(await self._websocket.recv())
+            self._note(message)
+            if message.get("id") == self._next_id:
+                assert "error" not in message, message
+                return message["result"]
+
+    def _note(self, message):
+        params = message.get("params", {})
+        if message.get("method") == "Runtime.exceptionThrown":
+            self.errors.append(
+                params["exceptionDetails"].get("text", "") + str(params["exceptionDetails"].get("exception"))
+            )
+        elif message.get("method") == "Log.entryAdded" and params["entry"]["level"] == "error":
+            self.errors.append(params["entry"]["text"])
+        elif message.get("method") == "Network.requestWillBeSent":
+            self.requests.append(params["request"]["url"])
+
+    async def evaluate(self, expression):
+        answer = await self.command("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        return answer["result"].get("value")
+
+    async def wait_for(self, expression, seconds=60.0):
+        """Poll until a JavaScript expression is true."""
+        async with asyncio.timeout(seconds):
+            while not await self.evaluate(expression):
+                await asyncio.sleep(0.3)
+
+    async def open(self, url):
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            await self.command(f"{domain}.enable")
+        await self.command("Page.navigate", url=url)
+
+    async def screenshot(self):
+        answer = await self.command("Page.captureScreenshot", format="png")
+        return base64.b64decode(answer["data"])
+
+
+class Chromium:
+    """A browser process with a fresh profile."""
+
+    def __init__(self, program):
+        self._profile = tempfile.TemporaryDirectory(prefix="mbf_chromium_", ignore_cleanup_errors=True)
+        self._process = subprocess.Popen(
+            [program, *FLAGS, f"--user-data-dir={self._profile.name}", "about:blank"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def close(self):
+        self._process.kill()
+        self._process.wait()
+        self._profile.cleanup()
+
+    def visit(self, visit):
+        """Run the coroutine ``visit(page)`` on a new page and return what it returns."""
+        return asyncio.run(self._visit(visit))
+
+    async def _visit(self, visit):
+        import websockets
+
+        port = await self._port()
+        request = urllib.request.Request(f"http://127.0.0.1:{port}/json/new", method="PUT")
+        with urllib.request.urlopen(request, timeout=START_TIMEOUT) as answer:
+            address = json.load(answer)["webSocketDebuggerUrl"]
+        async with websockets.connect(address, max_size=None) as websocket:
+            return await visit(Page(websocket))
+
+    async def _port(self):
+        file = Path(self._profile.name) / "DevToolsActivePort"
+        async with asyncio.timeout(START_TIMEOUT):
+            while not (file.is_file() and file.read_text().strip()):
+                await asyncio.sleep(0.1)
+        return int(file.read_text().split()[0])
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    program = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+    if program is None:
+        pytest.skip("no chromium on the path; install the package 'chromium' or set CHROMIUM")
+    browser = Chromium(program)
+    yield browser
+    browser.close()

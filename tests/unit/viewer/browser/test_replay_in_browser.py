@@ -1,0 +1,31 @@
+"""The replay opens from disk in a real browser, without network and without an error, and something is drawn."""
+
+import asyncio
+import io
+
+import numpy as np
+from PIL import Image
+
+from terrain.viewer.replay import write_replay
+
+DRAWN = "document.querySelector('canvas') !== null && document.querySelector('canvas').clientWidth > 300"
+
+
+def test_a_replay_opens_from_disk_and_plays(chromium, hill_recording, tmp_path):
+    write_replay(tmp_path / "replay.html", hill_recording)
+
+    async def watch(page):
+        await page.open((tmp_path / "replay.html").as_uri())
+        await page.wait_for(DRAWN)
+        await page.wait_for("Number(document.querySelector('input').value) > 1.0")  # the time bar moves
+        await asyncio.sleep(1.0)
+        return page.errors, page.requests, await page.screenshot()
+
+    errors, requests, png = chromium.visit(watch)
+
+    (tmp_path / "screenshot.png").write_bytes(png)
+    assert errors == []
+    assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
+    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
+    greenish = (pixels[..., 1] > pixels[..., 2] + 20) & (pixels[..., 1] > pixels[..., 0] - 40)
+    assert greenish.mean() > 0.05, "the hills fill a good part of the picture"
