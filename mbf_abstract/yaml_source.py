@@ -23,7 +23,9 @@ MAX_DEPTH = 32
 MAX_ALIASES = 100
 MAX_VALUES = 100_000
 
-_SCALAR_TAGS = {f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "timestamp")}
+_PLAIN_TAGS = {
+    f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "timestamp", "map", "seq")
+}
 
 
 @dataclass(frozen=True)
@@ -169,15 +171,15 @@ class _Reader:
         if self._values > MAX_VALUES or len(path) > MAX_DEPTH:
             limit = f"at most {MAX_VALUES} values, nested at most {MAX_DEPTH} deep, aliases expanded"
             raise _LimitError(Finding(str(self._path), line, format_key_path(path[:4]), limit, "more"))
+        if node.tag not in _PLAIN_TAGS:
+            self._report(line, path, "a plain value", f"the YAML tag {node.tag!r}")
+            return None
         if isinstance(node, yaml.MappingNode):
             return self._construct_mapping(node, path)
         if isinstance(node, yaml.SequenceNode):
             for index, item in enumerate(node.value):
                 self._lines.setdefault((*path, index), item.start_mark.line + 1)
             return [self._construct(item, (*path, index)) for index, item in enumerate(node.value)]
-        if node.tag not in _SCALAR_TAGS:
-            self._report(line, path, "a plain value", f"the YAML tag {node.tag!r}")
-            return None
         try:
             return self._loader.construct_object(node)
         except ValueError as error:  # e.g. a date with month 13

@@ -49,6 +49,12 @@ class CostmapDeclaration(PluginDeclaration):
     costmap: Literal["local", "global"] | None = None
 
 
+@pytest.fixture(autouse=True)
+def nothing_installed(monkeypatch):
+    """Hide the entry points of the installed packages."""
+    monkeypatch.setattr("mbf_abstract.registry.entry_points", lambda group: [])
+
+
 def registry(**options):
     registry = PluginRegistry("mesh", **options)
     registry.register(PluginKind.PLANNER, "mesh.cvp", Cvp)

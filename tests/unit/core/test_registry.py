@@ -30,6 +30,12 @@ class FreePlanner(MeshPlanner):
     pass
 
 
+@pytest.fixture(autouse=True)
+def nothing_installed(monkeypatch):
+    """Hide the entry points of the installed packages."""
+    monkeypatch.setattr(registry_module, "entry_points", lambda group: [])
+
+
 @pytest.fixture
 def plugin_module(tmp_path, monkeypatch):
     """A module of plugins that lives for one test."""

@@ -1,0 +1,67 @@
+"""Fault table, row 26: plugins that cannot be loaded."""
+
+import pytest
+
+from mbf_abstract.config import load_config, validate_config
+from mbf_abstract.events import EventKind
+from mbf_abstract.findings import ConfigError
+from mbf_abstract.geometry import Pose
+from mbf_abstract.registry import PluginRegistry
+from mbf_abstract.server import ServerError
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.testing.scripted import ScriptedPlanner
+from mbf_abstract.transforms import TransformBuffer
+
+BAD_PLANNERS = """\
+backend: none
+planners:
+  - {name: missing, type: 'no_such_module_anywhere:Planner'}
+  - {name: wrong_base, type: 'pathlib:Path'}
+  - {name: unknown, type: straight}
+  - {name: clash, type: 'mbf_abstract.testing.scripted:ScriptedPlanner'}
+  - {name: clash, type: 'mbf_abstract.testing.scripted:ScriptedPlanner'}
+"""
+
+
+class BrokenConstructor(ScriptedPlanner):
+    def __init__(self, context):
+        raise RuntimeError("no licence")
+
+
+def config(folder, text):
+    path = folder / "robot.yaml"
+    path.write_text(text)
+    return validate_config(load_config(path), {}, PluginRegistry("none"))
+
+
+def test_all_bad_plugins_are_listed_at_once(tmp_path):
+    with pytest.raises(ConfigError) as error:
+        config(tmp_path, BAD_PLANNERS)
+    assert [finding.line for finding in error.value.findings] == [3, 4, 5, 7]
+    text = str(error.value)
+    for reason in ("no_such_module_anywhere", "class Path is no AbstractPlanner", "unknown type", "first in line 6"):
+        assert reason in text
+
+
+def test_optional_plugins_are_left_out_with_their_reason(tmp_path):
+    text = BAD_PLANNERS.replace("'}", "', optional: true}").replace("straight}", "straight, optional: true}")
+    text = text.rsplit("\n", 2)[0] + "\n"
+    loaded = config(tmp_path, text)
+    assert [spec.name for spec in loaded.plugins] == ["clash"]
+    assert [skipped.name for skipped in loaded.skipped] == ["missing", "wrong_base", "unknown"]
+
+
+def test_a_raising_constructor_refuses_the_server_and_names_the_plugin():
+    with pytest.raises(ServerError, match=r"planner 'broken' \(BrokenConstructor\): RuntimeError: no licence"):
+        Bench({"broken": BrokenConstructor})
+
+
+def test_after_a_refused_start_a_good_one_works():
+    with pytest.raises(ServerError):
+        Bench({"good": ScriptedPlanner, "broken": BrokenConstructor})
+    with Bench({"good": ScriptedPlanner}) as bench:
+        assert isinstance(bench.robot, LoopbackRobot)
+        assert isinstance(bench.transforms, TransformBuffer)
+        assert bench.navigator.get_path(Pose.planar(1.0, 0.0)).success
+        assert not bench.events(EventKind.FAULT)
