@@ -11,5 +11,5 @@ KernelFunction = TypeVar("KernelFunction", bound=Callable[..., Any])
 
 
 def kernel(function: KernelFunction) -> KernelFunction:
-    """Compile ``function`` with numba at its first call; strict IEEE arithmetic, so NaN and inf keep their meaning."""
-    return cast(KernelFunction, njit(cache=True, nogil=True)(function))
+    """Compile ``function`` with numba at its first call; IEEE arithmetic throughout, also where it divides by zero."""
+    return cast(KernelFunction, njit(cache=True, nogil=True, error_model="numpy")(function))

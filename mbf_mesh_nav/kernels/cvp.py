@@ -20,6 +20,7 @@ from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagA
 from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top
 
 ALONG_EDGE = -1
+_FREE, _SETTLED, _BLOCKED = 0, 1, 2  # one settled and one free corner is the only pair with the sum 1
 # float32 constants: a plain number would turn the arithmetic of the update into float64.
 _ZERO: Any = np.float32(0)
 _HALF: Any = np.float32(0.5)
@@ -75,11 +76,11 @@ def propagate_wave(
     keys = np.empty(vertex_count, dtype=np.float32)
     ids = np.empty(vertex_count, dtype=np.int32)
     positions = np.full(vertex_count, -1, dtype=np.int32)
-    settled = np.zeros(vertex_count, dtype=np.bool_)
+    state = np.where(blocked, _BLOCKED, _FREE).astype(np.uint8)
     size = 0
     for seed in seeds:
         size = push_or_decrease(keys, ids, positions, size, seed, distances[seed])
-        settled[seed] = True  # the corners of the source's face: their distances are exact from the start
+        state[seed] = _SETTLED  # the corners of the source's face: their distances are exact from the start
     limit = np.inf
     pops = 0
     while size > 0 and keys[0] <= limit:
@@ -87,20 +88,20 @@ def propagate_wave(
             return -1
         vertex = ids[0]
         size = remove_top(keys, ids, positions, size)
-        settled[vertex] = True
+        state[vertex] = _SETTLED
         pops += 1
         if limit == np.inf and len(targets) > 0:
             all_settled = True
             for target in targets:
-                all_settled = all_settled and settled[target]
+                all_settled = all_settled and state[target] == _SETTLED
             if all_settled:
                 limit = distances[vertex] + overshoot
         for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
             slot_first, slot_second = corner_slots[record, 0], corner_slots[record, 1]
             first, second = neighbours[slot_first], neighbours[slot_second]
-            if settled[first] == settled[second] or blocked[first] or blocked[second]:
+            if state[first] + state[second] != _FREE + _SETTLED:
                 continue
-            if settled[first]:
+            if state[first] == _SETTLED:
                 slot_known, slot_free = slot_first, slot_second
             else:
                 slot_known, slot_free = slot_second, slot_first
