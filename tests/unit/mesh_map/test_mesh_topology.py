@@ -130,3 +130,32 @@ def test_vertex_graph_has_the_callers_numbers_positions_and_weights():
     for start, end, data in graph.edges(data=True):
         np.testing.assert_allclose(graph.nodes[start]["position"], vertices[start])
         assert data["weight"] == pytest.approx(np.linalg.norm(vertices[start] - vertices[end]), rel=1e-6)
+
+
+def test_heightfield_map_is_the_surface_bullet_drives_on():
+    pybullet = pytest.importorskip("pybullet")
+    heights = np.random.default_rng(8).random((9, 12)).astype(np.float32)
+    mesh = MeshMap.from_heights(heights, 0.3, 0.2, x0=2.0, y0=-1.0)
+    lowered = (heights - heights.max()).astype(np.float32)
+    middle = 0.5 * (float(lowered.min()) + float(lowered.max())) + float(heights.max())
+    client = pybullet.connect(pybullet.DIRECT)
+    shape = pybullet.createCollisionShape(
+        pybullet.GEOM_HEIGHTFIELD,
+        meshScale=[0.3, 0.2, 1.0],
+        heightfieldData=lowered.ravel(),
+        numHeightfieldRows=12,
+        numHeightfieldColumns=9,
+        physicsClientId=client,
+    )
+    base = [2.0 + 11 * 0.3 / 2, -1.0 + 8 * 0.2 / 2, middle]
+    pybullet.createMultiBody(0, shape, basePosition=base, physicsClientId=client)
+    xy = np.random.default_rng(9).uniform([2.05, -0.95], [5.25, 0.55], (300, 2))
+    top, bottom = np.column_stack([xy, np.full(300, 3.0)]), np.column_stack([xy, np.full(300, -3.0)])
+
+    hits = pybullet.rayTestBatch(top.tolist(), bottom.tolist(), physicsClientId=client)
+    _, depths = mesh.locator.cast_rays(top, [0.0, 0.0, -1.0])
+    pybullet.disconnect(client)
+
+    errors = np.abs(np.array([hit[3][2] for hit in hits]) - (3.0 - depths))
+    assert np.median(errors) < 1e-6
+    assert errors.max() < 1e-3
