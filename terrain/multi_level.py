@@ -26,6 +26,7 @@ GARAGE_LENGTH, GARAGE_WIDTH = 36.0, 24.0
 STOREY = 2.8
 RAMP_START, RAMP_END, RAMP_WIDTH = 8.0, 28.0, 5.0  # 2.8 m in 20 m: 8 degrees
 PILLARS = tuple((x, y) for x in (6.0, 12.0, 18.0, 24.0, 30.0) for y in (9.0, 15.0))
+BOX_HEIGHT = 1.5  # m
 PARKED = tuple((x, y) for x in (9.5, 14.5, 20.5, 26.5) for y in (9.5, 12.0))  # south-west corners of 2 x 2 m boxes
 
 BRIDGE_LENGTH, BRIDGE_WIDTH, DECK = 44.0, 24.0, 2.5
@@ -133,11 +134,11 @@ def _furniture_footprints(level: int, levels: int) -> list[tuple[tuple[float, fl
 
 
 def _garage_furniture(level: int, levels: int) -> list[TriangleMesh]:
-    """Pillars up to the next floor and parked boxes of 1.5 m."""
+    """Pillars that end just below the next floor, so that its traffic does not touch them, and parked boxes."""
     floor = level * STOREY
     boxes = []
     for low, high in _furniture_footprints(level, levels):
-        height = STOREY if high[0] - low[0] == CELL else 1.5
+        height = STOREY - WALL if high[0] - low[0] == CELL else BOX_HEIGHT
         boxes.append(box_between((*low, floor), (*high, floor + height)))
     return boxes
 
