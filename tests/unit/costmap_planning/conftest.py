@@ -64,9 +64,9 @@ class StandingRobot:
 def make_plugin() -> Callable[..., Any]:
     """``make_plugin(Class, cells or Costmap, resolution=.., footprint=.., seed=.., **parameters)``."""
 
-    def make(plugin_class, cells, *, resolution=1.0, footprint=SQUARE_ROBOT, seed=0, **parameters):
+    def make(plugin_class, cells, *, resolution=1.0, footprint=SQUARE_ROBOT, seed=0, costmap=None, **parameters):
         grid = cells if isinstance(cells, Costmap) else Costmap(np.asarray(cells, dtype=np.uint8), resolution)
-        costmap = FixedCostmap(grid, footprint)
+        costmap = costmap or FixedCostmap(grid, footprint)
         context = CostmapContext(
             "dut",
             plugin_class.Parameters(**parameters),

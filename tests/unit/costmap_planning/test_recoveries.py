@@ -9,12 +9,21 @@ from mbf_abstract.cancel import CancelToken
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
 from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.footprint import Footprint
+from mbf_costmap_nav.layer import LayerContext
+from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.layers.inflation import InflationLayer
+from mbf_costmap_nav.layers.static import StaticLayer
 from mbf_costmap_nav.recoveries.back_up import BackUpRecovery
 from mbf_costmap_nav.recoveries.clear import ClearRecovery
+from mbf_costmap_nav.recoveries.drive_on_heading import DriveOnHeadingRecovery
+from mbf_costmap_nav.recoveries.escape import EscapeRecovery
+from mbf_costmap_nav.recoveries.move_away import MoveAwayRecovery
+from mbf_costmap_nav.recoveries.relax import RelaxRecovery
 from mbf_costmap_nav.recoveries.rotate import RotateRecovery
 from mbf_costmap_nav.recoveries.wait import WaitRecovery
 
-MOVING = [RotateRecovery, BackUpRecovery]
+MOVING = [RotateRecovery, BackUpRecovery, DriveOnHeadingRecovery]
 
 
 def around(*boxes):
@@ -115,3 +124,56 @@ def test_clear_resets_both_maps(run):
 def test_clear_around_the_robot_on_one_map(run):
     result, _, plugin = run(ClearRecovery, costmaps="local", radius=1.5)
     assert result.success and plugin.costmap.cleared == ["area 3"]
+
+
+def test_drive_on_heading_goes_the_distance_along_the_heading(run):
+    result, robot, _ = run(DriveOnHeadingRecovery, start=(0, 0, math.pi / 2), distance=0.5)
+    assert result.success and robot.state[:2] == pytest.approx((0.0, 0.5), abs=0.03)
+
+
+def test_escape_backs_out_of_an_obstacle_in_front(run):
+    result, robot, _ = run(EscapeRecovery, around((0.15, -1, 0.3, 1)), free_cost=254)
+    assert result.success and robot.state[0] + 0.2 < 0.15
+
+
+def test_escape_does_nothing_where_nothing_is_wrong(run):
+    result, robot, _ = run(EscapeRecovery)
+    assert result.success and robot.state.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_escape_says_that_it_cannot_get_out(run):
+    walled = around((-1, -1, 1, 1))
+    result, robot, _ = run(EscapeRecovery, walled)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE and robot.commands[-1].is_stopped()
+
+
+def test_move_away_gains_the_clearance(run):
+    result, robot, _ = run(MoveAwayRecovery, around((0.3, -0.1, 0.4, 0.1)), clearance=0.6)
+    assert result.success and 0.3 - robot.state[0] >= 0.55
+
+
+def test_move_away_sideways_needs_an_omnidirectional_robot(run):
+    wall = around((-1, 0.3, 1, 0.4))
+    result, _, _ = run(MoveAwayRecovery, wall)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    result, robot, _ = run(MoveAwayRecovery, wall, omnidirectional=True)
+    assert result.success and robot.state[1] < -0.2
+
+
+def test_relax_shrinks_the_inflation_and_puts_it_back(make_plugin, closed_loop):
+    grid = around((0.5, -1, 0.6, 1))
+    static = StaticLayer(LayerContext("static", StaticLayer.Parameters(), static_map=grid))
+    inflation = InflationLayer(LayerContext("inflation", InflationLayer.Parameters(inflation_radius=0.8)))
+    costmap = LayeredCostmap(grid.geometry, [static, inflation], Footprint.circle(0.2))
+    plugin = make_plugin(RelaxRecovery, grid, costmap=costmap, duration=5.0)
+    robot = closed_loop.robot(0, 0, 0)
+    costmap.update(robot.pose(), 0.0)
+    before = costmap.snapshot().cells
+
+    assert plugin.run_behavior(RecoveryRequest(robot)).success
+    assert costmap.snapshot().cells.sum() < before.sum()
+    plugin.clock.time = 4.9
+    costmap.update(robot.pose(), 4.9)
+    assert inflation.parameters.inflation_radius == 0.4
+    costmap.update(robot.pose(), 5.1)
+    assert (costmap.snapshot().cells == before).all()

@@ -1,0 +1,107 @@
+"""Rotation shim: turn in place towards a new path first, then let another controller drive.
+
+When to use: controllers that start a path with a wide arc or back up (MPPI, DWA) on robots that can turn in place in
+tight rooms. When not: ``costmap.regulated_pure_pursuit``, which turns by itself, and car-like robots.
+
+The inner controller is constructed here, on the same context, from its own parameter block:
+``inner_type: "module:Class"`` and ``inner: {...}``; there is no reference to another configured plugin.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import replace
+from typing import Any, ClassVar
+
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_costmap_nav.footprint_check import arc_poses
+from mbf_costmap_nav.path_handling import ControlCycle, PathFollower, to_base_frame
+from mbf_costmap_nav.plugins import CostmapContext, CostmapController
+
+
+class RotationShimParameters(PluginParameters):
+    """Parameters of ``costmap.rotation_shim``."""
+
+    inner_type: str = parameter(
+        "mbf_costmap_nav.controllers.mppi:MppiController", "Class of the controller that drives.", dynamic=False
+    )
+    inner: dict[str, Any] = parameter({}, "Parameters of that controller.", dynamic=False)
+    angular_dist_threshold: float = parameter(
+        0.785, "Turn first if the path is further off.", unit="rad", gt=0.0, le=3.2
+    )
+    angular_done_threshold: float = parameter(0.3, "Aligned well enough to drive.", unit="rad", gt=0.0, le=3.2)
+    forward_sampling_distance: float = parameter(0.5, "Path point to turn to.", unit="m", gt=0.0, le=10.0)
+    rotate_vel: float = parameter(1.2, "Yaw rate of the turn.", unit="rad/s", gt=0.0, le=20.0)
+    max_angular_accel: float = parameter(3.2, "Change of the yaw rate.", unit="rad/s^2", gt=0.0, le=100.0)
+    control_period: float = parameter(0.05, "Time between two calls.", unit="s", gt=0.0, le=1.0)
+
+
+class RotationShimController(PathFollower):
+    """Aligns with the path, then delegates."""
+
+    Parameters: ClassVar[type[PluginParameters]] = RotationShimParameters
+    parameters: RotationShimParameters
+
+    def __init__(self, context: CostmapContext) -> None:
+        super().__init__(context)
+        module, _, name = self.parameters.inner_type.partition(":")
+        inner_class: type[CostmapController] = getattr(importlib.import_module(module), name)
+        parameters = inner_class.Parameters.model_validate(self.parameters.inner)
+        self._inner = inner_class(replace(context, name=f"{self.name}.inner", parameters=parameters))
+        self._aligning = False
+
+    def set_plan(self, path: Path) -> bool:
+        """Hand the path to both; alignment starts over."""
+        self._aligning = True
+        return super().set_plan(path) and self._inner.set_plan(path)
+
+    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """Whatever the inner controller says."""
+        super().is_goal_reached(pose, dist_tolerance, angle_tolerance)
+        return self._inner.is_goal_reached(pose, dist_tolerance, angle_tolerance)
+
+    def cancel(self) -> bool:
+        """Whatever the inner controller says."""
+        return self._inner.cancel()
+
+    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+        """Turn while the path is off the heading, else delegate."""
+        cycle = self.begin_cycle(request)
+        if isinstance(cycle, ControlResult):
+            return cycle
+        angle = self._angle_to_path(cycle)
+        limit = (
+            self.parameters.angular_done_threshold if self._turning(cycle) else self.parameters.angular_dist_threshold
+        )
+        self._aligning = self._aligning and abs(angle) > limit
+        command = self._rotation(angle, request.velocity.wz)
+        if not self._aligning or self._sweeps_obstacle(cycle, command):
+            return self._inner.compute_velocity_commands(request)
+        return ControlResult(ExePathOutcome.SUCCESS, "turning to the path", command)
+
+    def _turning(self, cycle: ControlCycle) -> bool:
+        return abs(cycle.request.velocity.wz) > 1e-2 and abs(cycle.request.velocity.vx) < 1e-2
+
+    def _angle_to_path(self, cycle: ControlCycle) -> float:
+        """Bearing [rad] of the path point ahead in the base frame."""
+        ahead = cycle.tracker.ahead(self.parameters.forward_sampling_distance)[-1:]
+        x, y = to_base_frame(ahead, cycle.request.pose)[0].tolist()
+        if cycle.tracker.driving_backward:
+            x, y = -x, -y
+        return math.atan2(y, x) if math.hypot(x, y) > 1e-3 else 0.0
+
+    def _rotation(self, angle: float, speed: float) -> Twist:
+        p = self.parameters
+        change = p.max_angular_accel * p.control_period
+        wanted = math.copysign(min(p.rotate_vel, math.sqrt(2.0 * p.max_angular_accel * abs(angle))), angle)
+        return Twist.planar(wz=min(max(wanted, speed - change), speed + change))
+
+    def _sweeps_obstacle(self, cycle: ControlCycle, command: Twist) -> bool:
+        """Whether half a second of turning on would touch a lethal cell; the inner controller may know better then."""
+        pose = cycle.request.pose
+        poses = arc_poses((pose.x, pose.y, pose.yaw), 0.0, 0.0, command.wz, 0.5, 0.05)
+        return cycle.footprint.first_collision(cycle.costmap, poses) >= 0

@@ -1,0 +1,74 @@
+"""Leave a collision: creep forward or back, whichever lowers what lies under the footprint, until it is free.
+
+When to use: the planner answers BLOCKED_START or a controller COLLISION because the robot stands on cells that are now
+lethal or inscribed. When not: the marks are ghosts; clear the costmap first. It stops (IMPASSABLE) where neither
+direction is better than staying.
+
+Rule: among forward, back and both turns, each tried over ``probe_distance``, take the one with the fewest covered
+lethal points and then the lowest cost at the centre; repeat until the centre is below ``free_cost``.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+from mbf_costmap_nav.footprint_check import FootprintCheck, arc_poses
+from mbf_costmap_nav.guarded_motion import GuardedMotionParameters, GuardedRecovery
+
+
+class EscapeParameters(GuardedMotionParameters):
+    """Parameters of ``costmap.escape``."""
+
+    speed: float = parameter(0.05, "How fast to creep.", unit="m/s", gt=0.0, le=0.5)
+    turn_speed: float = parameter(0.2, "How fast to turn; 0 = only forward and back.", unit="rad/s", ge=0.0, le=2.0)
+    probe_distance: float = parameter(0.15, "How far ahead each motion is judged.", unit="m", gt=0.0, le=2.0)
+    free_cost: int = parameter(253, "Free once the centre's cost is below this and nothing is touched.", ge=1, le=254)
+
+
+class EscapeRecovery(GuardedRecovery):
+    """Creeps out of a collision."""
+
+    Parameters: ClassVar[type[PluginParameters]] = EscapeParameters
+    parameters: EscapeParameters
+
+    def recover(self, request: RecoveryRequest) -> RecoveryResult:
+        """Creep down the cost until the robot is free."""
+        start = request.motion.pose()
+        stuck = False
+
+        def velocity(pose: Pose) -> Twist:
+            nonlocal stuck
+            best = min(self._motions(), key=lambda motion: self._badness(pose, motion))
+            stuck = self._badness(pose, best) >= self._badness(pose, Twist())
+            return Twist() if stuck else best
+
+        def finished(pose: Pose) -> bool:
+            touched, cost = self._badness(pose, Twist())
+            return stuck or (touched == 0 and cost < self.parameters.free_cost)
+
+        result = self.drive(request, velocity, finished)
+        moved = start.distance_to(request.motion.pose())
+        if stuck:
+            return RecoveryResult(
+                RecoveryOutcome.IMPASSABLE, f"no motion leads out of the collision, moved {moved:.2f} m"
+            )
+        return RecoveryResult(result.outcome, f"{result.message or 'free'}, moved {moved:.2f} m")
+
+    def _motions(self) -> list[Twist]:
+        p = self.parameters
+        motions = [Twist.planar(vx=-p.speed), Twist.planar(vx=p.speed)]
+        if p.turn_speed > 0.0:
+            motions += [Twist.planar(wz=p.turn_speed), Twist.planar(wz=-p.turn_speed)]
+        return motions
+
+    def _badness(self, pose: Pose, motion: Twist) -> tuple[int, int]:
+        """Covered lethal points and cost of the centre after the probe distance; staying is judged where it is."""
+        costmap = self.costmap.snapshot()
+        check = FootprintCheck(self.costmap.footprint, costmap.resolution)
+        duration = self.parameters.probe_distance / self.parameters.speed if motion != Twist() else 1e-3
+        x, y, yaw = arc_poses((pose.x, pose.y, pose.yaw), motion.vx, 0.0, motion.wz, duration, duration)[-1].tolist()
+        return check.lethal_count(costmap, x, y, yaw), costmap.cost_at(x, y) or 0

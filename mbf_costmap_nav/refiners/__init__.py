@@ -1,0 +1,1 @@
+"""Path refiners on a costmap."""
