@@ -2,7 +2,7 @@
 
 Each period, in this order: a new plan? canceled? paused? map current, pose and velocity fresh? arrived? stuck or
 oscillating? then the plugin is asked for a command, the command is judged and sent, and feedback is published.
-Whatever ends the loop, the lease is given back and the robot stands. ``docs/decisions`` says what differs from upstream.
+Whatever ends the loop, the lease is given back and the robot stands. Differences to upstream: ``docs/decisions``.
 """
 
 from __future__ import annotations
