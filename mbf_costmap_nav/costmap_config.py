@@ -20,6 +20,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from pydantic import field_validator
+
 from mbf_abstract.parameters import ParameterModel, PluginParameters, parameter
 from mbf_costmap_nav.costmap import Costmap, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
@@ -70,14 +72,17 @@ class CostmapParameters(ParameterModel):
     )
     layers: tuple[LayerEntry, ...] = parameter((), "Layers in order of writing.", dynamic=False)
 
-    def robot_footprint(self) -> Footprint:
-        """Return the robot's outline without padding.
+    @field_validator("footprint")
+    @classmethod
+    def _footprint_is_a_polygon(
+        cls, value: str | list[tuple[float, float]] | None
+    ) -> str | list[tuple[float, float]] | None:
+        if value is not None:
+            Footprint.parse(value)
+        return value
 
-        Raises
-        ------
-        ValueError
-            The footprint is malformed.
-        """
+    def robot_footprint(self) -> Footprint:
+        """Return the robot's outline without padding."""
         return Footprint.circle(self.robot_radius) if self.footprint is None else Footprint.parse(self.footprint)
 
     def geometry(self) -> GridGeometry:
@@ -134,8 +139,8 @@ def build_layered_costmap(
     Raises
     ------
     ValueError
-        Unknown layer type, bad layer parameters (pydantic's ValidationError is one), a block no layer has, two
-        layers of one name, or a malformed footprint.
+        Unknown layer type, bad layer parameters (pydantic's ValidationError is one), a block no layer has, or two
+        layers of one name.
     MapError
         A layer's map file cannot be used.
     """

@@ -176,19 +176,20 @@ class LayeredCostmap:
         with self._lock:
             if self.rolling_window and robot_pose is not None:
                 self._follow(robot_pose)
-            box, self._pending = self._pending, EMPTY_BOX
+            box = self._pending
+            self._pending = self._geometry.box  # stays so if a layer raises: the next update then repairs everything
             for layer in self._enabled_layers():
                 box = layer.update_bounds(robot_pose, now, box)
             box = box.clipped(self._geometry.box)
+            if not box.empty:
+                self._cells[box.slices] = self._default_value
+                for layer in self._enabled_layers():
+                    layer.update_costs(self._cells, box)
+                self._version += 1
+                self._snapshot = None
+            self._pending = EMPTY_BOX
             self._last_update = now
-            if box.empty:
-                return EMPTY_BOX
-            self._cells[box.slices] = self._default_value
-            for layer in self._enabled_layers():
-                layer.update_costs(self._cells, box)
-            self._version += 1
-            self._snapshot = None
-            return box
+            return EMPTY_BOX if box.empty else box
 
     def _follow(self, robot_pose: Pose) -> None:
         """Move the window so that the robot is in its middle; origins stay multiples of the resolution."""

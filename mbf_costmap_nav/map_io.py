@@ -1,10 +1,8 @@
 """Maps on disk in map_server's format: a YAML file that describes a grey image (pgm, png or bmp).
 
-Reading turns every grey value into an occupancy: 0 free, 100 occupied, 1..99 between (mode ``scale``), 255 unknown, or
-the grey value itself (mode ``raw``). Image rows run from top to bottom, map rows from bottom to top. The rules are
-map_server's: occupancy = (255 - grey) / 255, or grey / 255 with ``negate``; occupied above ``occupied_thresh``, free
-below ``free_thresh``; in between unknown (trinary) or ``1 + 98 * ratio`` (scale). Channels of a colour image are
-averaged, then rounded. In mode scale a pixel that is not opaque is unknown; elsewhere opacity is ignored.
+Reading turns every grey value into an occupancy (see ``map_description``). Image rows run from top to bottom, map rows
+from bottom to top. Channels of a colour image are averaged, then rounded. In mode scale a pixel that is not opaque is
+unknown; elsewhere opacity is ignored.
 
 Origins with a yaw are kept in ``OccupancyMap``. A ``Costmap`` has axes parallel to its frame, so ``to_costmap``
 resamples such a map onto the smallest upright grid around it: nothing that was occupied gets lost, what lies outside
@@ -19,91 +17,29 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, Costmap
+from mbf_costmap_nav.map_description import (
+    OCCUPIED,
+    UNKNOWN_OCCUPANCY,
+    MapDescription,
+    MapError,
+    MapMode,
+    OccupancyArray,
+    read_description,
+    validated_description,
+)
 
-OccupancyArray = NDArray[np.uint8]
-
-OCCUPIED = 100
-UNKNOWN_OCCUPANCY = 255
 MAX_CELLS = 64_000_000
-MAX_DESCRIPTION_BYTES = 1 << 20
+"""Default limit; 8000 x 8000 cells, checked before an image is decoded."""
 GREY_MODES = {"1", "L", "LA", "P", "RGB", "RGBA"}
 """Pillow's names of the 8-bit pixel layouts we read."""
-
-
-class MapError(Exception):
-    """A map file that cannot be used.
-
-    Attributes
-    ----------
-    file : pathlib.Path
-    reason : str
-    """
-
-    def __init__(self, file: Path, reason: str) -> None:
-        super().__init__(f"{file}: {reason}")
-        self.file = file
-        self.reason = reason
-
-
-class MapMode(str, Enum):
-    """How grey values between the two thresholds are read."""
-
-    TRINARY = "trinary"
-    SCALE = "scale"
-    RAW = "raw"
-
-
-class MapDescription(BaseModel):
-    """The YAML file of a map; keys we do not know are ignored, as map_server does."""
-
-    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
-
-    image: str = Field(min_length=1)
-    resolution: float = Field(ge=1e-4, le=1e3)
-    origin: tuple[float, float, float]
-    negate: bool = False
-    occupied_thresh: float = Field(0.65, ge=0.0, le=1.0)
-    free_thresh: float = Field(0.196, ge=0.0, le=1.0)
-    mode: MapMode = MapMode.TRINARY
-
-    @field_validator("origin", mode="before")
-    @classmethod
-    def _origin_is_a_list(cls, value: object) -> object:
-        if isinstance(value, list | tuple) and len(value) == 3:
-            return tuple(value)
-        raise ValueError("expected a list [x, y, yaw]")
-
-    @model_validator(mode="after")
-    def _thresholds_are_ordered(self) -> MapDescription:
-        if self.free_thresh >= self.occupied_thresh:
-            raise ValueError(f"free_thresh {self.free_thresh} must be below occupied_thresh {self.occupied_thresh}")
-        return self
-
-    def occupancy_of_grey(self) -> OccupancyArray:
-        """(256,) uint8: occupancy of each grey value of an opaque pixel."""
-        grey = np.arange(256, dtype=np.float64)
-        if self.negate:
-            grey = 255.0 - grey
-        if self.mode is MapMode.RAW:
-            return grey.astype(np.uint8)
-        occupancy = (255.0 - grey) / 255.0
-        ratio = np.clip((occupancy - self.free_thresh) / (self.occupied_thresh - self.free_thresh), 0.0, 1.0)
-        table = (1.0 + 98.0 * ratio).astype(np.uint8)
-        if self.mode is MapMode.TRINARY:
-            table[:] = UNKNOWN_OCCUPANCY
-        table[occupancy > self.occupied_thresh] = OCCUPIED
-        table[occupancy < self.free_thresh] = FREE
-        return table
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,38 +127,7 @@ def load_image(
         "free_thresh": free_thresh,
         "mode": mode,
     }
-    return _decode(_read_pixels(file, max_cells), _validated(file, keys))
-
-
-def read_description(file: Path) -> MapDescription:
-    """Read and check the YAML file alone.
-
-    Raises
-    ------
-    MapError
-        The file is missing, too large, no YAML mapping, or holds a bad value (all of them are named).
-    """
-    try:
-        if file.stat().st_size > MAX_DESCRIPTION_BYTES:
-            raise MapError(file, f"is larger than {MAX_DESCRIPTION_BYTES} bytes, which no map description is")
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise MapError(file, error.strerror or str(error)) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise MapError(file, f"is no readable YAML: {error}") from error
-    if not isinstance(content, dict):
-        raise MapError(
-            file, f"expected a mapping with the keys image, resolution, origin; got {type(content).__name__}"
-        )
-    return _validated(file, content)
-
-
-def _validated(file: Path, keys: dict[str, object]) -> MapDescription:
-    try:
-        return MapDescription.model_validate(keys)
-    except ValidationError as error:
-        findings = (f"{'.'.join(map(str, e['loc'])) or 'map'}: {e['msg']}, got {e['input']!r}" for e in error.errors())
-        raise MapError(file, "; ".join(findings)) from error
+    return _decode(_read_pixels(file, max_cells), validated_description(file, keys))
 
 
 def _read_pixels(file: Path, max_cells: int) -> NDArray[np.uint8]:
@@ -315,7 +220,7 @@ def save_map(
     }
     if image_format not in ("pgm", "png", "bmp"):
         raise MapError(image_file, f"image_format must be pgm, png or bmp, got {image_format!r}")
-    description = _validated(file, keys)
+    description = validated_description(file, keys)
     grey, opaque = _encode(image_file, content.occupancy[::-1], description)
     try:
         image = Image.fromarray(grey)

@@ -21,7 +21,7 @@ from pydantic import ValidationError, field_validator
 
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_costmap_nav.costmap import CellArray, CellBox, Costmap, GridGeometry
-from mbf_costmap_nav.map_io import MapError
+from mbf_costmap_nav.map_description import MapError
 
 
 class Zone(ParameterModel):

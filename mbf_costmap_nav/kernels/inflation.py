@@ -63,28 +63,23 @@ def inflate(
     left, right = max(0, x0 - radius), min(width, x1 + radius)
     bottom, top_row = max(0, y0 - radius), min(height, y1 + radius)
     columns = np.empty((top_row - bottom, right - left), dtype=np.uint8)
-    _column_distances(seeds[bottom:top_row, left:right], columns, np.uint8(radius + 1))
+    _column_distances(seeds, left, bottom, columns, np.uint8(radius + 1))
     closeness = np.zeros(x1 - x0 + 2 * radius, dtype=dtype)
-    nearest = np.empty(x1 - x0, dtype=dtype)
     _spread_rows(
-        cells[y0:y1, x0:x1],
-        columns[y0 - bottom : y1 - bottom],
-        radius,
-        radius - (x0 - left),
-        closeness,
-        nearest,
-        dtype(top),
-        cost_of_closeness,
+        cells, (x0, y0, x1, y1), columns, left, bottom, radius, closeness, dtype(top), cost_of_closeness,
         np.uint8(unknown_from),
-    )
+    )  # fmt: skip
 
 
 @kernel
-def _column_distances(seeds: Cells, columns: Cells, cap: np.uint8) -> None:
-    """Distance of each cell to the nearest seed of its column, at most ``cap``: one sweep up, one down."""
-    rows = columns.shape[0]
+def _column_distances(seeds: Cells, left: int, bottom: int, columns: Cells, cap: np.uint8) -> None:
+    """Distance of each cell to the nearest seed of its column, at most ``cap``: one sweep up, one down.
+
+    The first of ``columns`` belongs to the cell (left, bottom) of ``seeds``.
+    """
+    rows, width = columns.shape
     for y in range(rows):
-        _mark_row(seeds[y], columns[y], cap)
+        _mark_row(seeds[bottom + y, left : left + width], columns[y], cap)
         if y > 0:
             _sweep_row(columns[y - 1], columns[y], cap)
     for y in range(rows - 2, -1, -1):
@@ -108,32 +103,35 @@ def _sweep_row(previous: Cells, row: Cells, cap: np.uint8) -> None:
 @kernel
 def _spread_rows(
     cells: Cells,
+    box: tuple[int, int, int, int],
     columns: Cells,
+    left: int,
+    bottom: int,
     radius: int,
-    first: int,
     closeness: Closeness,
-    nearest: Closeness,
     top: Any,
     cost_of_closeness: Cells,
     unknown_from: np.uint8,
 ) -> None:
-    """Second pass: combine the column distances along every row and write the costs.
+    """Second pass: combine the column distances along every row of the box and write the costs.
 
-    ``closeness`` has ``radius`` entries more than the row on each side; those that ``columns`` does not fill stay 0,
-    too far. ``first`` is where the columns begin in it. ``nearest`` holds one row of results.
+    The first of ``columns`` belongs to the cell (left, bottom). ``closeness`` holds one row of the box and ``radius``
+    entries more on each side; those that the columns do not fill lie out of the grid and stay 0, too far.
     """
-    height, width = cells.shape
-    costs = np.empty(width, dtype=np.uint8)
-    for y in range(height):
-        closest = _closeness_row(columns[y], closeness, np.uint64(first), top)
+    x0, y0, x1, y1 = box
+    first = np.uint64(radius - (x0 - left))
+    nearest = np.empty(x1 - x0, dtype=closeness.dtype)
+    costs = np.empty(x1 - x0, dtype=np.uint8)
+    for y in range(y0, y1):
+        closest = _closeness_row(columns[y - bottom], closeness, first, top)
         if top - closest > radius * radius:
             continue  # no seed within the radius of this row
-        nearest[:] = closeness[radius : radius + width]
+        nearest[:] = closeness[radius : radius + x1 - x0]
         for dx in range(1, radius + 1):
             offset = nearest.dtype.type(dx * dx)
             _raise_row(nearest, closeness, np.uint64(radius - dx), np.uint64(radius + dx), offset)
         _look_up(nearest, cost_of_closeness, costs)
-        _raise_costs(cells[y], costs, unknown_from)
+        _raise_costs(cells[y, x0:x1], costs, unknown_from)
 
 
 @kernel

@@ -1,1 +1,1 @@
-"""The layers of a costmap, one a file; ``BUILTIN_LAYERS`` names them for configurations."""
+"""The layers of a costmap, one a file; ``costmap_config.BUILTIN_LAYERS`` names their types."""

@@ -16,7 +16,8 @@ from typing import Literal
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.costmap import FREE, CellArray, CellBox, Costmap
 from mbf_costmap_nav.layer import CostmapLayer, LayerContext, LayerParameters
-from mbf_costmap_nav.map_io import UNKNOWN_OCCUPANCY, load_map
+from mbf_costmap_nav.map_description import UNKNOWN_OCCUPANCY
+from mbf_costmap_nav.map_io import load_map
 from mbf_costmap_nav.zones import Zone, load_zones
 
 

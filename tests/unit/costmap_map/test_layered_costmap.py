@@ -12,7 +12,8 @@ from pydantic import ValidationError
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, CellBox, Costmap
 from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.map_io import MapError, MapMode, OccupancyMap, save_map
+from mbf_costmap_nav.map_description import MapError, MapMode
+from mbf_costmap_nav.map_io import OccupancyMap, save_map
 
 HERE = Pose.planar(5.0, 5.0)
 

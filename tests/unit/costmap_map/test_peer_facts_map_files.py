@@ -7,7 +7,8 @@ import pytest
 import yaml
 from PIL import Image
 
-from mbf_costmap_nav.map_io import MapError, MapMode, OccupancyMap, load_image, load_map, save_map
+from mbf_costmap_nav.map_description import MapError, MapMode
+from mbf_costmap_nav.map_io import OccupancyMap, load_image, load_map, save_map
 
 # yaml file: (width, height, resolution, free, occupied, other cells)
 COUNTS = {
