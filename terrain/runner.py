@@ -1,9 +1,8 @@
-"""Runs a scenario: world, robot, server and executive on one clock, and writes what happened into a folder.
+"""Runs a scenario from start to last goal with ``move_base`` and writes what happened into a folder.
 
-The order of one run: scenario -> world and its map files -> navigation configuration of the chosen backend ->
-server -> kernels warmed up -> ``move_base`` to each goal while a thread steps the simulator -> recording, metrics,
-picture, replay.
-On a ``SimClock`` the same scenario and seed write the same ``events.jsonl``, byte for byte.
+``events.jsonl``, ``metrics.json``, ``recording.npz``, ``picture.png``, ``replay.html``, ``navigation.yaml`` and the
+world's map files. On simulated time the same scenario and seed write the same ``events.jsonl``, byte for byte; how long
+the run took on the wall stands in ``timing.json``.
 """
 
 from __future__ import annotations
@@ -18,30 +17,21 @@ import numpy as np
 
 from mbf_abstract.actions.goals import MoveBaseGoal, MoveBaseResult
 from mbf_abstract.actions.handle import AnyGoalHandle
-from mbf_abstract.clock import Clock, WallClock, wall_seconds
-from mbf_abstract.events import EventBus, JsonLinesSink, MemorySink
-from mbf_abstract.findings import ConfigError, Finding
+from mbf_abstract.clock import wall_seconds
+from mbf_abstract.events import JsonLinesSink
 from mbf_abstract.geometry import Pose
-from mbf_abstract.navigator import Navigator
-from mbf_abstract.server import AbstractNavigationServer
-from mbf_abstract.server_factory import read_config
-from mbf_abstract.sim_clock import SimClock
-from mbf_abstract.transforms import TransformBuffer
-from terrain.drive_loop import ClockedRobot, DriveLoop
+from mbf_abstract.outcomes import MoveBaseOutcome
+from terrain.bench import Bench
 from terrain.metrics import measure
-from terrain.recorder import Recorder
-from terrain.recording import Recording, RobotShape
-from terrain.robot_models import ROBOTS
-from terrain.robots import WheeledRobot
-from terrain.scenario import Scenario, ground_pose
-from terrain.scenario_sensors import make_sensors
-from terrain.scenario_world import ScenarioWorld, build_world
-from terrain.simulation import Simulation
+from terrain.recording import Recording
+from terrain.scenario import Scenario
+
+CANCEL_WAIT = 10.0  # s a canceled goal is waited for at the time limit
 
 
 @dataclass(frozen=True)
 class Progress:
-    """One line of news while a run goes on; times in seconds, tilt in radians."""
+    """One line of news while a run goes on; times in seconds, distance in metres, tilt in radians."""
 
     time: float
     wall_time: float
@@ -53,7 +43,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class RunResult:
-    """What became of a run."""
+    """What became of a run; ``metrics`` holds the contents of metrics.json and timing.json."""
 
     success: bool
     outcome: int
@@ -69,20 +59,25 @@ class RunOptions:
 
     Attributes
     ----------
+    folder : Path
+        Where results go.
     backend, seed : optional
         Instead of the scenario's own.
     wall_clock : bool
         Real time instead of lockstep simulated time.
+    draw : bool
+        Make picture and replay too.
     on_progress : callable
         Told about ten times a simulated second.
     on_step : callable
-        Told the name of each preparation that may take a while.
+        Told the name of each step before and after the drive that may take a while.
     """
 
     folder: Path
     backend: str | None = None
     seed: int | None = None
     wall_clock: bool = False
+    draw: bool = True
     on_progress: Callable[[Progress], None] = lambda progress: None
     on_step: Callable[[str], None] = lambda text: None
 
@@ -95,142 +90,77 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     ConfigError
         The scenario has no configuration for the backend, or that configuration is wrong; all findings.
     """
-    folder, seed = options.folder, scenario.seed if options.seed is None else options.seed
-    folder.mkdir(parents=True, exist_ok=True)
-    options.on_step("building the world")
-    world = build_world(scenario, folder, np.random.default_rng([seed, 1]))
-    with world.bullet:
-        config_file = _navigation_config(scenario, options.backend or scenario.backend, world, folder)
-        run = _Run(scenario, options, world, seed)
-        recording = run.drive(config_file)
-    return _write_results(recording, run, options)
+    options.folder.mkdir(parents=True, exist_ok=True)
+    log = JsonLinesSink(options.folder / "events.jsonl")
+    bench = Bench(scenario, options.backend, options.seed, options.folder, options.wall_clock, (log,), options.on_step)
+    try:
+        drive = _Drive(bench, options)
+        result = drive.visit_goals()
+    finally:
+        bench.close()
+    recording = bench.recorder.finish(result.success, result.outcome_name, result.message, list(bench.memory.events))
+    metrics = _write_numbers(recording, bench, drive.wall_time, options.folder)
+    if options.draw:
+        _draw(recording, options)
+    return RunResult(result.success, result.outcome, result.outcome_name, result.message, options.folder, metrics)
 
 
-class _Run:
-    """One run's parts, wired together."""
+class _Drive:
+    """The executive of a run: one ``move_base`` goal after the other."""
 
-    def __init__(self, scenario: Scenario, options: RunOptions, world: ScenarioWorld, seed: int) -> None:
-        self.scenario = scenario
-        self.options = options
-        self.world = world
-        self.seed = seed
-        self.result = MoveBaseResult(17, "not started")
-        self.wall_time = 0.0
+    def __init__(self, bench: Bench, options: RunOptions) -> None:
+        self._bench = bench
+        self._options = options
         self._handle: AnyGoalHandle | None = None
-        self.spec = ROBOTS[scenario.robot]
-        self.goals = [ground_pose(goal, world.height_at(goal.x, goal.y)) for goal in scenario.goals]
-        self.start = ground_pose(scenario.start, world.height_at(scenario.start.x, scenario.start.y))
-        self.robot = WheeledRobot(world.bullet, self.spec, self.start)
-        self.robot.settle()
-        sensors = make_sensors(scenario.sensors, self.robot, world, seed)
-        self.simulation = Simulation(world.bullet, self.robot, sensors)
-        backend = options.backend or scenario.backend
-        self.recorder = Recorder(scenario.name, backend, RobotShape.of(self.spec), self.robot.pose(), list(self.goals))
-        self.recorder.ground, self.recorder.walls = world.ground, world.walls
-        self.recorder.obstacles = world.obstacles
+        self._started = wall_seconds()
+        self.wall_time = 0.0
 
-    def drive(self, config_file: Path) -> Recording:
-        """Start the server, drive to all goals, and return what was recorded."""
-        clock: Clock = WallClock() if self.options.wall_clock else SimClock()
-        memory = MemorySink(maxlen=200_000)
-        events = EventBus(clock.now, [memory, JsonLinesSink(self.options.folder / "events.jsonl")])
-        transforms = TransformBuffer()
-        server_class, config = read_config(config_file)
-        self.options.on_step("building the map")
-        robot = ClockedRobot(self.robot)
-        server = server_class(config, robot, clock, transforms, events, self.seed)
-        server.get_path.listeners.append(self._record_plan)
-        with Navigator(server) as navigator:
-            loop = DriveLoop(self.simulation, robot, server, self.recorder)
-            loop.publish()
-            self._warm_up(server)
-            started = wall_seconds()
-            loop.start(self._reporter(navigator, started))
-            clock.sleep(0.5)  # let every sensor speak and every map be updated once
-            self.result = self._visit_goals(navigator, clock)
-            self.wall_time = wall_seconds() - started
-            loop.stop()
-        events.close()
-        result = self.result
-        return self.recorder.finish(result.success, result.outcome_name, result.message, list(memory.events))
-
-    def _warm_up(self, server: AbstractNavigationServer) -> None:
-        """Compile every kernel the run needs before time starts; the first run on a machine takes a while here."""
-        self.options.on_step("compiling kernels (first run only)")
-        server.warm_up(self.robot.pose(), self.goals[0], self.options.on_step)
-
-    def _visit_goals(self, navigator: Navigator, clock: Clock) -> MoveBaseResult:
-        """Send the goals one by one; the first failure, or the time limit, ends the run."""
-        result = self.result
-        for goal in self.goals:
-            handle = navigator.send(MoveBaseGoal(goal))
-            self._handle = handle
-            try:
-                result = handle.wait(max(0.0, self.scenario.time_limit - clock.now()))
-            except TimeoutError:
-                handle.cancel(f"the time limit of {self.scenario.time_limit:g} s")
-                result = handle.wait(10.0)
+    def visit_goals(self) -> MoveBaseResult:
+        """Visit all goals; the first failure, or the time limit, ends the run."""
+        self._started = wall_seconds()
+        self._bench.run(self._report)
+        result = MoveBaseResult(MoveBaseOutcome.FAILURE, "the scenario has no goals")
+        for goal in self._bench.goals:
+            result = self._visit(goal)
             if not result.success:
                 break
+        self.wall_time = wall_seconds() - self._started
         return result
 
-    def _record_plan(self, handle: AnyGoalHandle) -> None:
-        path = handle.result.path if handle.result is not None else None
-        if path is not None:
-            self.recorder.path(self.simulation.time, path.positions)
+    def _visit(self, goal: Pose) -> MoveBaseResult:
+        limit = self._bench.scenario.time_limit
+        self._handle = handle = self._bench.navigator.send(MoveBaseGoal(goal))
+        try:
+            return handle.wait(max(0.0, limit - self._bench.clock.now()))
+        except TimeoutError:
+            handle.cancel(f"the time limit of {limit:g} s")
+            return handle.wait(CANCEL_WAIT)
 
-    def _reporter(self, navigator: Navigator, started: float) -> Callable[[float, Pose, float], None]:
-        def report(time: float, pose: Pose, speed: float) -> None:
-            handle = self._handle
-            feedback = handle.feedback if handle is not None else None
-            self.options.on_progress(
-                Progress(
-                    time=time,
-                    wall_time=wall_seconds() - started,
-                    distance_left=feedback.distance_along_path if feedback else float("nan"),
-                    speed=speed,
-                    tilt=float(np.arccos(np.clip(pose.rotation[2, 2], -1.0, 1.0))),
-                    state=handle.status.value if handle is not None else "starting",
-                )
+    def _report(self, time: float, pose: Pose, speed: float) -> None:
+        handle = self._handle
+        feedback = handle.feedback if handle is not None else None
+        self._options.on_progress(
+            Progress(
+                time=time,
+                wall_time=wall_seconds() - self._started,
+                distance_left=feedback.distance_along_path if feedback else float("nan"),
+                speed=speed,
+                tilt=float(np.arccos(np.clip(pose.rotation[2, 2], -1.0, 1.0))),
+                state=handle.status.value if handle is not None else "starting",
             )
-
-        return report
-
-
-def _navigation_config(scenario: Scenario, backend: str, world: ScenarioWorld, folder: Path) -> Path:
-    """Write the backend's configuration with the world's files filled in; a run can be planned again from it."""
-    source = scenario.navigation.get(backend)
-    if source is None:
-        known = ", ".join(scenario.navigation)
-        raise ConfigError([Finding(scenario.name, 1, "navigation", f"one of {known}", repr(backend))])
-    text = source.read_text()
-    for placeholder, file in world.files.items():
-        text = text.replace(placeholder, json.dumps(file.name))
-    target = folder / "navigation.yaml"
-    target.write_text(text)
-    return target
+        )
 
 
-def _write_results(recording: Recording, run: _Run, options: RunOptions) -> RunResult:
-    """Write metrics, recording, picture and replay."""
-    folder = options.folder
+def _write_numbers(recording: Recording, bench: Bench, wall_time: float, folder: Path) -> dict[str, Any]:
     metrics = measure(recording).to_json()
-    metrics["mishaps"] = sorted({mishap.kind.value for mishap in run.simulation.mishaps})
-    metrics["seed"] = run.seed
-    (folder / "metrics.json").write_text(json.dumps(metrics, indent=2, sort_keys=True) + "\n")
-    factor = recording.duration / run.wall_time if run.wall_time > 0.0 else 0.0
-    timing = {"wall_time_s": run.wall_time, "real_time_factor": factor}
-    (folder / "timing.json").write_text(json.dumps(timing, indent=2) + "\n")
+    metrics["mishaps"] = sorted({mishap.kind.value for mishap in bench.simulation.mishaps})
+    metrics["seed"] = bench.seed
+    factor = recording.duration / wall_time if wall_time > 0.0 else 0.0
+    timing = {"wall_time_s": round(wall_time, 3), "real_time_factor": round(factor, 2)}
+    for name, numbers in (("metrics.json", metrics), ("timing.json", timing)):
+        (folder / name).write_text(json.dumps(numbers, indent=2, sort_keys=True) + "\n")
     recording.save(folder / "recording.npz")
-    _draw(recording, options)
-    return RunResult(
-        success=run.result.success,
-        outcome=run.result.outcome,
-        outcome_name=run.result.outcome_name,
-        message=run.result.message,
-        folder=folder,
-        metrics={**metrics, **timing},
-    )
+    return {**metrics, **timing}
 
 
 def _draw(recording: Recording, options: RunOptions) -> None:

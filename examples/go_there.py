@@ -1,0 +1,35 @@
+"""One script for both maps: plan, look at the cost, drive, and on failure recover by the outcome code.
+
+Run it twice and change nothing but the configuration::
+
+    python examples/go_there.py outdoor mesh
+    python examples/go_there.py indoor costmap
+"""
+
+import sys
+
+from mbf_abstract.outcomes import ExePathOutcome
+from terrain.bench import Bench
+
+RECOVERY_FOR = {ExePathOutcome.COLLISION: "back_up", ExePathOutcome.ROBOT_STUCK: "back_up"}
+
+
+def main(scenario: str, backend: str) -> bool:
+    with Bench(scenario, backend) as bench:
+        navigator, goal = bench.navigator, bench.goals[0]
+        for attempt in range(5):
+            plan = navigator.get_path(goal)
+            print(f"{plan.outcome_name}: {plan.message}; cost {plan.cost:.1f}, path {plan.path}")
+            if plan.path is None:
+                return False
+            drive = navigator.exe_path(plan.path)
+            print(f"{drive.outcome_name}: {drive.message}; {drive.dist_to_goal:.2f} m from the goal")
+            if drive.success:
+                return True
+            recovery = navigator.recover(RECOVERY_FOR.get(drive.outcome, "wait"))
+            print(f"attempt {attempt + 1}, recovery {recovery.used_plugin}: {recovery.message}")
+    return False
+
+
+if __name__ == "__main__":
+    sys.exit(0 if main(sys.argv[1], sys.argv[2]) else 1)

@@ -1,0 +1,171 @@
+"""A scenario, ready to be driven by your own script: world, robot, server and navigator on one simulated clock.
+
+``mbf run`` is this plus ``move_base`` to each goal and the results on disk; use ``Bench`` to try an executive or
+plugins of your own in a world that ships.
+
+Example
+-------
+>>> with Bench("outdoor", "mesh") as bench:
+...     plan = bench.navigator.get_path(bench.goals[0])
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from mbf_abstract.actions.handle import AnyGoalHandle
+from mbf_abstract.clock import Clock, WallClock
+from mbf_abstract.events import EventBus, EventSink, MemorySink
+from mbf_abstract.findings import ConfigError, Finding
+from mbf_abstract.geometry import Pose
+from mbf_abstract.navigator import Navigator
+from mbf_abstract.server_factory import read_config
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.transforms import TransformBuffer
+from terrain.drive_loop import ClockedRobot, DriveLoop, Report
+from terrain.recorder import Recorder
+from terrain.recording import RobotShape
+from terrain.robot_models import ROBOTS
+from terrain.robots import WheeledRobot
+from terrain.scenario import Scenario, ground_pose, load_scenario
+from terrain.scenario_sensors import make_sensors
+from terrain.scenario_world import ScenarioWorld, build_world
+from terrain.simulation import Simulation
+
+SENSE_FIRST = 0.5  # s; every sensor has spoken and every map has been updated when a script gets its turn
+MAX_EVENTS = 200_000
+
+
+class Bench:
+    """One scenario, built and running; a context manager.
+
+    Parameters
+    ----------
+    scenario : Scenario or str
+        A scenario, the name of a shipped one, or a file.
+    backend : str, optional
+        Map backend instead of the scenario's own.
+    seed : int, optional
+        Instead of the scenario's own.
+    folder : path, optional
+        Where the world's map files and ``navigation.yaml`` are written; a temporary folder without it.
+    wall_clock : bool
+        Real time instead of lockstep simulated time.
+    sinks : sequence of EventSink
+        Where events go, beside ``memory``.
+    on_step : callable
+        Told the name of each preparation that may take a while.
+
+    Raises
+    ------
+    ConfigError
+        The scenario has no configuration for the backend, or that configuration is wrong; all findings.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario | str,
+        backend: str | None = None,
+        seed: int | None = None,
+        folder: str | os.PathLike[str] | None = None,
+        wall_clock: bool = False,
+        sinks: tuple[EventSink, ...] = (),
+        on_step: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        self.scenario = load_scenario(scenario) if isinstance(scenario, str) else scenario
+        self.backend = backend or self.scenario.backend
+        self.seed = self.scenario.seed if seed is None else seed
+        self._temporary = tempfile.TemporaryDirectory(prefix="mbf_bench_")  # removed with the bench, used or not
+        self.folder = Path(self._temporary.name if folder is None else folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        on_step("building the world")
+        self.world = build_world(self.scenario, self.folder, np.random.default_rng([self.seed, 1]))
+        try:
+            self._start(wall_clock, sinks, on_step)
+        except BaseException:
+            self.world.bullet.close()
+            raise
+
+    def _start(self, wall_clock: bool, sinks: tuple[EventSink, ...], on_step: Callable[[str], None]) -> None:
+        """Robot and sensors, then the server on their map, then time."""
+        config_file = write_navigation_config(self.scenario, self.backend, self.world, self.folder)
+        server_class, config = read_config(config_file)
+        self.robot, self.simulation = self._make_simulation()
+        self.recorder = self._make_recorder()
+        self.clock: Clock = WallClock() if wall_clock else SimClock()
+        self.memory = MemorySink(maxlen=MAX_EVENTS)
+        self.events = EventBus(self.clock.now, [self.memory, *sinks])
+        clocked = ClockedRobot(self.robot)
+        on_step("building the map")
+        server = server_class(config, clocked, self.clock, TransformBuffer(), self.events, self.seed)
+        server.get_path.listeners.append(self._record_plan)
+        self.navigator = Navigator(server)
+        self.loop = DriveLoop(self.simulation, clocked, server, self.recorder)
+        self.loop.publish()
+        on_step("compiling kernels (first run only)")
+        server.warm_up(self.robot.pose(), self.goals[0], on_step)
+
+    @property
+    def goals(self) -> list[Pose]:
+        """The scenario's goals on the ground."""
+        return [ground_pose(goal, self.world.height_at(goal.x, goal.y)) for goal in self.scenario.goals]
+
+    def run(self, report: Report = lambda time, pose, speed: None) -> None:
+        """Let time pass: start stepping the simulator, and wait until sensors and maps are alive."""
+        self.loop.start(report)
+        self.clock.sleep(SENSE_FIRST)
+
+    def close(self) -> None:
+        """Stop the robot, the server and the simulator."""
+        self.loop.stop()
+        self.navigator.close()
+        self.events.close()
+        self.world.bullet.close()
+        self._temporary.cleanup()
+
+    def __enter__(self) -> Bench:
+        self.run()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def _make_simulation(self) -> tuple[WheeledRobot, Simulation]:
+        start = self.scenario.start
+        pose = ground_pose(start, self.world.height_at(start.x, start.y))
+        robot = WheeledRobot(self.world.bullet, ROBOTS[self.scenario.robot], pose)
+        robot.settle()
+        return robot, Simulation(
+            self.world.bullet, robot, make_sensors(self.scenario.sensors, robot, self.world, self.seed)
+        )
+
+    def _make_recorder(self) -> Recorder:
+        shape = RobotShape.of(self.robot.spec)
+        recorder = Recorder(self.scenario.name, self.backend, shape, self.robot.pose(), self.goals)
+        recorder.ground, recorder.walls = self.world.ground, self.world.walls
+        recorder.obstacles = self.world.obstacles
+        return recorder
+
+    def _record_plan(self, handle: AnyGoalHandle) -> None:
+        path = handle.result.path if handle.result is not None else None
+        if path is not None:
+            self.recorder.path(self.simulation.time, path.positions)
+
+
+def write_navigation_config(scenario: Scenario, backend: str, world: ScenarioWorld, folder: Path) -> Path:
+    """Write the backend's configuration with the world's files filled in; a run can be planned again from it."""
+    source = scenario.navigation.get(backend)
+    if source is None:
+        known = ", ".join(scenario.navigation)
+        raise ConfigError([Finding(scenario.name, 1, "navigation", f"one of {known}", repr(backend))])
+    text = source.read_text()
+    for placeholder, file in world.files.items():
+        text = text.replace(placeholder, file.name)
+    target = folder / "navigation.yaml"
+    target.write_text(text)
+    return target
