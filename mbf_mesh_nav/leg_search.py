@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry import Pose
 from mbf_mesh_nav.kernels.dijkstra import propagate_distances
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap, MeshSnapshot
@@ -23,13 +24,18 @@ NO_OFFSETS = np.zeros(0, dtype=np.float32)
 
 @dataclass(frozen=True)
 class LegQuery:
-    """One search: from ``start`` to ``goal`` over the vertices that are not ``blocked`` (V,) bool."""
+    """One search: from ``start`` to ``goal`` over the vertices that are not ``blocked`` (V,) bool.
+
+    The poses behind the two points are for planners that look at headings.
+    """
 
     start: SurfacePoint
     goal: SurfacePoint
     snapshot: MeshSnapshot
     blocked: NDArray[np.bool_]
     cancel_flag: NDArray[np.uint8]
+    start_pose: Pose | None = None
+    goal_pose: Pose | None = None
 
 
 @dataclass(frozen=True)

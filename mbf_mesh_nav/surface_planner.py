@@ -58,8 +58,10 @@ class SurfacePlanner(MeshPlanner):
 
         # 3. Plan leg by leg; the last one may end near the goal instead of at it.
         legs: list[Leg] = []
-        for start, goal in itertools.pairwise(stops):
-            leg = self.find_leg(LegQuery(start, goal, snapshot, blocked, request.cancel_token.flag))
+        poses = (request.start, *request.via, request.goal)
+        for index, (start, goal) in enumerate(itertools.pairwise(stops)):
+            ends = poses[index], poses[index + 1]
+            leg = self.find_leg(LegQuery(start, goal, snapshot, blocked, request.cancel_token.flag, *ends))
             if leg is None:
                 problem = self._no_path(start, goal, blocked)
                 break
@@ -146,7 +148,8 @@ class SurfacePlanner(MeshPlanner):
         if not finished or offsets[vertex] > request.dist_tolerance:
             return None
         goal = surface_point_at_vertex(mesh_map, vertex)
-        return self.find_leg(LegQuery(start, goal, snapshot, blocked, flag))
+        last_pose = (request.start, *request.via)[-1]
+        return self.find_leg(LegQuery(start, goal, snapshot, blocked, flag, last_pose, request.goal))
 
     def _assemble(self, legs: list[Leg], goal: Pose, goal_reached_exactly: bool) -> Path:
         positions = np.concatenate([legs[0].positions[:1]] + [leg.positions[1:] for leg in legs])

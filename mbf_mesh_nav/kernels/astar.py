@@ -59,7 +59,9 @@ def search_towards(
         offset_of_target[targets[i]] = target_offsets[i]
     size = 0
     for seed in seeds:
-        size = push_or_decrease(keys, ids, positions, size, seed, distances[seed] + _bound(vertices, seed, goal))
+        size = push_or_decrease(
+            keys, ids, positions, size, seed, distances[seed] + straight_line_bound(vertices, seed, goal)
+        )
     best_total = np.float32(np.inf)
     settled = 0
     while size > 0 and keys[0] < best_total:
@@ -76,13 +78,13 @@ def search_towards(
             if candidate < distances[neighbour] and not blocked[neighbour]:
                 distances[neighbour] = candidate
                 predecessors[neighbour] = vertex
-                key = candidate + _bound(vertices, neighbour, goal)
+                key = candidate + straight_line_bound(vertices, neighbour, goal)
                 size = push_or_decrease(keys, ids, positions, size, neighbour, key)
     return settled
 
 
 @kernel
-def _bound(vertices: NDArray[np.float64], vertex: int, goal: NDArray[np.float64]) -> np.float32:
+def straight_line_bound(vertices: NDArray[np.float64], vertex: int, goal: NDArray[np.float64]) -> np.float32:
     """Straight-line distance [m] from a vertex to the goal, rounded down."""
     dx = vertices[vertex, 0] - goal[0]
     dy = vertices[vertex, 1] - goal[1]

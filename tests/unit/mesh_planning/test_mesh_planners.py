@@ -12,9 +12,10 @@ from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
+from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
 from mbf_mesh_nav.planners.repairing import RepairingPlanner
 
-PLANNERS = [DijkstraPlanner, AStarPlanner, CVPPlanner, RepairingPlanner, AnyAnglePlanner]
+PLANNERS = [DijkstraPlanner, AStarPlanner, CVPPlanner, RepairingPlanner, AnyAnglePlanner, HeadingAStarPlanner]
 
 
 @pytest.fixture(params=PLANNERS, ids=lambda planner: planner.__name__)

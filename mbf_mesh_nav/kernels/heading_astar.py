@@ -1,0 +1,127 @@
+"""A* over (vertex, heading): the same hill may be climbed straight up and forbidden sideways.
+
+A state is ``vertex * HEADINGS + heading``. A move turns on the spot to the heading of an edge, over headings that are
+all allowed there, and drives along the edge; it costs the edge's weight, lengthened by the roll it brings, plus the turn.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.astar import straight_line_bound
+from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top
+
+HEADINGS = 16
+HEADING_STEP = 2.0 * math.pi / HEADINGS
+
+
+@kernel
+def search_with_heading(
+    vertices: NDArray[np.float64],
+    neighbour_offsets: Int32Array,
+    neighbours: Int32Array,
+    edge_weights: Float32Array,
+    edge_headings: NDArray[np.uint8],
+    blocked: BoolArray,
+    allowed: BoolArray,
+    roll: Float32Array,
+    roll_cost: float,
+    turning_cost: float,
+    distances: Float32Array,
+    predecessors: Int32Array,
+    seeds: Int32Array,
+    targets: Int32Array,
+    target_offsets: Float32Array,
+    goal: NDArray[np.float64],
+    goal_heading: int,
+    cancel_flag: FlagArray,
+) -> int:
+    """Relax ``distances`` and ``predecessors`` in place until the best target state is settled.
+
+    Parameters
+    ----------
+    vertices, neighbour_offsets, neighbours, edge_weights, blocked
+        The graph, as in ``dijkstra.propagate_distances``.
+    edge_headings : (2E,) uint8
+        Heading of each directed edge, 0 to 15.
+    allowed, roll : (V, 16) bool, (V, 16) float32 [rad]
+        Where the robot may stand with which heading, and how it rolls there.
+    roll_cost, turning_cost : float
+        Extra lengths per length and rad of roll; extra length [m] per rad turned.
+    distances, predecessors : (16 V,) float32 [m], (16 V,) int32
+        Per state; inf and -1 except at seeds.
+    seeds : (s,) int32
+        Start states.
+    targets, target_offsets : (t,) int32, (t,) float32 [m]
+        Goal vertices and what is left from them to the goal.
+    goal : (3,) float64 [m]
+    goal_heading : int
+        Turning to it at the goal costs, too; -1 = any heading will do.
+    cancel_flag : (1,) uint8
+
+    Returns
+    -------
+    int
+        The best target state, -1 if there is none, -2 if cancelled.
+    """
+    state_count = len(distances)
+    keys = np.empty(state_count, dtype=np.float32)
+    ids = np.empty(state_count, dtype=np.int32)
+    positions = np.full(state_count, -1, dtype=np.int32)
+    size = 0
+    for seed in seeds:
+        key = distances[seed] + straight_line_bound(vertices, seed // HEADINGS, goal)
+        size = push_or_decrease(keys, ids, positions, size, seed, key)
+    best_state, best_total = -1, np.inf
+    settled = 0
+    while size > 0 and keys[0] < best_total:
+        if settled % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
+            return -2
+        state = ids[0]
+        size = remove_top(keys, ids, positions, size)
+        settled += 1
+        vertex, heading = state // HEADINGS, state % HEADINGS
+        for i in range(len(targets)):
+            if targets[i] == vertex:
+                turn = 0 if goal_heading < 0 else abs(_shortest_turn(heading, goal_heading))
+                total = distances[state] + target_offsets[i] + turning_cost * HEADING_STEP * turn
+                if total < best_total:
+                    best_state, best_total = state, total
+        for slot in range(neighbour_offsets[vertex], neighbour_offsets[vertex + 1]):
+            neighbour, new_heading = neighbours[slot], edge_headings[slot]
+            if blocked[neighbour] or not allowed[neighbour, new_heading]:
+                continue
+            turn = _shortest_turn(heading, new_heading)
+            if not _may_turn(allowed, vertex, heading, turn):
+                continue
+            drive = edge_weights[slot] * (1.0 + roll_cost * abs(roll[neighbour, new_heading]))
+            candidate = np.float32(distances[state] + drive + turning_cost * HEADING_STEP * abs(turn))
+            following = neighbour * HEADINGS + new_heading
+            if candidate < distances[following]:
+                distances[following] = candidate
+                predecessors[following] = state
+                key = float(candidate) + straight_line_bound(vertices, neighbour, goal)
+                size = push_or_decrease(keys, ids, positions, size, following, key)
+    return best_state
+
+
+@kernel
+def _shortest_turn(heading: int, new_heading: int) -> int:
+    """Steps to turn from one heading to another the short way, left positive."""
+    turn = (int(new_heading) - int(heading)) % HEADINGS
+    return turn if turn <= HEADINGS // 2 else turn - HEADINGS
+
+
+@kernel
+def _may_turn(allowed: BoolArray, vertex: int, heading: int, turn: int) -> bool:
+    """Whether all headings the robot passes, the new one included, are allowed at the vertex."""
+    step = 1 if turn > 0 else -1
+    for passed in range(1, abs(turn) + 1):
+        if not allowed[vertex, (heading + step * passed) % HEADINGS]:
+            return False
+    return True

@@ -1,0 +1,100 @@
+"""Heading-aware A*: plans where a slope may be taken straight but not sideways, and where turning has its price.
+
+Strengths: knows the direction of slopes (limits for roll and pitch, per heading) and the turns of the path; with a
+``tilt`` layer it uses the footprint settled on the surface, without one the vertex normals. Known failure: drives along
+edges only, so headings are those of the mesh (six to eight of 16 on regular grids), and the path zigzags in between;
+a cost of roll or turning too high for the map makes it slow. Cost: up to 16 x the states of ``mesh.astar``, about
+320 bytes a vertex while planning; meant for meshes below 300 k vertices.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.parameters import parameter
+from mbf_mesh_nav.kernels.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
+from mbf_mesh_nav.layers.tilt import TiltLayer, heading_index
+from mbf_mesh_nav.leg_search import Leg, LegQuery, drop_repeated_points, follow_predecessors, straight_leg
+from mbf_mesh_nav.plugins import MeshContext
+from mbf_mesh_nav.surface_planner import SurfacePlanner, SurfacePlannerParameters
+from mbf_mesh_nav.surface_point import corner_distances
+
+
+class HeadingAStarParameters(SurfacePlannerParameters):
+    """Parameters of ``mesh.heading_astar``."""
+
+    tilt_layer: str = parameter("tilt", "Layer of type tilt to use; if the map has none, normals and limits are used.")
+    max_roll: float = parameter(0.35, "Greatest slope across the heading (without a layer).", unit="rad", gt=0.0)
+    max_pitch: float = parameter(0.5, "Greatest slope along the heading (without a layer).", unit="rad", gt=0.0)
+    roll_cost: float = parameter(1.0, "Extra length per length and rad of roll.", unit="1/rad", ge=0.0)
+    turning_cost: float = parameter(0.1, "Extra length per rad turned.", unit="m/rad", ge=0.0)
+
+
+class HeadingAStarPlanner(SurfacePlanner):
+    """Cheapest way along edges that no heading on it forbids."""
+
+    Parameters = HeadingAStarParameters
+    parameters: HeadingAStarParameters
+
+    def __init__(self, context: MeshContext) -> None:
+        super().__init__(context)
+        mesh_map = self.mesh_map
+        starts = np.repeat(np.arange(len(mesh_map.vertices)), np.diff(mesh_map.neighbour_offsets))
+        steps = mesh_map.vertices[mesh_map.neighbours] - mesh_map.vertices[starts]
+        headings = np.rint(np.arctan2(steps[:, 1], steps[:, 0]) / HEADING_STEP).astype(np.int64)
+        self._edge_headings = (headings % HEADINGS).astype(np.uint8)
+
+    def find_leg(self, query: LegQuery) -> Leg | None:
+        """Search from the start's corners, with the robot's heading, to the goal's corners."""
+        mesh_map = self.mesh_map
+        if query.start.face == query.goal.face:
+            return straight_leg(mesh_map, query)
+        allowed, roll = self._tilt()
+        distances = np.full(HEADINGS * len(mesh_map.vertices), np.inf, dtype=np.float32)
+        predecessors = np.full(len(distances), -1, dtype=np.int32)
+        heading = 0 if query.start_pose is None else heading_index(query.start_pose.yaw)
+        corners, offsets = corner_distances(mesh_map, query.blocked, query.start)
+        seeds = corners * np.int32(HEADINGS) + np.int32(heading)
+        distances[seeds] = offsets
+        targets, target_offsets = corner_distances(mesh_map, query.blocked, query.goal)
+        best = search_with_heading(
+            mesh_map.vertices,
+            mesh_map.neighbour_offsets,
+            mesh_map.neighbours,
+            query.snapshot.edge_weights,
+            self._edge_headings,
+            query.blocked,
+            allowed,
+            roll,
+            self.parameters.roll_cost,
+            self.parameters.turning_cost,
+            distances,
+            predecessors,
+            seeds,
+            targets,
+            target_offsets,
+            query.goal.point,
+            -1 if query.goal_pose is None else heading_index(query.goal_pose.yaw),
+            query.cancel_flag,
+        )
+        if best < 0:
+            return None
+        chain = np.array(follow_predecessors(predecessors, best)[::-1]) // HEADINGS
+        positions = np.concatenate([[query.start.point], mesh_map.vertices[chain], [query.goal.point]])
+        ends = mesh_map.face_normals[[query.start.face]], mesh_map.face_normals[[query.goal.face]]
+        normals = np.concatenate([ends[0], mesh_map.vertex_normals[chain], ends[1]])
+        return drop_repeated_points(Leg(positions, normals, float(distances[best])))
+
+    def _tilt(self) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+        """Allowed headings (V, 16) and roll (V, 16) [rad]: of the tilt layer, or of the vertex normals."""
+        layer = self.mesh_map.layers.get(self.parameters.tilt_layer)
+        if isinstance(layer, TiltLayer):
+            return layer.allowed, layer.roll
+        headings = np.arange(HEADINGS) * HEADING_STEP
+        normals = self.mesh_map.vertex_normals
+        along = normals[:, :1] * np.cos(headings) + normals[:, 1:2] * np.sin(headings)
+        across = normals[:, 1:2] * np.cos(headings) - normals[:, :1] * np.sin(headings)
+        pitch, roll = np.arctan2(-along, normals[:, 2:]), np.arctan2(-across, normals[:, 2:])
+        allowed = (np.abs(roll) <= self.parameters.max_roll) & (np.abs(pitch) <= self.parameters.max_pitch)
+        return allowed, roll.astype(np.float32)

@@ -1,0 +1,107 @@
+"""Planning with headings: against a naive twin, and on a hill that may be climbed but not traversed."""
+
+import heapq
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PlanRequest
+from mbf_mesh_nav.kernels.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
+
+
+def slow_search(mesh_map, edge_headings, allowed, roll, roll_cost, turning_cost, start, target, offset, goal_heading):
+    """The twin: Dijkstra over (vertex, heading) with heapq."""
+    best, queue, total = {start: 0.0}, [(0.0, start)], np.inf
+    while queue:
+        cost, (vertex, heading) = heapq.heappop(queue)
+        if cost > best[vertex, heading]:
+            continue
+        if vertex == target:
+            turn = abs((goal_heading - heading + 8) % 16 - 8)
+            total = min(total, cost + offset + turning_cost * HEADING_STEP * turn)
+        for slot in range(mesh_map.neighbour_offsets[vertex], mesh_map.neighbour_offsets[vertex + 1]):
+            other, new = int(mesh_map.neighbours[slot]), int(edge_headings[slot])
+            turn = (new - heading) % 16
+            turn = turn if turn <= 8 else turn - 16
+            passed = [(heading + np.sign(turn) * k) % 16 for k in range(1, abs(turn) + 1)]
+            if not allowed[other, new] or not all(allowed[vertex, h] for h in passed):
+                continue
+            drive = mesh_map.neighbour_lengths[slot] * (1 + roll_cost * abs(roll[other, new]))
+            new_cost = cost + drive + turning_cost * HEADING_STEP * abs(turn)
+            if new_cost < best.get((other, new), np.inf):
+                best[other, new] = new_cost
+                heapq.heappush(queue, (new_cost, (other, new)))
+    return total
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=15, deadline=None)
+def test_the_search_finds_the_cost_of_the_naive_one(make_plugin, seed):
+    rng = np.random.default_rng(seed)
+    mesh_map = MeshMap.from_heights(rng.uniform(0, 0.2, (6, 6)), 0.5, 0.5)
+    count = len(mesh_map.vertices)
+    allowed, roll = rng.random((count, 16)) < 0.85, rng.uniform(-0.4, 0.4, (count, 16)).astype(np.float32)
+    headings = make_plugin(HeadingAStarPlanner, mesh_map)._edge_headings
+    start, target, goal_heading = 0, count - 1, int(rng.integers(16))
+    distances, predecessors = np.full(16 * count, np.inf, np.float32), np.full(16 * count, -1, np.int32)
+    distances[start * HEADINGS + 2] = 0.0
+    state = search_with_heading(
+        mesh_map.vertices, mesh_map.neighbour_offsets, mesh_map.neighbours, mesh_map.neighbour_lengths, headings,
+        np.zeros(count, bool), allowed, roll, 0.7, 0.2, distances, predecessors,
+        np.array([start * HEADINGS + 2], np.int32), np.array([target], np.int32), np.full(1, 0.1, np.float32),
+        mesh_map.vertices[target], goal_heading, np.zeros(1, np.uint8),
+    )  # fmt: skip
+    expected = slow_search(mesh_map, headings, allowed, roll, 0.7, 0.2, (start, 2), target, 0.1, goal_heading)
+    if state < 0:
+        assert expected == np.inf
+    else:
+        turn = abs((goal_heading - state % 16 + 8) % 16 - 8)
+        assert distances[state] + 0.1 + 0.2 * HEADING_STEP * turn == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.fixture(scope="module")
+def ridge():
+    """A long ridge along x with flanks of 0.4 rad between two plains."""
+    y = np.arange(61) * 0.2
+    height = np.clip(np.tan(0.4) * (3.0 - np.abs(y - 6.0)), 0.0, None)
+    return MeshMap.from_heights(np.tile(height[:, None], (1, 61)), 0.2, 0.2)
+
+
+def roll_of(path):
+    """Largest roll [rad] of the path's poses: the y axis against the horizontal."""
+    return max(abs(np.arcsin(pose.rotation[2, 1])) for pose in path)
+
+
+def test_a_flank_is_climbed_straight_and_not_traversed(make_plugin, ridge):
+    start, goal = Pose.planar(2.0, 1.0, 1.57, 0.0), Pose.planar(9.0, 11.0, 1.57, 0.0)
+    careless = make_plugin(HeadingAStarPlanner, ridge, max_roll=1.5, max_pitch=1.5, roll_cost=0.0, turning_cost=0.0)
+    careful = make_plugin(HeadingAStarPlanner, ridge, max_roll=0.2, max_pitch=0.5)
+    request = PlanRequest(start, goal)
+    assert roll_of(careless.make_plan(request).path) > 0.25
+    result = careful.make_plan(request)
+    assert result.success, result.message
+    assert roll_of(result.path) < 0.21
+
+
+def test_a_flank_too_steep_to_climb_is_no_path(make_plugin, ridge):
+    planner = make_plugin(HeadingAStarPlanner, ridge, max_roll=0.2, max_pitch=0.3)
+    result = planner.make_plan(PlanRequest(Pose.planar(2.0, 1.0, 1.57), Pose.planar(2.0, 11.0, 1.57)))
+    assert result.outcome == GetPathOutcome.NO_PATH_FOUND
+
+
+def test_turning_costs_make_paths_with_fewer_turns(make_plugin, hills):
+    def turns(turning_cost):
+        planner = make_plugin(HeadingAStarPlanner, hills, turning_cost=turning_cost, max_roll=1.0, max_pitch=1.0)
+        steps = np.diff(
+            planner.make_plan(PlanRequest(Pose.planar(0.5, 0.5), Pose.planar(5.5, 3.0))).path.positions, axis=0
+        )
+        yaws = np.arctan2(steps[1:-1, 1], steps[1:-1, 0])
+        return np.count_nonzero(np.abs(np.diff(yaws)) > 0.1)
+
+    assert turns(2.0) < turns(0.0)
