@@ -1,0 +1,107 @@
+"""Speed of the mesh map: load, each layer, obstacle updates and memory, as multiples of SciPy's Dijkstra.
+
+    python benchmarks/mesh_layers.py [--side 1000]
+
+Peers in the same run: ``scipy.sparse.csgraph.dijkstra`` with predecessors on the same mesh (the unit of every ratio)
+and ``scipy.spatial.cKDTree`` (vertices only) for building and batches of pose queries.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+from terrain_meshes import fractal_terrain
+
+from mbf_mesh_nav.layer import MeshLayer
+from mbf_mesh_nav.locate import SurfaceLocator
+from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.mesh_map import MeshMap
+
+ANALYSIS = ("border", "steepness", "roughness", "height_diff", "ridge", "clearance", "tilt")
+LIMIT_EIGHT_LAYERS = 40.0
+QUERIES = 100_000
+
+
+def seconds_of(task: Callable[[], object], rounds: int = 2) -> float:
+    times = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        task()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def layered_map(side: int) -> MeshMap:
+    """A terrain with every analysis layer, their inflation, and inflated obstacles."""
+    terrain = fractal_terrain(side)
+    layers = [{"name": name, "type": name} for name in ANALYSIS]
+    layers += [
+        {"name": "lethal", "type": "max_combination", "inputs": ANALYSIS[:6]},
+        {"name": "inflation", "type": "inflation", "inputs": ["lethal"]},
+        {"name": "seen", "type": "obstacle"},
+        {"name": "seen_inflation", "type": "inflation", "inputs": ["seen"]},
+        {"name": "final", "type": "max_combination", "inputs": ["inflation", "seen_inflation"]},
+    ]
+    blocks = {"clearance": {"robot_height": 1.0}, "height_diff": {"height_limit": 1.0}, "steepness": {"threshold": 0.5}}
+    parameters = MeshMapParameters(layers=layers, default_layer="final", edge_cost_factor=1.0)
+    return build_mesh_map(parameters, blocks, vertices=terrain.vertices, faces=terrain.faces)
+
+
+def report_layers(mesh_map: MeshMap, unit: float) -> None:
+    total = 0.0
+    for name in (*ANALYSIS, "lethal", "inflation"):
+        layer: MeshLayer = mesh_map.layers[name]
+        ratio = seconds_of(layer.recompute) / unit
+        total += ratio if name != "tilt" else 0.0
+        print(f"  {name:12} {ratio:7.2f} x SciPy")
+    print(f"  eight layers {total:7.2f} x SciPy, limit {LIMIT_EIGHT_LAYERS:g}  (tilt is not among them)")
+
+
+def report_obstacles(mesh_map: MeshMap) -> None:
+    rng = np.random.default_rng(2)
+    centre = mesh_map.vertices[len(mesh_map.vertices) // 2]
+    cloud = centre + rng.normal(0.0, 1.0, (5000, 3)) * [2.0, 2.0, 0.2] + [0.0, 0.0, 0.5]
+    mesh_map.insert_points(cloud, centre, 0.0)
+    moved = cloud + np.array([0.3, 0.0, 0.0])
+    shifted = seconds_of(lambda: mesh_map.insert_points(moved, centre, 1.0), 1)
+    anew = seconds_of(mesh_map.layers["inflation"].recompute, 1)
+    marked = int(mesh_map.layers["seen"].lethal.sum())
+    update, start = f"{shifted * 1e3:.1f} ms", f"{anew * 1e3:.1f} ms"
+    print(f"  cloud of 5000 points, {marked} lethal vertices: {update} (static inflation anew: {start})")
+
+
+def report_queries(mesh_map: MeshMap) -> None:
+    rng = np.random.default_rng(3)
+    points = mesh_map.vertices[rng.integers(len(mesh_map.vertices), size=QUERIES)] + rng.normal(0, 0.03, (QUERIES, 3))
+    tree = cKDTree(mesh_map.vertices)
+    build = seconds_of(lambda: SurfaceLocator(mesh_map.topology)) / seconds_of(lambda: cKDTree(mesh_map.vertices), 1)
+    query = seconds_of(lambda: mesh_map.locate(points, 0.5)) / seconds_of(lambda: tree.query(points), 1)
+    print(f"  pose queries: build {build:.2f} x, {QUERIES} exact surface points {query:.2f} x cKDTree (vertices only)")
+
+
+def main() -> None:
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("--side", type=int, default=316, help="vertices along a side of the terrain")
+    side = arguments.parse_args().side
+    layered_map(20)  # compiles the kernels
+    start = time.perf_counter()
+    mesh_map = layered_map(side)
+    print(f"{side * side} vertices, {len(mesh_map.layers)} layers, built in {time.perf_counter() - start:.2f} s")
+    graph = scipy.sparse.csr_matrix(
+        (mesh_map.neighbour_lengths.astype(float), mesh_map.neighbours, mesh_map.neighbour_offsets)
+    )
+    unit = seconds_of(lambda: dijkstra(graph, indices=0, return_predecessors=True))
+    print(f"  SciPy's full Dijkstra {unit * 1e3:.1f} ms")
+    report_layers(mesh_map, unit)
+    report_obstacles(mesh_map)
+    report_queries(mesh_map)
+
+
+if __name__ == "__main__":
+    main()
