@@ -1,0 +1,63 @@
+"""One room as a costmap and one field as a mesh, with a wall that has a gap and a place that cannot be reached."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mbf_abstract.geometry import Pose
+from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.plugins import CostmapContext
+from mbf_mesh_nav.layer import LayerContext, MeshLayer
+from mbf_mesh_nav.layer_graph import LayerGraph
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.plugins import MeshContext
+
+
+def is_wall(x, y):
+    """Wall at x = 4 with a gap above y = 4.2, and a closed closet around (7.2, 5.2)."""
+    wall = (np.abs(x - 4.0) < 0.11) & (y < 4.2)
+    from_closet = np.maximum(np.abs(x - 7.2), np.abs(y - 5.2))
+    return wall | ((from_closet > 0.55) & (from_closet < 0.8))
+
+
+@pytest.fixture(scope="session")
+def costmap_site():
+    """A room of 8 m x 6 m with a robot of 0.2 m radius."""
+    x, y = np.meshgrid((np.arange(160) + 0.5) * 0.05, (np.arange(120) + 0.5) * 0.05)
+    cells = np.where(is_wall(x, y), 254, 0).astype(np.uint8)
+    cells[[0, -1], :] = cells[:, [0, -1]] = 254
+    layers = ({"name": "walls", "type": "static"}, {"name": "inflation", "type": "inflation"})
+    parameters = CostmapParameters(resolution=0.05, robot_radius=0.2, max_age=0.0, layers=layers)
+
+    def make_map():
+        costmap = build_layered_costmap(parameters, static_map=Costmap(cells.copy(), 0.05))
+        costmap.update(Pose.planar(1.0, 1.0), 0.0)
+        return costmap
+
+    def make_context(base):
+        costmap = make_map()
+        return CostmapContext(**vars(base), global_costmap=costmap, local_costmap=costmap, costmap=costmap)
+
+    return SimpleNamespace(make_context=make_context, watched=[])
+
+
+class PaintedLayer(MeshLayer):
+    """Lethal where the wall is."""
+
+    def compute(self):
+        lethal = is_wall(*self.topology.vertices[:, :2].T)
+        return np.where(lethal, np.inf, 0.0).astype(np.float32), lethal
+
+
+@pytest.fixture(scope="session")
+def mesh_site():
+    """The same walls painted on a flat field of triangles of 0.1 m."""
+    mesh_map = MeshMap.from_heights(np.zeros((61, 81)), 0.1, 0.1)
+    layer = PaintedLayer(LayerContext("walls", mesh_map.topology, mesh_map.locator, PaintedLayer.Parameters()))
+    layer.recompute()
+    mesh_map.set_layers(LayerGraph([layer]), "walls", 0.0)
+    snapshot = mesh_map.snapshot()
+    watched = [snapshot.costs, snapshot.lethal, snapshot.edge_weights, mesh_map.vertices]
+    return SimpleNamespace(make_context=lambda base: MeshContext(**vars(base), mesh_map=mesh_map), watched=watched)
