@@ -134,7 +134,9 @@ def random_route(
     route: list[NDArray[np.intp]] = []
     for _ in range(MAX_ROUTE_DRAWS if len(cells) else 0):
         cell = cells[rng.integers(len(cells))]
-        ends = [cell] if not route else [route[-1], cell] if len(route) < corners - 1 else [route[-1], cell, route[0]]
+        ends = [*route[-1:], cell]
+        if len(route) == corners - 1:
+            ends.append(route[0])
         if all(_leg_is_open(open_cells, a, b, longest_leg / grid.resolution) for a, b in pairwise(ends)):
             route.append(cell)
         if len(route) == corners:

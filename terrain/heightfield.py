@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RectBivariateSpline
 
-from mbf_abstract.geometry import Pose, quaternions_from_axes
+from mbf_abstract.geometry import Pose, quaternion_from_yaw, quaternion_multiply
 
 FloatArray = NDArray[np.float64]
 
@@ -117,25 +117,55 @@ class Heightfield:
         iy = np.clip(np.floor(v).astype(np.intp), 0, self.ny - 2)
         return ix, iy, np.where(outside, np.nan, u - ix), np.where(outside, np.nan, v - iy)
 
+    def _corner_heights(self, ix: NDArray[np.intp], iy: NDArray[np.intp]) -> tuple[FloatArray, ...]:
+        """Heights of the corners (0, 0), (1, 0), (0, 1) and (1, 1) of cells, in float64."""
+        corners = ((iy, ix), (iy, ix + 1), (iy + 1, ix), (iy + 1, ix + 1))
+        return tuple(np.asarray(self.heights[corner], dtype=np.float64) for corner in corners)
+
     def height_at(self, x: ArrayLike, y: ArrayLike) -> FloatArray:
         """Height [m] of the triangulated surface, float64 of the broadcast shape; nan outside the terrain."""
         ix, iy, s, t = self._locate(x, y)
-        h = self.heights.astype(np.float64)
-        h10, h01 = h[iy, ix + 1], h[iy + 1, ix]
-        lower = h[iy, ix] * (1.0 - s - t) + h10 * s + h01 * t
-        upper = h[iy + 1, ix + 1] * (s + t - 1.0) + h10 * (1.0 - t) + h01 * (1.0 - s)
+        h00, h10, h01, h11 = self._corner_heights(ix, iy)
+        lower = h00 * (1.0 - s - t) + h10 * s + h01 * t
+        upper = h11 * (s + t - 1.0) + h10 * (1.0 - t) + h01 * (1.0 - s)
         return np.asarray(np.where(s + t <= 1.0, lower, upper))
 
     def normal_at(self, x: ArrayLike, y: ArrayLike) -> FloatArray:
         """Return the unit normal (..., 3) of the triangle under each position, pointing up; nan outside."""
         ix, iy, s, t = self._locate(x, y)
-        h = self.heights.astype(np.float64)
-        h10, h01 = h[iy, ix + 1], h[iy + 1, ix]
+        h00, h10, h01, h11 = self._corner_heights(ix, iy)
         is_lower = s + t <= 1.0
-        rise_x = np.where(is_lower, h10 - h[iy, ix], h[iy + 1, ix + 1] - h01)
-        rise_y = np.where(is_lower, h01 - h[iy, ix], h[iy + 1, ix + 1] - h10)
+        rise_x = np.where(is_lower, h10 - h00, h11 - h01)
+        rise_y = np.where(is_lower, h01 - h00, h11 - h10)
         normal = np.stack([-rise_x / self.dx, -rise_y / self.dy, np.where(np.isnan(s), np.nan, 1.0)], axis=-1)
         return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
+
+    def ground_at(self, x: float, y: float) -> tuple[float, float, float]:
+        """Height [m] and its derivatives along x and y at one place, without the cost of array calls.
+
+        Raises
+        ------
+        ValueError
+            The place is not on the terrain.
+        """
+        u, v = (x - self.x0) / self.dx, (y - self.y0) / self.dy
+        columns, rows = self.nx - 1, self.ny - 1
+        if not (0.0 <= u <= columns and 0.0 <= v <= rows):
+            raise ValueError(
+                f"({x:g}, {y:g}) is off the terrain x {self.x0:g}..{self.x_max:g}, y {self.y0:g}..{self.y_max:g}"
+            )
+        ix, iy = min(int(u), columns - 1), min(int(v), rows - 1)
+        s, t = u - ix, v - iy
+        h10, h01 = float(self.heights[iy, ix + 1]), float(self.heights[iy + 1, ix])
+        if s + t <= 1.0:
+            h00 = float(self.heights[iy, ix])
+            rise_x, rise_y = h10 - h00, h01 - h00
+            height = h00 + s * rise_x + t * rise_y
+        else:
+            h11 = float(self.heights[iy + 1, ix + 1])
+            rise_x, rise_y = h11 - h01, h11 - h10
+            height = h11 - (1.0 - s) * rise_x - (1.0 - t) * rise_y
+        return height, rise_x / self.dx, rise_y / self.dy
 
     def pose_at(self, x: float, y: float, yaw: float = 0.0) -> Pose:
         """Pose on the ground at (x, y) [m]: z axis along the normal, x axis towards ``yaw`` [rad] seen from above.
@@ -145,15 +175,18 @@ class Heightfield:
         ValueError
             The position is not on the terrain.
         """
-        if not self.contains(x, y):
-            raise ValueError(
-                f"({x:g}, {y:g}) is off the terrain x {self.x0:g}..{self.x_max:g}, y {self.y0:g}..{self.y_max:g}"
-            )
-        normal = self.normal_at(x, y)
-        slope_along = -(normal[0] * math.cos(yaw) + normal[1] * math.sin(yaw)) / normal[2]
-        heading = [[math.cos(yaw), math.sin(yaw), slope_along]]
-        qx, qy, qz, qw = quaternions_from_axes(heading, [normal])[0].tolist()
-        return Pose((x, y, float(self.height_at(x, y))), (qx, qy, qz, qw))
+        height, slope_x, slope_y = self.ground_at(x, y)
+        length = math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
+        a, b, c = -slope_x / length, -slope_y / length, 1.0 / length  # the normal
+        # tilt is the shortest rotation from z to the normal; the heading is then turned about the normal
+        scale = math.sqrt(2.0 * (1.0 + c))
+        tilt = (-b / scale, a / scale, 0.0, 0.5 * scale)
+        dx, dy = math.cos(yaw), math.sin(yaw)
+        dz = slope_x * dx + slope_y * dy
+        along_x = dx * (1.0 - a * a / (1.0 + c)) - dy * a * b / (1.0 + c) - dz * a
+        along_y = dy * (1.0 - b * b / (1.0 + c)) - dx * a * b / (1.0 + c) - dz * b
+        turn = quaternion_from_yaw(math.atan2(along_y, along_x))
+        return Pose((x, y, height), quaternion_multiply(tilt, turn))
 
     def triangles(self) -> tuple[FloatArray, NDArray[np.int32]]:
         """Build the surface as a mesh.

@@ -1,7 +1,7 @@
 """A PyBullet world without a window: ground, walls and things put in, and fixed steps of 1/240 s.
 
 Use it where contact matters: slopes, bumps, wheels that slip, doors that push. For sweeps on ground that does not
-matter take ``terrain.kinematic_robot`` instead, which is some hundred times faster.
+matter take ``terrain.kinematic_robot`` instead, which is some thirty times faster.
 
 Two ways to put ground in. ``add_heightfield`` is Bullet's own heightfield; the planner's mesh from
 ``Heightfield.triangles`` is the same surface to a fraction of a millimetre. ``add_mesh`` is a concave triangle mesh:

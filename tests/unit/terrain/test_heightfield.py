@@ -95,3 +95,29 @@ def test_resampling_of_a_plane_is_exact() -> None:
 def test_a_bad_grid_is_refused(heights: np.ndarray, dx: float, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         Heightfield(heights, dx, 1.0)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 5), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_the_fast_single_query_equals_the_array_queries(seed: int, u: float, v: float) -> None:
+    field = random_field(seed)
+    x, y = field.x0 + u * field.size[0], field.y0 + v * field.size[1]
+    height, slope_x, slope_y = field.ground_at(x, y)
+    assert height == pytest.approx(float(field.height_at(x, y)), abs=1e-9)
+    edge_distance = abs((u * 10) % 1.0 + (v * 6) % 1.0 - 1.0)
+    if edge_distance > 1e-6 and 0.0 < (u * 10) % 1.0 and 0.0 < (v * 6) % 1.0:  # on an edge both normals are right
+        normal = np.array([-slope_x, -slope_y, 1.0]) / np.sqrt(1.0 + slope_x**2 + slope_y**2)
+        assert normal == pytest.approx(field.normal_at(x, y), abs=1e-6)
+
+
+@given(st.integers(0, 5), st.floats(0.05, 0.95), st.floats(-3.1, 3.1))
+def test_a_pose_stands_on_the_ground_and_looks_where_it_was_told(seed: int, u: float, yaw: float) -> None:
+    field = random_field(seed)
+    x, y = field.x0 + u * field.size[0], field.y0 + (1.0 - u) * field.size[1]
+    pose = field.pose_at(x, y, yaw)
+    _, slope_x, slope_y = field.ground_at(x, y)
+    forward, up = pose.rotation[:, 0], pose.rotation[:, 2]
+    assert up == pytest.approx(np.array([-slope_x, -slope_y, 1.0]) / np.sqrt(1.0 + slope_x**2 + slope_y**2), abs=1e-9)
+    assert np.cos(np.arctan2(forward[1], forward[0]) - yaw) == pytest.approx(1.0, abs=1e-9)
+    with pytest.raises(ValueError, match="off the terrain"):
+        field.pose_at(field.x0 - 0.1, y)

@@ -1,0 +1,103 @@
+"""Speed of simulated worlds: how much faster than real time a run is, and Embree's rays against Bullet's.
+
+    python benchmarks/simulation_speed.py [--quick] [--json]
+
+A Husky-sized robot drives straight over the Jacksboro hills with a 16-ring lidar at 10 Hz (the kinematic one: without
+lidar, as in sweeps); figures are seconds of
+simulated time per second of CPU time of this process, so they are of one core. The peer of the lidar is Bullet's own
+``rayTestBatch`` in the same world in the same run. ``--json`` prints the figures as last line.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from mbf_abstract.geometry import Twist
+from terrain.dem_io import jacksboro
+from terrain.heightfield import Heightfield
+from terrain.kinematic_robot import KinematicRobot, KinematicWorld
+from terrain.rays import StaticRays
+from terrain.robot_models import HUSKY
+from terrain.robots import WheeledRobot
+from terrain.sensors import Lidar, ring_directions
+from terrain.simulation import SimulatedRobot, Simulation, SteppedWorld
+from terrain.world import STATIC, BulletWorld
+
+LIMITS = {"outdoor_realtime_factor": 10.0, "embree_over_bullet_rays": 2.0}
+RANGE = 20.0
+
+
+def cpu_seconds(work: Callable[[], object]) -> float:
+    started = time.process_time()
+    work()
+    return time.process_time() - started
+
+
+def ring_lidar(robot: SimulatedRobot, rays: StaticRays) -> Lidar:
+    rng = np.random.default_rng(0)
+    return Lidar(robot, "lidar", [rays], HUSKY.lidar_position, ring_directions(), 10.0, rng, max_range=RANGE)
+
+
+def realtime_factor(world: SteppedWorld, robot: SimulatedRobot, sensors: dict[str, Lidar], seconds: float) -> float:
+    """Simulated seconds per CPU second of a straight drive."""
+    simulation = Simulation(world, robot, sensors)
+    robot.send_command(Twist.planar(0.8))
+    return seconds / cpu_seconds(lambda: simulation.advance_to(seconds))
+
+
+def ray_ratio(terrain: Heightfield, rays: StaticRays, scans: int) -> tuple[float, float]:
+    """Embree's thousand rays per CPU second, and how many times Bullet's they are (Bullet on a mesh, its best)."""
+    directions = ring_directions()
+    x, y = (0.5 * (low + high) for low, high in ((terrain.x0, terrain.x_max), (terrain.y0, terrain.y_max)))
+    origins = np.tile([x, y, float(terrain.height_at(x, y)) + 1.0], (len(directions), 1))
+    with BulletWorld() as world:
+        world.add_mesh(*terrain.triangles())
+        bullet = cpu_seconds(
+            lambda: [world.cast_rays(origins, origins + RANGE * directions, STATIC) for _ in range(scans)]
+        )
+    embree = cpu_seconds(lambda: [rays.distances(origins, directions, RANGE) for _ in range(scans)])
+    return scans * len(directions) / embree / 1e3, bullet / embree
+
+
+def measure(seconds: float, scans: int) -> dict[str, float]:
+    terrain = jacksboro(100.0, spacing=0.3, roughness=0.015, rng=np.random.default_rng(0))
+    rays = StaticRays(*terrain.triangles())
+    start = terrain.pose_at(20.0, 20.0, 0.8)
+    with BulletWorld() as world:
+        world.add_heightfield(terrain)
+        wheels = WheeledRobot(world, HUSKY, start, command_timeout=math.inf)
+        wheels.settle()
+        outdoor = realtime_factor(world, wheels, {"lidar": ring_lidar(wheels, rays)}, seconds)
+    plain = KinematicWorld(terrain)
+    kinematic = realtime_factor(plain, KinematicRobot(plain, HUSKY, start, command_timeout=math.inf), {}, seconds)
+    kilo_rays, ratio = ray_ratio(terrain, rays, scans)
+    return {
+        "outdoor_realtime_factor": round(outdoor, 2),
+        "kinematic_realtime_factor": round(kinematic, 2),
+        "embree_kilorays_per_second": round(kilo_rays, 1),
+        "embree_over_bullet_rays": round(ratio, 2),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="10 s of driving instead of 60")
+    parser.add_argument("--json", action="store_true", help="print the figures as last line")
+    options = parser.parse_args()
+    figures = measure(10.0 if options.quick else 60.0, 10 if options.quick else 50)
+    for name, value in figures.items():
+        limit = LIMITS.get(name)
+        verdict = "" if limit is None else f"  (at least {limit:g}: {'met' if value >= limit else 'MISSED'})"
+        print(f"{name:28s} {value:10.2f}{verdict}")
+    if options.json:
+        print(json.dumps({"benchmark": "simulation_speed", **figures, "limits": LIMITS}))
+
+
+if __name__ == "__main__":
+    main()
