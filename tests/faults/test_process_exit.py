@@ -1,0 +1,99 @@
+"""Fault table, row 32: Ctrl-C, an exception in the main thread, the end of the interpreter, a fork.
+
+Each test runs a small robot program in a process of its own. Its robot writes every command to a file at once, so the
+file tells what the robot was told last, however the process ended.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROGRAM = """
+import os, signal, sys
+from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.clock import WallClock
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.faulty import BusyHang, Hang, drive
+
+class Robot:
+    '''Writes each command down, unbuffered.'''
+    def __init__(self, path):
+        self.file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    def send_command(self, command):
+        os.write(self.file, f"{command.vx}\\n".encode())
+    def odometry(self):
+        return None
+
+def run(path, hang=False):
+    bench = Bench(clock=WallClock(), robot=Robot(path), tf_timeout=60.0)
+    if hang:
+        bench.controller.play(drive(), drive(), Hang(bench.clock))
+    else:
+        bench.controller.play(drive())
+    bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
+    bench.clock.sleep(0.3)
+    print("driving", flush=True)
+    return bench
+"""
+ENDS = {
+    "end of the program": "bench = run(sys.argv[1])",
+    "sys.exit": "bench = run(sys.argv[1]); sys.exit(3)",
+    "exception": "bench = run(sys.argv[1]); raise RuntimeError('user code')",
+    "hanging plugin": "bench = run(sys.argv[1], hang=True)",
+    "context manager": "\nwith run(sys.argv[1]) as bench:\n    raise RuntimeError('user code')",
+}
+
+
+def start(program, log):
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", PROGRAM + program, str(log)]
+    return subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=Path.cwd()
+    )
+
+
+def velocities(log):
+    return [float(line) for line in log.read_text().split()]
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_however_the_process_ends_the_robot_is_told_to_stand(tmp_path, end):
+    log = tmp_path / "commands"
+    with start(ENDS[end], log) as process:
+        output, _ = process.communicate(timeout=20)
+    assert "driving" in output
+    assert 0.5 in velocities(log)
+    assert velocities(log)[-1] == 0.0
+
+
+def test_ctrl_c_stops_the_robot(tmp_path):
+    log = tmp_path / "commands"
+    with start("bench = run(sys.argv[1]); bench.clock.sleep(60.0)", log) as process:
+        assert process.stdout.readline().strip() == "driving"
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=20)
+    assert velocities(log)[-1] == 0.0
+
+
+@pytest.mark.xfail(reason="the exit hook also runs in a forked child and stops the parent's robot", strict=True)
+def test_a_forked_child_that_ends_does_not_stop_or_drive_the_robot(tmp_path):
+    log = tmp_path / "commands"
+    program = """
+bench = run(sys.argv[1])
+child = os.fork()
+if child == 0:
+    sys.exit(0)
+os.waitpid(child, 0)
+os.write(bench.server.runtime.gate._robot.file, b"9\\n")
+bench.clock.sleep(0.2)
+"""
+    with start(program, log) as process:
+        process.communicate(timeout=20)
+    told = velocities(log)
+    child_ended = told.index(9.0)
+    assert 0.0 not in told[:child_ended]
+    assert told[-1] == 0.0
