@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import ValidationError
+from pydantic import ValidationError, field_validator
 
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.densify import densify
@@ -34,7 +34,7 @@ from mbf_mesh_nav.layer_cache import LayerCache
 from mbf_mesh_nav.layer_graph import LayerGraph, LayerGraphError, dependency_order
 from mbf_mesh_nav.mesh_io import read_mesh
 from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.repair import Finding, checked_mesh
+from mbf_mesh_nav.repair import REPAIRS, Finding, checked_mesh
 from mbf_mesh_nav.topology import build_topology
 
 LAYER_TYPES: dict[str, str] = {
@@ -85,6 +85,13 @@ class MeshMapParameters(ParameterModel):
     )
     cache_dir: str = parameter("", "Folder for computed layers; empty = no cache.", dynamic=False)
 
+    @field_validator("repair")
+    @classmethod
+    def _repairs_are_known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if unknown := [name for name in names if name not in REPAIRS]:
+            raise ValueError(f"unknown repairs: {', '.join(unknown)}; the repairs are: {', '.join(REPAIRS)}")
+        return names
+
 
 def load_builtin_layer(type_name: str) -> type[MeshLayer]:
     """Class of a type in ``LAYER_TYPES`` or of ``module:Class``.
@@ -104,34 +111,29 @@ def load_builtin_layer(type_name: str) -> type[MeshLayer]:
     return layer_class
 
 
-def default_layers(inscribed_radius: float) -> MeshMapParameters:
-    """Return sane layers for a bare mesh: border, steepness, roughness and height steps, joined and inflated.
+def default_layers(inscribed_radius: float) -> tuple[MeshMapParameters, dict[str, dict[str, float]]]:
+    """Return parameters and layer blocks for a bare mesh and a robot of ``inscribed_radius`` [m].
 
-    Use together with ``default_layer_blocks`` of the same radius [m].
+    Border, steepness, roughness and height steps are joined and inflated to twice the radius.
     """
     guards = ("border", "steepness", "roughness", "height_diff")
     entries = [LayerEntry(name=guard, type=guard) for guard in guards]
     entries.append(LayerEntry(name="lethal", type="max_combination", inputs=guards))
     entries.append(LayerEntry(name="inflation", type="inflation", inputs=("lethal",)))
-    return MeshMapParameters(
-        layers=tuple(entries), default_layer="inflation", edge_cost_factor=1.0, inscribed_radius=inscribed_radius
-    )
-
-
-def default_layer_blocks(inscribed_radius: float, inflation_radius: float | None = None) -> dict[str, dict[str, float]]:
-    """Parameters of ``default_layers`` for a robot of ``inscribed_radius`` [m]; inflation reaches twice as far."""
-    return {
+    blocks = {
         "steepness": {"threshold": 0.6},
         "roughness": {"threshold": 0.8},
         "height_diff": {"threshold": 0.2, "height_limit": 1.0},
         "inflation": {
             "inscribed_radius": inscribed_radius,
-            "inflation_radius": inflation_radius or 2.0 * inscribed_radius,
+            "inflation_radius": 2.0 * inscribed_radius,
             "lethal_value": np.inf,
             "inscribed_value": 1.0,
             "cost_scaling_factor": 2.0,
         },
     }
+    parameters = MeshMapParameters(layers=tuple(entries), edge_cost_factor=1.0, inscribed_radius=inscribed_radius)
+    return parameters, blocks
 
 
 def build_mesh_map(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from pydantic import ValidationError
 
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.layers.roughness import RoughnessLayer
@@ -11,7 +12,6 @@ from mbf_mesh_nav.map_builder import (
     LayerGraphError,
     MeshMapParameters,
     build_mesh_map,
-    default_layer_blocks,
     default_layers,
 )
 from mbf_mesh_nav.mesh_io import read_mesh
@@ -23,7 +23,7 @@ VERTICES, FACES = heightfield_mesh(np.random.default_rng(0).random((12, 10)) * 0
 def test_default_layers_leave_a_floor_free_inside_and_close_its_border():
     vertices, faces = heightfield_mesh(np.zeros((30, 30)), 0.1, 0.1)
 
-    mesh = build_mesh_map(default_layers(0.3), default_layer_blocks(0.3), vertices=vertices, faces=faces)
+    mesh = build_mesh_map(*default_layers(0.3), vertices=vertices, faces=faces)
 
     snapshot = mesh.snapshot()
     middle = np.linalg.norm(mesh.vertices[:, :2] - 1.45, axis=1) < 0.8
@@ -58,6 +58,11 @@ def test_every_mistake_in_the_layers_is_reported_at_once():
         "layer 'd': radios",
     ):
         assert part in str(error.value)
+
+
+def test_unknown_repair_is_refused_with_the_configuration():
+    with pytest.raises(ValidationError, match=r"unknown repairs: duplicate; the repairs are: .*duplicate_faces"):
+        MeshMapParameters(repair=("zero_area", "duplicate"))
 
 
 def test_layer_class_can_be_named_by_module():
