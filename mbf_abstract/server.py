@@ -32,6 +32,7 @@ from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.map_queries import MapQueries
+from mbf_abstract.map_view import MapView
 from mbf_abstract.navigation_parameters import NavigationParameters
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugin_table import PluginTable
@@ -122,6 +123,14 @@ class AbstractNavigationServer(ABC):
     @classmethod
     def config_for_map(cls, file: FilePath) -> str | None:
         """YAML text of a sane configuration for a bare map file; None if this server does not read such files."""
+        return None
+
+    def ground_height(self, x: float, y: float) -> float:
+        """Height [m] of the ground at a place of the global frame; 0 where the map has none there."""
+        return 0.0
+
+    def map_view(self) -> MapView | None:
+        """What the map looks like, for pictures; None if this server has nothing to show."""
         return None
 
     def map_problem(self) -> str:

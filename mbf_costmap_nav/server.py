@@ -16,10 +16,12 @@ import numpy as np
 
 from mbf_abstract.config import Config, PluginDeclaration
 from mbf_abstract.map_queries import MapQueries
+from mbf_abstract.map_view import GridView
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.server import AbstractNavigationServer
+from mbf_costmap_nav.costmap import INSCRIBED, UNKNOWN
 from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.plugins import CostmapContext
@@ -30,6 +32,8 @@ MAP_SUFFIXES = {".yaml", ".yml", ".pgm", ".png", ".bmp"}
 
 BARE_MAP = """\
 backend: costmap
+planner_max_retries: 0
+planner_patience: 60.0
 planners:
   - {{name: astar, type: astar}}
   - {{name: dijkstra, type: dijkstra}}
@@ -95,6 +99,14 @@ class CostmapNavigationServer(AbstractNavigationServer):
                 origin = transforms.transform_points(np.atleast_2d(origin), scan.frame_id, costmap.frame_id)[0]
             if scan.source in costmap.source_names:
                 costmap.insert_scan(scan.source, origin, ends, scan.hits, scan.stamp)
+
+    def map_view(self) -> GridView:
+        """The costs of the global costmap, 1 for what the robot's middle must not touch."""
+        costmap = self.global_costmap.snapshot()
+        costs = (costmap.cells / np.float32(INSCRIBED)).astype(np.float32)
+        costs[costmap.cells == UNKNOWN] = np.nan
+        geometry = costmap.geometry
+        return GridView(costs, (geometry.origin_x, geometry.upper_x, geometry.origin_y, geometry.upper_y))
 
     @contextmanager
     def using_map(self, kind: PluginKind) -> Iterator[None]:

@@ -15,6 +15,7 @@ import numpy as np
 from mbf_abstract.config import Config
 from mbf_abstract.execution.ticker import Ticker
 from mbf_abstract.map_queries import MapQueries
+from mbf_abstract.map_view import MeshView
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.sensing import RangeScan
@@ -29,13 +30,15 @@ DECAY_PERIOD = 0.5  # s; how often obstacles are checked for their age
 
 BARE_MESH = """\
 backend: mesh
+planner_max_retries: 0
+planner_patience: 60.0
 planners:
   - {{name: dijkstra, type: dijkstra}}
   - {{name: astar, type: astar}}
   - {{name: cvp, type: cvp}}
 mesh_map:
   mesh_file: {file}
-  repair: [zero_area, duplicate, unreferenced, non_manifold]
+  repair: [duplicate_vertices, zero_area, duplicate_faces, non_manifold, unreferenced]
   inscribed_radius: 0.3
   edge_cost_factor: 1.0
   default_layer: inflation
@@ -92,6 +95,18 @@ class MeshNavigationServer(AbstractNavigationServer):
             points = transforms.transform_points(points, scan.frame_id, frame)
             origin = transforms.transform_points(np.atleast_2d(origin), scan.frame_id, frame)[0]
         self.mesh_map.insert_points(points, origin, scan.stamp)
+
+    def ground_height(self, x: float, y: float) -> float:
+        """Height of the highest surface at a place."""
+        top = float(self.mesh_map.vertices[:, 2].max()) + 1.0
+        faces, distances = self.mesh_map.locator.cast_rays([[x, y, top]], [[0.0, 0.0, -1.0]])
+        return top - float(distances[0]) if faces[0] >= 0 else 0.0
+
+    def map_view(self) -> MeshView:
+        """The mesh with the costs of the default layer."""
+        snapshot = self.mesh_map.snapshot()
+        costs = np.where(snapshot.lethal, np.inf, snapshot.costs).astype(np.float32)
+        return MeshView(self.mesh_map.vertices, self.mesh_map.faces, costs)
 
     def map_problem(self) -> str:
         """Name the obstacle layer whose sensor is silent, if there is one."""

@@ -40,16 +40,16 @@ def write_picture(file: str | Path, recording: Recording) -> None:
 
 def picture_png(recording: Recording) -> bytes:
     """Draw a recording as the bytes of a PNG file; raises ViewerMissing without matplotlib."""
-    figure, axes = _new_figure(_extent(recording))
+    figure, axes = new_figure(_extent(recording))
     _draw_world(axes, recording)
-    _draw_paths(axes, recording.paths)
+    draw_paths(axes, recording.paths)
     _draw_track(axes, recording)
-    _draw_marks(axes, recording.start, recording.goals)
+    draw_marks(axes, recording.start, recording.goals)
     _label(axes, recording)
-    return _png(figure)
+    return png_bytes(figure)
 
 
-def _new_figure(extent: tuple[float, float, float, float]) -> tuple[Figure, Axes]:
+def new_figure(extent: tuple[float, float, float, float]) -> tuple[Figure, Axes]:
     """Make a figure of the extent's proportions, without a window and without matplotlib's global state."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -67,7 +67,8 @@ def _new_figure(extent: tuple[float, float, float, float]) -> tuple[Figure, Axes
     return figure, axes
 
 
-def _png(figure: Figure) -> bytes:
+def png_bytes(figure: Figure) -> bytes:
+    """Return the figure as a PNG file, cut to its contents."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", bbox_inches="tight", facecolor="white")
     return buffer.getvalue()
@@ -85,17 +86,17 @@ def _extent(recording: Recording) -> tuple[float, float, float, float]:
 
 def _draw_world(axes: Axes, recording: Recording) -> None:
     if recording.ground is not None:
-        _draw_triangles(axes, *shaded_triangles(recording.ground))
+        draw_triangles(axes, *shaded_triangles(recording.ground))
     for surface, colour, label in ((recording.walls, WALL, None), (recording.obstacles, OBSTACLE, "in no map")):
         if surface is not None:
             corners = surface.vertices[surface.faces][:, :, :2]
-            _draw_triangles(axes, corners, np.tile(np.array(colour) / 255.0, (len(corners), 1)))
+            draw_triangles(axes, corners, np.tile(np.array(colour) / 255.0, (len(corners), 1)))
             axes.plot([], [], "s", color=np.array(colour) / 255.0, markersize=9, label=label)
     if recording.ground is not None and np.ptp(recording.ground.vertices[:, 2]) > 0.5:
         _draw_slope_legend(axes)
 
 
-def _draw_triangles(axes: Axes, corners: FloatArray, colours: FloatArray) -> None:
+def draw_triangles(axes: Axes, corners: FloatArray, colours: FloatArray) -> None:
     """Paint triangles (n, 3, 2) in the given order, one colour (n, 3) each."""
     from matplotlib.collections import PolyCollection
 
@@ -122,7 +123,7 @@ def _line(axes: Axes, points: FloatArray, colour: tuple[int, int, int], width: f
     line.set_path_effects(effects)
 
 
-def _draw_paths(axes: Axes, paths: list[StampedPoints]) -> None:
+def draw_paths(axes: Axes, paths: list[StampedPoints]) -> None:
     """The last plan strong, those before it faint."""
     for _, points in paths[:-1]:
         axes.plot(points[:, 0], points[:, 1], color=np.array(PLANNED) / 255.0, linewidth=1.0, alpha=0.35, zorder=4)
@@ -138,7 +139,8 @@ def _draw_track(axes: Axes, recording: Recording) -> None:
         axes.fill(*outline.T, facecolor=np.array(DRIVEN) / 255.0, edgecolor="white", linewidth=0.8, zorder=8)
 
 
-def _draw_marks(axes: Axes, start: Pose, goals: tuple[Pose, ...]) -> None:
+def draw_marks(axes: Axes, start: Pose, goals: tuple[Pose, ...]) -> None:
+    """Mark the start by a disc and the goals by stars."""
     mark: dict[str, Any] = {"linestyle": "none", "markeredgecolor": "white", "markeredgewidth": 1.2, "zorder": 9}
     axes.plot(start.x, start.y, marker="o", markersize=10, color=np.array(START) / 255.0, label="start", **mark)
     for index, goal in enumerate(goals):

@@ -1,0 +1,47 @@
+"""The command line ``mbf``: plan on a map, check a configuration, list plugins; other packages add commands.
+
+A package adds commands by an entry point of the group ``mbf.commands`` whose function takes the typer application, as
+``terrain`` does with ``mbf run``. Every command imports what it needs when it is called, so that ``mbf --help`` is
+there at once.
+
+Exit codes: 0 success, 1 the goal was not reached or no path was found, 2 bad arguments or a bad file.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint, entry_points
+
+import typer
+
+from mbf_abstract.commands import check, doctor, plan, plugins
+
+COMMANDS_GROUP = "mbf.commands"
+
+
+def make_app() -> typer.Typer:
+    """Build the application with the commands of all installed packages."""
+    app = typer.Typer(
+        name="mbf",
+        help="Map-independent navigation for mobile robots, on 2D costmaps and 3D triangle meshes.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+    )
+    for command in (plan, check, plugins, doctor):
+        command.register(app)
+    for point in sorted(entry_points(group=COMMANDS_GROUP), key=lambda point: point.name):
+        _add_commands(app, point)
+    return app
+
+
+def _add_commands(app: typer.Typer, point: EntryPoint) -> None:
+    """Let a package add its commands; one that cannot be imported costs its own commands, not the others."""
+    try:
+        point.load()(app)
+    except Exception as error:
+        typer.echo(f"warning: the commands of {point.value} are missing: {type(error).__name__}: {error}", err=True)
+
+
+def main() -> None:
+    """Run the command line."""
+    make_app()()

@@ -1,0 +1,88 @@
+"""A server without a simulator: a robot that stands at one pose, on simulated time. For planning and checking."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from mbf_abstract.config import Config
+from mbf_abstract.findings import ConfigError, Finding
+from mbf_abstract.geometry import Command, Pose, Twist
+from mbf_abstract.registry import PluginRegistry
+from mbf_abstract.robot import Odometry
+from mbf_abstract.server import AbstractNavigationServer
+from mbf_abstract.server_factory import read_config
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.transform import Transform
+from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.yaml_source import read_yaml
+
+YAML_SUFFIXES = {".yaml", ".yml"}
+
+
+class StandingRobot:
+    """A robot that never moves; commands to it are a mistake of the caller and have no effect."""
+
+    def __init__(self, clock: SimClock) -> None:
+        self._clock = clock
+
+    def send_command(self, command: Command) -> None:
+        """Stay."""
+
+    def odometry(self) -> Odometry:
+        """Return zero velocity, measured now."""
+        return Odometry(Twist(), self._clock.now())
+
+
+@contextmanager
+def standing_server(cls: type[AbstractNavigationServer], config: Config) -> Iterator[AbstractNavigationServer]:
+    """Build a server around a robot that stands at the origin; closed on the way out."""
+    clock, transforms = SimClock(), TransformBuffer()
+    parameters = config.parameters
+    with cls(config, StandingRobot(clock), clock, transforms) as server:
+        place_robot(server, Pose.planar(0.0, 0.0, frame_id=parameters.global_frame))
+        yield server
+
+
+def place_robot(server: AbstractNavigationServer, pose: Pose) -> None:
+    """Let the robot stand at ``pose`` (in the global frame) from now on."""
+    frame = server.config.parameters.robot_frame
+    transform = Transform(pose.position, pose.orientation, parent=pose.frame_id, child=frame, static=True)
+    server.runtime.transforms.set(transform)
+
+
+def read_config_or_map(file: Path) -> tuple[type[AbstractNavigationServer], Config]:
+    """Read a configuration, or make a default one for a bare map or mesh file.
+
+    Raises
+    ------
+    ConfigError
+        There is no such file, no installed server reads its format, or it is a configuration with mistakes.
+    """
+    if not file.is_file():
+        raise ConfigError([Finding(str(file), 1, "", "a configuration, map or mesh file", "no such file")])
+    if file.suffix.lower() in YAML_SUFFIXES and not _is_map_description(file):
+        return read_config(file)
+    registry = PluginRegistry()
+    for name in sorted({point.name for point in entry_points(group="mbf.servers")}):
+        cls: type[AbstractNavigationServer] = registry.load("servers", name, AbstractNavigationServer)
+        text = cls.config_for_map(file.resolve())
+        if text is not None:
+            return _read_config_text(text)
+    raise ConfigError([Finding(str(file), 1, "", "a format that an installed server reads", repr(file.suffix))])
+
+
+def _is_map_description(file: Path) -> bool:
+    """Whether a YAML file describes a map's image (map_server) and is no configuration."""
+    document = read_yaml(file, [])
+    return document is not None and "image" in document.data and "backend" not in document.data
+
+
+def _read_config_text(text: str) -> tuple[type[AbstractNavigationServer], Config]:
+    with tempfile.TemporaryDirectory(prefix="mbf_plan_") as folder:
+        file = Path(folder) / "default_configuration.yaml"
+        file.write_text(text, encoding="utf-8")
+        return read_config(file)

@@ -1,0 +1,104 @@
+"""``mbf doctor``: is everything here that the commands need, and how to mend what is not."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import platform
+import socket
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import typer
+
+from mbf_abstract.commands.reporting import FAILURE
+
+NEEDED = ("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "h5py")
+SIMULATION = ("pybullet", "embreex", "matplotlib", "viser")
+OLDEST_PYTHON = (3, 10)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at: ``cure`` is empty where all is well."""
+
+    what: str
+    state: str
+    cure: str = ""
+    optional: bool = False
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("doctor")(doctor)
+
+
+def doctor() -> None:
+    """Check the installation; exit code 1 if something needed is missing."""
+    findings = list(examine())
+    for finding in findings:
+        mark = "ok" if not finding.cure else "--" if finding.optional else "!!"
+        typer.echo(f"{mark}  {finding.what:22} {finding.state}")
+        if finding.cure:
+            typer.echo(f"    {'':22} -> {finding.cure}")
+    if any(finding.cure and not finding.optional for finding in findings):
+        raise typer.Exit(FAILURE)
+
+
+def examine() -> Iterator[Finding]:
+    """Look at everything, in order."""
+    enough = sys.version_info >= OLDEST_PYTHON
+    yield Finding(
+        "python", f"{platform.python_version()}, {os.cpu_count()} cores", "" if enough else "use 3.10 or newer"
+    )
+    for name in NEEDED:
+        yield _package(name, "pip install mbf-flex", optional=False)
+    for name in SIMULATION:
+        yield _package(name, "needed by mbf run and pictures: pip install 'mbf-flex[sim]'", optional=True)
+    yield _check("plugins", _plugins, "mbf plugins tells which and why")
+    yield _check("kernel cache", _kernel_cache, "set NUMBA_CACHE_DIR to a folder that can be written")
+    yield _check("loopback port", _loopback_port, "a firewall or sandbox forbids sockets: no replay, no live view")
+
+
+def _package(name: str, cure: str, optional: bool) -> Finding:
+    try:
+        importlib.import_module(name)
+    except Exception as error:
+        return Finding(name, f"{type(error).__name__}: {error}", cure, optional)
+    try:
+        return Finding(name, version("pyyaml" if name == "yaml" else name))
+    except PackageNotFoundError:
+        return Finding(name, "importable")
+
+
+def _check(what: str, look: Callable[[], str], cure: str) -> Finding:
+    try:
+        return Finding(what, look())
+    except Exception as error:
+        return Finding(what, f"{type(error).__name__}: {error}", cure)
+
+
+def _plugins() -> str:
+    from mbf_abstract.registry import PluginRegistry
+
+    entries = PluginRegistry().entries()
+    broken = [entry.name for entry in entries if entry.error]
+    if broken or not entries:
+        raise RuntimeError(f"{len(broken)} of {len(entries)} cannot be imported: {', '.join(broken) or 'none found'}")
+    return f"{len(entries)} installed, all can be imported"
+
+
+def _kernel_cache() -> str:
+    """Compiled kernels are kept beside the source or in NUMBA_CACHE_DIR; without a cache each start compiles anew."""
+    folder = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).resolve().parents[1])
+    with tempfile.TemporaryFile(dir=folder):
+        return f"{folder} can be written"
+
+
+def _loopback_port() -> str:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return f"127.0.0.1:{server.getsockname()[1]} can be opened"

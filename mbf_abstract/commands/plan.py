@@ -1,0 +1,81 @@
+"""``mbf plan``: one path on a map, without a robot and without a simulator."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from mbf_abstract.commands.coordinates import CoordinateCommand, Place, parse_place
+from mbf_abstract.commands.reporting import FAILURE, readable_errors
+
+if TYPE_CHECKING:
+    from mbf_abstract.actions.goals import GetPathResult
+    from mbf_abstract.geometry import Pose
+    from mbf_abstract.server import AbstractNavigationServer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("plan", cls=CoordinateCommand)(plan)
+
+
+def plan(
+    config: Path = typer.Argument(..., help="Configuration, or a bare map (yaml, png, pgm) or mesh (ply, obj, ...)."),
+    start: str = typer.Option(..., "--start", metavar="X Y [Z] [YAW]", help="Where the robot stands [m, rad]."),
+    goal: str = typer.Option(..., "--goal", metavar="X Y [Z] [YAW]", help="Where it shall go [m, rad]."),
+    planner: str = typer.Option("", "--planner", help="Name of the planner; the first one if not given."),
+    tolerance: float = typer.Option(0.0, "--tolerance", min=0.0, help="How far from the goal the path may end [m]."),
+    as_json: bool = typer.Option(False, "--json", help="Print one JSON object, with all poses."),
+    png: Path | None = typer.Option(None, "--png", help="Draw map and path into this file."),
+) -> None:
+    """Plan a path; exit code 0 only if there is one. Without Z the height of the ground is taken."""
+    from_place, to_place = parse_place(start, "--start"), parse_place(goal, "--goal")
+    with readable_errors():
+        from mbf_abstract.actions.goals import GetPathGoal
+        from mbf_abstract.clock import wall_seconds
+        from mbf_abstract.commands.bench import place_robot, read_config_or_map, standing_server
+        from mbf_abstract.commands.plan_picture import draw_plan
+        from mbf_abstract.navigator import Navigator
+
+        cls, checked = read_config_or_map(config)
+        with standing_server(cls, checked) as server:
+            start_pose, goal_pose = _pose(from_place, server), _pose(to_place, server)
+            place_robot(server, start_pose)
+            began = wall_seconds()
+            result = Navigator(server).send(GetPathGoal(goal_pose, planner=planner, dist_tolerance=tolerance)).wait()
+            seconds = wall_seconds() - began
+            if png is not None:
+                draw_plan(png, server, start_pose, goal_pose, result)
+    _tell(result, seconds, as_json)
+    if not result.success:
+        raise typer.Exit(FAILURE)
+
+
+def _pose(place: Place, server: AbstractNavigationServer) -> Pose:
+    from mbf_abstract.geometry import Pose
+
+    z = server.ground_height(place.x, place.y) if place.z is None else place.z
+    return Pose.planar(place.x, place.y, place.yaw, z, frame_id=server.config.parameters.global_frame)
+
+
+def _tell(result: GetPathResult, seconds: float, as_json: bool) -> None:
+    path = result.path
+    facts: dict[str, Any] = {
+        "outcome": int(result.outcome),
+        "outcome_name": result.outcome_name,
+        "message": result.message,
+        "planner": result.planner,
+        "cost": round(result.cost, 6) if path is not None else None,
+        "length_m": round(path.length, 6) if path is not None else None,
+        "time_s": round(seconds, 6),
+    }
+    if as_json:
+        poses = [] if path is None else [[*pose.position, *pose.orientation] for pose in path]
+        typer.echo(json.dumps({**facts, "poses": poses}))
+        return
+    facts["poses"] = 0 if path is None else len(path)
+    for key, value in facts.items():
+        typer.echo(f"{key:13} {'-' if value is None else value}")

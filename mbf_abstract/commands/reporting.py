@@ -1,0 +1,33 @@
+"""How commands end badly: one readable text on stderr and an exit code, never a traceback."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import typer
+
+FAILURE = 1
+BAD_INPUT = 2
+TRACEBACK_VARIABLE = "MBF_TRACEBACK"
+
+
+@contextmanager
+def readable_errors() -> Iterator[None]:
+    """Turn every exception into a text and exit code 2; set the environment variable MBF_TRACEBACK=1 to see it all."""
+    from mbf_abstract.findings import ConfigError
+
+    try:
+        yield
+    except (typer.Exit, typer.Abort, typer.BadParameter):
+        raise
+    except Exception as error:
+        if os.environ.get(TRACEBACK_VARIABLE):
+            raise
+        if isinstance(error, ConfigError):
+            count = len(error.findings)
+            typer.echo(f"{error}\n{count} mistake{'s' if count != 1 else ''} found", err=True)
+        else:
+            typer.echo(f"error: {error or type(error).__name__}", err=True)
+        raise typer.Exit(BAD_INPUT) from error

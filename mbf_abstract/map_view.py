@@ -1,0 +1,45 @@
+"""What a map looks like from outside, for pictures and viewers: an image of costs, or a mesh with costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class GridView:
+    """A map of cells.
+
+    Attributes
+    ----------
+    costs : (height, width) float32
+        0 free to 1 and above forbidden, nan unknown; row 0 at the smallest y.
+    extent : (x_min, x_max, y_min, y_max)
+        [m]
+    """
+
+    costs: NDArray[np.float32]
+    extent: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class MeshView:
+    """A map of triangles.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float64
+        [m]
+    faces : (F, 3) int32
+    costs : (V,) float32
+        0 free to 1 and above forbidden; inf is forbidden.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    costs: NDArray[np.float32]
+
+
+MapView = GridView | MeshView

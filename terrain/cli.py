@@ -1,0 +1,92 @@
+"""The commands ``mbf run`` and ``mbf scenarios``, which need the simulator."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from mbf_abstract.commands.reporting import FAILURE, readable_errors
+
+if TYPE_CHECKING:
+    from terrain.runner import RunResult
+
+RUNS = Path("runs")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the application ``mbf``."""
+    app.command("run")(run)
+    app.command("scenarios")(scenarios)
+
+
+def run(
+    scenario: str = typer.Argument(..., help="Name of a shipped scenario (see mbf scenarios), or a YAML file."),
+    backend: str = typer.Option("", "--backend", help="Map backend: mesh or costmap; the scenario's own if not given."),
+    seed: int = typer.Option(
+        -1, "--seed", min=-1, help="Seed of sensors and plugins; the scenario's own if not given."
+    ),
+    out: Path | None = typer.Option(None, "--out", help="Folder for the results; runs/<time> if not given."),
+    map_file: Path | None = typer.Option(None, "--map", help="Drive in the building of this map_server yaml instead."),
+    wall_clock: bool = typer.Option(False, "--wall-clock", help="Real time instead of as fast as possible."),
+    quiet: bool = typer.Option(False, "--quiet", help="Print only the outcome."),
+    as_json: bool = typer.Option(False, "--json", help="Print one JSON object with outcome and metrics."),
+) -> None:
+    """Drive a scenario in the simulator; exit code 0 only if the goal was reached."""
+    with readable_errors():
+        from terrain.live_line import LiveLine
+        from terrain.runner import RunOptions, run_scenario
+        from terrain.scenario import load_scenario
+        from terrain.scenario_on_map import on_map
+
+        loaded = load_scenario(scenario)
+        if map_file is not None:
+            loaded = on_map(loaded, map_file)
+        folder = out or new_run_folder(RUNS, datetime.now())
+        with LiveLine(show=not (quiet or as_json)) as live:
+            options = RunOptions(
+                folder=folder,
+                backend=backend or None,
+                seed=seed if seed >= 0 else None,
+                wall_clock=wall_clock,
+                on_progress=live.progress,
+                on_step=live.step,
+            )
+            result = run_scenario(loaded, options)
+    _tell(result, as_json)
+    if not result.success:
+        raise typer.Exit(FAILURE)
+
+
+def scenarios() -> None:
+    """List the scenarios that come with the package, and what each of them proves."""
+    with readable_errors():
+        from terrain.scenario import load_scenario, shipped_scenarios
+
+        for name in shipped_scenarios():
+            loaded = load_scenario(name)
+            typer.echo(f"{name:16} {loaded.proves}  [{', '.join(loaded.navigation)}]")
+
+
+def new_run_folder(parent: Path, now: datetime) -> Path:
+    """Return a folder name made of the time that does not exist yet."""
+    stamp = now.strftime("%Y-%m-%d_%H-%M-%S")
+    names = [stamp, *(f"{stamp}_{number}" for number in range(2, 1000))]
+    return next(parent / name for name in names if not (parent / name).exists())
+
+
+def _tell(result: RunResult, as_json: bool) -> None:
+    metrics = result.metrics
+    if as_json:
+        facts = {"outcome": result.outcome, "outcome_name": result.outcome_name, "message": result.message}
+        typer.echo(json.dumps({**facts, "success": result.success, "folder": str(result.folder), "metrics": metrics}))
+        return
+    typer.echo(f"{result.outcome_name}: {result.message}")
+    typer.echo(
+        f"{metrics['path_length_m']:.1f} m in {metrics['time_s']:.1f} s simulated, "
+        f"{metrics['wall_time_s']:.1f} s of wall time: {metrics['real_time_factor']:.1f} x real time"
+    )
+    typer.echo(f"results in {result.folder}: replay.html, picture.png, metrics.json, events.jsonl")

@@ -1,0 +1,64 @@
+"""The picture of ``mbf plan --png``: a map with its costs, start, goal and the path, if there is one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbf_abstract.geometry import Path as PlannedPath
+from mbf_abstract.geometry import Pose
+from mbf_abstract.map_view import GridView, MapView, MeshView
+from terrain.recording import Surface
+from terrain.viewer.colours import FLOOR, WALL
+from terrain.viewer.picture import draw_marks, draw_paths, draw_triangles, new_figure, png_bytes
+from terrain.viewer.shading import shaded_triangles
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COSTLY = (224, 120, 60)
+UNKNOWN = (170, 176, 186)
+
+
+def write_plan_picture(
+    file: str | Path, view: MapView | None, start: Pose, goal: Pose, path: PlannedPath | None, title: str
+) -> None:
+    """Draw a plan into a PNG file; raises ViewerMissing without matplotlib."""
+    figure, axes = new_figure(_extent(view, start, goal))
+    if isinstance(view, GridView):
+        _draw_grid(axes, view)
+    elif isinstance(view, MeshView):
+        colours = cost_colours(view.costs).astype(np.uint8)
+        draw_triangles(axes, *shaded_triangles(Surface(view.vertices, view.faces, colours)))
+    if path is not None:
+        draw_paths(axes, [(0.0, path.positions)])
+    draw_marks(axes, start, (goal,))
+    length = "no path" if path is None else f"{path.length:.2f} m, {len(path)} poses"
+    axes.set_title(f"{title} · {length}", loc="left", fontsize=11, fontweight="bold")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=3, frameon=False, fontsize=9)
+    Path(file).write_bytes(png_bytes(figure))
+
+
+def cost_colours(costs: np.typing.NDArray[np.float32]) -> np.typing.NDArray[np.float64]:
+    """Colours (..., 3) 0..255 of costs: floor to orange for 0 to 1, wall from 1 on and for inf, blue-grey for nan."""
+    levels = np.clip(np.nan_to_num(costs, nan=0.0, posinf=1.0), 0.0, 1.0)[..., None]
+    colours = np.array(FLOOR) * (1.0 - levels) + np.array(COSTLY) * levels
+    colours[np.isnan(costs)] = UNKNOWN
+    colours[costs >= 1.0] = WALL
+    return np.asarray(colours)
+
+
+def _draw_grid(axes: Axes, view: GridView) -> None:
+    pixels = cost_colours(view.costs).astype(np.uint8)
+    axes.imshow(pixels, origin="lower", extent=view.extent, interpolation="nearest", zorder=1)
+
+
+def _extent(view: MapView | None, start: Pose, goal: Pose) -> tuple[float, float, float, float]:
+    if isinstance(view, GridView):
+        return view.extent
+    ends = np.array([start.position, goal.position])
+    points = ends if view is None else np.concatenate([ends, view.vertices])
+    (x_min, y_min), (x_max, y_max) = points[:, :2].min(axis=0) - 0.5, points[:, :2].max(axis=0) + 0.5
+    return float(x_min), float(x_max), float(y_min), float(y_max)
