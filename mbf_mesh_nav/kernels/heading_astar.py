@@ -1,7 +1,8 @@
 """A* over (vertex, heading): the same hill may be climbed straight up and forbidden sideways.
 
 A state is ``vertex * HEADINGS + heading``. A move turns on the spot to the heading of an edge, over headings that are
-all allowed there, and drives along the edge; it costs the edge's weight, lengthened by the roll it brings, plus the turn.
+all allowed there, and drives along the edge; it costs the edge's weight, lengthened by the roll it brings, plus the
+turn.
 """
 
 from __future__ import annotations
@@ -105,7 +106,7 @@ def search_with_heading(
             if candidate < distances[following]:
                 distances[following] = candidate
                 predecessors[following] = state
-                key = float(candidate) + straight_line_bound(vertices, neighbour, goal)
+                key = float(candidate) + float(straight_line_bound(vertices, neighbour, goal))
                 size = push_or_decrease(keys, ids, positions, size, following, key)
     return best_state
 
