@@ -63,14 +63,28 @@ class Mishap:
 
 @dataclass(frozen=True)
 class MishapLimits:
-    """When a motion counts as a mishap; ``hold`` times [s] in brackets of the kind."""
+    """When a motion counts as a mishap.
+
+    Attributes
+    ----------
+    tilt : float
+        [rad], counts after ``tilt_hold`` [s].
+    slip_speed : float
+        [m/s], counts after ``slip_hold`` [s].
+    asked_speed : float
+        Commands below it [m/s, rad/s] do not ask for motion.
+    progress_distance, progress_angle : float
+        A robot that is asked to move and neither moves [m] nor turns [rad] this far is stuck after ``stuck_hold`` [s];
+        if its body lies on the ground it is high-centred, already after ``high_centred_hold`` [s].
+    """
 
     tilt: float = math.radians(60.0)
     tilt_hold: float = 0.3
     slip_speed: float = 0.25
     slip_hold: float = 0.5
-    standing_speed: float = 0.05
-    standing_share: float = 0.2
+    asked_speed: float = 0.05
+    progress_distance: float = 0.05
+    progress_angle: float = 0.1
     high_centred_hold: float = 1.5
     stuck_hold: float = 3.0
 
@@ -115,16 +129,17 @@ class MishapMonitor:
     _since: dict[MishapKind, float] = field(default_factory=dict)
     _counted: set[MishapKind] = field(default_factory=set)
     _last: MotionSample | None = None
+    _anchor: Pose | None = None
 
     def update(self, sample: MotionSample) -> list[Mishap]:
         """Take one sample, stamped by its pose; return the mishaps that count from this instant on."""
         self._sum_up(sample)
-        limits = self.limits
+        limits, standing = self.limits, self._standing_time(sample)
         conditions: list[tuple[MishapKind, float, Callable[[MotionSample], bool]]] = [
             (MishapKind.TIPPED_OVER, limits.tilt_hold, self._is_tipped),
             (MishapKind.SLIPPING, limits.slip_hold, lambda s: slip_speed(s) > limits.slip_speed),
-            (MishapKind.HIGH_CENTRED, limits.high_centred_hold, lambda s: s.body_on_ground and self._stands(s)),
-            (MishapKind.STUCK, limits.stuck_hold, self._stands),
+            (MishapKind.HIGH_CENTRED, 0.0, lambda s: s.body_on_ground and standing >= limits.high_centred_hold),
+            (MishapKind.STUCK, 0.0, lambda s: standing >= limits.stuck_hold),
             (MishapKind.COLLISION, 0.0, lambda s: s.body_on_obstacle),
         ]
         return [
@@ -158,15 +173,17 @@ class MishapMonitor:
     def _is_tipped(self, sample: MotionSample) -> bool:
         return tilt_of(sample.pose) > self.limits.tilt
 
-    def _stands(self, sample: MotionSample) -> bool:
-        """Whether the robot is asked to move and does neither move nor turn."""
-        asked, does = sample.commanded, sample.velocity
-        if asked.is_stopped(self.limits.standing_speed, self.limits.standing_speed):
-            return False
-        share = self.limits.standing_share
-        moves = math.hypot(does.vx, does.vy) > max(share * abs(asked.vx), 0.5 * self.limits.standing_speed)
-        turns = abs(does.wz) > max(share * abs(asked.wz), 0.5 * self.limits.standing_speed)
-        return not (moves or turns)
+    def _standing_time(self, sample: MotionSample) -> float:
+        """How long [s] the robot has been asked to move without getting anywhere; wheels that twitch do not count."""
+        limits = self.limits
+        is_asked = not sample.commanded.is_stopped(limits.asked_speed, limits.asked_speed)
+        if self._anchor is None or not is_asked or self._has_progressed(self._anchor, sample.pose):
+            self._anchor = sample.pose
+        return sample.pose.stamp - self._anchor.stamp
+
+    def _has_progressed(self, before: Pose, now: Pose) -> bool:
+        limits = self.limits
+        return now.distance_to(before) > limits.progress_distance or now.angle_to(before) > limits.progress_angle
 
 
 def slip_speed(sample: MotionSample) -> float:
