@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbf_mesh_nav.kernels.bounding_boxes import build_boxes, closest_faces, closest_surface_point
+from mbf_mesh_nav.kernels.bounding_boxes import build_boxes, closest_face, closest_faces
 from mbf_mesh_nav.kernels.rays import first_hits
 from mbf_mesh_nav.kernels.topology import morton_codes
 from mbf_mesh_nav.topology import MeshTopology
@@ -88,9 +88,7 @@ class SurfaceLocator:
             A face likely to be near, e.g. the last answer of a moving robot; the answer does not depend on it.
         """
         x, y, z = np.asarray(point, dtype=np.float64).tolist()
-        face, distance, v, w, px, py, pz = closest_surface_point(
-            *self._tree, x, y, z, float(max_distance), int(hint_face)
-        )
+        face, distance, v, w, px, py, pz = closest_face(*self._tree, x, y, z, float(max_distance), int(hint_face))
         if face < 0:
             return None
         return SurfacePoint(face, np.array([1.0 - v - w, v, w]), np.array([px, py, pz]), distance)

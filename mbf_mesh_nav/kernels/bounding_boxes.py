@@ -34,10 +34,16 @@ def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, NDAr
     for level in range(levels):
         starts[level + 1] = starts[level] + counts[level]
     boxes = np.zeros((starts[levels], 6))
-    boxes[:, :3] = np.inf
-    boxes[:, 3:] = -np.inf
+    for node in range(starts[levels]):
+        for axis in range(3):
+            boxes[node, axis] = np.inf
+            boxes[node, axis + 3] = -np.inf
     # Boxes are a hair larger than their faces, so that rounding loses no ray that runs along the side of one.
-    hair = 1e-12 * np.abs(vertices).max()
+    greatest = 0.0
+    for vertex in range(vertices.shape[0]):
+        for axis in range(3):
+            greatest = max(greatest, abs(vertices[vertex, axis]))
+    hair = 1e-12 * greatest
     for face in range(faces.shape[0]):
         leaf = face // BRANCHES
         for corner in range(3):
@@ -112,8 +118,8 @@ def closest_face(
     z: float,
     max_distance: float,
     hint_face: int,
-) -> tuple[int, float, float, float]:
-    """Nearest face of a point within ``max_distance``: (face or -1, distance, weight of corner 1, of corner 2).
+) -> tuple[int, float, float, float, float, float, float]:
+    """Nearest face of a point within ``max_distance``: (face or -1, distance, weights of corners 1 and 2, x, y, z).
 
     ``hint_face`` (or -1) is looked at first, so that a good guess prunes nearly the whole tree.
     """
@@ -152,7 +158,14 @@ def closest_face(
                 place -= 1
             nodes[place], depths[place], bounds[place] = child, depth - 1, bound
             top += 1
-    return best_face, np.sqrt(best), best_v, best_w
+    if best_face < 0:
+        return -1, np.inf, 0.0, 0.0, 0.0, 0.0, 0.0
+    a, b, c = faces[best_face, 0], faces[best_face, 1], faces[best_face, 2]
+    u = 1.0 - best_v - best_w
+    nearest_x = u * vertices[a, 0] + best_v * vertices[b, 0] + best_w * vertices[c, 0]
+    nearest_y = u * vertices[a, 1] + best_v * vertices[b, 1] + best_w * vertices[c, 1]
+    nearest_z = u * vertices[a, 2] + best_v * vertices[b, 2] + best_w * vertices[c, 2]
+    return best_face, np.sqrt(best), best_v, best_w, nearest_x, nearest_y, nearest_z
 
 
 @kernel
@@ -177,42 +190,11 @@ def closest_faces(
     hint = -1
     for index in order:
         x, y, z = points[index, 0], points[index, 1], points[index, 2]
-        face, distance, v, w = closest_face(vertices, faces, boxes, levels, x, y, z, max_distance, hint)
+        face, distance, v, w, px, py, pz = closest_face(vertices, faces, boxes, levels, x, y, z, max_distance, hint)
         hint = face
         if face < 0:
             continue
         found[index], distances[index] = face, distance
         weights[index, 0], weights[index, 1], weights[index, 2] = 1.0 - v - w, v, w
-        for axis in range(3):
-            surface[index, axis] = blend(vertices, faces, face, v, w, axis)
+        surface[index, 0], surface[index, 1], surface[index, 2] = px, py, pz
     return found, weights, surface, distances
-
-
-@kernel
-def blend(vertices: FloatArray, faces: IntArray, face: int, v: float, w: float, axis: int) -> float:
-    """One coordinate of the point of a face with the weights ``v``, ``w`` of its corners 1 and 2."""
-    a, b, c = vertices[faces[face, 0], axis], vertices[faces[face, 1], axis], vertices[faces[face, 2], axis]
-    value: float = (1.0 - v - w) * a + v * b + w * c
-    return value
-
-
-@kernel
-def closest_surface_point(
-    vertices: FloatArray,
-    faces: IntArray,
-    boxes: FloatArray,
-    levels: NDArray[np.int64],
-    x: float,
-    y: float,
-    z: float,
-    max_distance: float,
-    hint_face: int,
-) -> tuple[int, float, float, float, float, float, float]:
-    """``closest_face`` with its point: (face or -1, distance, weight 1, weight 2, x, y, z)."""
-    face, distance, v, w = closest_face(vertices, faces, boxes, levels, x, y, z, max_distance, hint_face)
-    if face < 0:
-        return -1, np.inf, 0.0, 0.0, 0.0, 0.0, 0.0
-    px = blend(vertices, faces, face, v, w, 0)
-    py = blend(vertices, faces, face, v, w, 1)
-    pz = blend(vertices, faces, face, v, w, 2)
-    return face, distance, v, w, px, py, pz
