@@ -17,7 +17,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull
 
 FloatArray = NDArray[np.float64]
 
@@ -101,7 +100,10 @@ class Footprint:
             return self
         if len(self.vertices) < 3:
             return Footprint.circle(distance / math.cos(math.pi / CIRCLE_POINTS))
-        hull = self.vertices[ConvexHull(self.vertices).vertices]
+        hull = _convex_hull(self.vertices)
+        if len(hull) == 1:
+            x, y = hull[0]
+            return Footprint(np.add(Footprint([]).offset(distance).vertices, (x, y)))
         return Footprint(_mitred_offset(hull, distance))
 
 
@@ -148,13 +150,37 @@ def _radii(points: FloatArray) -> tuple[float, float]:
     return float(np.linalg.norm(nearest, axis=1).min()), float(np.linalg.norm(points, axis=1).max())
 
 
+def _convex_hull(points: FloatArray) -> FloatArray:
+    """Corners of the hull, counter-clockwise, merged within a nanometre (monotone chain, Andrew 1979)."""
+    ordered = np.unique(np.round(points, 9), axis=0)
+    if len(ordered) < 3:
+        return ordered
+    chains: list[list[FloatArray]] = []
+    for run in (ordered, ordered[::-1]):
+        chain: list[FloatArray] = []
+        for point in run:
+            while len(chain) >= 2 and _turn(chain[-2], chain[-1], point) <= 0.0:
+                chain.pop()
+            chain.append(point)
+        chains.append(chain[:-1])
+    return np.array(chains[0] + chains[1])
+
+
+def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
+    """Twice the area of the triangle; positive if a, b, c turn left."""
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+
+
 def _mitred_offset(hull: FloatArray, distance: float) -> FloatArray:
-    """Offset a counter-clockwise convex polygon by moving its sides."""
+    """Offset a counter-clockwise convex polygon, or a segment, by moving its sides."""
     sides = np.roll(hull, -1, axis=0) - hull
     normals = np.column_stack([sides[:, 1], -sides[:, 0]]) / np.linalg.norm(sides, axis=1)[:, None]
     corners: list[FloatArray] = []
     for vertex, before, after in zip(hull, np.roll(normals, 1, axis=0), normals, strict=True):
-        bisector = (before + after) / np.linalg.norm(before + after)
+        between = before + after
+        length = float(np.linalg.norm(between))
+        # At the end of a segment the sides run back on themselves; outwards is then straight on.
+        bisector = between / length if length > 1e-9 else np.array([-before[1], before[0]])
         half_turn_cosine = float(bisector @ before)
         if distance < 0.0 or half_turn_cosine * MITRE_LIMIT >= 1.0:
             corners.append(vertex + bisector * (distance / half_turn_cosine))

@@ -200,6 +200,7 @@ def test_small_groups_are_found_by_flood_fill(obstacles, minimal_size, connectiv
 
 
 @given(st.integers(0, 2**32 - 1))
+@settings(deadline=None)
 def test_bits_are_counted(word):
     assert count_bits(np.uint32(word)) == word.bit_count()
 

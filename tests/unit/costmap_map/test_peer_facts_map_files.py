@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from PIL import Image
 
-from mbf_costmap_nav.map_description import MapError, MapMode
+from mbf_costmap_nav.map_description import MapError, MapMode, read_description
 from mbf_costmap_nav.map_io import OccupancyMap, load_image, load_map, save_map
 
 # yaml file: (width, height, resolution, free, occupied, other cells)
@@ -207,3 +209,28 @@ def test_a_bad_image_is_refused_before_memory_is_taken(tmp_path, case):
 def test_a_map_with_more_cells_than_asked_for_is_refused(spectrum):
     with pytest.raises(MapError, match="16 x 16 pixels are more than the limit of 255"):
         load_image(spectrum, 0.1, max_cells=255)
+
+
+@given(st.binary(max_size=200), st.sampled_from([b"", b"P5\n", b"P5\n4 4\n255\n", b"\x89PNG\r\n\x1a\n", b"BM"]))
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_any_bytes_are_a_map_or_a_map_error(tmp_path, content, start):
+    file = tmp_path / "map.pgm"
+    file.write_bytes(start + content)
+    try:
+        assert load_image(file, 1.0).occupancy.size > 0
+    except MapError as error:
+        assert error.file == file and error.reason
+
+
+@given(
+    st.text(max_size=80)
+    | st.dictionaries(st.sampled_from([*GOOD, "mode"]), st.none() | st.floats() | st.text()).map(yaml.safe_dump)
+)
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_any_text_is_a_description_or_a_map_error(tmp_path, text):
+    file = tmp_path / "map.yaml"
+    file.write_text(text, encoding="utf-8")
+    try:
+        assert read_description(file).resolution > 0.0
+    except MapError as error:
+        assert error.file == file and error.reason
