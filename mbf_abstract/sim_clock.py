@@ -17,6 +17,7 @@ Use it for simulation and tests. For a real robot use ``WallClock``.
 from __future__ import annotations
 
 import heapq
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -79,7 +80,7 @@ class SimClock:
 
     def sleep(self, seconds: float) -> None:
         """Wait for ``seconds`` of virtual time; zero or less lets the others of this instant run first."""
-        self.sleep_until(self._now + seconds)
+        self.sleep_until(self._after(seconds))
 
     def sleep_until(self, stamp: float) -> None:
         """Wait until virtual time ``stamp``."""
@@ -158,7 +159,7 @@ class SimClock:
             me.waiting_on = condition
             condition.waiters.append(me)
             if timeout is not None:
-                self._add_timer(me, self._now + max(0.0, timeout))
+                self._add_timer(me, self._after(timeout))
             else:
                 me.ticket += 1
             condition.release(me)
@@ -168,6 +169,11 @@ class SimClock:
         finally:
             condition.acquire(me)
         return me.notified
+
+    def _after(self, seconds: float) -> float:
+        """Stamp ``seconds`` from now; later than now for any positive number, or who waits again would never end."""
+        stamp = self._now + max(0.0, seconds)
+        return math.nextafter(self._now, math.inf) if stamp == self._now and seconds > 0.0 else stamp
 
     def _notify_all(self, condition: SimCondition) -> None:
         with self._mutex:

@@ -27,7 +27,8 @@ class Participant:
         self.name = name
         self.priority = priority
         self.foreign = foreign
-        self.baton = threading.Semaphore(0)
+        self.baton = threading.Lock()  # released by whoever passes it on, so it is no lock in the usual sense
+        self.baton.acquire()
         self.ticket = 0  # grows with every wait: a timer entry of an older wait is stale
         self.notified = False
         self.detached = False

@@ -155,9 +155,11 @@ class MoveBaseMachine:
 
     def _has_news(self) -> bool:
         handle = self._job.handle
-        canceling = handle.cancel_requested and self._state is not MoveBaseState.CANCELING
-        over = self._state is MoveBaseState.CANCELING and not self._sub_goals()
-        return self._offered is not None or canceling or over or handle.paused != self._oscillation.stopwatch.paused
+        if handle.paused != self._oscillation.stopwatch.paused:
+            return True
+        if self._state is MoveBaseState.CANCELING:
+            return not self._sub_goals()
+        return self._offered is not None or handle.cancel_requested
 
     # -------------------------------------------------------------------------------------- planning
     def _ask_for_plan(self) -> None:

@@ -77,8 +77,7 @@ class PluginRun(Generic[P]):
         self.handle = handle
         self._stop_asked = None  # a cancel of the goal before is none of this one
         handle.on_wake(lambda: self.runtime.supervisor.poke(self._watch))
-        if handle.cancel_requested or handle.paused:
-            self.runtime.supervisor.poke(self._watch)
+        self.runtime.supervisor.poke(self._watch)
 
     @property
     def canceled(self) -> bool:
@@ -144,7 +143,7 @@ class PluginRun(Generic[P]):
     def _next_check(self) -> float:
         """Seconds until the patience of the present call, or of one that begins soon, may be over."""
         limit = self._patience()
-        if limit <= 0.0:
+        if limit <= 0.0 or self.handle.paused:
             return IDLE_CHECK
         remaining = limit - self.patience_watch.elapsed
         if self._call_began is not None:

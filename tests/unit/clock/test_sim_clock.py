@@ -302,3 +302,14 @@ def test_the_guards_own_thread_ends_with_the_last_thread_it_guards():
         for guard in guards:
             guard.join(5.0)
             assert not guard.is_alive()
+
+
+def test_a_wait_that_is_too_short_for_the_clocks_numbers_still_ends():
+    clock = SimClock()
+    clock.sleep(1000.0)
+    deadline = clock.now() + 1e-18 + 2e-13
+    condition = clock.condition()
+    with condition:
+        while (remaining := deadline - clock.now()) > 0.0:
+            condition.wait(remaining / 2.0)
+    assert clock.now() >= deadline

@@ -1,0 +1,158 @@
+"""Seeded schedules of start, cancel, preempt, pause, finish and shut-down, on a clock that shuffles its threads.
+
+Each schedule is one seed: it draws plugins that take any time, fail, raise or hang, and a script of client actions
+at any moment. Whatever the order, every goal reaches exactly one final state and the robot stands at the end. A seed
+that fails here fails again: run it with ``MBF_SCHEDULES=20 MBF_FIRST_SCHEDULE=<seed>``. CI runs ``MBF_SCHEDULES=10000``.
+"""
+
+import gc
+import os
+
+import numpy as np
+import pytest
+
+from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
+from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
+from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.faulty import drive, obedient, slow
+from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, straight_plan
+
+SCHEDULES = int(os.environ.get("MBF_SCHEDULES", "2000"))
+FIRST = int(os.environ.get("MBF_FIRST_SCHEDULE", "0"))
+PARTS = 20
+PLUGINS = {
+    "planner": ScriptedPlanner,
+    "controller": ScriptedController,
+    "other": ScriptedController,
+    "recovery": ScriptedRecovery,
+}
+NEAR = Path.from_points([(0.0, 0.0, 0.0), (0.2, 0.0, 0.0)])
+FAR = Path.from_points([(0.0, 0.0, 0.0), (50.0, 0.0, 0.0)])
+
+
+def planner_answer(rng, clock):
+    seconds = float(rng.choice([0.0, 0.03, 0.2]))
+    failure = PlanResult(GetPathOutcome.NO_PATH_FOUND, "no")
+    return [
+        straight_plan,
+        failure,
+        slow(clock, seconds, straight_plan),
+        obedient(clock, seconds, straight_plan, PlanResult(GetPathOutcome.CANCELED, "as told")),
+        RuntimeError("planner"),
+        slow(clock, 1.5, failure),  # longer than patience and grace: quarantined for a while
+    ][int(rng.choice(6, p=[0.4, 0.1, 0.2, 0.2, 0.05, 0.05]))]
+
+
+def controller_answer(rng, clock, controller):
+    failure = ControlResult(ExePathOutcome.BLOCKED_PATH, "no")
+    return [
+        controller.follow,
+        drive(0.3),
+        failure,
+        slow(clock, float(rng.choice([0.02, 0.2])), drive(0.2)),
+        RuntimeError("controller"),
+        ControlResult(ExePathOutcome.CANCELED, "enough"),
+        slow(clock, 1.5, drive(2.0)),
+    ][int(rng.choice(7, p=[0.5, 0.15, 0.1, 0.1, 0.05, 0.05, 0.05]))]
+
+
+def recovery_answer(rng, clock):
+    def drives(request):
+        request.motion.send(Twist.planar(0.2))
+        ended = not request.motion.sleep(0.15)
+        return RecoveryResult(RecoveryOutcome.CANCELED if ended else 0, "")
+
+    return [drives, RecoveryResult(0, ""), RecoveryResult(RecoveryOutcome.FAILURE, ""), RuntimeError("recovery")][
+        int(rng.choice(4, p=[0.5, 0.2, 0.2, 0.1]))
+    ]
+
+
+def prepare(bench, rng):
+    bench.planner.play(*[planner_answer(rng, bench.clock) for _ in range(4)])
+    for name in ("controller", "other"):
+        controller = bench.plugin(name, ScriptedController)
+        controller.stops_itself = bool(rng.random() < 0.3)
+        controller.play(*[controller_answer(rng, bench.clock, controller) for _ in range(4)])
+    bench.recovery.play(*[recovery_answer(rng, bench.clock) for _ in range(3)])
+
+
+def random_goal(rng):
+    controller = str(rng.choice(["", "controller", "other"]))
+    slot = int(rng.integers(2))
+    return [
+        GetPathGoal(Pose.planar(2.0, 0.0), concurrency_slot=slot),
+        ExePathGoal(NEAR if rng.random() < 0.5 else FAR, controller=controller),
+        RecoveryGoal(concurrency_slot=slot),
+        MoveBaseGoal(Pose.planar(float(rng.choice([0.2, 50.0])), 0.0), controller=controller),
+    ][int(rng.choice(4, p=[0.15, 0.35, 0.1, 0.4]))]
+
+
+def client(bench, rng, handles, steps):
+    """One client: sends, cancels, pauses and resumes at random moments."""
+    for _ in range(steps):
+        bench.clock.sleep(float(rng.choice([0.0, 0.0, 0.01, 0.05, 0.1, 0.3])))
+        act = rng.random()
+        if act < 0.45 or not handles:
+            handles.append(bench.navigator.send(random_goal(rng)))
+        else:
+            handle = handles[int(rng.integers(len(handles)))]
+            [handle.cancel, handle.pause, handle.resume][int(rng.choice(3, p=[0.5, 0.25, 0.25]))]()
+
+
+def run_schedule(seed):
+    rng = np.random.default_rng(seed)
+    clock = SimClock(schedule=np.random.default_rng(seed + 1_000_000_007))
+    bench = Bench(
+        PLUGINS,
+        clock,
+        planner_patience=0.5,
+        controller_patience=0.5,
+        recovery_patience=0.5,
+        cancel_grace=0.3,
+        oscillation_timeout=float(rng.choice([0.0, 0.6])),
+        planner_frequency=float(rng.choice([0.0, 5.0])),
+        replan_failed_policy=str(rng.choice(["keep", "stop", "recover"])),
+        max_quarantined=100,
+        controller_frequency=10.0,
+    )
+    bench.robot._period = 0.2
+    prepare(bench, rng)
+    handles, helper_rng = [], np.random.default_rng(seed + 1)
+    second = clock.spawn(lambda: client(bench, helper_rng, handles, 3), "second client")
+    client(bench, rng, handles, 4)
+    second.join()
+    if rng.random() < 0.7:  # else shut down in the middle of everything
+        for handle in list(handles):
+            handle.resume()
+            handle.cancel()
+        clock.sleep(0.9)
+    bench.server.close()
+    bench.robot.close()
+    clock.sleep(2.5)
+    return bench, handles
+
+
+def verify(seed, bench, handles):
+    ends = [event.data["goal_id"] for event in bench.events(EventKind.GOAL_FINISHED)]
+    assert len(ends) == len(set(ends)), f"schedule {seed}: a goal ended twice"
+    accepted = {event.data["goal_id"] for event in bench.events(EventKind.GOAL_ACCEPTED)}
+    assert accepted <= set(ends), f"schedule {seed}: goals without an end: {accepted - set(ends)}"
+    assert all(handle.done and handle.result.message for handle in handles), f"schedule {seed}: {handles}"
+    assert bench.robot.command.is_stopped(), f"schedule {seed}: the robot still drives"
+    waiting = {who.name for who in bench.clock._known} - {"main"}
+    assert not waiting, f"schedule {seed}: threads left: {waiting}"
+    framework = [event for event in bench.events(EventKind.FAULT) if "where" not in event.data]
+    assert not framework, f"schedule {seed}: {framework[0].data}"
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.timeout(600)
+def test_every_goal_ends_once_and_the_robot_stands_whatever_the_order(part):
+    for seed in range(FIRST + part * SCHEDULES // PARTS, FIRST + (part + 1) * SCHEDULES // PARTS):
+        bench, handles = run_schedule(seed)
+        verify(seed, bench, handles)
+    gc.collect()
