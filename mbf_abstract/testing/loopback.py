@@ -96,10 +96,10 @@ class LoopbackRobot:
         self._closed = True
 
     def _loop(self) -> None:
-        next_step = self._clock.now()
+        start, steps = self._clock.now(), 0
         while not self._closed:
-            next_step += self._period
-            self._clock.sleep_until(next_step)
+            steps += 1
+            self._clock.sleep_until(start + steps * self._period)
             self._step(self._period)
 
     def _step(self, seconds: float) -> None:
