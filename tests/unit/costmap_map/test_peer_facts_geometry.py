@@ -176,3 +176,10 @@ def test_f292_safety_padding_of_a_triangle_and_the_offset_we_use_instead():
     grown = triangle.offset(0.1)
     assert grown.inscribed_radius == pytest.approx(0.1, abs=1e-9), "the long side passed through the base"
     assert math.hypot(*(grown.vertices.max(axis=0) - 1.0)) >= 0.1
+
+
+def test_many_points_get_the_cells_that_single_points_get():
+    points = np.random.default_rng(4).uniform(-1.0, 1.0, (200, 2))
+    cells, inside = TENTH.world_to_cells(points)
+    for point, cell, is_inside in zip(points, cells, inside, strict=True):
+        assert TENTH.world_to_cell(*point) == (tuple(cell.tolist()) if is_inside else None)
