@@ -4,7 +4,8 @@ When to use: behind a grid planner (A*, Theta*), before a controller that follow
 ``costmap.hybrid_astar``, which are drivable already - smoothing ignores headings and would break their curvature.
 
 The end poses stay. A path that drives backward somewhere is handed back unchanged. With ``max_curvature`` the pull to
-the original path is lowered until the largest curvature of the path is below it; if that fails the outcome is FAILURE and the message names the place.
+the original path is lowered until the largest curvature of the path is below it; if that fails the outcome is FAILURE
+and the message names the place.
 
 Formula: the gradient smoother of Dolgov et al. 2010 without its Voronoi term, with a hard limit of the cost instead.
 """

@@ -1,0 +1,142 @@
+"""Optimality of the grid planners against published lengths.
+
+    python benchmarks/grid_optimality.py [--quick] [--json] [--data ../shared/data]
+
+1. Every query of every MovingAI scenario under ``movingai/`` by our 8-connected A* (no corner cutting). A query counts
+   as optimal if our length, summed up in float64 from the path's steps, differs from the printed one by at most half a
+   unit of its last digit (1e-6 relative for eight decimals). ``--quick`` takes every 60th query.
+2. Theta* on the any-angle sets of ``movingai/anyangle/ohohcakester``, whose points are cell corners: each cell is cut
+   into 8 x 8, a corner becomes the free small cell that touches it, and the way from its centre to the corner is added.
+   Our path must keep half a small cell from obstacles, so a ratio slightly above 1 remains by construction.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import math
+from itertools import pairwise
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from mbf_costmap_nav.grid_planning import traversal_table
+from mbf_costmap_nav.kernels.grid_line import line_cost, pull_string
+from mbf_costmap_nav.kernels.grid_path import trace_cells
+from mbf_costmap_nav.kernels.grid_search import FOUND, pad_cells, search
+from mbf_costmap_nav.kernels.theta_star import theta_search
+
+FINE = 8
+"""Small cells along a cell of the any-angle maps."""
+TABLE = traversal_table(0.0, 253, False)
+NO_CANCEL = np.zeros(1, dtype=np.uint8)
+
+
+def read_map(path: FilePath) -> np.ndarray:
+    """MovingAI map as uint8 cells, row 0 = the file's first row."""
+    rows = path.read_text().split("map\n", 1)[1].splitlines()
+    return np.array([[0 if c in ".G" else 254 for c in row] for row in rows if row], dtype=np.uint8)
+
+
+def octile_length(grid: tuple[np.ndarray, int], start: int, goal: int) -> float:
+    """Length [cells] of our A* path, inf without one."""
+    cells, stride = grid
+    status, g = search(cells, stride, TABLE, start, goal, 1.0, False, NO_CANCEL)
+    if status != FOUND:
+        return math.inf
+    path = trace_cells(cells, stride, TABLE, g, goal, False)
+    diagonal = np.count_nonzero(np.diff(path // stride) * np.diff(path % stride))
+    return len(path) - 1 - diagonal + diagonal * math.sqrt(2.0)
+
+
+def printed_tolerance(text: str) -> float:
+    """Half a unit of the last printed digit; whole numbers and long prints get at least the rule of the data set."""
+    decimals = len(text.partition(".")[2])
+    value = abs(float(text))
+    significant = 6 - len(str(int(value)))  # old files print six significant digits and drop trailing zeros
+    return max(0.5 * 10.0 ** -max(significant, 0), 1e-6 * value) if decimals < 8 else 1e-6 * value
+
+
+def scenario_results(data: FilePath, every: int) -> tuple[int, int, list[str]]:
+    """Queries, optimal ones, and a line of text for each map."""
+    total, optimal, lines = 0, 0, []
+    for scenario in sorted(data.glob("movingai/*/*.scen")):
+        cells = read_map(scenario.with_name(scenario.name.removesuffix(".scen")))
+        stride = cells.shape[1] + 2
+        grid = (pad_cells(cells, 254), stride)
+        queries = [line.split() for line in scenario.read_text().splitlines()[1:] if line.strip()][::every]
+        good = 0
+        for query in queries:
+            sx, sy, gx, gy = (int(value) + 1 for value in query[4:8])
+            length = octile_length(grid, sy * stride + sx, gy * stride + gx)
+            good += abs(length - float(query[8])) <= printed_tolerance(query[8])
+        lines.append(f"  {scenario.name:28s} {good} of {len(queries)} optimal")
+        total, optimal = total + len(queries), optimal + good
+    return total, optimal, lines
+
+
+def fine_corner(cells: np.ndarray, x: int, y: int) -> int:
+    """Flat padded index of a free small cell that touches the corner (x, y) of the coarse grid."""
+    for dy in (-1, 0):
+        for dx in (-1, 0):
+            u, v = x * FINE + dx, y * FINE + dy
+            if 0 <= u < cells.shape[1] and 0 <= v < cells.shape[0] and cells[v, u] == 0:
+                return (v + 1) * (cells.shape[1] + 2) + u + 1
+    raise ValueError(f"corner ({x}, {y}) touches no free cell")
+
+
+def theta_length(grid: tuple[np.ndarray, int], start: int, goal: int) -> float:
+    """Length [small cells] of the any-angle path between two small cells."""
+    cells, stride = grid
+    _, _, parent = theta_search(cells, stride, TABLE, start, goal, NO_CANCEL)
+    chain = [goal]
+    while chain[-1] != start:
+        chain.append(int(parent[chain[-1]]))
+    corners = pull_string(cells, stride, TABLE, np.array(chain, dtype=np.int32))
+    return sum(float(line_cost(cells, stride, TABLE, int(a), int(b))) for a, b in pairwise(corners))
+
+
+def any_angle_results(data: FilePath, every: int) -> tuple[np.ndarray, int]:
+    """Ratios of Theta* to the exact length, and the number of paths longer than the octile one."""
+    ratios, longer = [], 0
+    for folder in sorted(p.parent for p in data.glob("movingai/anyangle/ohohcakester/*/maze.txt")):
+        numbers = np.array((folder / "maze.txt").read_text().split(), dtype=int)
+        coarse = numbers[2:].reshape(numbers[1], numbers[0]).astype(np.uint8) * np.uint8(254)
+        cells = np.repeat(np.repeat(coarse, FINE, axis=0), FINE, axis=1)
+        grid = (pad_cells(cells, 254), cells.shape[1] + 2)
+        for row in list(csv.reader((folder / "problems.csv").open()))[1::every]:
+            start, goal = fine_corner(cells, int(row[0]), int(row[1])), fine_corner(cells, int(row[2]), int(row[3]))
+            theta = theta_length(grid, start, goal)
+            longer += int(theta > octile_length(grid, start, goal) * (1.0 + 1e-6))
+            ratios.append((theta + math.sqrt(2.0)) / FINE / float(row[4]))
+    return np.array(ratios), longer
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="a part of the queries")
+    parser.add_argument("--json", action="store_true", help="last line is one JSON object")
+    parser.add_argument("--data", type=FilePath, default=FilePath(__file__).parents[2] / "shared" / "data")
+    arguments = parser.parse_args()
+    total, optimal, lines = scenario_results(arguments.data, 60 if arguments.quick else 1)
+    print(f"8-connected A* on MovingAI: {optimal} of {total} queries optimal", *lines, sep="\n")
+    ratios, longer = any_angle_results(arguments.data, 10 if arguments.quick else 1)
+    print(
+        f"Theta* over the exact any-angle length, {len(ratios)} queries: mean {ratios.mean():.4f}, "
+        f"largest {ratios.max():.4f}; longer than the octile path: {longer}"
+    )
+    if arguments.json:
+        result = {
+            "queries": total,
+            "optimal_share": optimal / total,
+            "theta_queries": len(ratios),
+            "theta_ratio_mean": float(ratios.mean()),
+            "theta_ratio_max": float(ratios.max()),
+            "theta_longer_than_octile": int(longer),
+        }
+        print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()
