@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
-from mbf_mesh_nav.kernels.dijkstra import propagate_distances
+from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distances
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap, MeshSnapshot
 from mbf_mesh_nav.surface_point import corner_distances
@@ -128,7 +128,7 @@ def vertex_path_leg(
     best = int(np.argmin(totals))
     chain = follow_predecessors(predecessors, int(corners[best]))
     if not rooted_at_goal:
-        chain.reverse()
+        chain = chain[::-1]
     positions = np.concatenate([[start.point], mesh_map.vertices[chain], [goal.point]])
     normals = np.concatenate(
         [mesh_map.face_normals[[start.face]], mesh_map.vertex_normals[chain], mesh_map.face_normals[[goal.face]]]
@@ -141,14 +141,6 @@ def straight_leg(mesh_map: MeshMap, query: LegQuery) -> Leg:
     positions = np.array([query.start.point, query.goal.point])
     cost = float(np.linalg.norm(positions[1] - positions[0]))
     return Leg(positions, mesh_map.face_normals[[query.start.face, query.goal.face]], cost)
-
-
-def follow_predecessors(predecessors: NDArray[np.int32], vertex: int) -> list[int]:
-    """Vertices from ``vertex`` back to the seed it was reached from."""
-    chain = [vertex]
-    while predecessors[chain[-1]] >= 0:
-        chain.append(int(predecessors[chain[-1]]))
-    return chain
 
 
 def drop_repeated_points(leg: Leg, tolerance: float = 1e-6) -> Leg:

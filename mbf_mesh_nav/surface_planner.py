@@ -15,11 +15,11 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Path, Pose, quaternions_from_axes
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_mesh_nav.leg_search import Leg, LegQuery, spread_from
+from mbf_mesh_nav.leg_search import Leg, LegQuery, drop_repeated_points, spread_from
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshSnapshot
 from mbf_mesh_nav.plugins import MeshPlanner
@@ -156,9 +156,13 @@ class SurfacePlanner(MeshPlanner):
         normals = np.concatenate([legs[0].normals[:1]] + [leg.normals[1:] for leg in legs])
         if goal_reached_exactly:
             positions[-1] = goal.position
-        guidance = tuple(leg.guidance for leg in legs if leg.guidance is not None)
-        frame_id = self.mesh_map.frame_id
-        return Path.from_points(positions, goal.orientation, normals, frame_id, self.clock.now(), guidance or None)
+        whole = drop_repeated_points(Leg(positions, normals, 0.0))
+        # Every pose looks to the next one and stands on the surface; the last one is as requested.
+        ahead = np.diff(whole.positions, axis=0, append=whole.positions[-1:])
+        orientations = quaternions_from_axes(ahead, whole.normals)
+        orientations[-1] = goal.orientation
+        guidance = tuple(leg.guidance for leg in legs if leg.guidance is not None) or None
+        return Path(whole.positions, orientations, self.mesh_map.frame_id, self.clock.now(), guidance)
 
 
 def _named_poses(request: PlanRequest) -> list[tuple[str, Pose]]:

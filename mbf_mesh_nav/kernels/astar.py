@@ -54,9 +54,6 @@ def search_towards(
     keys = np.empty(vertex_count, dtype=np.float32)
     ids = np.empty(vertex_count, dtype=np.int32)
     positions = np.full(vertex_count, -1, dtype=np.int32)
-    offset_of_target = np.full(vertex_count, np.inf, dtype=np.float32)
-    for i in range(len(targets)):
-        offset_of_target[targets[i]] = target_offsets[i]
     size = 0
     for seed in seeds:
         size = push_or_decrease(
@@ -71,7 +68,9 @@ def search_towards(
         size = remove_top(keys, ids, positions, size)
         settled += 1
         base = distances[vertex]
-        best_total = min(best_total, base + offset_of_target[vertex])
+        for i in range(len(targets)):
+            if targets[i] == vertex:
+                best_total = min(best_total, base + target_offsets[i])
         for slot in range(neighbour_offsets[vertex], neighbour_offsets[vertex + 1]):
             neighbour = neighbours[slot]
             candidate = base + edge_weights[slot]

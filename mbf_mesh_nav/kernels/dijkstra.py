@@ -132,3 +132,19 @@ def propagate_distances(
                 far[kept] = vertex
                 kept += 1
         far_count = kept
+
+
+@kernel
+def follow_predecessors(predecessors: Int32Array, vertex: int) -> Int32Array:
+    """Vertices (n,) int32 from ``vertex`` back to the seed it was reached from."""
+    count = 1
+    walker = vertex
+    while predecessors[walker] >= 0:
+        walker = predecessors[walker]
+        count += 1
+    chain = np.empty(count, dtype=np.int32)
+    walker = vertex
+    for i in range(count):
+        chain[i] = walker
+        walker = predecessors[walker]
+    return chain

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.parameters import parameter
+from mbf_mesh_nav.kernels.dijkstra import follow_predecessors
 from mbf_mesh_nav.kernels.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
 from mbf_mesh_nav.layers.tilt import TiltLayer, heading_index
-from mbf_mesh_nav.leg_search import Leg, LegQuery, drop_repeated_points, follow_predecessors, straight_leg
+from mbf_mesh_nav.leg_search import Leg, LegQuery, drop_repeated_points, straight_leg
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.surface_planner import SurfacePlanner, SurfacePlannerParameters
 from mbf_mesh_nav.surface_point import corner_distances
@@ -80,7 +81,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         )
         if best < 0:
             return None
-        chain = np.array(follow_predecessors(predecessors, best)[::-1]) // HEADINGS
+        chain = follow_predecessors(predecessors, best)[::-1] // HEADINGS
         positions = np.concatenate([[query.start.point], mesh_map.vertices[chain], [query.goal.point]])
         ends = mesh_map.face_normals[[query.start.face]], mesh_map.face_normals[[query.goal.face]]
         normals = np.concatenate([ends[0], mesh_map.vertex_normals[chain], ends[1]])

@@ -19,8 +19,8 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.goal_approach import arc_to, clamp
 from mbf_mesh_nav.guarded_motion import blocked_vertices, run_guarded
-from mbf_mesh_nav.kernels.dijkstra import propagate_distances
-from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, follow_predecessors, mean_edge_length, seeded_arrays
+from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distances
+from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, mean_edge_length, seeded_arrays
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.path_progress import PathProgress
 from mbf_mesh_nav.plugins import MeshRecovery
