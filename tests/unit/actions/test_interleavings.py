@@ -2,7 +2,7 @@
 
 Each schedule is one seed: it draws plugins that take any time, fail, raise or hang, and a script of client actions
 at any moment. Whatever the order, every goal reaches exactly one final state and the robot stands at the end. A seed
-that fails here fails again: run it with ``MBF_SCHEDULES=20 MBF_FIRST_SCHEDULE=<seed>``. CI runs ``MBF_SCHEDULES=10000``.
+that fails here fails again: run it with ``MBF_SCHEDULES=20 MBF_FIRST_SCHEDULE=<seed>``. CI sets 10000.
 """
 
 import gc

@@ -1,0 +1,90 @@
+"""Every parameter of MBF (mbf.md 4.1) with its default, its range, and what can be changed at run time."""
+
+import math
+
+import pytest
+from pydantic import ValidationError
+
+from mbf_abstract.events import EventKind
+from mbf_abstract.navigation_parameters import NavigationParameters
+
+MBF_DEFAULTS = {
+    "planner_frequency": 0.0,
+    "planner_patience": 5.0,
+    "planner_max_retries": -1,
+    "controller_frequency": 20.0,
+    "controller_patience": 5.0,
+    "controller_max_retries": -1,
+    "recovery_enabled": True,
+    "recovery_patience": 15.0,
+    "oscillation_timeout": 0.0,
+    "oscillation_distance": 0.5,
+    "oscillation_angle": 3.14,
+    "restore_defaults": False,
+    "shutdown_costmaps": False,
+    "shutdown_costmaps_delay": 1.0,
+    "clear_on_shutdown": False,
+    "planner_lock_costmap": True,
+    "controller_lock_costmap": True,
+    "force_stop_on_retry": True,
+    "mbf_tolerance_check": False,
+    "dist_tolerance": 0.1,
+    "angle_tolerance": math.pi / 18.0,
+    "cmd_vel_ignored_tolerance": 5.0,
+    "tf_timeout": 3.0,
+    "global_frame": "map",
+    "robot_frame": "base_link",
+    "odom_topic": "odom",
+    "tf_cache_time": 10.0,
+}
+OURS_ARE_SAFER = {"force_stop_at_goal": True, "force_stop_on_cancel": True}
+DYNAMIC = {
+    "planner_frequency", "planner_patience", "planner_max_retries", "controller_frequency", "controller_patience",
+    "controller_max_retries", "recovery_enabled", "recovery_patience", "oscillation_timeout", "oscillation_distance",
+    "oscillation_angle", "restore_defaults", "shutdown_costmaps", "shutdown_costmaps_delay",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "default"), [*MBF_DEFAULTS.items(), *OURS_ARE_SAFER.items()])
+def test_a_parameter_has_mbfs_default(name, default):
+    assert getattr(NavigationParameters(), name) == default
+
+
+@pytest.mark.parametrize("name", [*MBF_DEFAULTS, *OURS_ARE_SAFER])
+def test_a_parameter_is_dynamic_as_in_mbf(name):
+    extra = NavigationParameters.model_fields[name].json_schema_extra
+    assert extra["dynamic"] is (name in DYNAMIC)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"planner_patience": -1.0},
+        {"planner_patience": 101.0},
+        {"planner_max_retries": -2},
+        {"controller_frequency": 0.0},
+        {"controller_frequency": 101.0},
+        {"oscillation_timeout": 61.0},
+        {"oscillation_angle": 7.0},
+        {"recovery_patience": math.nan},
+        {"no_such_parameter": 1},
+        {"controller_frequency": 1.0, "command_timeout": 0.5},
+    ],
+)
+def test_a_value_out_of_range_is_refused_and_nothing_changes(make_bench, bad):
+    bench = make_bench()
+    before = bench.server.runtime.parameters
+    with pytest.raises(ValidationError):
+        bench.server.set_parameters(**bad)
+    assert bench.server.runtime.parameters is before
+
+
+def test_a_change_is_recorded_and_restore_defaults_brings_the_configured_values_back(make_bench):
+    bench = make_bench(planner_patience=7.0)
+    bench.server.set_parameters(planner_patience=1.0, max_vx=0.3)
+    assert bench.server.runtime.parameters.planner_patience == 1.0
+    assert bench.server.runtime.gate.limits.max_vx == 0.3
+    assert bench.events(EventKind.PARAMETER_CHANGED)[0].data == {"planner_patience": 1.0, "max_vx": 0.3}
+    bench.server.set_parameters(restore_defaults=True)
+    assert bench.server.runtime.parameters.planner_patience == 7.0
+    assert bench.server.runtime.gate.limits.max_vx == math.inf
