@@ -118,22 +118,22 @@ def _draw_slope_legend(axes: Axes) -> None:
 def _line(axes: Axes, points: FloatArray, colour: tuple[int, int, int], width: float, **style: Any) -> None:
     from matplotlib.patheffects import Normal, Stroke
 
-    effects = [Stroke(linewidth=width + HALO, foreground="white", alpha=0.85), Normal()]
+    effects = [Stroke(linewidth=width + HALO, foreground="white", alpha=0.7), Normal()]
     (line,) = axes.plot(points[:, 0], points[:, 1], color=np.array(colour) / 255.0, linewidth=width, **style)
     line.set_path_effects(effects)
 
 
 def draw_paths(axes: Axes, paths: list[StampedPoints]) -> None:
-    """The last plan strong, those before it faint."""
+    """Draw the last plan strong and those before it faint; wide, so that it shows beside the track upon it."""
     for _, points in paths[:-1]:
         axes.plot(points[:, 0], points[:, 1], color=np.array(PLANNED) / 255.0, linewidth=1.0, alpha=0.35, zorder=4)
     for _, points in paths[-1:]:
-        _line(axes, points, PLANNED, 2.0, linestyle=(0, (5, 1.5)), zorder=5, label="plan")
+        _line(axes, points, PLANNED, 3.6, zorder=5, label="plan")
 
 
 def _draw_track(axes: Axes, recording: Recording) -> None:
     if len(recording.poses):
-        _line(axes, recording.poses[:, :2], DRIVEN, 2.2, zorder=6, label="driven track")
+        _line(axes, recording.poses[:, :2], DRIVEN, 1.5, zorder=6, label="driven track")
         heading = Pose((0, 0, 0), tuple(recording.poses[-1, 3:].tolist()))
         outline = recording.robot.footprint @ heading.rotation[:2, :2].T + recording.poses[-1, :2]
         axes.fill(*outline.T, facecolor=np.array(DRIVEN) / 255.0, edgecolor="white", linewidth=0.8, zorder=8)

@@ -1,0 +1,136 @@
+"""The commands as a user calls them: what they print and how they exit."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+from mbf_abstract.cli import make_app
+from terrain.heightfield import Heightfield
+
+OFFICE = Path(__file__).resolve().parents[2] / "terrain" / "data" / "office.yaml"
+HEAVY = ("numba", "scipy", "trimesh", "pybullet", "numpy", "pydantic", "matplotlib", "viser")
+
+
+def mbf(*arguments):
+    return CliRunner().invoke(make_app(), [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def hill(tmp_path_factory):
+    """A mesh file of a hill, up to two metres high."""
+    x, y = np.meshgrid(np.linspace(0.0, 12.0, 41), np.linspace(0.0, 12.0, 41))
+    heights = 2.0 * np.exp(-((x - 6.0) ** 2 + (y - 6.0) ** 2) / 12.0)
+    vertices, faces = Heightfield(heights.astype(np.float32), 0.3, 0.3).triangles()
+    file = tmp_path_factory.mktemp("meshes") / "hill.ply"
+    trimesh.Trimesh(vertices, faces, process=False).export(file)
+    return file
+
+
+def test_a_plan_on_a_bare_map_is_told_and_succeeds():
+    result = mbf("plan", OFFICE, "--start", 3, 9.7, "--goal", 12, 9.7)
+
+    assert result.exit_code == 0, result.output
+    assert "SUCCESS" in result.stdout and "length_m" in result.stdout
+
+
+def test_a_plan_on_a_bare_mesh_takes_the_height_of_the_ground(hill, tmp_path):
+    result = mbf("plan", hill, "--start", 2, 2, "--goal", 9, 9, "--json", "--png", tmp_path / "plan.png")
+
+    answer = json.loads(result.stdout)
+    assert (result.exit_code, answer["outcome_name"]) == (0, "SUCCESS")
+    poses = np.array(answer["poses"])
+    assert answer["length_m"] == pytest.approx(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1).sum(), abs=1e-4)
+    assert poses[0, 2] == pytest.approx(2.0 * np.exp(-32.0 / 12.0), abs=0.05)
+    assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_no_path_is_exit_code_1_with_the_planners_words():
+    result = mbf("plan", OFFICE, "--start", 3, 9.7, "--goal", 12, -9.7)
+
+    assert result.exit_code == 1
+    assert "OUT_OF_MAP" in result.stdout and "-9.70" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("plan", "missing.yaml", "--start", "1", "2", "--goal", "3", "4"), "no such file"),
+        (("plan", OFFICE, "--start", "1", "--goal", "3", "4"), "X Y [Z] [YAW]"),
+        (("plan", OFFICE, "--goal", "3", "4"), "--start"),
+        (("plugins", "--kind", "wheels"), "wheels"),
+        (("check", "missing.yaml"), "missing.yaml"),
+    ],
+)
+def test_bad_arguments_are_exit_code_2_without_a_traceback(arguments, words):
+    result = mbf(*arguments)
+
+    assert result.exit_code == 2
+    assert words in " ".join(result.output.split())
+    assert "Traceback" not in result.output
+
+
+def test_a_file_that_is_neither_map_nor_mesh_is_refused(tmp_path):
+    (tmp_path / "notes.txt").write_text("hello")
+    (tmp_path / "broken.ply").write_text("hello")
+
+    for name in ("notes.txt", "broken.ply"):
+        result = mbf("plan", tmp_path / name, "--start", 1, 2, "--goal", 3, 4)
+        assert (result.exit_code, name in result.output) == (2, True), result.output
+        assert "Traceback" not in result.output
+
+
+def test_check_tells_all_mistakes_with_file_and_line(tmp_path):
+    file = tmp_path / "robot.yaml"
+    file.write_text(
+        "backend: mesh\ncontroler_frequency: 20.0\nplanner_patience: -1\nplanners:\n  - {name: a, type: nope}\n"
+    )
+
+    result = mbf("check", file)
+
+    assert result.exit_code == 2
+    for words in (f"{file}:2", f"{file}:3", f"{file}:5", "controller_frequency", "nope", "mistakes found"):
+        assert words in result.output, words
+
+
+def test_check_finds_a_missing_map_file_of_a_configuration_without_mistakes(hill, tmp_path):
+    good, bad = tmp_path / "good.yaml", tmp_path / "bad.yaml"
+    good.write_text(f"backend: mesh\nmesh_map: {{mesh_file: {hill}}}\n")
+    bad.write_text("backend: mesh\nmesh_map: {mesh_file: no_such_mesh.ply}\n")
+
+    assert (mbf("check", good).exit_code, mbf("check", bad).exit_code) == (0, 2)
+    assert "no_such_mesh.ply" in mbf("check", bad).output
+    assert mbf("check", bad, "--no-load").exit_code == 0
+
+
+def test_plugins_lists_planners_of_both_maps():
+    result = mbf("plugins", "--kind", "planners", "--json")
+
+    names = {entry["name"] for entry in json.loads(result.stdout)}
+    assert {"costmap.astar", "mesh.dijkstra"} <= names
+    assert result.exit_code == 0
+
+
+def test_doctor_finds_this_installation_healthy():
+    result = mbf("doctor")
+
+    assert result.exit_code == 0, result.output
+    assert "python" in result.stdout and "kernel cache" in result.stdout
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys\nfrom mbf_abstract.cli import main\n"
+        "sys.argv = ['mbf', '--help']\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)\n"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+
+    assert "plan" in result.stdout and "check" in result.stdout
+    assert result.stderr.strip() == "[]"

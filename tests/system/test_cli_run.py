@@ -1,0 +1,52 @@
+"""``mbf run`` refuses what it cannot run, and drives a real building end to end."""
+
+import json
+
+import typer
+from typer.testing import CliRunner
+
+from terrain.cli import register
+from terrain.recording import Recording
+
+
+def mbf(*arguments):
+    app = typer.Typer(pretty_exceptions_enable=False)
+    register(app)
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_an_unknown_scenario_is_exit_code_2_and_the_known_ones_are_named():
+    result = mbf("run", "moon")
+
+    assert result.exit_code == 2
+    assert "moon" in result.output and "outdoor" in result.output
+    assert "Traceback" not in result.output
+
+
+def test_a_backend_the_scenario_has_no_configuration_for_is_exit_code_2(tmp_path):
+    result = mbf("run", "indoor", "--backend", "voxels", "--out", tmp_path, "--quiet")
+
+    assert result.exit_code == 2
+    assert "voxels" in result.output
+
+
+def test_scenarios_are_listed_with_what_they_prove():
+    result = mbf("scenarios")
+
+    assert result.exit_code == 0
+    for name in ("indoor", "outdoor"):
+        assert any(line.startswith(name) and "[" in line for line in result.stdout.splitlines())
+
+
+def test_a_run_through_a_real_building_reaches_its_goal_and_leaves_all_files(shared_data, tmp_path):
+    building = shared_data / "maps" / "nav2_bringup" / "depot.yaml"
+
+    result = mbf("run", "indoor", "--map", building, "--out", tmp_path / "run", "--json")
+
+    answer = json.loads(result.stdout)
+    assert (result.exit_code, answer["success"]) == (0, True), result.output
+    files = {file.name for file in (tmp_path / "run").iterdir()}
+    assert {"events.jsonl", "metrics.json", "picture.png", "replay.html", "recording.npz"} <= files
+    recording = Recording.load(tmp_path / "run" / "recording.npz")
+    assert recording.success and recording.paths and recording.scans
+    assert answer["metrics"]["distance_to_goal_m"] < 0.5
