@@ -15,10 +15,14 @@ import csv
 import json
 from collections import defaultdict
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 import trimesh
 from mesh_speed import corner_query, plugin
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from terrain_meshes import add_layer, fractal_terrain
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
@@ -77,6 +81,39 @@ def compare_field(mesh_map: MeshMap) -> list[float]:
     return list(wave.distances[far] / exact[far])
 
 
+def free_regions(mesh_map: MeshMap) -> np.ndarray:
+    """Label (F,) of the connected region of free faces each face belongs to, -1 for faces with a lethal corner."""
+    free = ~mesh_map.snapshot().lethal[mesh_map.faces].any(axis=1)
+    face, side = np.nonzero(mesh_map.face_neighbours >= 0)
+    other = mesh_map.face_neighbours[face, side]
+    joined = free[face] & free[other]
+    pairs = (np.ones(joined.sum()), (face[joined], other[joined]))
+    _, labels = connected_components(coo_matrix(pairs, shape=(len(free), len(free))), directed=False)
+    return np.where(free, labels, -1)
+
+
+def solved_share(side: int, pair_count: int) -> dict[str, float]:
+    """Share of random reachable pairs on a terrain with lethal blobs that CVP finds a path for; goal: all of them."""
+    terrain = fractal_terrain(side)
+    mesh_map = MeshMap.from_arrays(terrain.vertices, terrain.faces)
+    add_layer(mesh_map, np.where(terrain.lethal, np.inf, terrain.costs).astype(np.float32), terrain.lethal)
+    regions, planner, rng = free_regions(mesh_map), plugin(CVPPlanner, mesh_map), np.random.default_rng(7)
+    solved = tried = 0
+    worst = 0.0
+    while tried < pair_count:
+        start, goal = rng.integers(len(regions), size=2)
+        if regions[start] < 0 or regions[start] != regions[goal]:
+            continue
+        tried += 1
+        weights = rng.dirichlet((1, 1, 1), 2)
+        ends = [w @ mesh_map.vertices[mesh_map.faces[face]] for w, face in zip(weights, (start, goal), strict=True)]
+        result = planner.make_plan(PlanRequest(*[Pose(tuple(end)) for end in ends]))
+        solved += result.success
+        if result.success:
+            worst = max(worst, float(mesh_map.locate(result.path.positions).distances.max()))
+    return {"solved": solved / tried, "pairs": tried, "farthest_off_the_surface_m": worst}
+
+
 def summary(ratios: list[float]) -> dict[str, float]:
     errors = np.abs(np.array(ratios) - 1.0)
     return {"mean_error": float(errors.mean()), "max_error": float(errors.max()), "count": len(ratios)}
@@ -99,7 +136,7 @@ def main() -> None:
         pairs: dict[str, list[dict[str, str]]] = defaultdict(list)
         for row in csv.DictReader(file):
             pairs[row["mesh"]].append(row)
-    results: dict[str, dict[str, dict[str, float]]] = {}
+    results: dict[str, dict[str, Any]] = {}
     pooled: dict[str, list[float]] = defaultdict(list)
     for name in list(pairs)[:3] if options.quick else pairs:
         ratios = compare_pairs(load(options.data / name), pairs[name])
@@ -116,6 +153,10 @@ def main() -> None:
     report(
         "all terrain (limits: field mean 0.5 % max 2 %, paths mean 0.5 %, traced path max 3 %)", results["all terrain"]
     )
+    for side in (100, 316):
+        name = f"{side * side} vertices, random pairs"
+        results[name] = solved_share(side, (2000 if side == 100 else 200) // (4 if options.quick else 1))
+        print(f"\n{name}: {results[name]['solved']:.2%} of {results[name]['pairs']} reachable pairs got a path by CVP")
     if options.json:
         print(json.dumps(results))
 
