@@ -6,7 +6,9 @@ from contextlib import AbstractContextManager
 
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.ticker import Ticker
+from mbf_abstract.geometry import Pose
 from mbf_abstract.robot import RobotStateError
+from mbf_abstract.transforms import TransformError
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.map_lifecycle import MapLifecycle, MapLifecycleParameters
 
@@ -51,12 +53,15 @@ class ServedCostmap:
     def _update(self) -> None:
         """One update; a rolling map keeps its place while the robot's pose is unknown."""
         try:
-            pose = self._runtime.robot.pose()
-        except RobotStateError:
-            if self.costmap.rolling_window:
-                return
+            pose: Pose | None = self._in_map_frame(self._runtime.robot.pose())
+        except (RobotStateError, TransformError):
             pose = None
         self.costmap.update(pose, self._runtime.clock.now())
+
+    def _in_map_frame(self, pose: Pose) -> Pose:
+        if pose.frame_id == self.costmap.frame_id:
+            return pose
+        return self._runtime.transforms.transform_pose(pose, self.costmap.frame_id)
 
     def _clear(self) -> None:
         self.costmap.clear()

@@ -86,7 +86,12 @@ class CostmapNavigationServer(AbstractNavigationServer):
     def queries(self) -> MapQueries:
         """The map-independent questions on the costmaps."""
         return CostmapQueries(
-            self.global_costmap, self.local_costmap, self.runtime.robot, self.runtime.transforms, self.runtime.clock
+            self.global_costmap,
+            self.local_costmap,
+            self.runtime.robot,
+            self.runtime.transforms,
+            self.runtime.clock,
+            using=lambda costmap: (self._global if costmap is self.global_costmap else self._local).in_use(),
         )
 
     def take_scan(self, scan: RangeScan) -> None:
