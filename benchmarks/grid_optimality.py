@@ -6,7 +6,7 @@
    as optimal if our length, summed up in float64 from the path's steps, differs from the printed one by at most half a
    unit of its last digit (1e-6 relative for eight decimals). ``--quick`` takes every 60th query.
 2. Theta* on the any-angle sets of ``movingai/anyangle/ohohcakester``, whose points are cell corners: each cell is cut
-   into 8 x 8, a corner becomes the free small cell that touches it, and the way from its centre to the corner is added.
+   into 16 x 16, a corner becomes the free small cell that touches it, and the way from its centre to the corner is added.
    Our path must keep half a small cell from obstacles, so a ratio slightly above 1 remains by construction.
 """
 
@@ -27,8 +27,10 @@ from mbf_costmap_nav.kernels.grid_path import trace_cells
 from mbf_costmap_nav.kernels.grid_search import FOUND, pad_cells, search
 from mbf_costmap_nav.kernels.theta_star import theta_search
 
-FINE = 8
+FINE = 16
 """Small cells along a cell of the any-angle maps."""
+SUMMING_ERROR = 1e-5
+"""Slack [cells] for the rounding of the published sums."""
 TABLE = traversal_table(0.0, 253, False)
 NO_CANCEL = np.zeros(1, dtype=np.uint8)
 
@@ -51,11 +53,14 @@ def octile_length(grid: tuple[np.ndarray, int], start: int, goal: int) -> float:
 
 
 def printed_tolerance(text: str) -> float:
-    """Half a unit of the last printed digit; whole numbers and long prints get at least the rule of the data set."""
-    decimals = len(text.partition(".")[2])
+    """Half a unit of the last printed digit, plus what the files' own summing loses there (some lines end in ..4|50198
+    and are printed as ..4); lengths printed to eight decimals are compared to 1e-6 relative.
+    """
     value = abs(float(text))
-    significant = 6 - len(str(int(value)))  # old files print six significant digits and drop trailing zeros
-    return max(0.5 * 10.0 ** -max(significant, 0), 1e-6 * value) if decimals < 8 else 1e-6 * value
+    if len(text.partition(".")[2]) >= 8:
+        return 1e-6 * value
+    decimals = max(6 - len(str(int(value))), 0)  # old files print six significant digits and drop trailing zeros
+    return 0.5 * 10.0**-decimals + SUMMING_ERROR
 
 
 def scenario_results(data: FilePath, every: int) -> tuple[int, int, list[str]]:

@@ -67,11 +67,11 @@ def _heuristic(
     """Larger of the field [m] at the pose's cell and the length of the free curve; ``field`` is (height, width)."""
     ix = int((pose[0] - geometry[1]) / geometry[0])
     iy = int((pose[1] - geometry[2]) / geometry[0])
-    around = float(field[iy, ix]) * geometry[0]
+    around = float(field[iy, ix] * geometry[0])
     if np.hypot(goal[0] - pose[0], goal[1] - pose[1]) > CURVE_RANGE * radius:
         return around
     free_curve = float(np.abs(_curve_to(pose, goal, radius, reversing)[:, 1]).sum() * radius)
-    return max(around, free_curve)
+    return free_curve if free_curve > around else around
 
 
 @kernel
