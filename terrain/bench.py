@@ -89,6 +89,7 @@ class Bench:
             self._start(wall_clock, sinks, on_step)
         except BaseException:
             self.world.bullet.close()
+            self._temporary.cleanup()
             raise
 
     def _start(self, wall_clock: bool, sinks: tuple[EventSink, ...], on_step: Callable[[str], None]) -> None:

@@ -108,8 +108,8 @@ def add_path(scene: Scene, name: str, points: FloatArray, colour: Colour = PLANN
 
 
 def add_track_piece(scene: Scene, name: str, points: FloatArray) -> Any:
-    """Add a piece of the driven track, a hand above the plan so that it covers it."""
-    return add_path(scene, name, points + np.array([0.0, 0.0, 0.05]), DRIVEN)
+    """Add a piece of the driven track, a hand above plans so that it covers them."""
+    return add_path(scene, name, points + np.array([0.0, 0.0, LINE_LIFT]), DRIVEN)
 
 
 def add_scan(scene: Scene, name: str, points: FloatArray) -> Any:

@@ -1,0 +1,77 @@
+"""The report says what happened, in one file that needs nothing else."""
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+
+from mbf_abstract.events import Event, EventKind
+from mbf_abstract.geometry import Pose
+from terrain.metrics import measure
+from terrain.recorder import Recorder
+from terrain.recording import RobotShape
+from terrain.robot_models import HUSKY
+from terrain.viewer.report import MAX_ROWS, report_html, write_report
+from terrain.viewer.timeline import Bar, bars_of, timeline_svg
+
+
+def report_of(recording):
+    return report_html(recording, measure(recording).to_json())
+
+
+def test_the_report_tells_outcome_metrics_and_stops(office_recording):
+    page = report_of(office_recording)
+
+    for words in ("BLOCKED_PATH: a box stands on the path", "max_tilt_deg", "no command for 0.5 s", "turtlebot"):
+        assert words in page
+
+
+def test_the_report_is_one_file_without_script_and_links(hill_recording, tmp_path):
+    write_report(tmp_path / "report.html", hill_recording, measure(hill_recording).to_json())
+
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in page
+    assert re.findall(r'(?:src|href)="(?!data:|#)', page) == []
+    assert page.count("<svg") == 2
+    assert len(page) < 3e6
+
+
+def test_texts_of_a_run_cannot_break_the_page(hill_recording):
+    evil = replace(hill_recording, message="<script>alert(1)</script>", scenario="<b>")
+
+    assert "<script" not in report_of(evil)
+
+
+def test_long_lists_are_cut_and_say_so(hill_recording):
+    stops = tuple(
+        Event(float(k), EventKind.ROBOT_STOPPED, "velocity_gate", {"reason": "x"}) for k in range(MAX_ROWS + 7)
+    )
+
+    assert "and 7 more" in report_of(replace(hill_recording, events=stops))
+
+
+def test_a_run_that_never_began_has_a_report_too():
+    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(False, "FAILURE", "no robot")
+
+    assert "FAILURE: no robot" in report_of(run)
+
+
+def test_every_accepted_goal_is_one_bar_with_its_outcome(office_recording):
+    bars = bars_of(office_recording.events)
+
+    assert bars == [
+        Bar("move_base", 0.0, 15.4, 110),
+        Bar("get_path", 0.0, 0.4, 0),
+        Bar("exe_path", 0.4, 15.4, 110),
+    ]
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_the_timeline_is_sound_svg_for_open_goals_too(office_recording, finished):
+    kinds = () if finished else (EventKind.GOAL_FINISHED,)
+    events = tuple(event for event in office_recording.events if event.kind not in kinds)
+
+    svg = ElementTree.fromstring(timeline_svg(events))
+
+    assert len([node for node in svg.iter() if node.tag.endswith("rect")]) == 3
