@@ -1,0 +1,181 @@
+"""Speed of the grid kernels against Python-callable peers in the same run.
+
+    python benchmarks/grid_speed.py [--quick] [--json]
+
+Maps: rooms of 6 m with doors at 0.05 m, 1 % boxes, inflated (0.55 m, inscribed 0.22 m, scaling 3.0), corner to corner;
+384^2, 1000^2 and 4000^2 cells (``--quick``: the first two). Ours and the peer alternate; a line shows both medians [ms]
+and the median of the ratios ours / peer. ``C++`` is what the ratio of that Python peer to a C++ peer, measured on a
+quiet machine (peers.md, section 4), makes of ours: how many times faster we are than that C++ planner.
+A peer that is not installed is skipped with a note. Times are CPU times of the one thread, so that other load on the
+machine counts less.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+from collections.abc import Callable
+from time import thread_time
+from types import ModuleType
+
+import numpy as np
+
+from mbf_costmap_nav.costmap import CellBox
+from mbf_costmap_nav.grid_planning import traversal_table
+from mbf_costmap_nav.kernels.grid_search import pad_cells, search
+from mbf_costmap_nav.kernels.inflation import inflate
+from mbf_costmap_nav.kernels.theta_star import theta_search
+from mbf_costmap_nav.layers.inflation import cost_table
+
+RESOLUTION = 0.05
+NO_CANCEL = np.zeros(1, dtype=np.uint8)
+# C++ peer / Python peer by size, from the table of peers.md section 4 (ms / ms).
+SMAC_TO_PYASTAR = {384: 28 / 6.5, 1000: 353 / 61, 4000: 13000 / 1600}
+THETA_TO_PYASTAR = {384: 46 / 6.5, 1000: 317 / 61, 4000: 8800 / 1600}
+NAVFN_TO_TCOD = {384: 3.9 / 51, 1000: 31.9 / 396, 4000: 658 / 8540}
+INFLATION_TO_OPENCV = {384: 1.8 / 1.8, 1000: 8.5 / 12.5, 4000: 332 / 250}
+
+
+def peer(name: str) -> ModuleType | None:
+    """Import a peer, or say that it is skipped."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        print(f"{name}: not installed, skipped")
+        return None
+
+
+def rooms(size: int, seed: int = 1) -> np.ndarray:
+    """Lethal cells of a building of 6 m rooms with two doors each and 1 % boxes."""
+    rng = np.random.default_rng(seed)
+    cells = np.zeros((size, size), dtype=np.uint8)
+    pitch = 120
+    for wall in range(0, size, pitch):
+        cells[wall : wall + 2] = cells[:, wall : wall + 2] = 254
+    for y0 in range(0, size, pitch):
+        for x0 in range(0, size, pitch):
+            door_x, door_y = rng.integers(10, 70, 2)
+            if y0:
+                cells[y0 : y0 + 2, x0 + door_x : x0 + door_x + 34] = 0
+            if x0:
+                cells[y0 + door_y : y0 + door_y + 34, x0 : x0 + 2] = 0
+    for y, x in rng.integers(4, size - 10, (size * size // 3600, 2)):
+        cells[y : y + 6, x : x + 6] = 254
+    cells[:, [0, -1]] = cells[[0, -1]] = 254
+    cells[10:40, 10:40] = 0
+    return cells
+
+
+def inflated(cells: np.ndarray) -> np.ndarray:
+    """Our inflation of 11 cells."""
+    out = cells.copy()
+    radius = 11
+    table = cost_table(radius, RESOLUTION, 0.22, 3.0)
+    box = CellBox(0, 0, cells.shape[1], cells.shape[0])
+    inflate(out, (cells == 254).astype(np.uint8), box, table, radius, 253)
+    return out
+
+
+def compare(ours: Callable[[], object], theirs: Callable[[], object], repeats: int) -> tuple[float, float, float]:
+    """Median times [ms] and median ratio of alternating calls, after one of each to compile and warm up."""
+    times = []
+    ours(), theirs()
+    for _ in range(repeats):
+        row = []
+        for function in (ours, theirs):
+            begin = thread_time()
+            function()
+            row.append((thread_time() - begin) * 1e3)
+        times.append(row)
+    table = np.array(times)
+    return float(np.median(table[:, 0])), float(np.median(table[:, 1])), float(np.median(table[:, 0] / table[:, 1]))
+
+
+class Suite:
+    """One size of map: all comparisons on it."""
+
+    def __init__(self, size: int, repeats: int, results: dict[str, float]) -> None:
+        self.size, self.repeats, self.results = size, repeats, results
+        self.lethal = rooms(size)
+        self.cells = inflated(self.lethal)
+        self.table = traversal_table(2.0, 253, False)
+        self.padded, self.stride = pad_cells(self.cells, 254), size + 2
+        self.start = (20 + 1) * self.stride + 20 + 1
+        field = search(self.padded, self.stride, self.table, self.start, -1, 0.0, False, NO_CANCEL)[1]
+        self.goal = int(np.flatnonzero(np.isfinite(field))[-1])  # the reached cell nearest to the far corner
+        self.weights = np.ascontiguousarray(self.table[self.cells])
+        self.goal_cell = (self.goal // self.stride - 1, self.goal % self.stride - 1)
+
+    def line(
+        self, name: str, ours: Callable[[], object], theirs: Callable[[], object], cpp: tuple[str, float] | None = None
+    ) -> None:
+        """Measure one pair and print it."""
+        mine, other, ratio = compare(ours, theirs, self.repeats)
+        self.results[f"{name}_{self.size}"] = ratio
+        text = f"{self.size:5d}^2 {name:28s} {mine:9.2f} ms, peer {other:9.2f} ms, ratio {ratio:6.3f}"
+        print(text + (f"   = {cpp[1] / ratio:.1f} x {cpp[0]} (C++)" if cpp else ""), flush=True)
+
+    def astar(self) -> object:
+        return search(self.padded, self.stride, self.table, self.start, self.goal, 1.0, False, NO_CANCEL)
+
+    def field(self) -> object:
+        return search(self.padded, self.stride, self.table, self.start, -1, 0.0, False, NO_CANCEL)
+
+    def theta(self) -> object:
+        return theta_search(self.padded, self.stride, self.table, self.start, self.goal, NO_CANCEL)
+
+    def run(self) -> None:
+        """All pairs whose peer is there."""
+        cv2, tcod, pyastar, graph = (peer(n) for n in ("cv2", "tcod", "pyastar2d", "skimage.graph"))
+        size = self.size
+        if cv2:
+            free = (self.lethal != 254).astype(np.uint8)
+            cv2.setNumThreads(1)
+            cpp = ("Nav2 inflation, legacy layer", INFLATION_TO_OPENCV[size])
+            self.line(
+                "inflation_over_opencv",
+                lambda: inflated(self.lethal),
+                lambda: cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE),
+                cpp,
+            )
+        if pyastar:
+            cpp = ("Smac 2D", SMAC_TO_PYASTAR[size])
+            theirs = lambda: pyastar.astar_path(self.weights, (20, 20), self.goal_cell, allow_diagonal=True)  # noqa: E731
+            self.line("astar_over_pyastar2d", self.astar, theirs, cpp)
+            self.line("theta_over_pyastar2d", self.theta, theirs, ("Nav2 Theta*", THETA_TO_PYASTAR[size]))
+        self.line("theta_over_our_astar", self.theta, self.astar)
+        if size > 1000 and self.repeats < 7:
+            return
+        integer = np.where(np.isfinite(self.weights), self.weights * 10.0, 0.0).astype(np.int32)
+        if tcod:
+            self.line("field_over_tcod", self.field, lambda: tcod_field(tcod, integer), ("NavFn", NAVFN_TO_TCOD[size]))
+            self.line(
+                "astar_over_tcod", self.astar, lambda: tcod.path.AStar(integer, 1.41).get_path(20, 20, *self.goal_cell)
+            )
+        if graph:
+            costs = np.where(np.isfinite(self.weights), self.weights, -1.0)
+            self.line("field_over_skimage", self.field, lambda: graph.MCP_Geometric(costs).find_costs([(20, 20)]))
+
+
+def tcod_field(tcod: ModuleType, costs: np.ndarray) -> np.ndarray:
+    """Integer Dijkstra field of tcod with the octile weights 10 and 14."""
+    distance = np.full(costs.shape, np.iinfo(np.int32).max, dtype=np.int32)
+    distance[20, 20] = 0
+    return tcod.path.dijkstra2d(distance, costs, 10, 14, out=distance)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="two sizes, three repeats")
+    parser.add_argument("--json", action="store_true", help="last line is one JSON object")
+    arguments = parser.parse_args()
+    results: dict[str, float] = {}
+    for size in (384, 1000) if arguments.quick else (384, 1000, 4000):
+        Suite(size, 3 if arguments.quick else 7, results).run()
+    if arguments.json:
+        print(json.dumps(results))
+
+
+if __name__ == "__main__":
+    main()
