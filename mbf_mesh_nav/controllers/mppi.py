@@ -30,6 +30,7 @@ from mbf_mesh_nav.plugins import MeshContext, MeshController
 _NOISE_HOLD = 3  # steps a noise value is kept for: explores further than independent noise of the same size
 _PATH_SPACING = 0.1  # [m] between the samples of the path ahead
 _COLLISION_SCORE = 1e6
+_STANDSTILL = 0.2  # [m] and [rad] gained over the horizon: less than this is no motion
 
 
 class MPPIParameters(PluginParameters):
@@ -108,7 +109,7 @@ class MPPIController(MeshController):
             return ControlResult(ExePathOutcome.SUCCESS, "", self._as_command(0.0, turn))
         motion = self._best_motion(spot, pose, projection)
         if motion is None:
-            return ControlResult(ExePathOutcome.NO_VALID_CMD, f"all {p.samples} sampled motions collide")
+            return ControlResult(ExePathOutcome.NO_VALID_CMD, "no sampled motion is free and gets on")
         self._nominal = np.concatenate([motion[1:], motion[-1:]])
         return ControlResult(ExePathOutcome.SUCCESS, "", self._as_command(float(motion[0, 0]), float(motion[0, 1])))
 
@@ -117,22 +118,23 @@ class MPPIController(MeshController):
         return self._goal is not None and is_at_goal(pose, self._goal, dist_tolerance, angle_tolerance)
 
     def _best_motion(self, spot: SurfacePoint, pose: Pose, projection: PathProjection) -> NDArray[np.float64] | None:
-        """Blend the sampled motions by their scores; (horizon_steps, 2), or None if all of them collide."""
+        """Blend the sampled motions by their scores; (horizon_steps, 2), or None if the robot cannot get on."""
         max_speed = min(
             self.parameters.max_lin_velocity,
             max(braking_speed(projection.remaining, self.parameters.max_deceleration), 0.1),
         )
         controls = self._sample(max_speed)
         scores, collided = self._score(controls, spot, pose, projection)
-        if collided.all():
-            return None
         scores = np.where(collided, scores + _COLLISION_SCORE, scores)
         weights = np.exp(-(scores - scores.min()) / self.parameters.temperature)
         blended: NDArray[np.float64] = np.einsum("n,ntc->tc", weights / weights.sum(), controls)
         # The mean of two free motions, left and right of an obstacle, may hit it.
         if self._score(blended[None], spot, pose, projection)[1][0]:
-            return np.asarray(controls[int(np.argmin(scores))])
-        return blended
+            blended = np.asarray(controls[int(np.argmin(scores))])
+        # Where most motions collide and the best one hardly moves, standing there would last for ever.
+        travel, turn = np.abs(blended.sum(axis=0)) * self.parameters.step_time
+        hemmed_in = collided.mean() > 0.5 and travel < _STANDSTILL and turn < _STANDSTILL
+        return None if hemmed_in or bool(collided.all()) else blended
 
     def _sample(self, max_speed: float) -> NDArray[np.float64]:
         """Motions (samples, horizon_steps, 2) around the last one; the first is that one, the second stands still."""

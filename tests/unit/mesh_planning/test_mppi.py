@@ -56,13 +56,27 @@ def test_an_ackermann_robot_gets_steering_and_reaches_the_goal(make_plugin, plai
 
 
 def test_walled_in_on_all_sides_it_finds_no_valid_command(make_plugin, plain, paint):
-    mesh_map = paint(plain(spacing=0.05, width=2.0, height=2.0), lambda v: np.where(v[:, 0] > 1.06, np.inf, 0.0))
-    controller = make_plugin(MPPIController, mesh_map, samples=50)
+    def ring(v):
+        distance = np.hypot(v[:, 0] - 1.0, v[:, 1] - 1.0)
+        return np.where((distance > 0.2) & (distance < 0.5), np.inf, 0.0)
+
+    controller = make_plugin(MPPIController, paint(plain(spacing=0.05, width=2.0, height=2.0), ring))
     controller.set_plan(Path.from_points([(0.5, 1.0, 0.0), (1.9, 1.0, 0.0)]))
-    stand = controller.compute_velocity_commands(ControlRequest(Pose.planar(1.0, 1.0), Twist()))
-    assert stand.success and stand.command.vx < 0.2  # standing still is free
-    off_the_map = controller.compute_velocity_commands(ControlRequest(Pose.planar(1.0, 1.0, z=3.0), Twist()))
-    assert off_the_map.outcome == ExePathOutcome.OUT_OF_MAP
+    pose, result = Pose.planar(1.0, 1.0), None
+    for _ in range(60):  # it may use the room it has before it gives up
+        result = controller.compute_velocity_commands(ControlRequest(pose, Twist()))
+        if not result.success:
+            break
+        pose = Pose.planar(pose.x + 0.05 * result.command.vx, 1.0)
+    assert result.outcome == ExePathOutcome.NO_VALID_CMD and result.command is None
+    assert pose.x < 1.21
+
+
+def test_off_the_surface_is_out_of_map(make_plugin, plain):
+    controller = make_plugin(MPPIController, plain())
+    controller.set_plan(straight_path())
+    result = controller.compute_velocity_commands(ControlRequest(Pose.planar(1.0, 3.0, z=3.0), Twist()))
+    assert result.outcome == ExePathOutcome.OUT_OF_MAP
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
