@@ -57,6 +57,7 @@ class ScannedMap(LayeredCostmap):
         self.current = empty
 
     def snapshot(self) -> Costmap:
+        """Return what has been seen so far."""
         return self.current
 
     def mark(self, points: np.ndarray) -> None:
@@ -108,6 +109,7 @@ class RunClock:
         self.time = 0.0
 
     def now(self) -> float:
+        """Return the run's time [s]."""
         return self.time
 
 

@@ -39,6 +39,7 @@ class GivenMap(LayeredCostmap):
         self.grid = grid
 
     def snapshot(self) -> Costmap:
+        """Return the grid."""
         return self.grid
 
 
@@ -46,6 +47,7 @@ class StandingClock:
     """Time that stands still."""
 
     def now(self) -> float:
+        """Return zero."""
         return 0.0
 
 

@@ -6,7 +6,7 @@
    as optimal if our length, summed up in float64 from the path's steps, differs from the printed one by at most half a
    unit of its last digit (1e-6 relative for eight decimals). ``--quick`` takes every 60th query.
 2. Theta* on the any-angle sets of ``movingai/anyangle/ohohcakester``, whose points are cell corners: each cell is cut
-   into 16 x 16, a corner becomes the free small cell that touches it, and the way from its centre to the corner is added.
+   into 16 x 16, a corner becomes the free small cell that touches it, and the way to its centre is added.
    Our path must keep half a small cell from obstacles, so a ratio slightly above 1 remains by construction.
 """
 

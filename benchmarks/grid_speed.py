@@ -117,12 +117,15 @@ class Suite:
         print(text + (f"   = {cpp[1] / ratio:.1f} x {cpp[0]} (C++)" if cpp else ""), flush=True)
 
     def astar(self) -> object:
+        """Run our A*."""
         return search(self.padded, self.stride, self.table, self.start, self.goal, 1.0, False, NO_CANCEL)
 
     def field(self) -> object:
+        """Run our full field."""
         return search(self.padded, self.stride, self.table, self.start, -1, 0.0, False, NO_CANCEL)
 
     def theta(self) -> object:
+        """Run our Theta*."""
         return theta_search(self.padded, self.stride, self.table, self.start, self.goal, NO_CANCEL)
 
     def run(self) -> None:

@@ -13,7 +13,7 @@ ACTIVE_BEYOND = 0.5
 """Length [m] left on the path below which the goal critics take over."""
 LEAST_FREE = 0.93
 """Share of free path points below which the path counts as blocked."""
-STRIDE = 4
+STRIDE = 6
 """Every how many steps trajectory and path are compared."""
 
 

@@ -38,6 +38,9 @@ def clip_velocities(
     per_radius = np.float32(1.0 / min_turning_radius) if min_turning_radius > 0.0 else np.float32(0.0)
     for component in range(3):
         lowest, highest, delta = low[component], high[component], change[component]
+        if lowest == highest:  # a direction this robot does not have
+            velocities[component] = lowest
+            continue
         last = np.full(samples, now[component], dtype=np.float32)
         for t in range(steps):
             row = velocities[component, t]
