@@ -1,4 +1,4 @@
-"""The commands ``mbf run`` and ``mbf scenarios``, which need the simulator."""
+"""The commands ``mbf run``, ``mbf scenarios`` and ``mbf replay``, which need the simulator and the viewer."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands to the application ``mbf``."""
     app.command("run")(run)
     app.command("scenarios")(scenarios)
+    app.command("replay")(replay)
 
 
 def run(
@@ -71,6 +72,28 @@ def scenarios() -> None:
             typer.echo(f"{name:16} {loaded.proves}  [{', '.join(loaded.navigation)}]")
 
 
+def replay(
+    folder: Path = typer.Argument(..., help="Folder of a run, e.g. runs/2030-01-02_03-04-05."),
+    show: bool = typer.Option(True, "--open/--no-open", help="Open the page in the browser."),
+) -> None:
+    """Write picture, report and replay of a run again from its recording, and open the replay."""
+    with readable_errors():
+        from terrain.metrics import measure
+        from terrain.recording import Recording
+        from terrain.viewer.picture import write_picture
+        from terrain.viewer.replay import write_replay
+        from terrain.viewer.report import write_report
+
+        recording = Recording.load(folder / "recording.npz")
+        write_picture(folder / "picture.png", recording)
+        write_report(folder / "report.html", recording, measure(recording).to_json())
+        write_replay(folder / "replay.html", recording)
+    page = (folder / "replay.html").resolve()
+    typer.echo(page)
+    if show:
+        typer.launch(page.as_uri())
+
+
 def new_run_folder(parent: Path, now: datetime) -> Path:
     """Return a folder name made of the time that does not exist yet."""
     stamp = now.strftime("%Y-%m-%d_%H-%M-%S")
@@ -89,4 +112,4 @@ def _tell(result: RunResult, as_json: bool) -> None:
         f"{metrics['path_length_m']:.1f} m in {metrics['time_s']:.1f} s simulated, "
         f"{metrics['wall_time_s']:.1f} s of wall time: {metrics['real_time_factor']:.1f} x real time"
     )
-    typer.echo(f"results in {result.folder}: replay.html, picture.png, metrics.json, events.jsonl")
+    typer.echo(f"results in {result.folder}: replay.html, report.html, picture.png, metrics.json")

@@ -1,8 +1,8 @@
 """Runs a scenario from start to last goal with ``move_base`` and writes what happened into a folder.
 
-``events.jsonl``, ``metrics.json``, ``recording.npz``, ``picture.png``, ``replay.html``, ``navigation.yaml`` and the
-world's map files. On simulated time the same scenario and seed write the same ``events.jsonl``, byte for byte; how long
-the run took on the wall stands in ``timing.json``.
+In the folder: ``events.jsonl``, ``metrics.json``, ``recording.npz``, ``picture.png``, ``report.html``, ``replay.html``,
+``navigation.yaml`` and the world's map files. On simulated time the same scenario and seed write the same
+``events.jsonl``, byte for byte; how long the run took on the wall stands in ``timing.json``.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     recording = bench.recorder.finish(result.success, result.outcome_name, result.message, list(bench.memory.events))
     metrics = _write_numbers(recording, bench, drive.wall_time, options.folder)
     if options.draw:
-        _draw(recording, options)
+        _draw(recording, metrics, options)
     return RunResult(result.success, result.outcome, result.outcome_name, result.message, options.folder, metrics)
 
 
@@ -163,11 +163,19 @@ def _write_numbers(recording: Recording, bench: Bench, wall_time: float, folder:
     return {**metrics, **timing}
 
 
-def _draw(recording: Recording, options: RunOptions) -> None:
-    from terrain.viewer.picture import write_picture
+def _draw(recording: Recording, metrics: dict[str, Any], options: RunOptions) -> None:
+    """Make everything that is looked at; without the packages that draw, a run still counts."""
+    from terrain.viewer.picture import ViewerMissing, write_picture
     from terrain.viewer.replay import write_replay
+    from terrain.viewer.report import write_report
 
-    options.on_step("drawing the picture")
-    write_picture(options.folder / "picture.png", recording)
-    options.on_step("writing the replay")
-    write_replay(options.folder / "replay.html", recording)
+    folder = options.folder
+    try:
+        options.on_step("drawing the picture")
+        write_picture(folder / "picture.png", recording)
+        options.on_step("writing the report")
+        write_report(folder / "report.html", recording, metrics)
+        options.on_step("writing the replay")
+        write_replay(folder / "replay.html", recording)
+    except ViewerMissing as missing:
+        options.on_step(str(missing))

@@ -69,10 +69,10 @@ def report_html(recording: Recording, metrics: Mapping[str, Any]) -> str:
             f'<img alt="map, plan and driven track from above" src="data:image/png;base64,{picture}">',
             "<h2>Over time</h2>" + plots_svg(recording) if len(recording.times) else "",
             f"<h2>Actions</h2>{timeline_svg(recording.events)}",
+            "<h2>Metrics</h2>" + _table(("name", "value"), metrics.items()),
             "<h2>Results of the goals, in order</h2>"
             + _table(("time", "action", "outcome", "text"), _goals(recording)),
             "<h2>Faults, stops and recoveries</h2>" + _table(("time", "what", "who", "text"), _notable(recording)),
-            "<h2>Metrics</h2>" + _table(("name", "value"), metrics.items()),
             "</body></html>",
         ]
     )
@@ -123,7 +123,7 @@ def _goals(recording: Recording) -> Iterable[tuple[str, ...]]:
         if event.kind is EventKind.GOAL_FINISHED:
             code = event.data.get("outcome")
             name = outcome_name(code) if isinstance(code, int) else str(code)
-            mark = "" if isinstance(code, int) and is_success(code) else " ✗"
+            mark = "" if name == "CANCELED" or (isinstance(code, int) and is_success(code)) else " ✗"
             yield f"{event.time:.2f} s", event.source, name + mark, str(event.data.get("message", ""))
 
 

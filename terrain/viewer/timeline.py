@@ -10,7 +10,7 @@ from mbf_abstract.outcomes import is_success, outcome_name
 
 ACTIONS = ("move_base", "get_path", "exe_path", "recovery", "refine_path")
 LEFT, WIDTH, ROW, BAR = 90, 900, 30, 18
-GOOD, BAD, OPEN = "#2da44e", "#cf222e", "#9aa4b2"
+GOOD, BAD, NEITHER = "#2da44e", "#cf222e", "#9aa4b2"
 TICKS = 8
 
 
@@ -54,14 +54,20 @@ def timeline_svg(events: tuple[Event, ...]) -> str:
 
 def _bar(bar: Bar, row: int, scale: float, last: float) -> str:
     end = last if bar.end is None else bar.end
-    colour = OPEN if bar.outcome is None else GOOD if is_success(bar.outcome) else BAD
     outcome = "not finished" if bar.outcome is None else outcome_name(bar.outcome)
     title = escape(f"{bar.action}: {outcome}, {bar.begin:.2f} s to {end:.2f} s")
     x, width = LEFT + bar.begin * scale, max(2.0, (end - bar.begin) * scale)
     return (
         f'<rect x="{x:.1f}" y="{ROW * row + (ROW - BAR) // 2}" width="{width:.1f}" height="{BAR}" rx="2" '
-        f'fill="{colour}" fill-opacity="0.75"><title>{title}</title></rect>'
+        f'fill="{_colour(bar.outcome)}" fill-opacity="0.75"><title>{title}</title></rect>'
     )
+
+
+def _colour(outcome: int | None) -> str:
+    """Green and red for success and failure; a goal that was canceled or replaced is neither."""
+    if outcome is None or outcome_name(outcome) == "CANCELED":
+        return NEITHER
+    return GOOD if is_success(outcome) else BAD
 
 
 def _tick(time: float, scale: float, bottom: int) -> str:

@@ -5,8 +5,11 @@ import json
 import typer
 from typer.testing import CliRunner
 
+from mbf_abstract.geometry import Pose, Twist
 from terrain.cli import register
-from terrain.recording import Recording
+from terrain.recorder import Recorder
+from terrain.recording import Recording, RobotShape
+from terrain.robot_models import HUSKY
 
 
 def mbf(*arguments):
@@ -46,7 +49,27 @@ def test_a_run_through_a_real_building_reaches_its_goal_and_leaves_all_files(sha
     answer = json.loads(result.stdout)
     assert (result.exit_code, answer["success"]) == (0, True), result.output
     files = {file.name for file in (tmp_path / "run").iterdir()}
-    assert {"events.jsonl", "metrics.json", "picture.png", "replay.html", "recording.npz"} <= files
+    assert {"events.jsonl", "metrics.json", "picture.png", "report.html", "replay.html", "recording.npz"} <= files
     recording = Recording.load(tmp_path / "run" / "recording.npz")
     assert recording.success and recording.paths and recording.scans
     assert answer["metrics"]["distance_to_goal_m"] < 0.5
+
+
+def test_a_replay_is_made_again_from_the_recording_alone(tmp_path):
+    shape = RobotShape.of(HUSKY)
+    recorder = Recorder("straight", "mesh", shape, Pose.planar(0.0, 0.0), [Pose.planar(1.0, 0.0)])
+    for step in range(11):
+        recorder.sample(0.1 * step, Pose.planar(0.1 * step, 0.0), Twist.planar(1.0), Twist.planar(1.0))
+    recorder.finish(True, "SUCCESS", "goal reached").save(tmp_path / "recording.npz")
+
+    result = mbf("replay", tmp_path, "--no-open")
+
+    assert result.exit_code == 0, result.output
+    assert {file.name for file in tmp_path.iterdir()} >= {"picture.png", "report.html", "replay.html"}
+
+
+def test_a_folder_without_a_recording_is_exit_code_2(tmp_path):
+    result = mbf("replay", tmp_path)
+
+    assert result.exit_code == 2
+    assert "recording.npz" in result.output
