@@ -8,6 +8,7 @@ driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_co
 from __future__ import annotations
 
 import atexit
+import os
 import weakref
 import zlib
 from abc import ABC, abstractmethod
@@ -294,11 +295,11 @@ def _limits(parameters: NavigationParameters) -> VelocityLimits:
 
 def _close_at_exit(server: AbstractNavigationServer) -> Callable[[], None]:
     """Stop the robot when the interpreter ends, without keeping the server alive until then."""
-    reference = weakref.ref(server)
+    reference, process = weakref.ref(server), os.getpid()
 
     def close() -> None:
         alive = reference()
-        if alive is not None:
+        if alive is not None and os.getpid() == process:  # a forked child must not touch the parent's robot
             alive.runtime.gate.close("the process ends")
 
     atexit.register(close)

@@ -7,6 +7,8 @@ answers; whatever happens the last command is zero.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +17,30 @@ from mbf_abstract.clock import Clock
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+from mbf_abstract.robot import RobotStateError
 from mbf_mesh_nav.kernels.surface_walk import tangent, walk
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap
 
 CONTROL_PERIOD = 0.05
 """Seconds between two commands."""
+
+
+Behavior = TypeVar("Behavior")
+Run = Callable[[Behavior, RecoveryRequest], RecoveryResult]
+
+
+def reports_lost_pose(run_behavior: Run[Behavior]) -> Run[Behavior]:
+    """Decorate ``run_behavior``: a robot whose pose is lost is a TF_ERROR, not an exception."""
+
+    @wraps(run_behavior)
+    def guarded(self: Behavior, request: RecoveryRequest) -> RecoveryResult:
+        try:
+            return run_behavior(self, request)
+        except RobotStateError as error:
+            return RecoveryResult(RecoveryOutcome.TF_ERROR, str(error))
+
+    return guarded
 
 
 def run_guarded(

@@ -3,7 +3,8 @@
 Strengths: needs only poses (any planner's path), a dozen lines of law, forgiving: a skid-steered robot that turns
 slower than told converges all the same, since the arc is computed anew every cycle. Slows down on slopes, in bends and
 towards the goal, and turns on the spot when the path leads elsewhere. Known failure: cuts corners by about
-``lookahead``² / (8 x bend radius), does not avoid what the plan did not know; use ``mesh.mppi`` for that.
+``lookahead``² / (8 x bend radius); stops before what the plan did not know (BLOCKED_PATH) but does not drive around
+it: plan anew while driving, or use ``mesh.mppi``.
 Cost: below 0.2 ms a cycle. Law: Coulter, "Implementation of the pure pursuit path tracking algorithm", CMU, 1992.
 """
 
@@ -20,6 +21,8 @@ from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.goal_approach import ArrivalLatch, arc_to, braking_speed, clamp, heading_error, is_at_goal
 from mbf_mesh_nav.path_progress import PathProgress, PathProjection
 from mbf_mesh_nav.plugins import MeshController
+
+OBSTACLE_STEP = 0.1  # m between two looks along the path
 
 
 class PathFollowerParameters(PluginParameters):
@@ -45,6 +48,10 @@ class PathFollowerParameters(PluginParameters):
     max_path_distance: float = parameter(
         1.0, "Farther from the path than this the path is missed.", unit="m", gt=0.0, allow_inf=True
     )
+    obstacle_distance: float = parameter(
+        1.0, "The path is looked at this far ahead on the current map; 0 = never.", unit="m", ge=0.0, le=20.0
+    )
+    cost_limit: float = parameter(1.0, "Ground whose cost reaches this is an obstacle.", gt=0.0, allow_inf=True)
     max_surface_distance: float = parameter(
         1.0, "Farther from the surface than this the robot is out of the map.", unit="m", gt=0.0
     )
@@ -86,12 +93,32 @@ class PathFollower(MeshController):
         if self._arrival.update(pose, self._goal):
             turn = self.parameters.turn_gain * heading_error(pose, self._goal)
             return self._command(0.0, turn)
+        blocked_in = self._distance_to_obstacle(projection.travelled)
+        if blocked_in is not None:
+            return ControlResult(ExePathOutcome.BLOCKED_PATH, f"the path is blocked {blocked_in:.2f} m ahead")
         slope = math.acos(clamp(float(self.mesh_map.face_normals[surface.face, 2]), 1.0))
         return self._pursue(pose, projection, slope)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the last pose of the plan is reached."""
         return self._goal is not None and is_at_goal(pose, self._goal, dist_tolerance, angle_tolerance)
+
+    def _distance_to_obstacle(self, travelled: float) -> float | None:
+        """Distance [m] along the path to ground the current map forbids; None if there is none in sight.
+
+        A robot that stands on such ground itself may leave it: only what comes after free ground counts.
+        """
+        ahead = np.arange(0.0, self.parameters.obstacle_distance, OBSTACLE_STEP)
+        places = self._progress.points_at(travelled + ahead)
+        location = self.mesh_map.locate(places, self.parameters.max_surface_distance)
+        corners = self.mesh_map.faces[location.faces, np.argmax(location.barycentric, axis=1)]
+        snapshot = self.mesh_map.snapshot()
+        blocked = snapshot.lethal[corners] | ~(snapshot.costs[corners] < self.parameters.cost_limit)
+        blocked &= location.faces >= 0
+        if blocked.all():
+            return None
+        hit = np.flatnonzero(blocked & (np.arange(len(blocked)) > np.argmin(blocked)))
+        return float(ahead[hit[0]]) if hit.size else None
 
     def _pursue(self, pose: Pose, projection: PathProjection, slope: float) -> ControlResult:
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""

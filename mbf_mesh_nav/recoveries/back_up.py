@@ -12,7 +12,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_mesh_nav.guarded_motion import blocked_vertices, free_distance, run_guarded
+from mbf_mesh_nav.guarded_motion import blocked_vertices, free_distance, reports_lost_pose, run_guarded
 from mbf_mesh_nav.plugins import MeshRecovery
 
 
@@ -33,6 +33,7 @@ class BackUpRecovery(MeshRecovery):
     Parameters = BackUpParameters
     parameters: BackUpParameters
 
+    @reports_lost_pose
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
         """Back up until the distance is driven or the ground behind ends."""
         p = self.parameters

@@ -18,7 +18,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.goal_approach import arc_to, clamp
-from mbf_mesh_nav.guarded_motion import blocked_vertices, run_guarded
+from mbf_mesh_nav.guarded_motion import blocked_vertices, reports_lost_pose, run_guarded
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distances
 from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, mean_edge_length, seeded_arrays
 from mbf_mesh_nav.locate import SurfacePoint
@@ -43,6 +43,7 @@ class EscapeRecovery(MeshRecovery):
     Parameters = EscapeParameters
     parameters: EscapeParameters
 
+    @reports_lost_pose
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
         """Find the nearest free vertex, drive there; a free start is a success at once."""
         p = self.parameters

@@ -15,7 +15,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.goal_approach import heading_error
-from mbf_mesh_nav.guarded_motion import run_guarded
+from mbf_mesh_nav.guarded_motion import reports_lost_pose, run_guarded
 from mbf_mesh_nav.plugins import MeshRecovery
 
 
@@ -34,6 +34,7 @@ class RotateRecovery(MeshRecovery):
     Parameters = RotateParameters
     parameters: RotateParameters
 
+    @reports_lost_pose
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
         """Turn until the angle is reached; checks the slope all the time."""
         p = self.parameters

@@ -6,7 +6,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_mesh_nav.guarded_motion import run_guarded
+from mbf_mesh_nav.guarded_motion import reports_lost_pose, run_guarded
 from mbf_mesh_nav.plugins import MeshRecovery
 
 
@@ -22,6 +22,7 @@ class WaitRecovery(MeshRecovery):
     Parameters = WaitParameters
     parameters: WaitParameters
 
+    @reports_lost_pose
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
         """Wait; ends early when cancelled."""
         end = self.clock.now() + self.parameters.duration

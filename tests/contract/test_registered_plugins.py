@@ -14,10 +14,6 @@ AROUND_THE_WALL = (Pose.planar(1.0, 1.0), Pose.planar(7.0, 1.0, 1.0))
 INTO_THE_CLOSET = (Pose.planar(1.0, 1.0), Pose.planar(7.2, 5.2))
 STRAIGHT_PATH = Path.from_points(np.linspace((1.0, 1.0, 0.0), (3.0, 1.2, 0.0), 41))
 NEEDS_PATH_OF = {"mesh.vector_field": "cvp"}  # a controller that follows what only this planner adds to its path
-KNOWN = {
-    f"mesh.{name}": "RobotStateError leaves run_behavior when the pose is lost; TF_ERROR is expected"
-    for name in ("back_up", "escape", "rotate", "wait")
-}
 CANNOT_GO_AROUND = {"costmap.straight_line"}
 CANCEL_WITHIN = 1.0  # s; the promise is 0.1 s of work, and this machine may be busy
 
@@ -25,11 +21,7 @@ CANCEL_WITHIN = 1.0  # s; the promise is 0.1 s of work, and this machine may be 
 def installed(kind):
     """All plugins of a kind that a backend offers, as (backend, short name)."""
     names = [(backend, name) for backend in ("costmap", "mesh") for name in PluginRegistry(backend).names(kind)]
-    return [pytest.param(*pair, id=".".join(pair), marks=_marks(".".join(pair))) for pair in names]
-
-
-def _marks(name):
-    return [pytest.mark.xfail(reason=KNOWN[name], strict=True)] if name in KNOWN else []
+    return [pytest.param(*pair, id=".".join(pair)) for pair in names]
 
 
 def plan(backend, planner, make_context):

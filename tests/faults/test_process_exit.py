@@ -79,7 +79,6 @@ def test_ctrl_c_stops_the_robot(tmp_path):
     assert velocities(log)[-1] == 0.0
 
 
-@pytest.mark.xfail(reason="the exit hook also runs in a forked child and stops the parent's robot", strict=True)
 def test_a_forked_child_that_ends_does_not_stop_or_drive_the_robot(tmp_path):
     log = tmp_path / "commands"
     program = """
