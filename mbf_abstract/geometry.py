@@ -346,14 +346,12 @@ class Path:
             Surface normals, the poses' z axes; without them z is up.
         """
         points = np.asarray(positions, dtype=np.float64).reshape(-1, 3)
-        ahead = np.zeros_like(points)
-        if len(points) > 1:
-            ahead[:-1] = points[1:] - points[:-1]
-            for i in range(len(points) - 2, -1, -1):  # a repeated point looks where the next one looks
-                if not ahead[i].any():
-                    ahead[i] = ahead[i + 1]
-            ahead[-1] = ahead[-2]
-        ahead[~ahead.any(axis=1)] = (1.0, 0.0, 0.0)
+        ahead = np.tile([1.0, 0.0, 0.0], (len(points), 1))
+        steps = np.diff(points, axis=0)
+        moving = np.flatnonzero(steps.any(axis=1))
+        if moving.size:  # a repeated point looks where the next one looks, the last one where the one before looked
+            following = np.minimum(np.searchsorted(moving, np.arange(len(points))), moving.size - 1)
+            ahead = steps[moving[following]]
         up = np.tile([0.0, 0.0, 1.0], (len(points), 1)) if normals is None else np.asarray(normals, dtype=float)
         orientations = quaternions_from_axes(ahead, up) if len(points) else np.zeros((0, 4))
         if final_orientation is not None and len(points):

@@ -1,0 +1,141 @@
+"""Poses, twists and paths: finite, unit length, and headed where they should be."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from mbf_abstract.geometry import (
+    AckermannCommand,
+    NonFiniteError,
+    Path,
+    Pose,
+    Twist,
+    normalize_angle,
+    quaternion_from_yaw,
+    quaternion_multiply,
+    quaternions_from_axes,
+    rotation_matrix,
+)
+
+angles = st.floats(-20.0, 20.0)
+coordinates = st.floats(-1e3, 1e3)
+points = st.tuples(coordinates, coordinates, coordinates)
+
+
+def headings(path):
+    """Naive twin: look at the next different point; the end looks where the way led."""
+    ways = []
+    for i in range(len(path)):
+        ahead = [p - path.positions[i] for p in path.positions[i + 1 :] if (p != path.positions[i]).any()]
+        ways.append(ahead[0] if ahead else (ways[-1] if ways else np.array([1.0, 0.0, 0.0])))
+    return [math.atan2(way[1], way[0]) for way in ways]
+
+
+@given(angles)
+def test_an_angle_is_wrapped_to_the_same_direction(angle):
+    wrapped = normalize_angle(angle)
+    assert -math.pi < wrapped <= math.pi
+    assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-9)
+    assert math.sin(wrapped) == pytest.approx(math.sin(angle), abs=1e-9)
+
+
+@given(coordinates, coordinates, st.floats(-3.1, 3.1))
+def test_a_planar_pose_keeps_its_heading(x, y, yaw):
+    pose = Pose.planar(x, y, yaw)
+    assert pose.yaw == pytest.approx(yaw, abs=1e-9)
+    assert pose.rotation[:, 0] == pytest.approx([math.cos(yaw), math.sin(yaw), 0.0], abs=1e-9)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_quaternions_multiply_and_turn_as_scipy_says(seed):
+    a, b = Rotation.random(2, rng=np.random.default_rng(seed)).as_quat()
+    expected = (Rotation.from_quat(a) * Rotation.from_quat(b)).as_matrix()
+    assert rotation_matrix(quaternion_multiply(a, b)) == pytest.approx(expected, abs=1e-9)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_frames_from_axes_have_the_z_axis_and_the_heading_asked_for(seed):
+    rng = np.random.default_rng(seed)
+    x_axes, z_axes = rng.normal(size=(5, 3)), rng.normal(size=(5, 3))
+    for q, x, z in zip(quaternions_from_axes(x_axes, z_axes), x_axes, z_axes, strict=True):
+        rotation = rotation_matrix(q)
+        assert rotation[:, 2] == pytest.approx(z / np.linalg.norm(z), abs=1e-9)
+        assert rotation[:, 0] @ x > 0.0
+        assert rotation[:, 1] @ x == pytest.approx(0.0, abs=1e-9)
+
+
+def test_distance_and_angle_between_poses():
+    here, there = Pose((1.0, 2.0, 3.0)), Pose((3.0, 2.0, 1.0), quaternion_from_yaw(math.pi))
+    assert here.distance_to(there) == pytest.approx(2.82843, abs=1e-5)  # F124
+    assert here.angle_to(there) == pytest.approx(math.pi)
+    assert Pose.planar(0, 0, 3.14).angle_to(Pose.planar(0, 0, -3.14)) == pytest.approx(2 * (math.pi - 3.14), abs=1e-6)
+
+
+def test_ten_poses_two_metres_apart_are_eighteen_metres():  # F126
+    path = Path.from_points([(2.0 * i, 0.0, 0.0) for i in range(10)])
+    assert path.length == pytest.approx(18.0)
+    assert path.remaining_lengths[0] == pytest.approx(18.0)
+    assert path.remaining_lengths[-1] == 0.0
+
+
+@given(st.lists(st.sampled_from([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 2.0, 0.0)]), max_size=8))
+def test_path_poses_look_at_the_next_different_point(positions):
+    path = Path.from_points(positions)
+    assert [pose.yaw for pose in path] == pytest.approx(headings(path), abs=1e-9)
+
+
+def test_the_last_pose_of_a_path_can_be_given():
+    path = Path.from_points([(0, 0, 0), (1, 0, 0)], quaternion_from_yaw(1.0))
+    assert path[-1].yaw == pytest.approx(1.0)
+
+
+def test_a_slice_of_a_path_is_a_path_in_the_same_frame():
+    path = Path.from_points([(0, 0, 0), (1, 0, 0), (2, 0, 0)], frame_id="odom", stamp=3.0)
+    assert len(path[1:]) == 2
+    assert path[1:].frame_id == "odom"
+    assert path[1].stamp == 3.0
+
+
+def test_the_arrays_of_a_path_are_its_own_and_read_only():
+    positions = np.zeros((2, 3))
+    path = Path(positions)
+    positions[0, 0] = 5.0
+    assert path.positions[0, 0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        path.positions[0, 0] = 1.0
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_numbers_that_are_not_finite_are_refused_by_name_or_index(bad):
+    with pytest.raises(NonFiniteError, match=r"position\[1\]"):
+        Pose((0.0, bad, 0.0))
+    with pytest.raises(NonFiniteError, match=r"angular\[2\]"):
+        Twist.planar(wz=bad)
+    with pytest.raises(NonFiniteError, match="speed"):
+        AckermannCommand(bad)
+    with pytest.raises(NonFiniteError, match="pose 1"):
+        Path(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, bad]]))
+
+
+def test_a_quaternion_off_unit_length_by_more_than_a_hundredth_is_refused():
+    Pose((0, 0, 0), (0.0, 0.0, 0.0, 1.004))
+    with pytest.raises(ValueError, match="squared norm"):
+        Pose((0, 0, 0), (0.0, 0.0, 0.0, 1.01))
+    with pytest.raises(ValueError, match="orientation of pose 0"):
+        Path(np.zeros((1, 3)), np.zeros((1, 4)))
+
+
+def test_poses_of_a_path_must_share_a_frame():
+    with pytest.raises(ValueError, match="'map', 'odom'"):
+        Path.from_poses([Pose.planar(0, 0), Pose.planar(1, 0, frame_id="odom")])
+
+
+def test_a_standing_car_may_keep_its_wheels_turned():
+    assert AckermannCommand(0.0, 0.4).is_stopped()
+    assert not AckermannCommand(0.1, 0.0).is_stopped()
+    assert Twist.planar(0.001, 0.0, 0.001).is_stopped()
+    assert not Twist.planar(wz=0.01).is_stopped()
