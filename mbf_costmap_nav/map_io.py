@@ -38,6 +38,8 @@ from mbf_costmap_nav.map_description import (
 
 MAX_CELLS = 64_000_000
 """Default limit; 8000 x 8000 cells, checked before an image is decoded."""
+IMAGE_SUFFIXES = {".pgm", ".png", ".bmp"}
+BARE_IMAGE_RESOLUTION = 0.05  # m, what most map makers use
 GREY_MODES = {"1", "L", "LA", "P", "RGB", "RGBA"}
 """Pillow's names of the 8-bit pixel layouts we read."""
 
@@ -95,8 +97,16 @@ def load_map(file: Path | str, max_cells: int = MAX_CELLS) -> OccupancyMap:
 
 
 def load_costmap(file: Path | str, frame_id: str = "map", track_unknown_space: bool = True) -> Costmap:
-    """Read a map_server YAML file as a costmap; see ``load_map`` and ``OccupancyMap.to_costmap``."""
-    return load_map(file).to_costmap(frame_id, track_unknown_space)
+    """Read a map_server YAML file, or a bare image, as a costmap; see ``load_map`` and ``OccupancyMap.to_costmap``.
+
+    A bare image is described by the YAML file of the same name beside it; without one its cells have
+    ``BARE_IMAGE_RESOLUTION`` and its lower left corner is the origin.
+    """
+    file = Path(file)
+    description = file.with_suffix(".yaml") if file.suffix.lower() in IMAGE_SUFFIXES else file
+    bare = description != file and not description.is_file()
+    content = load_image(file, BARE_IMAGE_RESOLUTION) if bare else load_map(description)
+    return content.to_costmap(frame_id, track_unknown_space)
 
 
 def load_image(

@@ -7,6 +7,7 @@ Each map is updated at its own rate; before every control cycle the local one mu
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -132,7 +133,7 @@ class CostmapNavigationServer(AbstractNavigationServer):
     @classmethod
     def config_for_map(cls, file: Path) -> str | None:
         """Take every image format this package reads, and map_server's YAML."""
-        return BARE_MAP.format(file=str(file)) if file.suffix.lower() in MAP_SUFFIXES else None
+        return BARE_MAP.format(file=json.dumps(str(file))) if file.suffix.lower() in MAP_SUFFIXES else None
 
     def _serve(self, config: Config, key: str) -> ServedCostmap:
         section = config.sections[key]

@@ -6,6 +6,7 @@ one section, ``mesh_map`` (see ``map_builder``); plugin types are looked for wit
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, cast
@@ -122,4 +123,8 @@ class MeshNavigationServer(AbstractNavigationServer):
     @classmethod
     def config_for_map(cls, file: Path) -> str | None:
         """Take every mesh format this package reads."""
-        return BARE_MESH.format(file=str(file)) if file.suffix.lower() in TRIMESH_FORMATS | HDF5_FORMATS else None
+        return (
+            BARE_MESH.format(file=json.dumps(str(file)))
+            if file.suffix.lower() in TRIMESH_FORMATS | HDF5_FORMATS
+            else None
+        )

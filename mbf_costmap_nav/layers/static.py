@@ -24,7 +24,9 @@ from mbf_costmap_nav.zones import sample_costmap
 class StaticLayerParameters(LayerParameters):
     """Parameters of the static layer."""
 
-    map_file: str = parameter("", "map_server YAML file, relative to the configuration's folder.", dynamic=False)
+    map_file: str = parameter(
+        "", "map_server YAML file or image, relative to the configuration's folder.", dynamic=False
+    )
     use_maximum: bool = parameter(False, "Combine by the larger cost instead of replacing what is below.")
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
@@ -48,6 +49,16 @@ def test_a_plan_on_a_bare_mesh_takes_the_height_of_the_ground(hill, tmp_path):
     assert answer["length_m"] == pytest.approx(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1).sum(), abs=1e-4)
     assert poses[0, 2] == pytest.approx(2.0 * np.exp(-32.0 / 12.0), abs=0.05)
     assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_bare_image_without_description_has_cells_of_five_centimetres(tmp_path):
+    image = tmp_path / 'floor: "1" #b.png'  # a name YAML would trip over
+    Image.fromarray(np.full((100, 200), 254, np.uint8)).save(image)
+
+    result = mbf("plan", image, "--start", 1, 1, "--goal", 9, 4, "--json")
+
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["length_m"] == pytest.approx(np.hypot(8, 3), rel=0.1)
 
 
 def test_no_path_is_exit_code_1_with_the_planners_words():
