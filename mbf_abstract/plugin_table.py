@@ -27,6 +27,10 @@ class PluginTable:
             raise ValueError(f"a {_WORDS[kind]} named {plugin.name!r} is loaded already")
         self._plugins[kind][plugin.name] = plugin
 
+    def replace(self, kind: PluginKind, plugin: LoadedPlugin[Any]) -> None:
+        """Put a plugin in the place of the one of its name."""
+        self._plugins[kind][plugin.name] = plugin
+
     def remove(self, kind: PluginKind, name: str) -> None:
         """Forget a plugin; raises KeyError if there is none of that name."""
         del self._plugins[kind][name]

@@ -14,6 +14,7 @@ import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
@@ -38,6 +39,7 @@ from mbf_abstract.navigation_parameters import NavigationParameters
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugin_table import PluginTable
 from mbf_abstract.plugins import ControlRequest, PlanRequest, Plugin, PluginContext, PluginKind
+from mbf_abstract.registry import PluginRegistry
 from mbf_abstract.robot import Robot, RobotInformation
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.sim_clock import SimClock
@@ -148,22 +150,83 @@ class AbstractNavigationServer(ABC):
     # ------------------------------------------------------------------------------------------ plugins
     def load_plugin(self, spec: PluginSpec) -> None:
         """Construct and add a plugin; raises ServerError with the reason if its constructor fails."""
-        rng = np.random.default_rng([self._seed, zlib.crc32(spec.name.encode())])
-        base = PluginContext(spec.name, spec.parameters, self.runtime.clock, rng, self.runtime.robot)
         try:
-            instance: Plugin = spec.plugin_class(self.make_context(spec.kind, spec.options, base))
-            self.plugins.add(spec.kind, LoadedPlugin(spec.name, spec.type_name, instance, self.runtime))
+            self.plugins.add(spec.kind, self._construct(spec))
         except Exception as error:
             text = f"{spec.kind.name.lower()} {spec.name!r} ({spec.type_name}): {type(error).__name__}: {error}"
             if not spec.optional:
                 raise ServerError(text) from error
             self.runtime.events.emit(EventKind.FAULT, "server", message=f"optional plugin left out: {text}")
 
-    def unload_plugin(self, kind: PluginKind, name: str) -> None:
-        """Remove a plugin; raises ServerError if there is none of that name or a goal is using it."""
+    def load_plugin_type(
+        self, kind: PluginKind, name: str, type_name: str, options: Mapping[str, Any] | None = None, **parameters: Any
+    ) -> None:
+        """Load a plugin at run time by its type, as a configuration would.
+
+        Parameters
+        ----------
+        kind, name, type_name
+            As in a plugin list; the type may be a registered name or ``module:Class``.
+        options : mapping
+            Keys of the declaration that this server added, e.g. which costmap to use.
+        **parameters
+            Values of the plugin's parameter block.
+
+        Raises
+        ------
+        PluginError
+            The type is unknown or is no plugin of this kind.
+        pydantic.ValidationError
+            A parameter is not legal.
+        ServerError
+            The name is taken, or the constructor raised.
+        """
+        plugin_class = PluginRegistry(self.backend).load(kind, type_name)
+        values = plugin_class.Parameters.model_validate(parameters)  # type: ignore[attr-defined]
+        self.load_plugin(PluginSpec(kind, name, type_name, plugin_class, values, options or {}))
+
+    def reload_plugin(self, kind: PluginKind, name: str) -> None:
+        """Replace a plugin by one of its class's changed source, with its present parameters and its place in the list.
+
+        The old instance stays where anything goes wrong.
+
+        Raises
+        ------
+        PluginError
+            The source does not load any more.
+        pydantic.ValidationError
+            The new class does not take the present parameters.
+        ServerError
+            No such plugin, a goal is using it, or the new constructor raised.
+        """
+        old = self._loaded(kind, name)
+        plugin_class = PluginRegistry(self.backend).reload(kind, old.spec.type_name)
+        present = old.instance.parameters.model_dump()
+        values = plugin_class.Parameters.model_validate(present)  # type: ignore[attr-defined]
+        try:
+            new = self._construct(replace(old.spec, plugin_class=plugin_class, parameters=values))
+        except Exception as error:
+            text = f"{kind.name.lower()} {name!r} ({old.spec.type_name}): {type(error).__name__}: {error}"
+            raise ServerError(text) from error
+        if not old.retire():
+            raise ServerError(f"{kind.name.lower()} {name!r} is in use")
+        self.plugins.replace(kind, new)
+
+    def _construct(self, spec: PluginSpec) -> LoadedPlugin[Any]:
+        rng = np.random.default_rng([self._seed, zlib.crc32(spec.name.encode())])
+        base = PluginContext(spec.name, spec.parameters, self.runtime.clock, rng, self.runtime.robot)
+        instance: Plugin = spec.plugin_class(self.make_context(spec.kind, spec.options, base))
+        return LoadedPlugin(spec, instance, self.runtime)
+
+    def _loaded(self, kind: PluginKind, name: str) -> LoadedPlugin[Any]:
         plugin = self.plugins.find(kind, name) if name else None
         if plugin is None:
             raise ServerError(f"no {kind.name.lower()} named {name!r} is loaded")
+        return plugin
+
+    def unload_plugin(self, kind: PluginKind, name: str) -> None:
+        """Remove a plugin; raises ServerError if there is none of that name or a goal is using it."""
+        plugin = self._loaded(kind, name)
         if not plugin.retire():
             raise ServerError(f"{kind.name.lower()} {name!r} is in use")
         self.plugins.remove(kind, name)
@@ -178,9 +241,7 @@ class AbstractNavigationServer(ABC):
         pydantic.ValidationError
             A value is not legal; nothing is changed.
         """
-        plugin = self.plugins.find(kind, name) if name else None
-        if plugin is None:
-            raise ServerError(f"no {kind.name.lower()} named {name!r} is loaded")
+        plugin = self._loaded(kind, name)
         instance = plugin.instance
         new = type(instance.parameters).model_validate({**instance.parameters.model_dump(), **changes})
         if not plugin.acquire(self, lambda: True):
@@ -238,6 +299,8 @@ class AbstractNavigationServer(ABC):
             atexit.unregister(self._exit_hook)
         for action in self._actions():
             action.close()
+        if isinstance(self.runtime.clock, SimClock):
+            self.runtime.clock.on_hang.remove(self.runtime.on_hang)
         self.runtime.callbacks.close()
         self.runtime.supervisor.close()
         self.close_map()

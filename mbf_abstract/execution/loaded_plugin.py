@@ -16,6 +16,7 @@ from mbf_abstract.geometry import NonFiniteError
 from mbf_abstract.plugins import Plugin
 
 if TYPE_CHECKING:
+    from mbf_abstract.config import PluginSpec
     from mbf_abstract.execution.runtime import Runtime
 
 P = TypeVar("P", bound=Plugin)
@@ -37,9 +38,9 @@ class PluginGone(LookupError):
 class LoadedPlugin(Generic[P]):
     """One named plugin instance of a server."""
 
-    def __init__(self, name: str, type_name: str, instance: P, runtime: Runtime) -> None:
-        self.name = name
-        self.type_name = type_name
+    def __init__(self, spec: PluginSpec, instance: P, runtime: Runtime) -> None:
+        self.name = spec.name
+        self.spec = spec
         self.instance = instance
         self.quarantined = ""
         self._runtime = runtime
