@@ -13,10 +13,8 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-
-import numpy as np
 
 from mbf_abstract.actions.handle import AnyGoalHandle
 from mbf_abstract.clock import Clock, WallClock
@@ -32,9 +30,12 @@ from terrain.recorder import Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import ROBOTS
 from terrain.robots import WheeledRobot
-from terrain.scenario import Scenario, ground_pose, load_scenario
-from terrain.scenario_sensors import make_sensors
-from terrain.scenario_world import ScenarioWorld, build_world
+from terrain.scenario import Scenario, load_scenario
+from terrain.scenario_faults import FaultSchedule
+from terrain.scenario_sensors import make_localization, make_sensors
+from terrain.scenario_settings import apply_settings
+from terrain.scenario_stage import set_stage
+from terrain.scenario_world import ScenarioWorld
 from terrain.simulation import Simulation
 
 SENSE_FIRST = 0.5  # s; every sensor has spoken and every map has been updated when a script gets its turn
@@ -60,6 +61,8 @@ class Bench:
         Where events go, beside ``memory``.
     on_step : callable
         Told the name of each preparation that may take a while.
+    settings : mapping of str to str
+        Changes of the navigation configuration, see ``terrain.scenario_settings``.
 
     Raises
     ------
@@ -76,6 +79,7 @@ class Bench:
         wall_clock: bool = False,
         sinks: tuple[EventSink, ...] = (),
         on_step: Callable[[str], None] = lambda text: None,
+        settings: Mapping[str, str] | None = None,
     ) -> None:
         self.scenario = load_scenario(scenario) if isinstance(scenario, str) else scenario
         self.backend = backend or self.scenario.backend
@@ -84,8 +88,9 @@ class Bench:
         self.folder = Path(self._temporary.name if folder is None else folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         on_step("building the world")
-        self.world = build_world(self.scenario, self.folder, np.random.default_rng([self.seed, 1]))
+        self.world, self._obstacles = set_stage(self.scenario, self.folder, self.seed)
         try:
+            self._settings = settings or {}
             self._start(wall_clock, sinks, on_step)
         except BaseException:
             self.world.bullet.close()
@@ -94,7 +99,7 @@ class Bench:
 
     def _start(self, wall_clock: bool, sinks: tuple[EventSink, ...], on_step: Callable[[str], None]) -> None:
         """Robot and sensors, then the server on their map, then time."""
-        config_file = write_navigation_config(self.scenario, self.backend, self.world, self.folder)
+        config_file = write_navigation_config(self.scenario, self.backend, self.world, self.folder, self._settings)
         server_class, config = read_config(config_file)
         self.robot, self.simulation = self._make_simulation()
         self.recorder = self._make_recorder()
@@ -106,7 +111,7 @@ class Bench:
         server = server_class(config, clocked, self.clock, TransformBuffer(), self.events, self.seed)
         server.get_path.listeners.append(self._record_plan)
         self.navigator = Navigator(server)
-        self.loop = DriveLoop(self.simulation, clocked, server, self.recorder)
+        self.loop = DriveLoop(self.simulation, clocked, self.localization, server, self.recorder)
         self.loop.publish()
         on_step("compiling kernels (first run only)")
         server.warm_up(self.robot.pose(), self.goals[0], on_step)
@@ -114,7 +119,7 @@ class Bench:
     @property
     def goals(self) -> list[Pose]:
         """The scenario's goals on the ground."""
-        return [ground_pose(goal, self.world.height_at(goal.x, goal.y)) for goal in self.scenario.goals]
+        return [self.world.pose_of(goal) for goal in self.scenario.goals]
 
     def run(self, report: Report = lambda time, pose, speed: None) -> None:
         """Let time pass: start stepping the simulator, and wait until sensors and maps are alive."""
@@ -137,19 +142,19 @@ class Bench:
         self.close()
 
     def _make_simulation(self) -> tuple[WheeledRobot, Simulation]:
-        start = self.scenario.start
-        pose = ground_pose(start, self.world.height_at(start.x, start.y))
+        pose = self.world.pose_of(self.scenario.start)
         robot = WheeledRobot(self.world.bullet, ROBOTS[self.scenario.robot], pose)
         robot.settle()
-        return robot, Simulation(
-            self.world.bullet, robot, make_sensors(self.scenario.sensors, robot, self.world, self.seed)
-        )
+        sensors = make_sensors(self.scenario.sensors, robot, self.world, self.seed)
+        self.localization = make_localization(robot, self.seed)
+        FaultSchedule(self.world.bullet, sensors, self.localization, self.scenario.faults)
+        return robot, Simulation(self.world.bullet, robot, sensors)
 
     def _make_recorder(self) -> Recorder:
         shape = RobotShape.of(self.robot.spec)
         recorder = Recorder(self.scenario.name, self.backend, shape, self.robot.pose(), self.goals)
         recorder.ground, recorder.walls = self.world.ground, self.world.walls
-        recorder.obstacles = self.world.obstacles
+        recorder.obstacles = self._obstacles
         return recorder
 
     def _record_plan(self, handle: AnyGoalHandle) -> None:
@@ -158,7 +163,9 @@ class Bench:
             self.recorder.path(self.simulation.time, path.positions)
 
 
-def write_navigation_config(scenario: Scenario, backend: str, world: ScenarioWorld, folder: Path) -> Path:
+def write_navigation_config(
+    scenario: Scenario, backend: str, world: ScenarioWorld, folder: Path, settings: Mapping[str, str]
+) -> Path:
     """Write the backend's configuration with the world's files filled in; a run can be planned again from it."""
     source = scenario.navigation.get(backend)
     if source is None:
@@ -168,5 +175,5 @@ def write_navigation_config(scenario: Scenario, backend: str, world: ScenarioWor
     for placeholder, file in world.files.items():
         text = text.replace(placeholder, file.name)
     target = folder / "navigation.yaml"
-    target.write_text(text)
+    target.write_text(apply_settings(text, settings))
     return target

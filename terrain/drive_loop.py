@@ -13,8 +13,10 @@ from mbf_abstract.robot import Odometry
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.server import AbstractNavigationServer
 from mbf_abstract.transform import Transform
+from terrain.ego_sensors import Localization
 from terrain.recorder import Recorder
 from terrain.robots import WheeledRobot
+from terrain.scenario_faults import seen_from
 from terrain.simulation import Simulation
 
 PERIOD = 1.0 / 60.0  # s between two publications of the robot's pose
@@ -48,16 +50,24 @@ class DriveLoop:
     ----------
     simulation : Simulation
     robot : ClockedRobot
+    localization : Localization
+        Where the robot believes to be; its pose is what the server gets.
     server : AbstractNavigationServer
         Gets the scans; its clock drives the loop.
     recorder : Recorder
     """
 
     def __init__(
-        self, simulation: Simulation, robot: ClockedRobot, server: AbstractNavigationServer, recorder: Recorder
+        self,
+        simulation: Simulation,
+        robot: ClockedRobot,
+        localization: Localization,
+        server: AbstractNavigationServer,
+        recorder: Recorder,
     ) -> None:
         self._robot = robot
         self._simulation = simulation
+        self._localization = localization
         self._server = server
         self._recorder = recorder
         self._runtime = server.runtime
@@ -77,11 +87,12 @@ class DriveLoop:
         self._stopped = True
 
     def publish(self) -> None:
-        """Publish the robot's present pose."""
-        pose, robot = self._simulation.robot.pose(), self._runtime.robot
-        self._runtime.transforms.set(
-            Transform(pose.position, pose.orientation, robot.global_frame, robot.robot_frame, self._runtime.clock.now())
-        )
+        """Publish the pose that the robot's localisation gives, if it gives one."""
+        pose, robot = self._localization.measure(self._runtime.clock.now()), self._runtime.robot
+        if pose is not None:
+            self._runtime.transforms.set(
+                Transform(pose.position, pose.orientation, robot.global_frame, robot.robot_frame, pose.stamp)
+            )
 
     def _loop(self) -> None:
         clock, tick = self._runtime.clock, 0
@@ -102,8 +113,12 @@ class DriveLoop:
     def _take_measurement(self, name: str, measurement: Any) -> None:
         if not isinstance(measurement, RangeScan):
             return
+        scan = replace(measurement, stamp=self._origin + measurement.stamp)
+        pose, believed = self._simulation.robot.pose(), self._localization.measure(scan.stamp)
+        if believed is not None and (believed.position, believed.orientation) != (pose.position, pose.orientation):
+            scan = seen_from(scan, pose, believed)
         try:
-            self._server.take_scan(replace(measurement, stamp=self._origin + measurement.stamp))
+            self._server.take_scan(scan)
         except Exception as error:  # a map that refuses a scan must not stop the physics
             self._runtime.events.emit(EventKind.FAULT, name, type=type(error).__name__, message=str(error))
         self._scans += 1

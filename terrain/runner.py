@@ -8,7 +8,7 @@ In the folder: ``events.jsonl``, ``metrics.json``, ``recording.npz``, ``picture.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from terrain.bench import Bench
 from terrain.metrics import measure
 from terrain.recording import Recording
 from terrain.scenario import Scenario
+from terrain.scenario_limits import broken_limits
 
 CANCEL_WAIT = 10.0  # s a canceled goal is waited for at the time limit
 
@@ -71,6 +72,8 @@ class RunOptions:
         Told about ten times a simulated second.
     on_step : callable
         Told the name of each step before and after the drive that may take a while.
+    settings : mapping of str to str
+        Changes of the navigation configuration, see ``terrain.scenario_settings``.
     """
 
     folder: Path
@@ -80,6 +83,7 @@ class RunOptions:
     draw: bool = True
     on_progress: Callable[[Progress], None] = lambda progress: None
     on_step: Callable[[str], None] = lambda text: None
+    settings: Mapping[str, str] = field(default_factory=dict)
 
 
 def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
@@ -92,7 +96,16 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     """
     options.folder.mkdir(parents=True, exist_ok=True)
     log = JsonLinesSink(options.folder / "events.jsonl")
-    bench = Bench(scenario, options.backend, options.seed, options.folder, options.wall_clock, (log,), options.on_step)
+    bench = Bench(
+        scenario,
+        options.backend,
+        options.seed,
+        options.folder,
+        options.wall_clock,
+        (log,),
+        options.on_step,
+        options.settings,
+    )
     try:
         drive = _Drive(bench, options)
         result = drive.visit_goals()
@@ -102,7 +115,8 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     metrics = _write_numbers(recording, bench, drive.wall_time, options.folder)
     if options.draw:
         _draw(recording, metrics, options)
-    return RunResult(result.success, result.outcome, result.outcome_name, result.message, options.folder, metrics)
+    message = "; ".join([result.message, *metrics["broken_limits"]])
+    return RunResult(metrics["success"], result.outcome, result.outcome_name, message, options.folder, metrics)
 
 
 class _Drive:
@@ -154,6 +168,10 @@ class _Drive:
 def _write_numbers(recording: Recording, bench: Bench, wall_time: float, folder: Path) -> dict[str, Any]:
     metrics = measure(recording).to_json()
     metrics["mishaps"] = sorted({mishap.kind.value for mishap in bench.simulation.mishaps})
+    metrics["energy_j"] = round(bench.simulation.monitor.energy, 3)
+    metrics["slipped_m"] = round(bench.simulation.monitor.slipped, 6)
+    metrics["broken_limits"] = broken_limits(bench.scenario.limits, metrics)
+    metrics["success"] = metrics["success"] and not metrics["broken_limits"]
     metrics["seed"] = bench.seed
     factor = recording.duration / wall_time if wall_time > 0.0 else 0.0
     timing = {"wall_time_s": round(wall_time, 3), "real_time_factor": round(factor, 2)}

@@ -9,52 +9,22 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Literal
-
-from pydantic import Field
+from typing import Literal
 
 from mbf_abstract.findings import ConfigError, Finding
-from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.validation import validate
-from mbf_abstract.yaml_source import load_yaml
+from mbf_abstract.yaml_source import YamlDocument, load_yaml
+from terrain.scenario_actors import Actor
+from terrain.scenario_faults import LOCALIZATION, Fault, SensorFault
+from terrain.scenario_limits import Limits
+from terrain.scenario_obstacles import Forest, Obstacle
+from terrain.scenario_places import Place, PlanarPose
+from terrain.scenario_world_types import MapWorld, World
+
+__all__ = ["MapWorld", "Obstacle", "PlanarPose", "Scenario", "Sensor", "load_scenario", "shipped_scenarios"]
 
 SHIPPED = Path(__file__).parent / "scenarios"
-
-
-class JacksboroWorld(ParameterModel):
-    """Real hills: the Jacksboro fault, shrunk isotropically."""
-
-    type: Literal["jacksboro"]
-    size: float = parameter(100.0, "Length along x.", unit="m", gt=1.0, le=1000.0)
-    spacing: float | None = parameter(None, "Sample again at this distance; absent = the survey's own.", unit="m")
-    roughness: float = parameter(0.0, "Root mean square height of small bumps added to the survey.", unit="m", ge=0.0)
-
-
-class OfficeWorld(ParameterModel):
-    """The office floor that comes with the package."""
-
-    type: Literal["office"]
-
-
-class MapWorld(ParameterModel):
-    """A building from a map_server map."""
-
-    type: Literal["map"]
-    file: Path = parameter(..., "The map's yaml file.")
-
-
-World = Annotated[JacksboroWorld | OfficeWorld | MapWorld, Field(discriminator="type")]
-
-
-class Obstacle(ParameterModel):
-    """Something that stands in the world but on no map."""
-
-    shape: Literal["box", "cylinder"] = parameter("box", "Its form.")
-    x: float = parameter(..., "Position of its middle.", unit="m")
-    y: float = parameter(..., "Position of its middle.", unit="m")
-    yaw: float = parameter(0.0, "Heading.", unit="rad")
-    size: tuple[float, float, float] = parameter((0.5, 0.5, 1.0), "Length, width, height; a cylinder's diameter.")
 
 
 class Sensor(ParameterModel):
@@ -69,14 +39,6 @@ class Sensor(ParameterModel):
     drop_out: float = parameter(0.0, "Share of rays without an answer.", ge=0.0, lt=1.0)
 
 
-class PlanarPose(ParameterModel):
-    """A place on the ground."""
-
-    x: float = parameter(..., "Position.", unit="m")
-    y: float = parameter(..., "Position.", unit="m")
-    yaw: float = parameter(0.0, "Heading.", unit="rad")
-
-
 class Scenario(ParameterModel):
     """One scenario file."""
 
@@ -86,10 +48,14 @@ class Scenario(ParameterModel):
     navigation: dict[str, Path] = parameter(..., "Configuration file of each backend.")
     world: World = parameter(..., "What it takes place in.")
     robot: Literal["husky", "turtlebot"] = parameter(..., "Model of the robot.")
-    start: PlanarPose = parameter(..., "Where the robot starts.")
-    goals: tuple[PlanarPose, ...] = parameter(..., "Where it shall go, in order.")
+    start: Place = parameter(..., "Where the robot starts: x, y, yaw, or the name of a place of the world.")
+    goals: tuple[Place, ...] = parameter(..., "Where it shall go, in order.")
     sensors: tuple[Sensor, ...] = parameter((), "Its lidars.")
     obstacles: tuple[Obstacle, ...] = parameter((), "Things that are on no map.")
+    forests: tuple[Forest, ...] = parameter((), "Posts that are on no map, drawn from the seed.")
+    actors: tuple[Actor, ...] = parameter((), "What moves by itself.")
+    faults: tuple[Fault, ...] = parameter((), "What goes wrong with sensors and localisation, and when.")
+    limits: Limits = parameter(Limits(), "What must not happen.")
     time_limit: float = parameter(300.0, "Simulated time after which the run is ended.", unit="s", gt=0.0)
     seed: int = parameter(0, "Seed where the command line names none.", ge=0)
 
@@ -107,29 +73,43 @@ def load_scenario(name_or_file: str | os.PathLike[str]) -> Scenario:
     document = load_yaml(path)
     findings: list[Finding] = []
     scenario = validate(Scenario, document.data, document, (), findings)
-    if scenario is not None and not scenario.goals:
-        findings.append(document.finding(("goals",), "at least one goal", "none"))
-    if scenario is not None and scenario.backend not in scenario.navigation:
-        known = ", ".join(scenario.navigation) or "none"
-        findings.append(
-            document.finding(("backend",), f"a backend listed under navigation ({known})", scenario.backend)
-        )
-    if findings or scenario is None:
+    if scenario is None:
         raise ConfigError(findings)
-    configs = {backend: document.path.parent / file for backend, file in scenario.navigation.items()}
-    for backend, file in configs.items():
-        if not file.is_file():
-            findings.append(document.finding(("navigation", backend), "a configuration file", f"no file {file}"))
+    scenario = _with_absolute_files(scenario, document.path.parent)
+    findings += _find_contradictions(scenario, document)
     if findings:
         raise ConfigError(findings)
-    return scenario.model_copy(update={"navigation": configs})
+    return scenario
+
+
+def _with_absolute_files(scenario: Scenario, folder: Path) -> Scenario:
+    """Let relative files count from the scenario's folder."""
+    navigation = {backend: folder / file for backend, file in scenario.navigation.items()}
+    file = getattr(scenario.world, "file", None)
+    world = scenario.world if file is None else scenario.world.model_copy(update={"file": folder / file})
+    return scenario.model_copy(update={"navigation": navigation, "world": world})
+
+
+def _find_contradictions(scenario: Scenario, document: YamlDocument) -> list[Finding]:
+    """Find what is legal key by key and wrong together."""
+    findings = []
+    if not scenario.goals:
+        findings.append(document.finding(("goals",), "at least one goal", "none"))
+    if scenario.backend not in scenario.navigation:
+        known = ", ".join(scenario.navigation) or "none"
+        expected = f"a backend listed under navigation ({known})"
+        findings.append(document.finding(("backend",), expected, scenario.backend))
+    for backend, file in scenario.navigation.items():
+        if not file.is_file():
+            findings.append(document.finding(("navigation", backend), "a configuration file", f"no file {file}"))
+    sensors = [*(sensor.name for sensor in scenario.sensors), LOCALIZATION]
+    for index, fault in enumerate(scenario.faults):
+        if isinstance(fault, SensorFault) and fault.sensor not in sensors:
+            expected = "one of " + ", ".join(sensors)
+            findings.append(document.finding(("faults", index, "sensor"), expected, repr(fault.sensor)))
+    return findings
 
 
 def shipped_scenarios() -> dict[str, Path]:
     """Names and files of the scenarios that come with the package."""
     return {file.stem: file for file in sorted(SHIPPED.glob("*.yaml"))}
-
-
-def ground_pose(place: PlanarPose, z: float) -> Pose:
-    """Pose of a place on the ground at height ``z`` [m], upright."""
-    return Pose.planar(place.x, place.y, place.yaw, z)

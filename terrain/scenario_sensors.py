@@ -7,8 +7,10 @@ import zlib
 import numpy as np
 
 from terrain import scenario as model
+from terrain.ego_sensors import Localization
 from terrain.rays import MovingRays, StaticRays
 from terrain.robots import WheeledRobot
+from terrain.scenario_faults import LOCALIZATION
 from terrain.scenario_world import ScenarioWorld
 from terrain.sensors import Lidar, planar_directions, ring_directions
 
@@ -21,6 +23,11 @@ def make_sensors(
     if world.bullet.has_moving_bodies:
         casters.append(MovingRays(world.bullet))
     return {sensor.name: _lidar(sensor, robot, casters, seed) for sensor in sensors}
+
+
+def make_localization(robot: WheeledRobot, seed: int) -> Localization:
+    """Make the localisation of a robot: exact until a fault of the scenario says otherwise."""
+    return Localization(robot, np.random.default_rng([seed, zlib.crc32(LOCALIZATION.encode())]))
 
 
 def _lidar(sensor: model.Sensor, robot: WheeledRobot, casters: list[StaticRays | MovingRays], seed: int) -> Lidar:

@@ -1,27 +1,28 @@
 """From a scenario's world to physics, and to the two files a navigation configuration may ask for.
 
-A run writes its world as ``world.ply`` (the very triangles Bullet collides with) and ``world.yaml`` + ``world.png`` (a
-map_server map), so every server gets the map it can read, and a configuration never sees the simulator.
+A run writes its world as ``world.ply`` (the very triangles Bullet collides with) and, where a 2D map can describe it,
+``world.yaml`` + ``world.png`` (a map_server map), so every server gets the map it can read, and a configuration never
+sees the simulator.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray, Pose
-from terrain.dem_io import jacksboro
-from terrain.floor_plan import OFFICE_MAP, write_map
+from terrain.floor_plan import write_map
 from terrain.heightfield import Heightfield
 from terrain.indoor import add_building
-from terrain.occupancy import OccupancyGrid, read_occupancy, wall_triangles
+from terrain.occupancy import OccupancyGrid, wall_triangles
 from terrain.recording import Surface
-from terrain.scenario import JacksboroWorld, Obstacle, OfficeWorld, Scenario
-from terrain.solids import box_triangles, cylinder_triangles
+from terrain.scenario_places import Place
+from terrain.scenario_world_types import BuildingWorld, LevelsWorld, TerrainWorld
 from terrain.world import BulletWorld
 
 MAX_SLOPE = 30.0  # degrees; steeper ground is an obstacle on a 2D map of a terrain
@@ -41,39 +42,89 @@ class ScenarioWorld:
     files : dict of str to Path
         Placeholder of a navigation configuration -> the file that stands for it.
     height_at : callable
-        Height of the ground [m] at (x, y).
+        Height of the highest ground [m] at (x, y).
+    grid : OccupancyGrid or None
+        2D map of it, where there is one.
+    places : mapping of str to Pose
+        Places with a name.
     """
 
     bullet: BulletWorld
     files: dict[str, Path]
     height_at: HeightAt
     ground: Surface
-    walls: Surface | None
-    obstacles: Surface | None
+    walls: Surface | None = None
+    grid: OccupancyGrid | None = None
+    places: Mapping[str, Pose] = field(default_factory=dict)
+
+    def pose_of(self, place: Place) -> Pose:
+        """Return the pose on the ground that a place means, upright; raises ConfigError for an unknown name."""
+        if isinstance(place, str):
+            if place not in self.places:
+                known = ", ".join(self.places) or "none"
+                raise ConfigError([Finding("scenario", 1, "start or goals", f"a place of the world ({known})", place)])
+            return self.places[place]
+        z = self.height_at(place.x, place.y) if place.z is None else place.z
+        return Pose.planar(place.x, place.y, place.yaw, z)
 
 
-def build_world(scenario: Scenario, folder: Path, rng: np.random.Generator) -> ScenarioWorld:
-    """Put the scenario's world into Bullet and write its map files into ``folder``."""
+def build_world(
+    world: TerrainWorld | BuildingWorld | LevelsWorld, folder: Path, rng: np.random.Generator, keep_clear: FloatArray
+) -> ScenarioWorld:
+    """Put a world into Bullet and write its map files into ``folder``.
+
+    Parameters
+    ----------
+    keep_clear : (n, 2) float
+        Places [m] on which nothing that is drawn may stand.
+    """
     bullet = BulletWorld()
-    if isinstance(scenario.world, JacksboroWorld):
-        mesh = jacksboro(scenario.world.size, scenario.world.spacing, scenario.world.roughness, rng)
-        bullet.add_heightfield(mesh)
-        ground, walls, grid = Surface(*mesh.triangles()), None, slope_map(mesh)
+    try:
+        if isinstance(world, TerrainWorld):
+            return _build_terrain(world.heightfield(rng, keep_clear), bullet, folder)
+        if isinstance(world, BuildingWorld):
+            return _build_building(world, bullet, folder)
+        return _build_levels(world, bullet, folder)
+    except BaseException:
+        bullet.close()
+        raise
 
-        def height_at(x: float, y: float) -> float:
-            return float(mesh.height_at(x, y))
 
-    else:
-        grid = read_occupancy(OFFICE_MAP if isinstance(scenario.world, OfficeWorld) else scenario.world.file)
-        add_building(bullet, grid)
-        ground, walls, mesh = _floor_surface(grid), Surface(*wall_triangles(grid)), storey_heights(grid)
+def _build_terrain(terrain: Heightfield, bullet: BulletWorld, folder: Path) -> ScenarioWorld:
+    bullet.add_heightfield(terrain)
+    grid, ground = slope_map(terrain), Surface(*terrain.triangles())
+    return ScenarioWorld(
+        bullet, _write_files(ground, folder, grid), lambda x, y: float(terrain.height_at(x, y)), ground, None, grid
+    )
 
-        def height_at(x: float, y: float) -> float:
-            return 0.0
 
-    files = {"$WORLD_MAP": write_map(grid, folder, "world"), "$WORLD_MESH": write_mesh(mesh, folder / "world.ply")}
-    obstacles = _add_obstacles(bullet, scenario.obstacles, height_at)
-    return ScenarioWorld(bullet, files, height_at, ground, walls, obstacles)
+def _build_building(world: BuildingWorld, bullet: BulletWorld, folder: Path) -> ScenarioWorld:
+    grid = world.grid()
+    add_building(bullet, grid)
+    files = _write_files(Surface(*storey_heights(grid).triangles()), folder, grid)
+    walls = Surface(*wall_triangles(grid))
+    return ScenarioWorld(bullet, files, lambda x, y: 0.0, _floor_surface(grid), walls, grid, world.places())
+
+
+def _build_levels(world: LevelsWorld, bullet: BulletWorld, folder: Path) -> ScenarioWorld:
+    levels = world.levels()
+    bullet.add_mesh(levels.ground.vertices, levels.ground.faces)
+    ground, walls = Surface(levels.ground.vertices, levels.ground.faces), None
+    if len(levels.walls.faces):
+        bullet.add_mesh(levels.walls.vertices, levels.walls.faces, ground=False)
+        walls = Surface(levels.walls.vertices, levels.walls.faces)
+
+    def height_at(x: float, y: float) -> float:
+        return float(bullet.vertical_rays([(x, y)])[0])
+
+    return ScenarioWorld(bullet, _write_files(ground, folder), height_at, ground, walls, places=levels.places)
+
+
+def _write_files(ground: Surface, folder: Path, grid: OccupancyGrid | None = None) -> dict[str, Path]:
+    files = {"$WORLD_MESH": write_mesh(ground.vertices, ground.faces, folder / "world.ply")}
+    if grid is not None:
+        files["$WORLD_MAP"] = write_map(grid, folder, "world")
+    return files
 
 
 def slope_map(terrain: Heightfield) -> OccupancyGrid:
@@ -104,9 +155,8 @@ def storey_heights(grid: OccupancyGrid) -> Heightfield:
     return Heightfield(heights, spacing, spacing, grid.origin_x + half, grid.origin_y + half)
 
 
-def write_mesh(terrain: Heightfield, file: Path) -> Path:
-    """Write a terrain's triangles as a PLY file with double precision, the same surface to the last bit."""
-    vertices, faces = terrain.triangles()
+def write_mesh(vertices: FloatArray, faces: NDArray[np.int32], file: Path) -> Path:
+    """Write triangles as a PLY file with double precision, the same surface to the last bit."""
     header = (
         "ply\nformat binary_little_endian 1.0\n"
         f"element vertex {len(vertices)}\nproperty double x\nproperty double y\nproperty double z\n"
@@ -122,23 +172,3 @@ def _floor_surface(grid: OccupancyGrid) -> Surface:
     x_min, x_max, y_min, y_max = grid.bounds
     corners = np.array([[x_min, y_min, 0.0], [x_max, y_min, 0.0], [x_max, y_max, 0.0], [x_min, y_max, 0.0]])
     return Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32))
-
-
-def _add_obstacles(bullet: BulletWorld, obstacles: tuple[Obstacle, ...], height_at: HeightAt) -> Surface | None:
-    """Stand the obstacles on the ground; return them as one surface to look at."""
-    vertices: list[FloatArray] = []
-    faces: list[NDArray[np.integer]] = []
-    for obstacle in obstacles:
-        length, _, height = obstacle.size
-        pose = Pose.planar(obstacle.x, obstacle.y, obstacle.yaw, height_at(obstacle.x, obstacle.y) + 0.5 * height)
-        if obstacle.shape == "box":
-            bullet.add_box(pose, obstacle.size)
-            corners, triangles = box_triangles(obstacle.size)
-        else:
-            bullet.add_cylinder(pose, 0.5 * length, height)
-            corners, triangles = cylinder_triangles(0.5 * length, height)
-        faces.append(triangles + sum(len(part) for part in vertices))
-        vertices.append(corners @ pose.rotation.T + np.array(pose.position))
-    if not vertices:
-        return None
-    return Surface(np.concatenate(vertices), np.concatenate(faces).astype(np.int32))

@@ -1,0 +1,95 @@
+"""What goes wrong with sensors and localisation in a scenario, from one time to another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from mbf_abstract.geometry import Pose, rotation_matrix
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.sensing import RangeScan
+from terrain.ego_sensors import Localization
+from terrain.sensors import Sensor
+from terrain.world import BulletWorld
+
+LOCALIZATION = "localization"
+"""Name of the localisation among the sensors of a fault."""
+
+
+class TimedFault(ParameterModel):
+    """A fault that holds from ``start`` until just before ``end``."""
+
+    start: float = parameter(..., "When it begins.", unit="s", ge=0.0)
+    end: float = parameter(math.inf, "When it ends; absent = never.", unit="s", gt=0.0, allow_inf=True)
+
+    def holds_at(self, time: float) -> bool:
+        """Whether it holds at ``time`` [s]."""
+        return self.start <= time < self.end
+
+
+class SensorFault(TimedFault):
+    """A sensor says nothing, its last measurement again and again, or something untrue."""
+
+    type: Literal["silent", "stale", "wrong"]
+    sensor: str = parameter(..., "Name of the sensor, or localization.")
+
+
+class LocalizationJump(TimedFault):
+    """The localisation is off by a fixed amount; scans end up in the wrong place with it."""
+
+    type: Literal["jump"]
+    dx: float = parameter(0.0, "Error along x.", unit="m")
+    dy: float = parameter(0.0, "Error along y.", unit="m")
+    dyaw: float = parameter(0.0, "Error of the heading.", unit="rad")
+
+
+Fault = Annotated[SensorFault | LocalizationJump, Field(discriminator="type")]
+
+
+class FaultSchedule:
+    """Switches the faults of a scenario on and off as the world's time goes on.
+
+    Parameters
+    ----------
+    world : BulletWorld
+    sensors : mapping of str to Sensor
+    localization : Localization
+    faults : sequence of Fault
+    """
+
+    def __init__(
+        self,
+        world: BulletWorld,
+        sensors: Mapping[str, Sensor[Any]],
+        localization: Localization,
+        faults: Sequence[SensorFault | LocalizationJump],
+    ) -> None:
+        self._world = world
+        self._localization = localization
+        self._sensors = {**sensors, LOCALIZATION: localization}
+        self._sensor_faults = [fault for fault in faults if isinstance(fault, SensorFault)]
+        self._jumps = [fault for fault in faults if isinstance(fault, LocalizationJump)]
+        if faults:
+            world.before_step(self._apply)
+
+    def _apply(self) -> None:
+        now = self._world.time
+        for fault in self._sensor_faults:
+            sensor = self._sensors[fault.sensor]
+            same = [other for other in self._sensor_faults if (other.sensor, other.type) == (fault.sensor, fault.type)]
+            setattr(sensor, fault.type, any(other.holds_at(now) for other in same))
+        holding = [jump for jump in self._jumps if jump.holds_at(now)]
+        dx, dy, dyaw = (sum(getattr(jump, name) for jump in holding) for name in ("dx", "dy", "dyaw"))
+        self._localization.offset = (dx, dy, dyaw)
+
+
+def seen_from(scan: RangeScan, true_pose: Pose, believed_pose: Pose) -> RangeScan:
+    """Return a scan as a robot puts it into the map that believes to be at ``believed_pose``."""
+    R_believed_true = rotation_matrix(believed_pose.orientation) @ true_pose.rotation.T
+    true_place, believed_place = true_pose.position, believed_pose.position
+    origin = (scan.origin - true_place) @ R_believed_true.T + believed_place
+    return replace(scan, origin=origin, ends=(scan.ends - true_place) @ R_believed_true.T + believed_place)

@@ -1,0 +1,27 @@
+"""Places in a scenario: coordinates, or the name of a place that the world knows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray
+from mbf_abstract.parameters import ParameterModel, parameter
+
+
+class PlanarPose(ParameterModel):
+    """A place on the ground."""
+
+    x: float = parameter(..., "Position.", unit="m")
+    y: float = parameter(..., "Position.", unit="m")
+    yaw: float = parameter(0.0, "Heading.", unit="rad")
+    z: float | None = parameter(None, "Height of the level that is meant; absent = the highest ground.", unit="m")
+
+
+Place = PlanarPose | str
+
+
+def coordinates(places: Iterable[Place]) -> FloatArray:
+    """Return (n, 2) x and y [m] of the places that are given by coordinates."""
+    return np.array([(place.x, place.y) for place in places if isinstance(place, PlanarPose)]).reshape(-1, 2)

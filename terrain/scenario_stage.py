@@ -1,0 +1,38 @@
+"""Everything that the robot of a scenario meets: the world, what stands in it and what moves in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from terrain.recording import Surface
+from terrain.scenario import Scenario
+from terrain.scenario_actors import add_actors
+from terrain.scenario_obstacles import add_obstacles
+from terrain.scenario_places import coordinates
+from terrain.scenario_world import ScenarioWorld, build_world
+
+WORLD_STREAM, FOREST_STREAM, ACTOR_STREAM = 1, 2, 3  # each part draws from its own generator
+
+
+def set_stage(scenario: Scenario, folder: Path, seed: int) -> tuple[ScenarioWorld, Surface | None]:
+    """Build the world of a scenario, write its map files into ``folder``, then add obstacles and actors.
+
+    Returns
+    -------
+    world : ScenarioWorld
+    obstacles : Surface or None
+        What stands in the world and is on no map, to look at.
+    """
+    keep_clear = coordinates((scenario.start, *scenario.goals))
+    world = build_world(scenario.world, folder, np.random.default_rng([seed, WORLD_STREAM]), keep_clear)
+    try:
+        rng = np.random.default_rng([seed, FOREST_STREAM])
+        posts = [post for forest in scenario.forests for post in forest.posts(rng, keep_clear)]
+        obstacles = add_obstacles(world.bullet, [*scenario.obstacles, *posts], world.height_at)
+        add_actors(world, scenario.actors, np.random.default_rng([seed, ACTOR_STREAM]))
+    except BaseException:
+        world.bullet.close()
+        raise
+    return world, obstacles
