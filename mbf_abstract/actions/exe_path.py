@@ -16,7 +16,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.arrival import ArrivalCheck, ToleranceCheck
 from mbf_abstract.execution.controller import ControllerEnd, ControllerExecution, Cycle, Plan
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
-from mbf_abstract.execution.plan_check import path_in_global_frame
+from mbf_abstract.execution.plan_check import area_problem, path_in_global_frame
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.execution.progress import PathProgress
 from mbf_abstract.execution.runtime import Runtime
@@ -66,7 +66,8 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
             value = getattr(goal, name)
             if value is not None and not value > 0.0:
                 return ExePathOutcome.INVALID_PATH, f"{name} must be positive, got {value}"
-        return None
+        problem = area_problem(goal.goal_area, self.runtime)
+        return (ExePathOutcome.INVALID_PATH, problem) if problem else None
 
     # ----------------------------------------------------------------------- 2. plan update while driving
     def _dispatch(self, job: Job) -> None:
@@ -166,6 +167,7 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
             parameters.dist_tolerance if goal.dist_tolerance is None else goal.dist_tolerance,
             parameters.angle_tolerance if goal.angle_tolerance is None else goal.angle_tolerance,
             self._tolerance_check(),
+            goal.goal_area,
         )
         return Plan(path, arrival)
 

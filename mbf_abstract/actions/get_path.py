@@ -12,7 +12,7 @@ from mbf_abstract.actions.action import Action, GoalJob
 from mbf_abstract.actions.goals import GetPathGoal, GetPathResult, NoFeedback
 from mbf_abstract.actions.handle import GoalHandle
 from mbf_abstract.events import EventKind
-from mbf_abstract.execution.plan_check import check_path, in_global_frame
+from mbf_abstract.execution.plan_check import area_problem, check_path, in_global_frame
 from mbf_abstract.execution.planner import PlannerExecution, PlannerState
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.execution.runtime import Runtime
@@ -46,7 +46,8 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
             return GetPathOutcome.INVALID_PLUGIN, problem
         if goal.dist_tolerance < 0.0 or goal.angle_tolerance < 0.0:
             return GetPathOutcome.INVALID_GOAL, "tolerances must not be negative"
-        return None
+        problem = area_problem(goal.goal_area, self.runtime)
+        return (GetPathOutcome.INVALID_GOAL, problem) if problem else None
 
     def execute(self, job: Job) -> GetPathResult:
         """2. to 5.: from the accepted goal to its result, on the slot's thread."""
@@ -69,7 +70,7 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
             on_abandon=lambda: job.abandon(*self._hung(plugin.name, handle)),
         )
         with self.runtime.map_hooks.using_map(PluginKind.PLANNER), run:
-            execution = PlannerExecution(run, request)
+            execution = PlannerExecution(run, request, goal.goal_area)
             state = execution.execute()
         # 4. Judge how it ended.
         return self._result(state, execution.last_result, handle, request, plugin.name)
@@ -106,7 +107,7 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
 
     def _found(self, said: PlanResult, handle: Handle, request: PlanRequest, words: dict[str, Any]) -> GetPathResult:
         """5. Believe a plugin's success only after a look at its path."""
-        checked = check_path(said, request, self.runtime)
+        checked = check_path(said, request, self.runtime, handle.goal.goal_area)
         if checked.path is None:
             return GetPathResult(checked.outcome, checked.message, **words)
         path, cost = checked.path, said.cost if said.cost != 0.0 else checked.path.length

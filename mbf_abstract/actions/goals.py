@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mbf_abstract.geometry import Command, Path, Pose
+from mbf_abstract.goal_area import GoalArea
 from mbf_abstract.outcomes import is_success, outcome_name
 
 
@@ -26,6 +27,8 @@ class GetPathGoal:
         How far [m, rad] from the target the path may end where the target itself cannot be reached.
     via : tuple of Pose
         Poses to pass on the way, in order.
+    goal_area : GoalArea, optional
+        Any place inside will do; ``target_pose`` is then not looked at.
     concurrency_slot : int
         0..255; goals in different slots run in parallel, a new goal in a used slot preempts.
     """
@@ -36,17 +39,22 @@ class GetPathGoal:
     dist_tolerance: float = 0.0
     angle_tolerance: float = 0.0
     via: tuple[Pose, ...] = ()
+    goal_area: GoalArea | None = None
     concurrency_slot: int = 0
 
 
 @dataclass(frozen=True)
 class ExePathGoal:
-    """Follow a path. Tolerances [m, rad] of None are the server's ``dist_tolerance`` and ``angle_tolerance``."""
+    """Follow a path. Tolerances [m, rad] of None are the server's ``dist_tolerance`` and ``angle_tolerance``.
+
+    With a ``goal_area`` the robot has arrived as soon as it is inside, whatever controller and tolerances say.
+    """
 
     path: Path
     controller: str = ""
     dist_tolerance: float | None = None
     angle_tolerance: float | None = None
+    goal_area: GoalArea | None = None
     concurrency_slot: int = 0
 
 
@@ -77,6 +85,8 @@ class MoveBaseGoal:
         Names to try in order; None = all that are loaded, in load order; empty = none.
     dist_tolerance, angle_tolerance : float, optional
         Arrival tolerances [m, rad], None = the server's. The planner may end its path that far from the target too.
+    goal_area : GoalArea, optional
+        Go to the cheapest place inside instead of to ``target_pose``, and stop as soon as inside.
     """
 
     target_pose: Pose
@@ -85,6 +95,7 @@ class MoveBaseGoal:
     recovery_behaviors: tuple[str, ...] | None = None
     dist_tolerance: float | None = None
     angle_tolerance: float | None = None
+    goal_area: GoalArea | None = None
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ from mbf_abstract.actions.handle import GoalHandle
 from mbf_abstract.actions.move_base_machine import MoveBaseMachine
 from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.events import EventKind
-from mbf_abstract.execution.plan_check import in_global_frame
+from mbf_abstract.execution.plan_check import area_problem, in_global_frame
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import MoveBaseOutcome
@@ -82,7 +82,8 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
             value = getattr(goal, name)
             if value is not None and not value > 0.0:
                 return MoveBaseOutcome.FAILURE, f"{name} must be positive, got {value}"
-        return None
+        problem = area_problem(goal.goal_area, self.runtime)
+        return (MoveBaseOutcome.FAILURE, problem) if problem else None
 
     def _dispatch(self, job: Job) -> None:
         """Hand the goal to the running machine, which takes it over while driving, else queue it."""

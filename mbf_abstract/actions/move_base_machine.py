@@ -174,6 +174,7 @@ class MoveBaseMachine:
                 planner=goal.planner,
                 dist_tolerance=goal.dist_tolerance or 0.0,
                 angle_tolerance=goal.angle_tolerance or 0.0,
+                goal_area=goal.goal_area,
                 concurrency_slot=SUB_GOAL_SLOT,
             ),
         )
@@ -230,6 +231,7 @@ class MoveBaseMachine:
                 controller=goal.controller,
                 dist_tolerance=goal.dist_tolerance,
                 angle_tolerance=goal.angle_tolerance,
+                goal_area=goal.goal_area,
                 concurrency_slot=SUB_GOAL_SLOT,
             ),
         )

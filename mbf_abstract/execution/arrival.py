@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goal_area import GoalArea
 
 ToleranceCheck = Literal["plugin", "either", "exclusive"]
 
@@ -23,15 +24,20 @@ class ArrivalCheck:
         Largest 3D distance [m] and rotation [rad], exclusive.
     check : {"plugin", "either", "exclusive"}
         Who decides: the controller; the controller or the server; the server alone.
+    area : GoalArea, optional
+        Decides alone where there is one.
     """
 
     goal: Pose
     dist_tolerance: float
     angle_tolerance: float
     check: ToleranceCheck = "plugin"
+    area: GoalArea | None = None
 
     def reached(self, pose: Pose, ask_plugin: Callable[[], bool]) -> bool:
         """Apply the rule; ``ask_plugin`` is called only where its answer counts."""
+        if self.area is not None:
+            return self.area.contains(pose)
         if self.check == "exclusive":
             return self.within(pose)
         return ask_plugin() or (self.check == "either" and self.within(pose))

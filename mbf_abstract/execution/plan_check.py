@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goal_area import GoalArea
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_abstract.transforms import TransformError
@@ -25,7 +26,15 @@ def path_in_global_frame(path: Path, runtime: Runtime) -> Path:
     return path if path.frame_id == frame else runtime.transforms.transform_path(path, frame)
 
 
-def check_path(said: PlanResult, request: PlanRequest, runtime: Runtime) -> PlanResult:
+def area_problem(area: GoalArea | None, runtime: Runtime) -> str:
+    """Why a goal area can not be used; empty if it can, or if there is none."""
+    frame = runtime.robot.global_frame
+    if area is None or area.frame_id == frame:
+        return ""
+    return f"a goal area must be given in the global frame {frame!r}, got {area.frame_id!r}"
+
+
+def check_path(said: PlanResult, request: PlanRequest, runtime: Runtime, area: GoalArea | None = None) -> PlanResult:
     """Check a successful answer; return it with the path in the global frame, or a failure without a path."""
     if said.path is None or len(said.path) == 0:
         return PlanResult(GetPathOutcome.EMPTY_PATH, "the planner reported success but gave no poses")
@@ -33,10 +42,14 @@ def check_path(said: PlanResult, request: PlanRequest, runtime: Runtime) -> Plan
         path = path_in_global_frame(said.path, runtime)
     except TransformError as error:
         return PlanResult(GetPathOutcome.TF_ERROR, f"the path can not be brought into the global frame: {error}")
+    if area is not None and not area.contains(path[-1]):
+        text = f"the path ends at {path[-1].position}, outside the goal area"
+        return PlanResult(GetPathOutcome.INTERNAL_ERROR, text)
+    goal = request.goal if area is None else path[-1]
     slack = runtime.parameters.plan_end_tolerance
     for name, index, pose, wanted, tolerance in (
         ("start", 0, path[0], request.start, 0.0),
-        ("goal", len(path) - 1, path[-1], request.goal, request.dist_tolerance),
+        ("goal", len(path) - 1, path[-1], goal, request.dist_tolerance),
     ):
         distance = pose.distance_to(wanted)
         if distance > tolerance + slack:

@@ -21,6 +21,7 @@ from enum import Enum
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import PluginFault, plugin_events
 from mbf_abstract.execution.plugin_run import PluginRun
+from mbf_abstract.goal_area import GoalArea, plan_to_area
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult
 
@@ -43,10 +44,11 @@ class PlannerState(Enum):
 class PlannerExecution:
     """One get_path goal's calls of its planner."""
 
-    def __init__(self, run: PluginRun[AbstractPlanner], request: PlanRequest) -> None:
+    def __init__(self, run: PluginRun[AbstractPlanner], request: PlanRequest, area: GoalArea | None = None) -> None:
         self._run = run
         self._runtime = run.runtime
         self._request = request
+        self._area = area
         self.state = PlannerState.INITIALIZED
         self.last_result: PlanResult | None = None
 
@@ -89,7 +91,7 @@ class PlannerExecution:
     def _call(self) -> PlanResult:
         planner = self._run.plugin.instance
         with plugin_events(self._runtime, self._run.handle.id, self._run.plugin.name, "make_plan") as told:
-            result = self._run.call("make_plan", lambda: planner.make_plan(self._request))
+            result = self._run.call("make_plan", lambda: self._plan_with(planner))
             if not isinstance(result, PlanResult):
                 raise PluginFault(
                     f"plugin {self._run.plugin.name!r} returned {type(result).__name__} from make_plan, not PlanResult"
@@ -97,6 +99,11 @@ class PlannerExecution:
             told.update(outcome=int(result.outcome), message=result.message)
         self.last_result = result
         return result
+
+    def _plan_with(self, planner: AbstractPlanner) -> PlanResult:
+        if self._area is None:
+            return planner.make_plan(self._request)
+        return plan_to_area(planner.make_plan, self._request, self._area)
 
     def _enter(self, state: PlannerState) -> PlannerState:
         if state is not self.state:

@@ -1,0 +1,177 @@
+"""Goals that are areas: a disc, a polygon, or a set of poses. Reaching any place inside is success.
+
+Use one where the exact pose does not matter ("into the kitchen", "to one of the three charging stations"): the
+planner is asked for a path to every member, the cheapest wins, it is cut where it enters the area, and the robot
+stops as soon as it is inside. Do not use a large area where one pose would do: each member costs one call of the
+planner. Areas are given in the server's global frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PlanRequest, PlanResult
+
+
+class GoalArea(Protocol):
+    """Where a goal may end."""
+
+    @property
+    def frame_id(self) -> str:
+        """Frame the area is given in."""
+
+    def contains(self, pose: Pose) -> bool:
+        """Whether a robot at ``pose`` is inside."""
+
+    def members(self) -> tuple[Pose, ...]:
+        """Poses inside that a planner is asked for; never empty."""
+
+
+@dataclass(frozen=True)
+class DiscArea:
+    """All places within ``radius`` [m], in 3D, of a centre; any heading."""
+
+    center: Pose
+    radius: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.radius < math.inf:
+            raise ValueError(f"the radius must be positive and finite, got {self.radius}")
+
+    @property
+    def frame_id(self) -> str:
+        """Frame of the centre."""
+        return self.center.frame_id
+
+    def contains(self, pose: Pose) -> bool:
+        """Whether the position is in the disc."""
+        return pose.distance_to(self.center) <= self.radius
+
+    def members(self) -> tuple[Pose, ...]:
+        """The centre, and eight poses on the circle of 0.9 radius for centres that cannot be reached."""
+        x, y, z = self.center.position
+        ring = 0.9 * self.radius
+        angles = [k * math.pi / 4.0 for k in range(8)]
+        around = [(x + ring * math.cos(angle), y + ring * math.sin(angle), z) for angle in angles]
+        return (self.center, *(replace(self.center, position=position) for position in around))
+
+
+@dataclass(frozen=True)
+class PolygonArea:
+    """The inside of a simple polygon, seen from above; any height and heading.
+
+    Parameters
+    ----------
+    corners : tuple of (x, y, z)
+        In order, at least three [m].
+    """
+
+    corners: tuple[tuple[float, float, float], ...]
+    frame_id: str = "map"
+
+    def __post_init__(self) -> None:
+        if len(self.corners) < 3:
+            raise ValueError(f"a polygon has at least three corners, got {len(self.corners)}")
+        if not abs(self._area()) > 0.0:
+            raise ValueError("the polygon encloses no area")
+
+    def contains(self, pose: Pose) -> bool:
+        """Whether the position is inside, by the even-odd rule."""
+        inside = False
+        for (x1, y1, _), (x2, y2, _) in zip(self.corners, self.corners[1:] + self.corners[:1], strict=True):
+            if (y1 > pose.y) != (y2 > pose.y) and pose.x < x1 + (pose.y - y1) / (y2 - y1) * (x2 - x1):
+                inside = not inside
+        return inside
+
+    def members(self) -> tuple[Pose, ...]:
+        """Poses of a 5 x 5 grid over the bounding box that are inside; of a thin polygon the middle of one ear.
+
+        An ear is a triangle of three neighbouring corners that lies inside; every simple polygon has at least two.
+        """
+        xs, ys, zs = zip(*self.corners, strict=True)
+        z = sum(zs) / len(zs)
+        steps = [0.1, 0.3, 0.5, 0.7, 0.9]
+        grid = [
+            Pose((min(xs) + (max(xs) - min(xs)) * a, min(ys) + (max(ys) - min(ys)) * b, z), frame_id=self.frame_id)
+            for a in steps
+            for b in steps
+        ]
+        inside = tuple(pose for pose in grid if self.contains(pose))
+        return inside or tuple(pose for pose in self._triangle_centres(z) if self.contains(pose))[:1]
+
+    def _area(self) -> float:
+        edges = zip(self.corners, self.corners[1:] + self.corners[:1], strict=True)
+        return 0.5 * sum(x1 * y2 - x2 * y1 for (x1, y1, _), (x2, y2, _) in edges)
+
+    def _triangle_centres(self, z: float) -> tuple[Pose, ...]:
+        """Centroids of the triangles of three neighbouring corners."""
+        n = len(self.corners)
+        triangles = [[self.corners[(i + k) % n] for k in range(3)] for i in range(n)]
+        return tuple(
+            Pose((sum(c[0] for c in three) / 3.0, sum(c[1] for c in three) / 3.0, z), frame_id=self.frame_id)
+            for three in triangles
+        )
+
+
+@dataclass(frozen=True)
+class PoseSetArea:
+    """One of several poses, within tolerances [m, rad]."""
+
+    poses: tuple[Pose, ...]
+    dist_tolerance: float = 0.1
+    angle_tolerance: float = math.pi
+
+    def __post_init__(self) -> None:
+        if not self.poses or len({pose.frame_id for pose in self.poses}) > 1:
+            raise ValueError("a set of goal poses has at least one pose, and all in one frame")
+
+    @property
+    def frame_id(self) -> str:
+        """Frame of the poses."""
+        return self.poses[0].frame_id
+
+    def contains(self, pose: Pose) -> bool:
+        """Whether ``pose`` is at one of the members."""
+        return any(
+            pose.distance_to(member) <= self.dist_tolerance and pose.angle_to(member) <= self.angle_tolerance
+            for member in self.poses
+        )
+
+    def members(self) -> tuple[Pose, ...]:
+        """The poses."""
+        return self.poses
+
+
+def plan_to_area(make_plan: Callable[[PlanRequest], PlanResult], request: PlanRequest, area: GoalArea) -> PlanResult:
+    """Ask for a path to every member and answer the cheapest, cut where it enters the area.
+
+    Without any success the answer is the one for the first member. A canceled request ends between two calls.
+    """
+    answers: list[PlanResult] = []
+    for member in area.members():
+        if request.cancel_token.cancelled:
+            return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
+        answers.append(make_plan(replace(request, goal=member)))
+    reached = [answer for answer in answers if answer.success and answer.path is not None and len(answer.path)]
+    if not reached:
+        return answers[0]
+    return _cut(min(reached, key=_cost), area)
+
+
+def _cost(answer: PlanResult) -> float:
+    assert answer.path is not None
+    return answer.cost if answer.cost != 0.0 else answer.path.length
+
+
+def _cut(answer: PlanResult, area: GoalArea) -> PlanResult:
+    path = answer.path
+    assert path is not None
+    first_inside = next((i for i, pose in enumerate(path) if area.contains(pose)), len(path) - 1)
+    cut: Path = path[: first_inside + 1]
+    share = cut.length / path.length if path.length > 0.0 else 1.0
+    return replace(answer, path=cut, cost=_cost(answer) * share)

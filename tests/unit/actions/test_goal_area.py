@@ -1,0 +1,129 @@
+"""Goal areas: the cheapest member is planned to, the path ends where it enters, the robot stops inside."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, MoveBaseGoal
+from mbf_abstract.actions.handle import GoalStatus
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.goal_area import DiscArea, PolygonArea, PoseSetArea
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PlanResult
+from mbf_abstract.testing.scripted import straight_plan
+
+NOT_LOOKED_AT = Pose.planar(-99.0, -99.0)
+DISC = DiscArea(Pose.planar(3.0, 0.0), 1.0)
+SQUARE = PolygonArea(((2.0, -1.0, 0.0), (4.0, -1.0, 0.0), (4.0, 1.0, 0.0), (2.0, 1.0, 0.0)))
+STATIONS = PoseSetArea((Pose.planar(5.0, 0.0), Pose.planar(0.0, 2.0), Pose.planar(-4.0, 0.0)))
+L_SHAPE = ((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (3.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 3.0, 0.0))
+
+
+def send(bench, area, kind=GetPathGoal):
+    return bench.navigator.send(kind(NOT_LOOKED_AT, goal_area=area))
+
+
+@pytest.mark.parametrize(("area", "length"), [(DISC, 2.0), (SQUARE, 2.0), (STATIONS, 1.9)])
+def test_the_path_ends_where_it_enters_the_area(make_bench, area, length):
+    bench = make_bench()
+    result = send(bench, area).wait()
+    assert result.success
+    assert area.contains(result.path[-1])
+    assert not any(area.contains(pose) for pose in result.path[:-1])
+    assert result.path.length == pytest.approx(length, abs=0.25)
+    assert result.cost == pytest.approx(result.path.length)
+
+
+def test_the_cheapest_member_wins(make_bench):
+    bench = make_bench()
+    assert send(bench, STATIONS).wait().path[-1].y == pytest.approx(1.9, abs=0.1)
+    assert [request.goal for request in bench.planner.requests] == list(STATIONS.poses)
+
+
+def test_members_that_can_not_be_reached_do_not_count(make_bench):
+    bench = make_bench(planner_max_retries=0)
+    blocked = PlanResult(GetPathOutcome.BLOCKED_GOAL, "occupied")
+    bench.planner.play(lambda request: blocked if request.goal.x < 1.0 else straight_plan(request))
+    assert send(bench, STATIONS).wait().path[-1].x == pytest.approx(4.9, abs=0.1)
+    bench.planner.play(blocked)
+    assert send(bench, STATIONS).wait().outcome == GetPathOutcome.BLOCKED_GOAL
+
+
+def test_a_cancel_ends_the_search_between_two_members(make_bench):
+    bench = make_bench()
+    handle = send(bench, STATIONS)
+    bench.planner.play(lambda request: (handle.cancel(), straight_plan(request))[1])
+    assert handle.wait().outcome == GetPathOutcome.CANCELED
+    assert len(bench.planner.requests) == 1
+
+
+def test_a_robot_that_is_inside_already_stays_where_it_is(make_bench):
+    bench = make_bench()
+    result = send(bench, DiscArea(Pose.planar(0.2, 0.0), 1.0), MoveBaseGoal).wait()
+    assert result.success
+    assert not bench.robot.moved_after(-1.0)
+
+
+@pytest.mark.parametrize("area", [DISC, SQUARE, STATIONS])
+def test_move_base_stops_inside_the_area(make_bench, area):
+    bench = make_bench()
+    result = send(bench, area, MoveBaseGoal).wait()
+    assert result.success
+    assert area.contains(bench.robot.pose)
+    assert bench.robot.command == Twist()
+
+
+def test_exe_path_stops_where_the_path_enters_the_area(make_bench):
+    bench = make_bench()
+    assert bench.navigator.send(ExePathGoal(bench.path_to(9.0), goal_area=DISC)).wait().success
+    assert 2.0 <= bench.robot.pose.x < 2.1
+
+
+@pytest.mark.parametrize("kind", [GetPathGoal, MoveBaseGoal])
+def test_an_area_in_another_frame_is_rejected(make_bench, kind):
+    handle = send(make_bench(), DiscArea(Pose.planar(1, 0, frame_id="odom"), 1.0), kind)
+    assert handle.status is GoalStatus.REJECTED
+    assert "must be given in the global frame 'map', got 'odom'" in handle.result.message
+
+
+def test_an_exe_path_area_in_another_frame_is_rejected(make_bench):
+    bench = make_bench()
+    area = DiscArea(Pose.planar(1, 0, frame_id="odom"), 1.0)
+    assert bench.navigator.send(ExePathGoal(bench.path_to(1.0), goal_area=area)).status is GoalStatus.REJECTED
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "inside"), [(0.5, 2.5, True), (2.5, 0.5, True), (2.5, 2.5, False), (-0.1, 0.5, False)]
+)
+def test_a_polygon_may_be_concave(x, y, inside):
+    assert PolygonArea(L_SHAPE).contains(Pose.planar(x, y)) is inside
+
+
+@given(st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9)), min_size=3, max_size=3))
+def test_every_member_of_a_triangle_is_inside_it(points):
+    (ax, ay), (bx, by), (cx, cy) = points
+    if abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) < 1e-3:
+        return
+    area = PolygonArea(tuple((x, y, 0.0) for x, y in points))
+    members = area.members()
+    assert members
+    assert all(area.contains(member) for member in members)
+
+
+def test_every_member_of_a_disc_is_inside_it():
+    assert all(DISC.contains(member) for member in DISC.members())
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: DiscArea(Pose.planar(0, 0), 0.0),
+        lambda: PolygonArea(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))),
+        lambda: PolygonArea(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))),
+        lambda: PoseSetArea(()),
+        lambda: PoseSetArea((Pose.planar(0, 0), Pose.planar(0, 0, frame_id="odom"))),
+    ],
+)
+def test_an_area_without_inside_is_refused(make):
+    with pytest.raises(ValueError):
+        make()
