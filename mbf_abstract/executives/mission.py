@@ -1,0 +1,114 @@
+"""What the nodes of one running tree or state machine share: the navigator, the target, and what came out so far.
+
+There is no global blackboard: an executive makes one ``MissionContext`` for a run and hands it to its nodes, so two
+runs never see each other's data and a reader finds every shared value in this file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mbf_abstract.actions.goals import ActionResult, ExePathFeedback, ExePathResult, GetPathResult
+from mbf_abstract.actions.handle import AnyGoalHandle
+from mbf_abstract.clock import Clock
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.navigator import Navigator
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, is_success
+
+PATIENCE_CODES = (GetPathOutcome.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED)
+
+
+@dataclass
+class MissionContext:
+    """Shared state of one run; nodes read and write it on the executive's thread only.
+
+    Attributes
+    ----------
+    navigator : Navigator
+        Where goals are sent.
+    target : Pose, optional
+        Where the robot shall go.
+    path : Path, optional
+        The path to follow. Whoever finds a better one replaces it; the node that drives then follows that one.
+    plan, drive : optional
+        Last result of ``get_path`` and of ``exe_path``.
+    feedback : ExePathFeedback, optional
+        Newest feedback of driving along ``path``.
+    failure : ActionResult, optional
+        The last failure of planning, driving, a check or a watchdog; recoveries are picked by its code.
+    """
+
+    navigator: Navigator
+    target: Pose | None = None
+    path: Path | None = None
+    plan: GetPathResult | None = None
+    drive: ExePathResult | None = None
+    feedback: ExePathFeedback | None = None
+    failure: ActionResult | None = None
+    _handles: list[AnyGoalHandle] = field(default_factory=list, repr=False)
+
+    @property
+    def clock(self) -> Clock:
+        """The server's clock."""
+        return self.navigator.server.runtime.clock
+
+    @property
+    def failure_code(self) -> int:
+        """Code of the last failure, 0 without one; where patience ran out, what the plugin itself complained of."""
+        if self.failure is None:
+            return 0
+        said = getattr(self.failure, "plugin_outcome", None)
+        if self.failure.outcome in PATIENCE_CODES and said is not None and not is_success(said):
+            return int(said)
+        return self.failure.outcome
+
+    def robot_pose(self) -> Pose:
+        """Fresh robot pose in the global frame; raises RobotStateError."""
+        return self.navigator.robot_pose()
+
+    def required_target(self) -> Pose:
+        """Return the target; raises ValueError where the mission has none."""
+        if self.target is None:
+            raise ValueError("this node needs a target; give one to the executive's run()")
+        return self.target
+
+    # ------------------------------------------------------------------------------------------ goals
+    def send(self, goal: Any) -> AnyGoalHandle:
+        """Send a goal and remember it, so that no run leaves one behind."""
+        handle: AnyGoalHandle = self.navigator.send(goal)
+        self._handles = [*self.running_goals(), handle]
+        return handle
+
+    def running_goals(self) -> list[AnyGoalHandle]:
+        """Goals of this mission that are not final."""
+        return [handle for handle in self._handles if not handle.done]
+
+    @property
+    def robot_is_stopping(self) -> bool:
+        """Whether a canceled goal of this mission still holds the robot."""
+        return any(goal.cancel_requested and goal.action != "get_path" for goal in self.running_goals())
+
+    def end_goals(self, reason: str) -> None:
+        """Cancel all goals of this mission and wait until each of them is final; the robot then stands."""
+        for handle in self.running_goals():
+            handle.cancel(reason)
+        for handle in self.running_goals():
+            handle.wait()
+
+    # ------------------------------------------------------------------------------------------- path
+    def path_to_follow(self) -> Path:
+        """Return the part of ``path`` the robot has not driven yet; raises ValueError without a path."""
+        if self.path is None:
+            raise ValueError("this node needs a path; run a node that plans before it")
+        if self.feedback is None:
+            return self.path
+        ahead = self.path.remaining_lengths <= self.feedback.distance_along_path
+        first = min(int(np.argmax(ahead)), len(self.path) - 1)
+        return self.path[max(first - 1, 0) :]
+
+    def take_plan(self, result: GetPathResult) -> None:
+        """Take over the path of a successful plan; the feedback of an older path no longer counts."""
+        self.plan, self.path, self.feedback = result, result.path, None

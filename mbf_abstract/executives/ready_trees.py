@@ -1,0 +1,169 @@
+"""Ready trees after the Move Base Flex paper (Figures 5, 6 and 7): navigation, and its parts planning and control.
+
+- *planning*: plan; where that fails, run the next recovery of a list and plan again.
+- *control*: follow the path while a second planner keeps updating it; where driving fails, run a recovery that fits the
+  outcome code, then drive on along the **same** path. Only if that does not help does the tree fall back to planning.
+- *navigation*: free the robot and the goal if they are blocked, then plan and drive.
+
+Use them as they are, or as a pattern: a tree is an expression of nodes. They need the behaviours named in
+``TreeOptions`` to be loaded; a name of "" leaves the behaviour out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import ParallelPolicy
+from py_trees.composites import Parallel, Sequence
+
+from mbf_abstract.executives.conditions import BEYOND_RECOVERY, recovery_would_help
+from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
+from mbf_abstract.executives.map_leaves import CheckPose
+from mbf_abstract.executives.pacing import Delay, InBackground
+from mbf_abstract.executives.recovering import (
+    InOrder,
+    MemRec,
+    OutcomeGuard,
+    PickByOutcome,
+    RecoveryNode,
+    RoundRobin,
+)
+from mbf_abstract.executives.watchdogs import MotorWatchdog, OscillationWatchdog, ProgressWatchdog
+from mbf_abstract.outcomes import ExePathOutcome
+
+BLOCKED = (ExePathOutcome.BLOCKED_PATH, ExePathOutcome.BLOCKED_GOAL, ExePathOutcome.NO_VALID_CMD)
+OFF_THE_PATH = (ExePathOutcome.MISSED_PATH, ExePathOutcome.MISSED_GOAL)
+IN_CONTACT = (ExePathOutcome.COLLISION, ExePathOutcome.ROBOT_STUCK)
+SECOND_PLANNER_SLOT = 1
+
+
+@dataclass(frozen=True)
+class TreeOptions:
+    """Names of plugins and limits of the ready trees.
+
+    Attributes
+    ----------
+    planner, second_planner, controller : str
+        Empty = the first one loaded.
+    clear, out_of_collision, relax_planner, relax_controller, move_away : str
+        Recovery behaviours by what they are for; empty = none.
+    check_poses : bool
+        Whether navigation first looks whether robot and goal stand free.
+    second_planner_pause : float
+        Pause of the second planner between two of its plans [s]; 0 = no second planner.
+    control_retries : int
+        Recoveries of driving before the tree falls back to planning.
+    replans : int
+        How often the tree falls back to planning before it gives up.
+    reuse_path : bool
+        Drive on along the same path after a recovery; otherwise plan anew after each failure of driving.
+    by_outcome : bool
+        Pick recoveries of driving by outcome code; otherwise take them in turn.
+    progress_timeout, oscillation_timeout, motor_timeout : float
+        Limits of the watchdogs [s]; 0 = off.
+    """
+
+    planner: str = ""
+    second_planner: str = ""
+    controller: str = ""
+    clear: str = "clear"
+    out_of_collision: str = "back_up"
+    relax_planner: str = ""
+    relax_controller: str = ""
+    move_away: str = ""
+    check_poses: bool = True
+    second_planner_pause: float = 2.0
+    control_retries: int = 4
+    replans: int = 3
+    reuse_path: bool = True
+    by_outcome: bool = True
+    progress_timeout: float = 20.0
+    oscillation_timeout: float = 0.0
+    motor_timeout: float = 0.0
+
+
+def navigation_tree(options: TreeOptions = TreeOptions()) -> Behaviour:
+    """Make the whole tree (Figure 5): checks with recoveries, then plan, then drive, planning anew where needed."""
+    steps = [planning_tree(options), _drive_or_plan_anew(options)]
+    if options.check_poses:
+        steps = [
+            MemRec(
+                "free the robot",
+                CheckPose("robot stands free?", at_robot=True),
+                _recoveries(options.clear, options.out_of_collision),
+            ),
+            MemRec("free the goal", CheckPose("goal is free?"), _recoveries(options.clear)),
+            *steps,
+        ]
+    return Sequence("navigation", memory=True, children=steps)
+
+
+def planning_tree(options: TreeOptions = TreeOptions(), name: str = "planning") -> Behaviour:
+    """Make the planning tree (Figure 6): plan, with a memory list of recoveries."""
+    recoveries = _recoveries(options.clear, options.relax_planner, options.move_away)
+    return MemRec(name, GetPath(planner=options.planner), recoveries, give_up_on=BEYOND_RECOVERY)
+
+
+def control_tree(options: TreeOptions = TreeOptions()) -> Behaviour:
+    """Make the control tree (Figure 7): follow and update the path, recover by outcome code, drive on."""
+    return RecoveryNode("control", [_drive(options), _recovery(options)], options.control_retries)
+
+
+def _drive_or_plan_anew(options: TreeOptions) -> Behaviour:
+    """Fall back to planning where control gives up, or, without reuse of the path, after each recovery."""
+    plan_anew = planning_tree(options, "plan anew")
+    if options.reuse_path:
+        return RecoveryNode("drive, else plan anew", [control_tree(options), plan_anew], options.replans)
+    recovery = InOrder("recover and plan", [_recovery(options), plan_anew])
+    drives = (options.control_retries + 1) * (options.replans + 1)
+    return RecoveryNode("drive, else recover and plan", [_drive(options), recovery], drives - 1)
+
+
+def _drive(options: TreeOptions) -> Behaviour:
+    """Drive, watched, and with a second planner beside it."""
+    follow = ExePath("follow path", options.controller)
+    drive: Behaviour = follow
+    if options.second_planner_pause > 0.0:
+        second = GetPath("update path", options.second_planner or options.planner, slot=SECOND_PLANNER_SLOT)
+        pause = f"every {options.second_planner_pause:g} s"
+        background = InBackground("in the background", Delay(pause, second, options.second_planner_pause))
+        policy = ParallelPolicy.SuccessOnSelected(children=[follow], synchronise=False)
+        drive = Parallel("drive and update", policy, [follow, background])
+    if options.progress_timeout > 0.0:
+        drive = ProgressWatchdog("progress?", drive, options.progress_timeout)
+    if options.oscillation_timeout > 0.0:
+        drive = OscillationWatchdog("oscillation?", drive, options.oscillation_timeout)
+    if options.motor_timeout > 0.0:
+        drive = MotorWatchdog("motors?", drive, options.motor_timeout)
+    return drive
+
+
+def _recovery(options: TreeOptions) -> Behaviour:
+    o = options
+    if not o.by_outcome:
+        names = (o.clear, o.relax_planner, o.out_of_collision, o.relax_controller, o.move_away)
+        return OutcomeGuard("any failure", _in_turn("fixed order", *names), recovery_would_help)
+    guards = [
+        OutcomeGuard("in contact", _in_turn("free", o.out_of_collision, o.move_away, o.clear), IN_CONTACT),
+        OutcomeGuard("blocked", _in_turn("unblock", o.clear, o.relax_controller, o.out_of_collision), BLOCKED),
+        OutcomeGuard("off the path", _in_turn("loosen", o.relax_controller, o.clear), OFF_THE_PATH),
+        OutcomeGuard("other", _in_turn("others", o.clear, o.relax_controller, o.move_away), recovery_would_help),
+    ]
+    return PickByOutcome("recover by outcome", guards)
+
+
+def _in_turn(name: str, *behaviors: str) -> RoundRobin:
+    return RoundRobin(name, _recoveries(*behaviors))
+
+
+def _recoveries(*behaviors: str) -> list[Behaviour]:
+    return [Recovery(behavior) for behavior in behaviors if behavior]
+
+
+READY_TREES: dict[str, Callable[[], Behaviour]] = {
+    "control": control_tree,
+    "navigation": navigation_tree,
+    "planning": planning_tree,
+}

@@ -1,0 +1,133 @@
+"""Runs a behaviour tree (or a state machine) for one target after the other: ticks it on the server's clock.
+
+The tree is ticked on the caller's thread, every ``period`` seconds of the server's clock, so a simulated run
+repeats bit for bit. However a run ends - the tree is done, ``cancel`` from another thread, an exception, Ctrl-C - every
+goal it sent is ended and the robot stands when ``run`` returns.
+
+Example
+-------
+>>> executive = TreeExecutive(navigation_tree(), navigator)
+>>> result = executive.run(Pose.planar(8.0, 3.0))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from mbf_abstract.events import EventKind
+from mbf_abstract.executives.conditions import TIME_RESOLUTION
+from mbf_abstract.executives.mission import MissionContext
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.navigator import Navigator
+
+
+@dataclass(frozen=True)
+class TreeResult:
+    """How a run ended: ``status`` of the tree (INVALID = canceled), a text, and the mission with all results."""
+
+    status: Status
+    message: str
+    mission: MissionContext
+
+    @property
+    def success(self) -> bool:
+        """Whether the tree succeeded."""
+        return bool(self.status == Status.SUCCESS)
+
+
+class TreeExecutive:
+    """Ticks one tree; runs one target at a time.
+
+    Parameters
+    ----------
+    tree : Behaviour
+        Any ``py_trees`` tree; ours need a mission, which ``run`` gives them.
+    navigator : Navigator
+    period : float
+        Time between two ticks [s].
+
+    Attributes
+    ----------
+    on_tick : list of callables
+        Called with the number of each tick (from 1) after it, on the executive's thread; for views and tests.
+    """
+
+    def __init__(self, tree: Behaviour, navigator: Navigator, period: float = 0.05) -> None:
+        if period <= 0.0:
+            raise ValueError(f"period must be positive, got {period}")
+        self.tree = tree
+        self.period = period
+        self.on_tick: list[Callable[[int], None]] = []
+        self._navigator = navigator
+        self._runtime = navigator.server.runtime
+        self._condition = self._runtime.clock.condition()
+        self._cancel_reason = ""
+        self._tip = ""
+
+    def run(self, target: Pose | None = None, path: Path | None = None) -> TreeResult:
+        """Tick until the tree has succeeded or failed, or ``cancel`` is called; then no goal of it runs.
+
+        Parameters
+        ----------
+        target : Pose, optional
+            For trees that plan.
+        path : Path, optional
+            For trees that follow a path they are given.
+        """
+        mission = MissionContext(self._navigator, target, path)
+        self._cancel_reason = ""
+        for node in self.tree.iterate():
+            node.setup(mission=mission)
+        try:
+            status = self._tick_until_done()
+        finally:
+            self.tree.stop(Status.INVALID)
+            mission.end_goals(self._cancel_reason or "the tree has ended")
+        return TreeResult(status, self._message(status, mission), mission)
+
+    def cancel(self, reason: str = "canceled from outside") -> None:
+        """End the present run soon; may be called from any thread, never waits."""
+        with self._condition:
+            self._cancel_reason = reason
+            self._condition.notify_all()
+
+    def _tick_until_done(self) -> Status:
+        clock = self._runtime.clock
+        start, ticks = clock.now(), 0
+        while not self._cancel_reason:
+            self.tree.tick_once()
+            ticks += 1
+            self._tell_tip()
+            for listener in self.on_tick:
+                listener(ticks)
+            if self.tree.status != Status.RUNNING:
+                return self.tree.status
+            self._wait_until(start + ticks * self.period)
+        return Status.INVALID
+
+    def _wait_until(self, stamp: float) -> None:
+        clock = self._runtime.clock
+        with self._condition:
+            while not self._cancel_reason and clock.now() < stamp - TIME_RESOLUTION:
+                self._condition.wait(stamp - clock.now())
+
+    def _tell_tip(self) -> None:
+        """Log which node is at work, so that a tree can be followed in the event log, live and in a replay."""
+        tip = self.tree.tip()
+        name = "" if tip is None else tip.name
+        if name != self._tip:
+            self._runtime.events.emit(EventKind.STATE_CHANGED, "tree", tree=self.tree.name, old=self._tip, new=name)
+            self._tip = name
+
+    def _message(self, status: Status, mission: MissionContext) -> str:
+        if status == Status.SUCCESS:
+            return f"{self.tree.name!r} succeeded"
+        if status == Status.INVALID:
+            return self._cancel_reason
+        if mission.failure is None:
+            return f"{self.tree.name!r} failed"
+        return f"{mission.failure.outcome_name}: {mission.failure.message}"
