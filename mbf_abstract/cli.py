@@ -13,7 +13,7 @@ from importlib.metadata import EntryPoint, entry_points
 
 import typer
 
-from mbf_abstract.commands import check, doctor, plan, plugins
+from mbf_abstract.commands import check, doctor, new, plan, plugins
 
 COMMANDS_GROUP = "mbf.commands"
 
@@ -27,7 +27,7 @@ def make_app() -> typer.Typer:
         add_completion=False,
         pretty_exceptions_enable=False,
     )
-    for command in (plan, check, plugins, doctor):
+    for command in (plan, check, plugins, new, doctor):
         command.register(app)
     for point in sorted(entry_points(group=COMMANDS_GROUP), key=lambda point: point.name):
         _add_commands(app, point)

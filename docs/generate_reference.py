@@ -1,0 +1,94 @@
+"""Write the parts of the documentation that come from the code, so that they cannot say anything else.
+
+    python docs/generate_reference.py            write all of them
+    python docs/generate_reference.py --check    write nothing; exit code 1 and the names of pages that are out of date
+
+Written are ``configuration.md`` (every parameter of every model), the example plugins (what ``mbf new`` writes), the
+listings in the guides (the text of the example files) and the table of ``faults_and_promises.md`` (the docstrings of
+``tests/faults``).
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+import sys
+from pathlib import Path
+
+from parameter_tables import configuration_page
+
+from mbf_abstract.commands.new import plugin_source
+
+DOCS = Path(__file__).resolve().parent
+REPOSITORY = DOCS.parent
+
+EXAMPLES = {
+    "straight_on_mesh": ("planner", "mesh"),
+    "straight_on_costmap": ("planner", "costmap"),
+    "chase_on_mesh": ("controller", "mesh"),
+    "chase_on_costmap": ("controller", "costmap"),
+    "look_around_on_mesh": ("recovery", "mesh"),
+    "look_around_on_costmap": ("recovery", "costmap"),
+    "flooded_ground": ("layer", "mesh"),
+    "wet_floor": ("layer", "costmap"),
+}
+"""Example plugins that are what ``mbf new`` writes: module -> kind and map."""
+
+LISTING = re.compile(r"(<!-- listing: (?P<file>\S+) -->\n)(?:```python\n.*?\n```\n)?", re.DOTALL)
+TABLE = re.compile(r"(<!-- table: tests/faults -->\n)(?:\|.*\n)*")
+FAULT_ROW = re.compile(r"Fault table, rows? (?P<rows>[\d, and]+)[^:]*: (?P<text>.+)", re.DOTALL)
+
+
+def generate() -> dict[Path, str]:
+    """Return every generated file with the text it should have."""
+    texts = {DOCS / "configuration.md": configuration_page()}
+    for name, (kind, map_name) in EXAMPLES.items():
+        texts[REPOSITORY / "examples" / "plugins" / f"{name}.py"] = plugin_source(kind, name, map_name)
+    for page in sorted(DOCS.glob("*.md")):
+        if page not in texts:
+            text = LISTING.sub(lambda match: _listing(match, texts), page.read_text(encoding="utf-8"))
+            texts[page] = TABLE.sub(lambda match: match[1] + fault_table(), text)
+    return texts
+
+
+def _listing(match: re.Match[str], texts: dict[Path, str]) -> str:
+    """Put the text of the named file below its marker."""
+    file = REPOSITORY / match["file"]
+    source = texts.get(file) or file.read_text(encoding="utf-8")
+    return f"{match[1]}```python\n{source.rstrip()}\n```\n"
+
+
+def fault_table() -> str:
+    """Return a table of the fault tests: row of the fault table, fault, what the tests show, file."""
+    rows = []
+    for file in sorted((REPOSITORY / "tests" / "faults").glob("test_*.py")):
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        match = FAULT_ROW.match(ast.get_docstring(tree) or "")
+        if match is None:
+            raise ValueError(f"the docstring of {file.name} must begin with 'Fault table, row N: ...'")
+        fault = " ".join(match["text"].partition("\n\n")[0].split())
+        names = [node.name for node in tree.body if isinstance(node, ast.FunctionDef) and node.name[:5] == "test_"]
+        shown = "<br>".join(name.removeprefix("test_").replace("_", " ") for name in names)
+        first_row = int(match["rows"].replace(",", " ").split()[0])
+        rows.append((first_row, f"| {match['rows'].strip(', ')} | {fault} | {shown} | `{file.name}` |"))
+    lines = ["| row | fault | what the tests show | file |", "|---|---|---|---|", *(line for _, line in sorted(rows))]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Write or check all generated files."""
+    parser = argparse.ArgumentParser(description="Generate the documentation's parts that come from the code.")
+    parser.add_argument("--check", action="store_true", help="write nothing, tell what is out of date")
+    check = parser.parse_args().check
+    old = [file for file, text in generate().items() if not file.is_file() or file.read_text("utf-8") != text]
+    for file in old:
+        sys.stdout.write(f"{'out of date' if check else 'written'}: {file.relative_to(REPOSITORY)}\n")
+    if not check:
+        for file, text in generate().items():
+            file.write_text(text, encoding="utf-8")
+    return 1 if check and old else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,139 @@
+"""The configuration reference: a table for every parameter model of the core, the servers, the plugins and layers."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from typing import Any
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic.fields import FieldInfo
+
+from mbf_abstract.config import PluginDeclaration
+from mbf_abstract.navigation_parameters import NavigationParameters
+from mbf_abstract.parameters import ParameterModel
+from mbf_abstract.registry import PluginRegistry
+from mbf_abstract.server import AbstractNavigationServer
+
+INTRODUCTION = """\
+# Configuration
+
+<!-- Written by docs/generate_reference.py from the parameter models; do not edit. -->
+
+A configuration is one YAML file. `backend` chooses the server. Navigation parameters stand at the top level. The lists
+`planners`, `controllers`, `recovery_behaviors` and `refiners` name plugins; each plugin's parameters stand in a block
+of its name. The map has a section of its own, with a list of layers and a block for each layer.
+
+`mbf check FILE` tells every mistake at once. *While running* says whether a change takes effect on goals that run
+already; otherwise it is read when a goal starts or when the server is made. A default of **required** must be given.
+Range brackets: `[` includes the bound, `(` does not.
+"""
+
+SERVERS = ("costmap", "mesh")
+TITLES = {
+    "planners": "Planners",
+    "controllers": "Controllers",
+    "recoveries": "Recovery behaviours",
+    "refiners": "Refiners",
+    "costmap_layers": "Costmap layers",
+    "mesh_layers": "Mesh layers",
+}
+
+
+def configuration_page() -> str:
+    """Return the text of ``configuration.md``."""
+    parts = [INTRODUCTION, "## Navigation\n", *_core()]
+    registry = PluginRegistry()
+    for name in SERVERS:
+        parts += _server(registry.load("servers", name, AbstractNavigationServer))
+    ours = [entry for entry in registry.entries() if _is_ours(entry.target)]
+    for group, title in TITLES.items():
+        parts.append(f"## {title}\n")
+        parts += [_plugin(entry.name, registry.load(group, entry.name)) for entry in ours if entry.group == group]
+    return "\n".join(parts)
+
+
+def _is_ours(target: str) -> bool:
+    return target.startswith(("mbf_abstract.", "mbf_costmap_nav.", "mbf_mesh_nav."))
+
+
+TOP_LEVEL = """\
+| name | default | meaning |
+|---|---|---|
+| `backend` | **required** | The server: a registered name or module:Class. |
+| `allow_module_types` | true | Whether types may be module:Class. |
+| `planners`, `controllers`, `recovery_behaviors`, `refiners` | [] | Plugins in order; the first is the default. |
+"""
+
+
+def _core() -> list[str]:
+    items = f"### Items of the plugin lists\n\n{parameter_table(PluginDeclaration)}"
+    return [TOP_LEVEL, parameter_table(NavigationParameters), items]
+
+
+def _server(server: type[AbstractNavigationServer]) -> list[str]:
+    """Sections of one server; sections of one model share a table."""
+    parts = [f"## Map of the {server.backend} server\n"]
+    models: dict[type[ParameterModel], list[str]] = {}
+    for key, model in server.config_sections.items():
+        models.setdefault(model, []).append(f"`{key}`")
+    parts += [f"### {' and '.join(keys)}\n\n{parameter_table(model)}" for model, keys in models.items()]
+    own = [name for name in server.plugin_declaration.model_fields if name not in PluginDeclaration.model_fields]
+    if own:
+        parts.append(f"### Further keys of its plugin lists\n\n{parameter_table(server.plugin_declaration, own)}")
+    return parts
+
+
+def _plugin(name: str, plugin_class: Any) -> str:
+    """Heading, the first paragraph of the module's text, and the table."""
+    module = inspect.getdoc(inspect.getmodule(plugin_class)) or ""
+    summary = " ".join(module.partition("\n\n")[0].split())
+    return f"### `{name}`\n\n{summary}\n\n{parameter_table(plugin_class.Parameters)}"
+
+
+def parameter_table(model: type[ParameterModel], names: list[str] | None = None) -> str:
+    """Return the Markdown table of a model's parameters, or of some of them."""
+    fields = {name: field for name, field in model.model_fields.items() if names is None or name in names}
+    if not fields:
+        return "No parameters.\n"
+    rows = [
+        "| name | default | unit | range | while running | meaning |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, field in fields.items():
+        extra: Any = field.json_schema_extra or {}
+        dynamic = "yes" if extra.get("dynamic", True) else "no"
+        cells = (f"`{name}`", _default(field), extra.get("unit", ""), _range(field), dynamic, field.description or "")
+        rows.append("| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(rows) + "\n"
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "**required**"
+    value = field.get_default(call_default_factory=True)
+    if value is None or value == "":
+        return "none" if value is None else '""'
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return ".inf" if math.isinf(value) else f"{value:.6g}"
+    if isinstance(value, tuple | list | dict):
+        return "{}" if isinstance(value, dict) and not value else str(list(value))
+    return str(getattr(value, "value", value))
+
+
+def _range(field: FieldInfo) -> str:
+    """Interval of the legal values; empty if there is none."""
+    low = high = ""
+    for limit in field.metadata:
+        if isinstance(limit, Ge | Gt):
+            low = f"[{limit.ge:.6g}" if isinstance(limit, Ge) else f"({limit.gt:.6g}"
+        elif isinstance(limit, Le | Lt):
+            high = f"{limit.le:.6g}]" if isinstance(limit, Le) else f"{limit.lt:.6g})"
+    choices = getattr(field.annotation, "__args__", ())
+    if choices and all(isinstance(choice, str) for choice in choices):
+        return ", ".join(f"`{choice}`" if choice else '`""`' for choice in choices)
+    if not low and not high:
+        return ""
+    return f"{low or '(-inf'}, {high or 'inf)'}"

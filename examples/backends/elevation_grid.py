@@ -1,0 +1,199 @@
+"""A map backend of its own in one file: a 2.5D grid of heights, with server, planner and queries.
+
+When to use: as the pattern of a backend, or for open ground of a known shape. When not: bridges, overhangs, sensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+from scipy.sparse import coo_array, csgraph
+
+from mbf_abstract.config import Config
+from mbf_abstract.geometry import FloatArray, Path, Pose
+from mbf_abstract.map_queries import CellState, MapQueries, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginContext, PluginKind
+from mbf_abstract.robot import RobotInformation
+from mbf_abstract.sensing import RangeScan
+from mbf_abstract.server import AbstractNavigationServer
+from mbf_abstract.transforms import TransformBuffer
+
+ROBOT_AS_IT_IS = PlaceQuery()
+
+
+class ElevationGridParameters(ParameterModel):
+    """The configuration's block ``elevation_grid``."""
+
+    file: str = parameter(..., "File of a (rows, columns) array of heights [m], as numpy.save writes it.")
+    resolution: float = parameter(0.5, "Distance of two samples.", unit="m", gt=0.0)
+    max_slope: float = parameter(0.5, "Lethal above this inclination.", unit="rad", gt=0.0, lt=1.57)
+    robot_radius: float = parameter(0.3, "Radius of the robot.", unit="m", ge=0.0)
+
+
+class ElevationGrid:
+    """The map: heights (ny, nx) [m] at ``resolution`` [m] with row 0 at y = 0, and what follows from them."""
+
+    def __init__(self, heights: FloatArray, parameters: ElevationGridParameters, frame_id: str) -> None:
+        self.heights, self.frame_id = heights, frame_id
+        self.resolution, self.robot_radius = parameters.resolution, parameters.robot_radius
+        rise = np.hypot(*np.gradient(heights, self.resolution))
+        self.slope = np.arctan(np.nan_to_num(rise, nan=np.inf))  # unknown ground counts as a wall
+        steps = distance_transform_edt(np.pad(self.slope <= parameters.max_slope, 1))[1:-1, 1:-1]
+        self.clearance = steps * self.resolution  # [m] to the next sample that is lethal or off the map; 0 = lethal
+
+    def index(self, x: float, y: float) -> int:
+        """Flat index of the sample next to a point [m], -1 outside the grid."""
+        (ny, nx), iy, ix = self.heights.shape, round(y / self.resolution), round(x / self.resolution)
+        return iy * nx + ix if 0 <= iy < ny and 0 <= ix < nx else -1
+
+    def points(self, samples: NDArray[np.int_]) -> FloatArray:
+        """Positions (n, 3) [m] of samples given by flat index (n,)."""
+        iy, ix = np.unravel_index(samples, self.heights.shape)
+        return np.column_stack([ix * self.resolution, iy * self.resolution, self.heights[iy, ix]])
+
+    def graph(self) -> coo_array:
+        """Sparse matrix of the 3D lengths [m] between free neighbours, each pair once."""
+        index = np.arange(self.heights.size).reshape(self.heights.shape)
+        pairs = [(index[:, :-1], index[:, 1:]), (index[:-1], index[1:])]
+        pairs += [(index[:-1, :-1], index[1:, 1:]), (index[:-1, 1:], index[1:, :-1])]
+        start, end = (np.concatenate([pair[side].ravel() for pair in pairs]) for side in (0, 1))
+        free = (self.clearance > self.robot_radius).ravel()
+        start, end = np.array([start, end])[:, free[start] & free[end]]
+        lengths = np.linalg.norm(self.points(end) - self.points(start), axis=1)
+        return coo_array((lengths, (start, end)), shape=(index.size, index.size))
+
+    def state(self, x: float, y: float, safety_dist: float = 0.0) -> tuple[CellState, float]:
+        """State of the robot at a point, and the slope [rad] there as its cost."""
+        index = self.index(x, y)
+        if index < 0:
+            return CellState.OUTSIDE, 0.0
+        clearance, slope = float(self.clearance.flat[index]), float(self.slope.flat[index])
+        if clearance == 0.0:
+            return CellState.LETHAL, slope
+        return (CellState.FREE if clearance > self.robot_radius + safety_dist else CellState.INSCRIBED), slope
+
+
+@dataclass(frozen=True)
+class ElevationContext(PluginContext):
+    """What plugins of this server are constructed with."""
+
+    grid: ElevationGrid
+
+
+class ElevationPlanner(AbstractPlanner):
+    """Dijkstra's search over the samples; the shortest way on the ground in eight directions. Via poses are ignored."""
+
+    def __init__(self, context: ElevationContext) -> None:
+        super().__init__(context)
+        self.grid = context.grid
+        self._graph = context.grid.graph().tocsr()
+
+    def make_plan(self, request: PlanRequest) -> PlanResult:
+        """Search from the sample next to the start to the sample next to the goal."""
+        if request.cancel_token.cancelled:
+            return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
+        for pose, code in ((request.start, GetPathOutcome.BLOCKED_START), (request.goal, GetPathOutcome.BLOCKED_GOAL)):
+            state, slope = self.grid.state(pose.x, pose.y)
+            if state is not CellState.FREE:
+                return PlanResult(code, f"({pose.x:.2f}, {pose.y:.2f}) is {state.name}, slope {slope:.2f} rad")
+        start, goal = (self.grid.index(pose.x, pose.y) for pose in (request.start, request.goal))
+        (lengths,), (before,) = csgraph.dijkstra(self._graph, False, [start], return_predecessors=True)
+        if not np.isfinite(lengths[goal]):
+            return PlanResult(GetPathOutcome.NO_PATH_FOUND, "start and goal are not connected")
+        samples = [goal]
+        while samples[0] != start:
+            samples.insert(0, before[samples[0]])
+        points = self.grid.points(np.array(samples))
+        path = Path.from_points(points, request.goal.orientation, frame_id=self.grid.frame_id)
+        return PlanResult(GetPathOutcome.SUCCESS, f"{lengths[goal]:.1f} m over ground", path, float(lengths[goal]))
+
+
+class ElevationQueries:
+    """The map-independent questions; the map never changes, so clearing and updating do nothing."""
+
+    def __init__(self, grid: ElevationGrid, robot: RobotInformation, transforms: TransformBuffer) -> None:
+        self._grid, self._robot, self._transforms = grid, robot, transforms
+
+    def check_point(self, point: Pose, local: bool = False) -> PlaceAnswer:
+        """State and slope of one point."""
+        return self.check_pose(point)
+
+    def check_pose(self, pose: Pose | None, query: PlaceQuery = ROBOT_AS_IT_IS) -> PlaceAnswer:
+        """State and slope of the robot's disc."""
+        there = self._transforms.transform_pose(pose or self._robot.pose(), self._grid.frame_id)
+        return PlaceAnswer(*self._grid.state(there.x, there.y, query.safety_dist))
+
+    def check_path(
+        self,
+        path: Path,
+        query: PlaceQuery = ROBOT_AS_IT_IS,
+        return_on: CellState | None = None,
+        skip_poses: int = 0,
+        path_cells_only: bool = False,
+    ) -> PathAnswer:
+        """Worst state and summed slope along a path."""
+        worst, total, last = CellState.FREE, 0.0, 0
+        for last in range(0, len(path), skip_poses + 1):
+            answer = self.check_pose(path[last], query)
+            worst, total = max(worst, answer.state), total + answer.cost
+            if return_on is not None and worst >= return_on:
+                break
+        return PathAnswer(last, worst, total)
+
+    def find_valid_pose(
+        self, pose: Pose | None, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery = ROBOT_AS_IT_IS
+    ) -> PoseAnswer:
+        """Nearest free sample within the tolerance; the heading stays."""
+        there = self._transforms.transform_pose(pose or self._robot.pose(), self._grid.frame_id)
+        free = np.flatnonzero(self._grid.clearance > self._grid.robot_radius + query.safety_dist)
+        points = self._grid.points(free)
+        distances = np.hypot(points[:, 0] - there.x, points[:, 1] - there.y)
+        if not len(free) or distances.min() > dist_tolerance:
+            return PoseAnswer(*self._grid.state(there.x, there.y, query.safety_dist), None)
+        x, y, z = points[distances.argmin()].tolist()
+        found = Pose((x, y, z), there.orientation, there.frame_id)
+        return PoseAnswer(*self._grid.state(x, y, query.safety_dist), found)
+
+    def clear_map(self) -> None:
+        """Nothing was sensed."""
+
+    def update_map(self) -> None:
+        """It is up to date."""
+
+
+class ElevationGridServer(AbstractNavigationServer):
+    """The server: it loads the map and hands it to the plugins, the rest is inherited."""
+
+    backend: ClassVar[str] = "elevation_grid"
+    config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {"elevation_grid": ElevationGridParameters}
+    grid: ElevationGrid
+
+    def load_map(self, config: Config) -> None:
+        """Read the array."""
+        parameters = cast(ElevationGridParameters, config.sections["elevation_grid"].parameters)
+        heights = np.load(config.path.parent / parameters.file, allow_pickle=False).astype(np.float64)
+        self.grid = ElevationGrid(heights, parameters, config.parameters.global_frame)
+
+    def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
+        """Add the grid."""
+        return ElevationContext(**vars(base), grid=self.grid)
+
+    @property
+    def queries(self) -> MapQueries:
+        """The map-independent questions."""
+        return ElevationQueries(self.grid, self.runtime.robot, self.runtime.transforms)
+
+    def take_scan(self, scan: RangeScan) -> None:
+        """Look away: this map is static."""
+
+    def ground_height(self, x: float, y: float) -> float:
+        """Height of the next sample."""
+        index = self.grid.index(x, y)
+        return 0.0 if index < 0 else float(np.nan_to_num(self.grid.heights.flat[index]))

@@ -1,0 +1,67 @@
+"""Controller `chase_on_costmap`: turn towards a point ahead on the path and drive.
+
+When to use: as a start for a controller of your own. When not: crowds and tight corners; it looks at one point only.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray, Path, Pose, Twist
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_costmap_nav.costmap import INSCRIBED
+from mbf_costmap_nav.plugins import CostmapController
+
+
+class ChaseOnCostmapParameters(PluginParameters):
+    """Parameters of `chase_on_costmap`."""
+
+    speed: float = parameter(0.5, "Speed straight ahead.", unit="m/s", gt=0.0, le=5.0)
+    max_turn: float = parameter(1.0, "Greatest yaw rate.", unit="rad/s", gt=0.0, le=5.0)
+    look_ahead: float = parameter(0.5, "Distance of the point to drive to.", unit="m", gt=0.0, le=10.0)
+
+
+class ChaseOnCostmap(CostmapController):
+    """Chases a point ahead and turns to the goal's heading on arrival."""
+
+    Parameters = ChaseOnCostmapParameters
+    parameters: ChaseOnCostmapParameters
+    _path: Path
+
+    def set_plan(self, path: Path) -> bool:
+        """Take any path that has poses."""
+        self._path = path
+        return len(path) > 0
+
+    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+        """Turn in place while the point is far off the heading, else drive towards it."""
+        point = self._point_ahead(np.array(request.pose.position))
+        cost = self.costmap.snapshot().cost_at(point[0], point[1])
+        if cost is None or cost >= INSCRIBED:
+            return ControlResult(ExePathOutcome.BLOCKED_PATH, f"cost {cost} at {point[:2].round(2).tolist()}")
+        to_goal = request.pose.distance_to(self._path[-1])
+        arriving = to_goal < 0.05
+        direction = self._path[-1].rotation[:, 0] if arriving else point - request.pose.position
+        x, y, _ = direction @ request.pose.rotation  # in the robot's frame
+        bearing = math.atan2(y, x)
+        limit = self.parameters.max_turn
+        turn = min(limit, max(-limit, 2.0 * bearing))
+        speed = 0.0 if arriving or abs(bearing) > 1.0 else min(self.parameters.speed, to_goal) * math.cos(bearing)
+        return ControlResult(ExePathOutcome.SUCCESS, "driving", Twist.planar(speed, wz=turn))
+
+    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """Compare the pose with the last pose of the path."""
+        end = self._path[-1]
+        return pose.distance_to(end) <= dist_tolerance and pose.angle_to(end) <= angle_tolerance
+
+    def _point_ahead(self, position: FloatArray) -> FloatArray:
+        """First point after the nearest one that is at least ``look_ahead`` away, or the last point."""
+        distances = np.linalg.norm(self._path.positions - position, axis=1)
+        nearest = int(distances.argmin())
+        far = np.flatnonzero(distances[nearest:] >= self.parameters.look_ahead)
+        point: FloatArray = self._path.positions[nearest + far[0] if far.size else -1]
+        return point

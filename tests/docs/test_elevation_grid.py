@@ -1,0 +1,112 @@
+"""The backend of the guide: a configuration chooses it, and the same navigator plans, drives and asks on it."""
+
+import importlib
+
+import numpy as np
+import pytest
+
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.map_queries import CellState, PlaceQuery
+from mbf_abstract.navigator import Navigator
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.contract import check_planner
+from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.transforms import TransformBuffer
+
+CONFIG = """\
+backend: elevation_grid:ElevationGridServer
+planner_max_retries: 0
+dist_tolerance: 0.2
+planners:
+  - {name: shortest, type: "elevation_grid:ElevationPlanner"}
+controllers:
+  - {name: carrot, type: "follow_carrot:FollowCarrot"}
+elevation_grid: {file: hill.npy, resolution: 0.25, max_slope: 0.6, robot_radius: 0.3}
+"""
+START, GOAL = Pose.planar(1.0, 5.0), Pose.planar(9.0, 5.0)
+HILL_TOP = Pose.planar(5.0, 5.0)
+FLANK = Pose.planar(5.0, 4.0)
+
+
+def hill():
+    """10 m x 10 m with a steep hill of 2 m in the middle and an unknown corner."""
+    x, y = np.meshgrid(np.arange(41) * 0.25, np.arange(41) * 0.25)
+    heights = 2.0 * np.exp(-((x - 5.0) ** 2 + (y - 5.0) ** 2) / 1.5)
+    heights[-5:, -5:] = np.nan
+    return heights
+
+
+@pytest.fixture
+def navigator(tmp_path):
+    np.save(tmp_path / "hill.npy", hill())
+    file = tmp_path / "navigation.yaml"
+    file.write_text(CONFIG)
+    clock, transforms = SimClock(), TransformBuffer()
+    robot = LoopbackRobot(clock, transforms, START)
+    with Navigator.from_file(file, robot, clock, transforms) as made:
+        yield made
+    robot.close()
+    clock.sleep(1.0)
+
+
+def test_the_robot_drives_around_the_hill(navigator):
+    result = navigator.go_to(GOAL)
+
+    assert result.success, result.message
+    assert navigator.robot_pose().distance_to(GOAL) < 0.25
+
+
+def test_the_plan_keeps_to_free_ground_and_costs_its_length(navigator):
+    plan = navigator.get_path(GOAL)
+
+    assert plan.success and plan.cost == pytest.approx(plan.path.length)
+    assert plan.path.length > 8.2, "the straight line is 8 m and goes over the hill"
+    assert navigator.server.queries.check_path(plan.path).state is CellState.FREE
+
+
+def test_a_goal_on_the_flank_is_blocked_with_the_slope(navigator):
+    plan = navigator.get_path(FLANK)
+
+    assert plan.outcome == GetPathOutcome.BLOCKED_GOAL
+    assert "LETHAL, slope" in plan.message
+
+
+def test_ground_without_a_height_is_a_wall_and_beyond_the_grid_is_outside(navigator):
+    queries = navigator.server.queries
+
+    assert queries.check_point(Pose.planar(9.8, 9.8)).state is CellState.LETHAL
+    assert queries.check_point(Pose.planar(12.0, 5.0)).state is CellState.OUTSIDE
+    assert queries.check_pose(None).state is CellState.FREE
+
+
+def test_the_worst_state_along_a_path_counts_and_can_end_the_search(navigator):
+    over = Path.from_points(np.linspace(START.position, GOAL.position, 33))
+    whole = navigator.server.queries.check_path(over)
+    early = navigator.server.queries.check_path(over, return_on=CellState.LETHAL)
+
+    assert (whole.state, whole.last_checked) == (CellState.LETHAL, 32)
+    assert early.state is CellState.LETHAL and early.last_checked < 16
+
+
+def test_a_valid_pose_is_found_within_the_tolerance_only(navigator):
+    queries = navigator.server.queries
+    near = queries.find_valid_pose(FLANK, 3.0, 0.0, PlaceQuery(safety_dist=0.1))
+
+    assert near.state is CellState.FREE and 0.5 < near.pose.distance_to(FLANK) < 3.1
+    assert queries.find_valid_pose(FLANK, 0.3, 0.0).pose is None
+
+
+def test_the_planner_keeps_the_contract():
+    module = importlib.import_module("elevation_grid")
+    parameters = module.ElevationGridParameters(file="none", resolution=0.25, max_slope=0.6)
+    grid = module.ElevationGrid(hill(), parameters, "map")
+
+    check_planner(
+        module.ElevationPlanner,
+        [(START, GOAL)],
+        unreachable=[(START, FLANK), (START, HILL_TOP)],
+        make_context=lambda base: module.ElevationContext(**vars(base), grid=grid),
+        watched=[grid.heights, grid.clearance],
+        cancel_within=1.0,
+    )

@@ -1,0 +1,88 @@
+"""``mbf new`` writes packages whose own tests pass."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from mbf_abstract.cli import make_app
+from mbf_abstract.registry import PluginRegistry
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+KINDS = ("planner", "controller", "recovery", "layer")
+
+
+def mbf(*arguments):
+    return CliRunner().invoke(make_app(), [str(argument) for argument in arguments])
+
+
+@pytest.mark.parametrize("map_name", ["mesh", "costmap"])
+def test_the_tests_of_new_packages_pass(map_name, tmp_path):
+    names = [f"fresh_{map_name}_{kind}" for kind in KINDS]
+    for kind, name in zip(KINDS, names, strict=True):
+        written = mbf("new", kind, name, "--map", map_name, "--out", tmp_path)
+        assert written.exit_code == 0, written.output
+
+    paths = [str(REPOSITORY), *(str(tmp_path / name) for name in names)]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "--rootdir",
+        str(tmp_path),
+        str(tmp_path),
+    ]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    result = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment, check=False)
+
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "6 passed" in result.stdout
+
+
+def test_the_entry_point_leads_to_the_class(tmp_path, monkeypatch):
+    mbf("new", "planner", "my-planner", "--map", "mesh", "--out", tmp_path)
+    monkeypatch.syspath_prepend(tmp_path / "my_planner")
+
+    project = (tmp_path / "my_planner" / "pyproject.toml").read_text()
+    loaded = PluginRegistry("mesh").load("planners", "my_planner:MyPlanner")
+
+    assert '[project.entry-points."mbf.planners"]\n"mesh.my_planner" = "my_planner:MyPlanner"' in project
+    assert loaded.__name__ == "MyPlanner"
+
+
+def test_the_layers_go_to_the_group_of_their_map(tmp_path):
+    mbf("new", "layer", "wet", "--map", "costmap", "--out", tmp_path)
+
+    assert '[project.entry-points."mbf.costmap_layers"]' in (tmp_path / "wet" / "pyproject.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("refiner", "x", "--map", "mesh"), "no kind 'refiner'; known: planner, controller, recovery, layer"),
+        (("planner", "x", "--map", "octomap"), "no map 'octomap' is installed; known: costmap, mesh"),
+        (("planner", "2fast", "--map", "mesh"), "'2fast' is no name for a module"),
+        (("planner", "class", "--map", "mesh"), "'class' is no name for a module"),
+    ],
+)
+def test_a_bad_argument_is_named_and_nothing_is_written(arguments, text, tmp_path):
+    result = mbf("new", *arguments, "--out", tmp_path)
+
+    assert result.exit_code == 2 and text in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_there_is_not_overwritten(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("keep me")
+
+    result = mbf("new", "planner", "mine", "--map", "mesh", "--out", tmp_path)
+
+    assert result.exit_code == 2
+    assert [file.name for file in (tmp_path / "mine").iterdir()] == ["notes.txt"]
