@@ -289,7 +289,7 @@ def test_a_guarded_section_that_waits_now_and_then_is_not_hung():
 
 
 def test_the_guards_own_thread_ends_with_the_last_thread_it_guards():
-    clock = SimClock(hang_guard=10.0)
+    clock, others = SimClock(hang_guard=10.0), set(threading.enumerate())
 
     def guarded():
         with clock.guarded("short"):
@@ -297,7 +297,7 @@ def test_the_guards_own_thread_ends_with_the_last_thread_it_guards():
 
     for _ in range(2):
         thread = clock.spawn(guarded, "guarded")
-        guards = [thread for thread in threading.enumerate() if thread.name == "hang guard"]
+        guards = [one for one in set(threading.enumerate()) - others if one.name == "hang guard"]
         thread.join()
         for guard in guards:
             guard.join(5.0)
