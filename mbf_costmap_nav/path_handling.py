@@ -130,13 +130,14 @@ def to_base_frame(points: FloatArray, pose: Pose) -> FloatArray:
 
 @dataclass(frozen=True)
 class ControlCycle:
-    """What a controller works on in one cycle: request, plan, map, footprint, goal tolerance [m]."""
+    """What a controller works on in one cycle: request, plan, map, footprint, goal tolerance [m], speed limit [m/s]."""
 
     request: ControlRequest
     tracker: PathTracker
     costmap: Costmap
     footprint: FootprintCheck
     goal_tolerance: float
+    speed_limit: float
 
 
 class PathFollower(CostmapController):
@@ -147,6 +148,11 @@ class PathFollower(CostmapController):
         self.tracker: PathTracker | None = None
         self.goal_dist_tolerance = 0.1
         self._footprint: FootprintCheck | None = None
+
+    @property
+    def full_speed(self) -> float:
+        """Largest speed [m/s] where no layer limits it; every controller that drives has one."""
+        return math.inf
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the frame of the costmap."""
@@ -181,4 +187,11 @@ class PathFollower(CostmapController):
         if self._footprint.collides(costmap, pose.x, pose.y, pose.yaw):
             text = f"the footprint at ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad) touches a lethal cell"
             return ControlResult(ExePathOutcome.COLLISION, text)
-        return ControlCycle(request, self.tracker, costmap, self._footprint, self.goal_dist_tolerance)
+        limit = self._speed_limit(pose)
+        return ControlCycle(request, self.tracker, costmap, self._footprint, self.goal_dist_tolerance, limit)
+
+    def _speed_limit(self, pose: Pose) -> float:
+        """Lowest speed [m/s] that the layers of either costmap allow at ``pose``."""
+        maps = [costmap for costmap in (self.local_costmap, self.global_costmap) if costmap.frame_id == pose.frame_id]
+        limits = [costmap.speed_limit(pose.x, pose.y, self.full_speed) for costmap in maps]
+        return min([self.full_speed, *limits])

@@ -66,6 +66,11 @@ class DwaController(PathFollower):
         """Take over new weights."""
         self._critics = build_critics(self.parameters.critics)
 
+    @property
+    def full_speed(self) -> float:
+        """Largest forward speed [m/s]."""
+        return self.parameters.max_vel_x
+
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """Sample, roll out, score, and take the cheapest arc that the full footprint can drive."""
         cycle = self.begin_cycle(request)
@@ -99,10 +104,12 @@ class DwaController(PathFollower):
     def _window(self, cycle: ControlCycle) -> FloatArray:
         """Velocities (n, 3) the robot can reach within the window time."""
         p, now = self.parameters, cycle.request.velocity
-        vx = sample_window(now.vx, p.min_vel_x, p.max_vel_x, p.acc_lim_x * p.window_time, p.vx_samples)
+        slowest, fastest = max(p.min_vel_x, -cycle.speed_limit), cycle.speed_limit
+        vx = sample_window(now.vx, slowest, fastest, p.acc_lim_x * p.window_time, p.vx_samples)
         vy = np.zeros(1)
         if p.max_vel_y > 0.0:
-            vy = sample_window(now.vy, -p.max_vel_y, p.max_vel_y, p.acc_lim_y * p.window_time, p.vy_samples)
+            sideways = min(p.max_vel_y, cycle.speed_limit)
+            vy = sample_window(now.vy, -sideways, sideways, p.acc_lim_y * p.window_time, p.vy_samples)
         wz = sample_window(now.wz, -p.max_vel_theta, p.max_vel_theta, p.acc_lim_theta * p.window_time, p.vtheta_samples)
         return np.stack(np.meshgrid(vx, vy, wz, indexing="ij"), axis=-1).reshape(-1, 3)
 

@@ -104,6 +104,11 @@ class MppiController(PathFollower):
             self._nominal[:] = 0.0
         return super().set_plan(path)
 
+    @property
+    def full_speed(self) -> float:
+        """Largest forward speed [m/s]."""
+        return self.parameters.vx_max
+
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: sample around the nominal sequence, score, average, check, shift."""
         cycle = self.begin_cycle(request)
@@ -149,7 +154,9 @@ class MppiController(PathFollower):
     def _clip(self, cycle: ControlCycle, velocities: Float32Array) -> None:
         measured = cycle.request.velocity
         now = np.array([measured.vx, measured.vy, measured.wz], dtype=np.float32)
-        clip_velocities(velocities, now, self._low, self._high, self._change, self._radius)
+        limit = np.array([cycle.speed_limit, cycle.speed_limit, np.inf], dtype=np.float32)
+        low, high = np.maximum(self._low, -limit), np.minimum(self._high, limit)
+        clip_velocities(velocities, now, low, high, self._change, self._radius)
 
     def _control_cost(self, velocities: Float32Array) -> Float32Array:
         """(samples,) price of the first step's distance from the nominal one, per variance (Williams 2018, eq. 29)."""

@@ -72,6 +72,11 @@ class RegulatedPurePursuitController(PathFollower):
         self._at_goal = False
         return super().set_plan(path)
 
+    @property
+    def full_speed(self) -> float:
+        """Speed [m/s] on a free straight path."""
+        return self.parameters.max_linear_vel
+
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """Find the carrot, choose between turning and driving, regulate the speed, look ahead for collisions."""
         cycle = self.begin_cycle(request)
@@ -157,7 +162,8 @@ class RegulatedPurePursuitController(PathFollower):
         curvature = 2.0 * carrot[1] / max(carrot[0] ** 2 + carrot[1] ** 2, 1e-6)
         remaining = cycle.tracker.to_cusp if p.allow_reversing else cycle.tracker.remaining
         cost = cycle.costmap.cost_at(cycle.request.pose.x, cycle.request.pose.y) or FREE
-        wanted = self.regulated_speed(curvature, cost, remaining) * (-1.0 if backward else 1.0)
+        regulated = min(self.regulated_speed(curvature, cost, remaining), cycle.speed_limit)
+        wanted = -regulated if backward else regulated
         change = p.max_linear_accel * p.control_period
         speed = min(max(wanted, velocity.vx - change), velocity.vx + change)
         if abs(speed * curvature) > p.max_angular_vel:
