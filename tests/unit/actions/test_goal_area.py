@@ -1,7 +1,7 @@
 """Goal areas: the cheapest member is planned to, the path ends where it enters, the robot stops inside."""
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, MoveBaseGoal
@@ -99,6 +99,7 @@ def test_a_polygon_may_be_concave(x, y, inside):
     assert PolygonArea(L_SHAPE).contains(Pose.planar(x, y)) is inside
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9)), min_size=3, max_size=3))
 def test_every_member_of_a_triangle_is_inside_it(points):
     (ax, ay), (bx, by), (cx, cy) = points

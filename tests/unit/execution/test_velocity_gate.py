@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.events import EventBus, EventKind, MemorySink
@@ -174,6 +174,7 @@ def _naive_limit(vx, vy, wz):
     return vx * factor, vy * factor, wz * factor
 
 
+@settings(deadline=None)
 @given(speeds, speeds, speeds)
 def test_limits_scale_the_whole_command_so_that_its_direction_is_kept(vx, vy, wz):
     limited = LIMITS.apply(Twist.planar(vx, vy, wz))
@@ -183,6 +184,7 @@ def test_limits_scale_the_whole_command_so_that_its_direction_is_kept(vx, vy, wz
     assert limited.vx * wz == pytest.approx(limited.wz * vx, abs=1e-6)
 
 
+@settings(deadline=None)
 @given(speeds, st.floats(-math.pi, math.pi))
 def test_an_ackermann_command_is_limited_in_speed_and_angle(speed, angle):
     limited = LIMITS.apply(AckermannCommand(speed, angle))
