@@ -1,0 +1,31 @@
+"""Makes the pictures of the README from real runs: ``python docs/make_pictures.py``."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+from terrain.runner import RunOptions, run_scenario
+from terrain.scenario import load_scenario
+
+PICTURES = Path(__file__).resolve().parent / "pictures"
+WIDTH = 900  # pixels
+
+
+def make(name: str) -> None:
+    """Run a shipped scenario and keep its picture, small."""
+    with tempfile.TemporaryDirectory() as folder:
+        result = run_scenario(load_scenario(name), RunOptions(Path(folder)))
+        if not result.success:
+            raise SystemExit(f"{name}: {result.outcome_name}: {result.message}")
+        image = Image.open(Path(folder) / "picture.png").convert("RGB")
+        image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
+        image.quantize(128).save(PICTURES / f"{name}.png", optimize=True)
+
+
+if __name__ == "__main__":
+    PICTURES.mkdir(exist_ok=True)
+    for scenario in ("outdoor", "indoor"):
+        make(scenario)
