@@ -36,7 +36,7 @@ def test_the_path_ends_where_it_enters_the_area(make_bench, area, length):
 
 def test_the_cheapest_member_wins(make_bench):
     bench = make_bench()
-    assert send(bench, STATIONS).wait().path[-1].y == pytest.approx(1.9, abs=0.1)
+    assert send(bench, STATIONS).wait().path[-1].y == pytest.approx(1.9, abs=0.15)
     assert [request.goal for request in bench.planner.requests] == list(STATIONS.poses)
 
 
@@ -44,7 +44,7 @@ def test_members_that_can_not_be_reached_do_not_count(make_bench):
     bench = make_bench(planner_max_retries=0)
     blocked = PlanResult(GetPathOutcome.BLOCKED_GOAL, "occupied")
     bench.planner.play(lambda request: blocked if request.goal.x < 1.0 else straight_plan(request))
-    assert send(bench, STATIONS).wait().path[-1].x == pytest.approx(4.9, abs=0.1)
+    assert send(bench, STATIONS).wait().path[-1].x == pytest.approx(4.9, abs=0.15)
     bench.planner.play(blocked)
     assert send(bench, STATIONS).wait().outcome == GetPathOutcome.BLOCKED_GOAL
 
