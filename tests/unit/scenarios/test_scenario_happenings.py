@@ -1,0 +1,146 @@
+"""Faults, actors, limits and settings of scenarios."""
+
+import math
+
+import numpy as np
+import pytest
+import yaml
+
+from mbf_abstract.findings import ConfigError
+from mbf_abstract.geometry import Pose
+from mbf_abstract.sensing import RangeScan
+from terrain.ego_sensors import Localization
+from terrain.kinematic_robot import KinematicRobot, KinematicWorld
+from terrain.mishaps import MishapKind
+from terrain.robot_models import TURTLEBOT
+from terrain.scenario_actors import Crowd, Door, Walker, add_actors
+from terrain.scenario_faults import FaultSchedule, LocalizationJump, SensorFault, seen_from
+from terrain.scenario_limits import Limits, broken_limits
+from terrain.scenario_settings import apply_settings
+from terrain.scenario_world import build_world
+from terrain.scenario_world_types import OfficeWorld
+
+
+class ClockOnly:
+    """The part of a world that a fault schedule uses."""
+
+    def __init__(self):
+        self.time = 0.0
+
+    def before_step(self, callback):
+        self.step = callback
+
+    def at(self, time):
+        self.time = time
+        self.step()
+
+
+@pytest.fixture
+def localization():
+    world = KinematicWorld()
+    return Localization(KinematicRobot(world, TURTLEBOT, Pose.planar(1.0, 2.0)), np.random.default_rng(0))
+
+
+def test_a_fault_holds_from_its_start_to_just_before_its_end(localization):
+    clock = ClockOnly()
+    FaultSchedule(clock, {}, localization, [SensorFault(type="silent", sensor="localization", start=1.0, end=2.0)])
+    said = []
+    for time in (0.0, 1.0, 1.9, 2.0):
+        clock.at(time)
+        said.append(localization.measure(time) is not None)
+    assert said == [True, False, False, True]
+
+
+def test_two_faults_of_one_sensor_do_not_switch_each_other_off(localization):
+    clock = ClockOnly()
+    spans = [(1.0, 3.0), (5.0, 6.0)]
+    faults = [SensorFault(type="silent", sensor="localization", start=a, end=b) for a, b in spans]
+    FaultSchedule(clock, {}, localization, faults)
+    clock.at(2.0)
+    assert localization.measure(2.0) is None
+
+
+def test_a_jump_shifts_the_pose_and_ends(localization):
+    clock = ClockOnly()
+    FaultSchedule(clock, {}, localization, [LocalizationJump(type="jump", dx=0.5, dyaw=0.1, start=1.0, end=2.0)])
+    clock.at(1.5)
+    jumped = localization.measure(1.5)
+    assert (jumped.x, jumped.y) == pytest.approx((1.5, 2.0))
+    assert jumped.yaw == pytest.approx(0.1)
+    clock.at(2.0)
+    assert localization.measure(2.0).x == pytest.approx(1.0)
+
+
+def test_a_scan_turns_and_moves_with_the_believed_pose():
+    scan = RangeScan("lidar", "map", np.array([1.0, 2.0, 0.3]), np.array([[2.0, 2.0, 0.3]]), np.array([True]), 0.0)
+    seen = seen_from(scan, Pose.planar(1.0, 2.0), Pose.planar(3.0, 0.0, math.pi / 2))
+    assert seen.origin == pytest.approx([3.0, 0.0, 0.3])
+    assert seen.ends[0] == pytest.approx([3.0, 1.0, 0.3])
+
+
+def test_actors_move_in_the_world_and_the_seed_draws_the_crowd(tmp_path):
+    actors = (
+        Walker(type="walker", route=((4.0, 9.7), (6.0, 9.7)), speed=1.0),
+        Door(type="door", opened={"x": 9.0, "y": 11.0}, closed={"x": 7.5, "y": 11.0}, closes_at=0.0),
+        Crowd(type="crowd", count=2, x_range=(1.0, 10.0), y_range=(8.6, 10.9)),
+    )
+    places = []
+    for seed in (1, 1, 2):
+        world = build_world(OfficeWorld(type="office"), tmp_path, np.random.default_rng(0), np.zeros((0, 2)))
+        before = world.bullet.bullet.getNumBodies(physicsClientId=world.bullet.client)
+        add_actors(world, actors, np.random.default_rng(seed))
+        for _ in range(240):
+            world.bullet.step()
+        bodies = range(before, before + 4)
+        places.append([world.bullet.bullet.getBasePositionAndOrientation(b, world.bullet.client)[0] for b in bodies])
+        world.bullet.close()
+    assert places[0][0] == pytest.approx((5.0, 9.7, 0.85), abs=0.02)
+    assert places[0][1] == pytest.approx((8.25, 11.0, 1.0), abs=0.02)
+    assert places[0] == places[1]
+    assert places[0][2:] != places[2][2:]
+
+
+def test_each_broken_limit_is_named():
+    limits = Limits(max_tilt=20.0, max_path_length=50.0, forbidden=(MishapKind.COLLISION,))
+    metrics = {"max_tilt_deg": 25.0, "path_length_m": 40.0, "mishaps": ["collision", "slipping"]}
+    assert broken_limits(limits, metrics) == ["max_tilt_deg 25.0 is above 20 degrees", "collision happened"]
+    assert broken_limits(Limits(), metrics) == []
+
+
+CONFIG = """
+planners:
+  - {name: fast, type: dijkstra}
+  - {name: smooth, type: cvp}
+mesh_map: {edge_cost_factor: 1.0}
+"""
+
+
+@pytest.mark.parametrize(
+    ("planner", "first", "count"),
+    [
+        ("smooth", "cvp", 2),
+        ("cvp", "cvp", 2),
+        ("dijkstra", "dijkstra", 2),
+        ("astar", "astar", 3),
+        ("a.b:C", "a.b:C", 3),
+    ],
+)
+def test_the_planner_of_a_setting_becomes_the_default(planner, first, count):
+    planners = yaml.safe_load(apply_settings(CONFIG, {"planner": planner}))["planners"]
+    assert planners[0]["type"] == first
+    assert len(planners) == count
+
+
+def test_a_dotted_setting_changes_one_value_with_its_type():
+    changed = yaml.safe_load(apply_settings(CONFIG, {"mesh_map.edge_cost_factor": "2.5", "oscillation.timeout": "3"}))
+    assert changed["mesh_map"] == {"edge_cost_factor": 2.5}
+    assert changed["oscillation"] == {"timeout": 3}
+
+
+def test_a_dotted_setting_through_a_value_is_refused():
+    with pytest.raises(ConfigError, match="block of keys"):
+        apply_settings(CONFIG, {"mesh_map.edge_cost_factor.x": "2"})
+
+
+def test_no_settings_leave_the_text_as_it_is():
+    assert apply_settings(CONFIG, {}) == CONFIG
