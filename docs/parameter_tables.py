@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from typing import Any
+from typing import Any, get_args
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic.fields import FieldInfo
@@ -105,7 +105,19 @@ def parameter_table(model: type[ParameterModel], names: list[str] | None = None)
         dynamic = "yes" if extra.get("dynamic", True) else "no"
         cells = (f"`{name}`", _default(field), extra.get("unit", ""), _range(field), dynamic, field.description or "")
         rows.append("| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |")
-    return "\n".join(rows) + "\n"
+    table = "\n".join(rows) + "\n"
+    for name, field in fields.items():
+        for inner in _models_in(field.annotation):
+            summary = (inspect.getdoc(inner) or "").partition("\n\n")[0]
+            table += f"\nKeys of `{name}`: {summary}\n\n{parameter_table(inner)}"
+    return table
+
+
+def _models_in(annotation: Any) -> list[type[ParameterModel]]:
+    """Parameter models inside a type such as ``tuple[Zone, ...]`` or ``dict[str, Source]``."""
+    if isinstance(annotation, type) and issubclass(annotation, ParameterModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models_in(part)]
 
 
 def _default(field: FieldInfo) -> str:
@@ -114,6 +126,8 @@ def _default(field: FieldInfo) -> str:
     value = field.get_default(call_default_factory=True)
     if value is None or value == "":
         return "none" if value is None else '""'
+    if isinstance(value, ParameterModel):
+        return "see below"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):

@@ -1,0 +1,46 @@
+"""What the documentation takes from the code is what the code says now."""
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+@pytest.fixture(scope="module")
+def generated():
+    return importlib.import_module("generate_reference").generate()
+
+
+def test_no_generated_file_is_out_of_date(generated):
+    old = [file.name for file, text in generated.items() if not file.is_file() or file.read_text("utf-8") != text]
+    assert not old, "run: python docs/generate_reference.py"
+
+
+def test_every_parameter_has_a_sentence_and_every_plugin_a_summary(generated):
+    page = generated[DOCS / "configuration.md"]
+    assert not re.findall(r"^\|.*\|\s*\|$", page, re.MULTILINE), "a parameter without a sentence"
+    assert not re.findall(r"^### .*\n\n\n", page, re.MULTILINE), "a plugin without a text"
+
+
+def test_the_fault_table_has_a_row_for_every_file(generated):
+    rows = generated[DOCS / "faults_and_promises.md"]
+    files = {file.name for file in (DOCS.parent / "tests" / "faults").glob("test_*.py")}
+    assert {name for name in files if f"`{name}`" in rows} == files
+
+
+def test_every_listing_names_a_file_and_shows_it(generated):
+    listings = [match for text in generated.values() for match in re.findall(r"<!-- listing: (\S+) -->\n(.*)", text)]
+    assert len(listings) >= 10
+    assert [file for file, first in listings if first != "```python"] == []
+
+
+def test_every_relative_link_leads_to_a_file():
+    dead = []
+    for page in DOCS.rglob("*.md"):
+        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text("utf-8")):
+            if not (page.parent / target).exists():
+                dead.append(f"{page.name}: {target}")
+    assert not dead
