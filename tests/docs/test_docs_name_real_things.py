@@ -1,0 +1,77 @@
+"""Commands, keys, types and methods that the pages mention exist."""
+
+import re
+from pathlib import Path
+
+import pytest
+import typer
+import yaml
+
+from mbf_abstract.actions.handle import GoalHandle
+from mbf_abstract.cli import make_app
+from mbf_abstract.config import PLUGIN_LISTS
+from mbf_abstract.map_queries import MapQueries
+from mbf_abstract.navigation_parameters import NavigationParameters
+from mbf_abstract.navigator import Navigator
+from mbf_abstract.registry import PluginRegistry
+from mbf_abstract.server import AbstractNavigationServer
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGES = sorted(page for page in DOCS.glob("*.md"))
+TEXTS = "\n".join(page.read_text("utf-8") for page in PAGES)
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", TEXTS, re.DOTALL)
+
+
+def test_every_command_of_the_shell_blocks_exists():
+    known = set(typer.main.get_command(make_app()).commands)
+    used = {name for block in blocks("sh") for name in re.findall(r"^mbf (\w+)", block, re.MULTILINE)}
+
+    assert used and used <= known
+
+
+def test_every_script_of_the_shell_blocks_exists():
+    used = {name for block in blocks("sh") for name in re.findall(r"python (\S+\.py)", block)}
+
+    assert [name for name in used if not (DOCS.parent / name).is_file()] == []
+
+
+def test_every_yaml_block_has_known_keys_or_names_of_its_plugins():
+    sections = {"global_costmap", "local_costmap", "mesh_map", "elevation_grid"}
+    for block in blocks("yaml"):
+        data = yaml.safe_load(block)
+        names = {item["name"] for key in PLUGIN_LISTS for item in data.get(key, [])}
+        unknown = set(data) - names - sections - {"backend", *PLUGIN_LISTS, *NavigationParameters.model_fields}
+        assert not unknown, block
+
+
+@pytest.mark.parametrize(
+    ("pattern", "owner"),
+    [
+        (r"`navigator\.(?!server)(\w+)", Navigator),
+        (r"`server\.(?!queries)(\w+)", AbstractNavigationServer),
+        (r"`server\.queries\.(\w+)", MapQueries),
+        (r"`handle\.(\w+)", GoalHandle),
+    ],
+)
+def test_every_method_that_is_named_exists(pattern, owner):
+    named = set(re.findall(pattern, TEXTS))
+
+    assert named and [name for name in named if not hasattr(owner, name)] == []
+
+
+def test_every_plugin_type_of_the_name_tables_is_registered():
+    entries = {entry.name for entry in PluginRegistry().entries()}
+    named = set(re.findall(r"`((?:costmap|mesh)\.[a-z_]+)`", (DOCS / "coming_from.md").read_text("utf-8")))
+
+    assert len(named) > 10 and named <= entries
+
+
+def test_every_parameter_of_the_name_tables_exists():
+    """The right-hand names of the move_base table that look like navigation parameters."""
+    kept = re.findall(r"`([a-z]+_[a-z_]+)`.*\| the same", (DOCS / "coming_from.md").read_text("utf-8"))
+    table = [name for name in kept if name.startswith(("planner_", "controller_", "oscillation_", "shutdown_"))]
+
+    assert table and set(table) <= set(NavigationParameters.model_fields)
