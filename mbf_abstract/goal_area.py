@@ -1,9 +1,9 @@
 """Goals that are areas: a disc, a polygon, or a set of poses. Reaching any place inside is success.
 
 Use one where the exact pose does not matter ("into the kitchen", "to one of the three charging stations"): the
-planner is asked for a path to every member, the cheapest wins, it is cut where it enters the area, and the robot
-stops as soon as it is inside. Do not use a large area where one pose would do: each member costs one call of the
-planner. Areas are given in the server's global frame.
+planner is asked for a path to every member, the cheapest wins, and the robot stops as soon as it is inside. Do not use
+a large area where one pose would do: each member costs one call of the planner. Areas are given in the server's global
+frame.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 
@@ -148,7 +148,9 @@ class PoseSetArea:
 
 
 def plan_to_area(make_plan: Callable[[PlanRequest], PlanResult], request: PlanRequest, area: GoalArea) -> PlanResult:
-    """Ask for a path to every member and answer the cheapest, cut where it enters the area.
+    """Ask for a path to every member and answer the cheapest.
+
+    The path leads on to the member, not to the border only: a robot that slows down at a border might never cross it.
 
     Without any success the answer is the one for the first member. A canceled request ends between two calls.
     """
@@ -160,18 +162,9 @@ def plan_to_area(make_plan: Callable[[PlanRequest], PlanResult], request: PlanRe
     reached = [answer for answer in answers if answer.success and answer.path is not None and len(answer.path)]
     if not reached:
         return answers[0]
-    return _cut(min(reached, key=_cost), area)
+    return min(reached, key=_cost)
 
 
 def _cost(answer: PlanResult) -> float:
     assert answer.path is not None
     return answer.cost if answer.cost != 0.0 else answer.path.length
-
-
-def _cut(answer: PlanResult, area: GoalArea) -> PlanResult:
-    path = answer.path
-    assert path is not None
-    first_inside = next((i for i, pose in enumerate(path) if area.contains(pose)), len(path) - 1)
-    cut: Path = path[: first_inside + 1]
-    share = cut.length / path.length if path.length > 0.0 else 1.0
-    return replace(answer, path=cut, cost=_cost(answer) * share)

@@ -1,4 +1,4 @@
-"""Goal areas: the cheapest member is planned to, the path ends where it enters, the robot stops inside."""
+"""Goal areas: the cheapest member is planned to, the robot stops as soon as it is inside."""
 
 import pytest
 from hypothesis import given, settings
@@ -23,20 +23,19 @@ def send(bench, area, kind=GetPathGoal):
     return bench.navigator.send(kind(NOT_LOOKED_AT, goal_area=area))
 
 
-@pytest.mark.parametrize(("area", "length"), [(DISC, 2.0), (SQUARE, 2.0), (STATIONS, 1.9)])
-def test_the_path_ends_where_it_enters_the_area(make_bench, area, length):
+@pytest.mark.parametrize(("area", "length"), [(DISC, 2.1), (SQUARE, 2.2), (STATIONS, 2.0)])
+def test_the_path_leads_to_the_nearest_member(make_bench, area, length):
     bench = make_bench()
     result = send(bench, area).wait()
     assert result.success
     assert area.contains(result.path[-1])
-    assert not any(area.contains(pose) for pose in result.path[:-1])
-    assert result.path.length == pytest.approx(length, abs=0.25)
+    assert result.path.length == pytest.approx(length)
     assert result.cost == pytest.approx(result.path.length)
 
 
 def test_the_cheapest_member_wins(make_bench):
     bench = make_bench()
-    assert send(bench, STATIONS).wait().path[-1].y == pytest.approx(1.9, abs=0.15)
+    assert send(bench, STATIONS).wait().path[-1].y == pytest.approx(2.0)
     assert [request.goal for request in bench.planner.requests] == list(STATIONS.poses)
 
 
@@ -44,7 +43,7 @@ def test_members_that_can_not_be_reached_do_not_count(make_bench):
     bench = make_bench(planner_max_retries=0)
     blocked = PlanResult(GetPathOutcome.BLOCKED_GOAL, "occupied")
     bench.planner.play(lambda request: blocked if request.goal.x < 1.0 else straight_plan(request))
-    assert send(bench, STATIONS).wait().path[-1].x == pytest.approx(4.9, abs=0.15)
+    assert send(bench, STATIONS).wait().path[-1].x == pytest.approx(5.0)
     bench.planner.play(blocked)
     assert send(bench, STATIONS).wait().outcome == GetPathOutcome.BLOCKED_GOAL
 
