@@ -221,7 +221,7 @@ class ClassicMoveBase:
             self._planner.retries += 1
             limit, patience = self.settings.max_planning_retries, self.settings.planner_patience
             too_many = 0 <= limit < self._planner.retries
-            if was_running and (too_many or self._clock.now() > self._planner.last_valid + patience):
+            if was_running and (too_many or self._is_over(self._planner.last_valid, patience)):
                 self._planner.running = False
                 self._clear(Trigger.PLANNING)
 
@@ -243,7 +243,7 @@ class ClassicMoveBase:
             return ActionResult(result.outcome, f"Failed to pass global plan to the controller: {result.message}")
         if self._state is not ClassicState.CONTROLLING:
             return None
-        if self._clock.now() > self._last_valid_control + self.settings.controller_patience:
+        if self._is_over(self._last_valid_control, self.settings.controller_patience):
             self._clear(Trigger.CONTROLLING)
         else:
             self._planner.restart_patience()
@@ -275,7 +275,7 @@ class ClassicMoveBase:
             self._planner.wake()
         elif self._state is ClassicState.CONTROLLING:
             timeout = self.settings.oscillation_timeout
-            if 0.0 < timeout < self._clock.now() - self._last_oscillation_reset:
+            if timeout > 0.0 and self._is_over(self._last_oscillation_reset, timeout):
                 self._clear(Trigger.OSCILLATION)
         elif not self._mission.robot_is_stopping:
             return self._next_recovery()
@@ -313,6 +313,9 @@ class ClassicMoveBase:
         if self._drive is not None:
             self._drive.cancel(f"recovery, trigger {trigger.name.lower()}")
         self._enter(ClassicState.CLEARING)
+
+    def _is_over(self, since: float, seconds: float) -> bool:
+        return self._clock.now() > since + seconds + TIME_RESOLUTION
 
     def _enter(self, state: ClassicState) -> None:
         if state is not self._state:

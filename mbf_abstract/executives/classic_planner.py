@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 from mbf_abstract.actions.goals import GetPathGoal, GetPathResult
 from mbf_abstract.actions.handle import AnyGoalHandle
+from mbf_abstract.executives.conditions import TIME_RESOLUTION
 from mbf_abstract.executives.mission import MissionContext
 
 PLANNER_SLOT = 0
@@ -67,7 +68,7 @@ class ClassicPlanner:
     def start_if_due(self) -> None:
         """Send the next goal if its time has come."""
         now = self._mission.clock.now()
-        if self.due > now:
+        if self.due > now + TIME_RESOLUTION:
             return
         self._started = now
         self._handle = self._mission.send(

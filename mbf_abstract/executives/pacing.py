@@ -180,6 +180,6 @@ class PipelineSequence(Composite):
             if status == Status.FAILURE:
                 return Status.FAILURE
             if status == Status.RUNNING and index >= self._reached:
+                self._reached = index
                 return Status.RUNNING
-            self._reached = max(self._reached, index)
         return self.children[-1].status

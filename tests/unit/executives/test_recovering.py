@@ -1,0 +1,188 @@
+"""MemRec, the recovery node (F183 to F192), round robin (F193 to F196), guards and the recovery filter (F206 to F208).
+
+Nav2's "skipped" (F188, F189, F195) does not exist in py_trees; a closed guard fails instead.
+"""
+
+from types import SimpleNamespace
+
+import pytest
+from py_trees.common import Status
+
+from mbf_abstract.executives.conditions import recovery_would_help
+from mbf_abstract.executives.recovering import InOrder, MemRec, OutcomeGuard, PickByOutcome, RecoveryNode, RoundRobin
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
+
+
+def bind(tree, code=0):
+    """Let the tree run in a mission whose last failure has this code."""
+    for node in tree.iterate():
+        node.setup(mission=SimpleNamespace(failure_code=code))
+    return tree
+
+
+def recovery_node(scripted, task, recovery, retries=1):
+    return RecoveryNode("node", [scripted(task), scripted(recovery)], retries)
+
+
+# ------------------------------------------------------------------------------------------------------ MemRec
+def test_memrec_ends_with_a_check_that_passes(scripted, tick):
+    tree = MemRec("free", scripted("S"), [scripted("S")])
+    assert tick(tree) == "S"
+    assert tree.children[1].ticks == 0
+
+
+def test_memrec_alternates_the_check_with_the_next_recovery(scripted, tick):
+    tree = MemRec("free", scripted("FFS"), [scripted("S"), scripted("S"), scripted("S")])
+    assert tick(tree) == "S"
+    assert [child.ticks for child in tree.children] == [3, 1, 1, 0]
+
+
+def test_memrec_checks_again_after_a_failed_recovery(scripted, tick):
+    tree = MemRec("free", scripted("FS"), [scripted("F")])
+    assert tick(tree) == "S"
+
+
+def test_memrec_fails_when_the_list_is_used_up(scripted, tick):
+    tree = MemRec("free", scripted("F"), [scripted("S"), scripted("RS")])
+    assert tick(tree, 2) == "RF"
+    assert [child.ticks for child in tree.children] == [3, 1, 2]
+
+
+def test_memrec_remembers_its_place_while_a_recovery_runs(scripted, tick):
+    tree = MemRec("free", scripted("FFS"), [scripted("RRS"), scripted("RS")])
+    assert tick(tree, 4) == "RRRS"
+    assert [child.entries for child in tree.children] == [3, 1, 1]
+
+
+def test_memrec_starts_its_list_again_when_entered_again(scripted, tick):
+    tree = MemRec("free", scripted("FSFS"), [scripted("S"), scripted("S")])
+    assert tick(tree, 2) == "SS"
+    assert [child.ticks for child in tree.children] == [4, 2, 0]
+
+
+def test_memrec_gives_up_on_a_code_no_recovery_mends(scripted, tick):
+    tree = bind(MemRec("plan", scripted("F"), [], give_up_on=[53]), code=53)
+    tree.add_child(recovery := scripted("S"))
+    assert tick(tree) == "F"
+    assert recovery.ticks == 0
+
+
+# ----------------------------------------------------------------------------------------------- recovery node
+@pytest.mark.parametrize(
+    ("fact", "task", "recovery", "seen"),
+    [
+        ("F183", "S", "S", "S"),
+        ("F184", "FS", "S", "S"),
+        ("F185", "F", "F", "F"),
+        ("F186", "FF", "S", "F"),
+        ("F187", "R", "S", "R"),
+        ("F187", "F", "R", "R"),
+    ],
+)
+def test_recovery_node(scripted, tick, fact, task, recovery, seen):
+    assert tick(recovery_node(scripted, task, recovery)) == seen
+
+
+def test_f190_a_recovery_node_refuses_three_children(scripted):
+    with pytest.raises(ValueError, match="got 3 children"):
+        RecoveryNode("node", [scripted("S"), scripted("S"), scripted("S")])
+
+
+def test_f191_a_child_without_status_is_an_error(scripted, tick):
+    with pytest.raises(RuntimeError, match="returned no status"):
+        tick(recovery_node(scripted, "I", "S"))
+
+
+@pytest.mark.parametrize(("task", "recovery"), [("S", "S"), ("FS", "S"), ("F", "F"), ("FF", "S")])
+def test_f192_after_any_end_both_children_are_idle(scripted, tick, task, recovery):
+    tree = recovery_node(scripted, task, recovery)
+    tick(tree)
+    assert [child.status for child in tree.children] == [Status.INVALID] * 2
+
+
+# ------------------------------------------------------------------------------------------------- round robin
+def test_f193_a_success_is_remembered(scripted, tick):
+    tree = RoundRobin("turns", [scripted("F"), scripted("S"), scripted("S")])
+    assert tick(tree, 2) == "SS"
+    assert [child.ticks for child in tree.children] == [1, 1, 1]
+
+
+def test_f194_all_failures_fail(scripted, tick):
+    tree = RoundRobin("turns", [scripted("F"), scripted("F")])
+    assert tick(tree) == "F"
+    assert [child.ticks for child in tree.children] == [1, 1]
+
+
+def test_f196_without_wrap_around_a_turn_ends_with_the_last_child(scripted, tick):
+    tree = RoundRobin("turns", [scripted("SF"), scripted("F"), scripted("F")], wrap_around=False)
+    assert tick(tree, 2) == "SF"
+    assert [child.ticks for child in tree.children] == [1, 1, 1]
+
+
+def test_an_idle_round_robin_begins_with_its_first_child(scripted, tick):
+    tree = RoundRobin("turns", [scripted("S"), scripted("S")])
+    tick(tree)
+    tree.stop(Status.INVALID)
+    tick(tree)
+    assert [child.ticks for child in tree.children] == [2, 0]
+
+
+# ------------------------------------------------------------------------------------------------------ guards
+def test_a_guard_opens_for_its_codes_only(scripted, tick):
+    child = scripted("S")
+    tree = OutcomeGuard("contact", child, [ExePathOutcome.COLLISION])
+    assert tick(bind(tree, ExePathOutcome.BLOCKED_PATH)) == "F"
+    assert child.ticks == 0
+    assert tick(bind(tree, ExePathOutcome.COLLISION)) == "S"
+
+
+def test_a_guard_decides_once_and_lets_its_child_finish(scripted, tick):
+    tree = bind(OutcomeGuard("contact", scripted("RS"), [104]), 104)
+    assert tick(tree) == "R"
+    tree.mission.failure_code = 0
+    assert tick(tree) == "S"
+
+
+def test_the_first_guard_that_fits_is_picked(scripted, tick):
+    children = [scripted("S"), scripted("S"), scripted("S")]
+    codes = [[1], [2, 3], [3]]
+    tree = PickByOutcome("pick", [OutcomeGuard(str(c), child, c) for c, child in zip(codes, children, strict=True)])
+    assert tick(bind(tree, 3)) == "S"
+    assert [child.ticks for child in children] == [0, 1, 0]
+
+
+def test_where_no_guard_fits_the_pick_fails(scripted, tick):
+    assert tick(bind(PickByOutcome("pick", [OutcomeGuard("g", scripted("S"), [1])]), 2)) == "F"
+
+
+def test_turns_are_remembered_across_picks_of_other_codes(scripted, tick):
+    ran = []
+    first, second, other = (scripted("S", name) for name in ("first", "second", "other"))
+    for node in (first, second, other):
+        node.terminate = lambda status, node=node: ran.append(node.name) if status == Status.SUCCESS else None
+    blocked = OutcomeGuard("blocked", RoundRobin("turns", [first, second]), [110])
+    tree = InOrder("recover", [PickByOutcome("pick", [OutcomeGuard("contact", other, [104]), blocked])])
+    for code in (110, 104, 110):
+        tick(bind(tree, code))
+    assert ran == ["first", "other", "second"]
+
+
+# ------------------------------------------------------------------------------------------------ recovery filter
+@pytest.mark.parametrize(
+    ("fact", "outcome", "helps"),
+    [
+        ("F206", ExePathOutcome.SUCCESS, False),
+        ("F206", ExePathOutcome.INVALID_PLUGIN, False),
+        ("F206", ExePathOutcome.TF_ERROR, False),
+        ("F206", ExePathOutcome.INVALID_PATH, False),
+        ("F207", ExePathOutcome.FAILURE, True),
+        ("F207", ExePathOutcome.PAT_EXCEEDED, True),
+        ("F207", ExePathOutcome.ROBOT_STUCK, True),
+        ("F207", ExePathOutcome.NO_VALID_CMD, True),
+        ("F208", GetPathOutcome.FAILURE, True),
+        ("F208", GetPathOutcome.NO_PATH_FOUND, True),
+        ("F208", GetPathOutcome.SUCCESS, False),
+    ],
+)
+def test_whether_a_recovery_would_help(fact, outcome, helps):
+    assert recovery_would_help(outcome) is helps
