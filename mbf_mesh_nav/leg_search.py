@@ -82,7 +82,7 @@ def spread_from(
         distances,
         predecessors,
         seeds,
-        mean_edge_length(mesh_map),
+        threshold_step(mesh_map),
         targets,
         offsets,
         cancel_flag,
@@ -102,9 +102,9 @@ def seeded_arrays(
     return distances, predecessors, seeds
 
 
-def mean_edge_length(mesh_map: MeshMap) -> float:
-    """Mean edge length [m] of a sample of the edges: the natural step of a wave."""
-    return float(np.mean(mesh_map.neighbour_lengths[:65536])) if len(mesh_map.neighbour_lengths) else 1.0
+def threshold_step(mesh_map: MeshMap) -> float:
+    """Step [m] of the work lists of ``propagate_distances``: four edges; with less the far list is scanned often."""
+    return 4.0 * mesh_map.topology.mean_edge_length
 
 
 def vertex_path_leg(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +74,11 @@ class MeshTopology:
     def vertex_count(self) -> int:
         """Number of vertices."""
         return len(self.vertices)
+
+    @cached_property
+    def mean_edge_length(self) -> float:
+        """Mean length of the edges [m], the natural unit of steps over the mesh; 1 without edges."""
+        return float(np.mean(self.neighbour_lengths)) if len(self.neighbour_lengths) else 1.0
 
     def digest(self) -> str:
         """Hexadecimal SHA-256 of vertices and faces: the identity of the mesh in caches."""

@@ -11,8 +11,8 @@ from mbf_mesh_nav.kernels.corners import build_corner_slots
 from mbf_mesh_nav.kernels.cvp import propagate_wave
 from mbf_mesh_nav.kernels.descent import trace_descent
 from mbf_mesh_nav.kernels.wave_directions import wave_directions
-from mbf_mesh_nav.leg_search import LegQuery, mean_edge_length, seeded_arrays
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.leg_search import LegQuery, seeded_arrays
+from mbf_mesh_nav.mesh_map import MeshMap, MeshSnapshot
 from mbf_mesh_nav.vector_field import VectorField
 
 
@@ -34,7 +34,7 @@ class Wave:
 
 
 class WaveSearch:
-    """Waves over one mesh; keeps the corner records, which depend on the mesh alone."""
+    """Waves over one mesh; keeps the corner records of the mesh and their weights at the last snapshot."""
 
     def __init__(self, mesh_map: MeshMap) -> None:
         self._mesh_map = mesh_map
@@ -45,6 +45,8 @@ class WaveSearch:
             mesh_map.neighbour_offsets,
             mesh_map.neighbours,
         )
+        self._corner_ends = mesh_map.neighbours[self._corner_slots[:, :2]]
+        self._gather_weights(mesh_map.snapshot())
 
     def spread(self, query: LegQuery, overshoot: float) -> Wave | None:
         """Spread a wave from the goal until it is ``overshoot`` [m] past the start; None: not reached, or cancelled."""
@@ -54,19 +56,19 @@ class WaveSearch:
             seeds = self._seed_around(query, int(seeds[0]), distances, predecessors)
         cut_records = np.full(len(distances), -1, dtype=np.int32)
         corners = mesh_map.faces[query.start.face]
+        if query.snapshot is not self._weighted_for:
+            self._gather_weights(query.snapshot)
         settled = propagate_wave(
-            mesh_map.neighbour_offsets,
-            mesh_map.neighbours,
-            query.snapshot.edge_weights,
             mesh_map.vertex_face_offsets,
-            self._corner_slots,
+            self._corner_ends,
+            self._corner_weights,
             query.blocked,
             distances,
             predecessors,
             cut_records,
             seeds,
             np.ascontiguousarray(corners[~query.blocked[corners]]),
-            max(overshoot, 2.0 * mean_edge_length(mesh_map)),
+            max(overshoot, 2.0 * mesh_map.topology.mean_edge_length),
             query.cancel_flag,
         )
         if settled < 0 or not np.isfinite(distances[corners]).any():
@@ -106,9 +108,8 @@ class WaveSearch:
             mesh_map.vertices,
             mesh_map.faces,
             mesh_map.vertex_faces,
-            mesh_map.neighbours,
-            query.snapshot.edge_weights,
-            self._corner_slots,
+            self._corner_ends,
+            self._corner_weights,
             wave.distances,
             wave.predecessors,
             wave.cut_records,
@@ -117,6 +118,10 @@ class WaveSearch:
         towards_goal = goal.point - mesh_map.vertices[corners]
         directions[corners] = towards_goal / np.maximum(np.linalg.norm(towards_goal, axis=1, keepdims=True), 1e-9)
         return VectorField(directions, wave.distances, goal.face, goal.point.copy(), query.snapshot.version)
+
+    def _gather_weights(self, snapshot: MeshSnapshot) -> None:
+        self._weighted_for = snapshot
+        self._corner_weights = snapshot.edge_weights[self._corner_slots]
 
     def _seed_around(
         self, query: LegQuery, center: int, distances: NDArray[np.float32], predecessors: NDArray[np.int32]

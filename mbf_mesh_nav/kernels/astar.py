@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.compiled import kernel
 from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
-from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top
+from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
 _ROUNDING_MARGIN = 1.0 - 1e-6  # keeps the float32 bound below the float32 path cost
 
@@ -51,21 +51,19 @@ def search_towards(
         Number of settled vertices, -1 if cancelled. No path: all target distances stay infinite.
     """
     vertex_count = len(distances)
-    keys = np.empty(vertex_count, dtype=np.float32)
-    ids = np.empty(vertex_count, dtype=np.int32)
+    heap = np.empty(vertex_count, dtype=np.int64)
     positions = np.full(vertex_count, -1, dtype=np.int32)
     size = 0
     for seed in seeds:
-        size = push_or_decrease(
-            keys, ids, positions, size, seed, distances[seed] + straight_line_bound(vertices, seed, goal)
-        )
+        key = distances[seed] + straight_line_bound(vertices, seed, goal)
+        size = push_or_decrease(heap, positions, size, seed, key)
     best_total = np.float32(np.inf)
     settled = 0
-    while size > 0 and keys[0] < best_total:
+    while size > 0 and top_key(heap) < best_total:
         if settled % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
             return -1
-        vertex = ids[0]
-        size = remove_top(keys, ids, positions, size)
+        vertex = top_item(heap)
+        size = remove_top(heap, positions, size)
         settled += 1
         base = distances[vertex]
         for i in range(len(targets)):
@@ -78,7 +76,7 @@ def search_towards(
                 distances[neighbour] = candidate
                 predecessors[neighbour] = vertex
                 key = candidate + straight_line_bound(vertices, neighbour, goal)
-                size = push_or_decrease(keys, ids, positions, size, neighbour, key)
+                size = push_or_decrease(heap, positions, size, neighbour, key)
     return settled
 
 

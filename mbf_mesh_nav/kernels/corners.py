@@ -2,8 +2,9 @@
 
 A wave that unfolds triangles needs, at each incident face of a vertex, the two other corners and three edge weights.
 The record is three slots into ``neighbours`` and ``edge_weights``: towards the first other corner (counter-clockwise),
-towards the second, and the edge between those two. So it depends on the mesh alone: new costs need no new records, and
-the wave never searches for a face or an edge.
+towards the second, and the edge between those two. It depends on the mesh alone. ``neighbours[slots[:, :2]]`` are the
+records' ends and ``edge_weights[slots]`` their weights: with these two gathered the wave reads 20 bytes a record, one
+after the other, and never searches for a face or an edge. New costs need the weights gathered again, a tenth of a wave.
 """
 
 from __future__ import annotations

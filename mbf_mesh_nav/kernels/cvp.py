@@ -17,10 +17,10 @@ import numpy as np
 
 from mbf_mesh_nav.kernels.compiled import kernel
 from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
-from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top
+from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
 ALONG_EDGE = -1
-_FREE, _SETTLED, _BLOCKED = 0, 1, 2  # one settled and one free corner is the only pair with the sum 1
+_FREE, _BLOCKED, _SETTLED = 0, 1, 3  # one settled and one free corner is the only pair with the sum 3
 # float32 constants: a plain number would turn the arithmetic of the update into float64.
 _ZERO: Any = np.float32(0)
 _HALF: Any = np.float32(0.5)
@@ -30,11 +30,9 @@ _INFINITE: Any = np.float32(np.inf)
 
 @kernel
 def propagate_wave(
-    neighbour_offsets: Int32Array,
-    neighbours: Int32Array,
-    edge_weights: Float32Array,
     vertex_face_offsets: Int32Array,
-    corner_slots: Int32Array,
+    corner_ends: Int32Array,
+    corner_weights: Float32Array,
     blocked: BoolArray,
     distances: Float32Array,
     predecessors: Int32Array,
@@ -48,10 +46,8 @@ def propagate_wave(
 
     Parameters
     ----------
-    neighbour_offsets, neighbours, edge_weights : CSR arrays
-        int32 (V+1,), int32 (2E,), float32 (2E,) [m].
-    vertex_face_offsets, corner_slots : (V+1,) int32, (3F, 3) int32
-        Faces around a vertex as corner records, see ``corners.py``.
+    vertex_face_offsets, corner_ends, corner_weights : (V+1,) int32, (3F, 2) int32, (3F, 3) float32
+        Faces around a vertex as corner records with weights [m], see ``corners.py``.
     blocked : (V,) bool
         Vertices never entered.
     distances : (V,) float32
@@ -73,52 +69,43 @@ def propagate_wave(
         Number of settled vertices, -1 if cancelled.
     """
     vertex_count = len(distances)
-    keys = np.empty(vertex_count, dtype=np.float32)
-    ids = np.empty(vertex_count, dtype=np.int32)
+    heap = np.empty(vertex_count, dtype=np.int64)
     positions = np.full(vertex_count, -1, dtype=np.int32)
-    state = np.where(blocked, _BLOCKED, _FREE).astype(np.uint8)
+    state = blocked.astype(np.uint8)  # _FREE or _BLOCKED
     size = 0
     for seed in seeds:
-        size = push_or_decrease(keys, ids, positions, size, seed, distances[seed])
+        size = push_or_decrease(heap, positions, size, seed, distances[seed])
         state[seed] = _SETTLED  # the corners of the source's face: their distances are exact from the start
     limit = np.inf
-    pops = 0
-    while size > 0 and keys[0] <= limit:
+    pops, targets_settled = 0, 0
+    while size > 0 and top_key(heap) <= limit:
         if pops % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
             return -1
-        vertex = ids[0]
-        size = remove_top(keys, ids, positions, size)
+        vertex = top_item(heap)
+        size = remove_top(heap, positions, size)
         state[vertex] = _SETTLED
         pops += 1
-        if limit == np.inf and len(targets) > 0:
-            all_settled = True
-            for target in targets:
-                all_settled = all_settled and state[target] == _SETTLED
-            if all_settled:
+        while targets_settled < len(targets) and state[targets[targets_settled]] == _SETTLED:
+            targets_settled += 1
+            if targets_settled == len(targets):
                 limit = distances[vertex] + overshoot
         for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
-            slot_first, slot_second = corner_slots[record, 0], corner_slots[record, 1]
-            first, second = neighbours[slot_first], neighbours[slot_second]
+            first, second = corner_ends[record, 0], corner_ends[record, 1]
             if state[first] + state[second] != _FREE + _SETTLED:
                 continue
-            if state[first] == _SETTLED:
-                slot_known, slot_free = slot_first, slot_second
-            else:
-                slot_known, slot_free = slot_second, slot_first
-            known, free = neighbours[slot_known], neighbours[slot_free]
+            known, free = first, second
+            to_known, to_free, between = corner_weights[record, 0], corner_weights[record, 1], corner_weights[record, 2]
+            if state[first] == _FREE:
+                known, free = second, first
+                to_known, to_free = to_free, to_known
             distance, nearer = unfolded_distance(
-                distances[vertex],
-                distances[known],
-                distances[free],
-                edge_weights[slot_known],
-                edge_weights[slot_free],
-                edge_weights[corner_slots[record, 2]],
+                distances[vertex], distances[known], distances[free], to_known, to_free, between
             )
             if distance < distances[free]:
                 distances[free] = distance
                 predecessors[free] = vertex if abs(nearer) == 1 else known
                 cut_records[free] = record if nearer > 0 else ALONG_EDGE
-                size = push_or_decrease(keys, ids, positions, size, free, distance)
+                size = push_or_decrease(heap, positions, size, free, distance)
     return pops
 
 
@@ -156,10 +143,10 @@ def unfolded_distance(u1: float, u2: float, u3: float, c: float, b: float, a: fl
     n0 = a * a + (b - c) * (b + c)
     n1 = b * b + (u - u1) * (u + u1)
     n2 = a * a + (u - u2) * (u + u2)
-    if abs(n1) > _TWO * u * b:
+    beyond1, beyond2 = abs(n1) > _TWO * u * b, abs(n2) > _TWO * u * a
+    nearer_to_1 = n1 * a > n2 * b
+    if n1 * a > n0 * u and n2 * b > n0 * u and not beyond1 and not beyond2:  # the ray crosses side 12
+        return u, 1 if nearer_to_1 else 2
+    if beyond1 or (nearer_to_1 and not beyond2):
         return u1 + b, -1
-    if abs(n2) > _TWO * u * a:
-        return u2 + a, -2
-    if n1 * a > n2 * b:  # the ray passes nearer to corner 1
-        return (u, 1) if n2 * b > n0 * u else (u1 + b, -1)
-    return (u, 2) if n1 * a > n0 * u else (u2 + a, -2)
+    return u2 + a, -2

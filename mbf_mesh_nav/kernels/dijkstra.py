@@ -2,7 +2,7 @@
 
 Vertices below a moving threshold wait in the *near* list, the others in the *far* list. A vertex whose value drops
 is queued again, so the result is the same fixed point as Dijkstra's, bit for bit, whatever the step of the threshold;
-the step (about one edge) only keeps repeated visits rare. Compared with a heap nothing is sorted, which is
+the step (a few edges) only keeps repeated visits rare. Compared with a heap nothing is sorted, which is
 about twice as fast on meshes. (The idea of delta-stepping: Meyer and Sanders, 2003, on one thread.)
 
 Use it for whole fields. For one goal far from the borders ``astar.py`` settles fewer vertices.
@@ -51,7 +51,7 @@ def propagate_distances(
     seeds : (s,) int32
         Vertices whose distance is already final or better than what their neighbours know.
     threshold_step : float
-        Growth of the near list's bound [m]; about one mean edge weight. Does not change the result.
+        Growth of the near list's bound [m]; a few mean edge weights. Does not change the result.
     targets, target_offsets : (t,) int32, (t,) float32 [m]
         Stop once no target can improve ``min(distances[targets] + target_offsets)``; empty for the whole field.
     cancel_flag : (1,) uint8

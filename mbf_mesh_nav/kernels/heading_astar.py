@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mbf_mesh_nav.kernels.astar import straight_line_bound
 from mbf_mesh_nav.kernels.compiled import kernel
 from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
-from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top
+from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
 HEADINGS = 16
 HEADING_STEP = 2.0 * math.pi / HEADINGS
@@ -71,20 +71,19 @@ def search_with_heading(
         The best target state, -1 if there is none, -2 if cancelled.
     """
     state_count = len(distances)
-    keys = np.empty(state_count, dtype=np.float32)
-    ids = np.empty(state_count, dtype=np.int32)
+    heap = np.empty(state_count, dtype=np.int64)
     positions = np.full(state_count, -1, dtype=np.int32)
     size = 0
     for seed in seeds:
         key = distances[seed] + straight_line_bound(vertices, seed // HEADINGS, goal)
-        size = push_or_decrease(keys, ids, positions, size, seed, key)
+        size = push_or_decrease(heap, positions, size, seed, key)
     best_state, best_total = -1, np.inf
     settled = 0
-    while size > 0 and keys[0] < best_total:
+    while size > 0 and top_key(heap) < best_total:
         if settled % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
             return -2
-        state = ids[0]
-        size = remove_top(keys, ids, positions, size)
+        state = top_item(heap)
+        size = remove_top(heap, positions, size)
         settled += 1
         vertex, heading = state // HEADINGS, state % HEADINGS
         for i in range(len(targets)):
@@ -107,7 +106,7 @@ def search_with_heading(
                 distances[following] = candidate
                 predecessors[following] = state
                 key = float(candidate) + float(straight_line_bound(vertices, neighbour, goal))
-                size = push_or_decrease(keys, ids, positions, size, following, key)
+                size = push_or_decrease(heap, positions, size, following, key)
     return best_state
 
 

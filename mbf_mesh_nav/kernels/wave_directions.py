@@ -21,9 +21,8 @@ def wave_directions(
     vertices: NDArray[np.float64],
     faces: Int32Array,
     vertex_faces: Int32Array,
-    neighbours: Int32Array,
-    edge_weights: Float32Array,
-    corner_slots: Int32Array,
+    corner_ends: Int32Array,
+    corner_weights: Float32Array,
     distances: Float32Array,
     predecessors: Int32Array,
     cut_records: Int32Array,
@@ -40,21 +39,14 @@ def wave_directions(
         record = cut_records[vertex]
         if record >= 0:
             # The face is (base, first, second); the free corner of the record is this vertex, the other one was known.
-            slot_first, slot_second, slot_opposite = corner_slots[record]
-            first, second = neighbours[slot_first], neighbours[slot_second]
+            first, second = corner_ends[record]
+            to_known, to_free, between = corner_weights[record]
             face = faces[vertex_faces[record]]
             base = face[0] + face[1] + face[2] - first - second
+            known = first
             if first == vertex:
-                known, slot_known, slot_free = second, slot_second, slot_first
-            else:
-                known, slot_known, slot_free = first, slot_first, slot_second
-            share = _crossing_share(
-                distances[base],
-                distances[known],
-                edge_weights[slot_known],
-                edge_weights[slot_free],
-                edge_weights[slot_opposite],
-            )
+                known, to_known, to_free = second, to_free, to_known
+            share = _crossing_share(distances[base], distances[known], to_known, to_free, between)
             x = vertices[base, 0] + share * (vertices[known, 0] - vertices[base, 0])
             y = vertices[base, 1] + share * (vertices[known, 1] - vertices[base, 1])
             z = vertices[base, 2] + share * (vertices[known, 2] - vertices[base, 2])

@@ -20,8 +20,8 @@ from mbf_mesh_nav.leg_search import (
     NO_TARGETS,
     Leg,
     LegQuery,
-    mean_edge_length,
     seeded_arrays,
+    threshold_step,
     vertex_path_leg,
 )
 from mbf_mesh_nav.mesh_map import MeshSnapshot
@@ -62,7 +62,7 @@ class RepairingPlanner(SurfacePlanner):
             wave.distances,
             wave.predecessors,
             seeds,
-            mean_edge_length(self.mesh_map),
+            threshold_step(self.mesh_map),
             NO_TARGETS,
             NO_OFFSETS,
             query.cancel_flag,

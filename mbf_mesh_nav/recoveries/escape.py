@@ -20,7 +20,7 @@ from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.goal_approach import arc_to, clamp
 from mbf_mesh_nav.guarded_motion import blocked_vertices, reports_lost_pose, run_guarded
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distances
-from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, mean_edge_length, seeded_arrays
+from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, seeded_arrays, threshold_step
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.path_progress import PathProgress
 from mbf_mesh_nav.plugins import MeshRecovery
@@ -78,7 +78,7 @@ class EscapeRecovery(MeshRecovery):
         nowhere = np.zeros(len(blocked), dtype=np.bool_)
         distances, predecessors, seeds = seeded_arrays(mesh_map, nowhere, spot)
         graph = (mesh_map.neighbour_offsets, mesh_map.neighbours, mesh_map.neighbour_lengths, nowhere)
-        step, flag = mean_edge_length(mesh_map), request.cancel_token.flag
+        step, flag = threshold_step(mesh_map), request.cancel_token.flag
         propagate_distances(*graph, distances, predecessors, seeds, step, NO_TARGETS, NO_OFFSETS, flag)
         beside_blocked = blocked[mesh_map.edges].any(axis=1)
         safe = ~blocked

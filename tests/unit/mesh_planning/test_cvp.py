@@ -30,7 +30,7 @@ def wave_from_vertex(mesh_map, source, weights=None, blocked=None):
     seeds = np.concatenate([[source], ring]).astype(np.int32)
     distances[seeds] = np.linalg.norm(mesh_map.vertices[seeds] - mesh_map.vertices[source], axis=1)
     propagate_wave(
-        mesh_map.neighbour_offsets, mesh_map.neighbours, weights, mesh_map.vertex_face_offsets, slots, blocked,
+        mesh_map.vertex_face_offsets, mesh_map.neighbours[slots[:, :2]], weights[slots], blocked,
         distances, np.full(count, -1, np.int32), np.full(count, -1, np.int32), seeds, np.zeros(0, np.int32), 0.3,
         np.zeros(1, np.uint8),
     )  # fmt: skip

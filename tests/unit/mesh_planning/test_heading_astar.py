@@ -79,7 +79,8 @@ def roll_of(path):
 
 
 def test_a_flank_is_climbed_straight_and_not_traversed(make_plugin, ridge):
-    start, goal = Pose.planar(2.0, 1.0, 1.57, 0.0), Pose.planar(9.0, 11.0, 1.57, 0.0)
+    # Along the diagonals of this mesh the shortest way leads over the flank, no other is as short.
+    start, goal = Pose.planar(9.0, 1.0, 1.57, 0.0), Pose.planar(2.0, 11.0, 1.57, 0.0)
     careless = make_plugin(HeadingAStarPlanner, ridge, max_roll=1.5, max_pitch=1.5, roll_cost=0.0, turning_cost=0.0)
     careful = make_plugin(HeadingAStarPlanner, ridge, max_roll=0.2, max_pitch=0.5)
     request = PlanRequest(start, goal)

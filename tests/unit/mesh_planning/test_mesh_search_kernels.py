@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from mbf_mesh_nav.kernels.astar import search_towards
 from mbf_mesh_nav.kernels.dijkstra import propagate_distances
-from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top
+from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
 NO_INTS = np.zeros(0, np.int32)
 CALM = np.zeros(1, np.uint8)
@@ -116,15 +116,15 @@ def test_a_flag_set_before_the_call_cancels_both_kernels():
 @given(st.lists(st.tuples(st.integers(0, 19), st.integers(0, 1000)), min_size=1, max_size=80))
 @settings(max_examples=60, deadline=None)
 def test_the_indexed_heap_returns_items_by_their_lowest_key(pushes):
-    keys, ids, positions = np.empty(20, np.float32), np.empty(20, np.int32), np.full(20, -1, np.int32)
+    heap, positions = np.empty(20, np.int64), np.full(20, -1, np.int32)
     size, lowest = 0, {}
     for item, key in pushes:
         if key < lowest.get(item, 10**9):  # the contract: a queued key is only ever lowered
-            size = push_or_decrease(keys, ids, positions, size, item, np.float32(key))
+            size = push_or_decrease(heap, positions, size, np.int32(item), np.float32(key))
             lowest[item] = key
     popped = []
     while size:
-        popped.append(float(keys[0]))
-        size = remove_top(keys, ids, positions, size)
-    assert popped == sorted(lowest.values())
+        popped.append((float(top_key(heap)), int(top_item(heap))))
+        size = remove_top(heap, positions, size)
+    assert popped == sorted((key, item) for item, key in lowest.items())
     assert (positions == -1).all()
