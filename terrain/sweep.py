@@ -83,7 +83,7 @@ def run_all(scenario: Scenario, runs: Sequence[SweepRun], workers: int) -> Itera
     left = list(runs)
     for attempt in range(MAX_POOLS):
         try:
-            for run, metrics in _run_in_pool(scenario, left, workers):
+            for run, metrics in _run_in_pool(scenario, tuple(left), workers):
                 left.remove(run)
                 yield run, metrics
             return

@@ -43,6 +43,7 @@ def sweep(
             finished = run_all(loaded, left, workers)
             for run, metrics in track(finished, loaded.name, total=len(left), console=console):
                 log.append(run.key(hashed), {**metrics, "seed": run.seed, "variant": run.variant})
+                console.print(f"seed {run.seed} {run.variant}: {metrics['outcome']}", markup=False, highlight=False)
             rows = [log.rows[run.key(hashed)] for run in planned]
         files = write_tables(f"{loaded.name}: {loaded.proves}", rows, out)
         summary = summarise(rows)

@@ -1,0 +1,17 @@
+"""Fixtures of the tests that run whole scenarios."""
+
+import pytest
+
+from terrain.scenario import load_scenario
+from terrain.scenario_world_types import GarageWorld
+
+SHORTER = {  # shorter runs that still need what the scenario proves
+    "garage_roof": {"world": GarageWorld(type="garage", floors=2)},
+    "office_delivery": {"goals": ("meeting_room", "corridor_west")},
+}
+
+
+@pytest.fixture
+def shipped():
+    """Load a shipped scenario, shortened where that loses nothing."""
+    return lambda name: load_scenario(name).model_copy(update=SHORTER.get(name, {}))

@@ -1,0 +1,110 @@
+"""Sweeps: what is run, what is remembered, what the tables say."""
+
+import csv
+
+import pytest
+import typer
+
+from terrain.scenario import load_scenario
+from terrain.sweep import SweepRun, hash_of, plan_sweep
+from terrain.sweep_cli import parse_seeds, parse_settings
+from terrain.sweep_log import SweepLog
+from terrain.sweep_report import summarise, write_tables
+
+
+def row(seed, variant="planner=cvp", success=True, **more):
+    numbers = {"time_s": 10.0 + seed, "path_length_m": 20.0, "mishaps": ["slipping"] if seed else []}
+    return {"seed": seed, "variant": variant, "success": success, "outcome": "SUCCESS", **numbers, **more}
+
+
+def test_every_seed_meets_every_combination_of_settings():
+    runs = plan_sweep([3, 4], {"planner": ["cvp", "dijkstra"], "backend": ["mesh"]})
+    assert [run.seed for run in runs] == [3, 3, 4, 4]
+    assert [run.variant for run in runs[:2]] == ["backend=mesh planner=cvp", "backend=mesh planner=dijkstra"]
+    assert len({run.key("hash") for run in runs}) == 4
+
+
+def test_the_key_of_a_run_does_not_depend_on_the_order_of_settings():
+    assert SweepRun(1, {"a": "1", "b": "2"}).key("x") == SweepRun(1, {"b": "2", "a": "1"}).key("x")
+
+
+def test_a_changed_scenario_or_configuration_has_another_hash(tmp_path):
+    scenario = load_scenario("bridge")
+    config = tmp_path / "nav.yaml"
+    config.write_text("backend: mesh\n")
+    hashes = {
+        hash_of(scenario),
+        hash_of(scenario.model_copy(update={"goals": ("south",)})),
+        hash_of(scenario.model_copy(update={"navigation": {"mesh": config}})),
+    }
+    assert len(hashes) == 3
+    assert hash_of(scenario) == hash_of(load_scenario("bridge"))
+
+
+def test_the_log_keeps_what_it_was_given_over_a_restart(tmp_path):
+    with SweepLog(tmp_path / "runs.jsonl") as log:
+        log.append("a", {"seed": 1})
+        log.append("a", {"seed": 2})
+    with SweepLog(tmp_path / "runs.jsonl") as log:
+        assert log.rows == {"a": {"key": "a", "seed": 1}}
+
+
+@pytest.mark.parametrize("length", [1, 10, 17])
+def test_a_line_that_was_cut_short_is_taken_away_and_written_again(tmp_path, length):
+    file = tmp_path / "runs.jsonl"
+    with SweepLog(file) as log:
+        log.append("a", {"seed": 1})
+    whole = file.read_bytes()
+    file.write_bytes(whole + b'{"key": "b", "seed": 2}'[:length])
+    with SweepLog(file) as log:
+        assert list(log.rows) == ["a"]
+        log.append("b", {"seed": 2})
+    assert file.read_bytes() == whole + b'{"key": "b", "seed": 2}\n'
+
+
+def test_the_csv_has_one_row_per_run_sorted_by_variant_and_seed(tmp_path):
+    rows = [row(1), row(0), row(0, "planner=astar", success=False)]
+    files = write_tables("Trial <1>", rows, tmp_path)
+    with files[0].open() as file:
+        table = list(csv.DictReader(file))
+    assert [(line["variant"], line["seed"]) for line in table] == [
+        ("planner=astar", "0"),
+        ("planner=cvp", "0"),
+        ("planner=cvp", "1"),
+    ]
+    page = files[1].read_text()
+    assert "Trial &lt;1&gt;" in page
+    assert page.count('class="failed"') == 1
+
+
+def test_a_run_that_could_not_begin_has_a_row_too(tmp_path):
+    rows = [{"seed": 0, "variant": "planner=none", "success": False, "outcome": "ConfigError", "message": "unknown"}]
+    write_tables("Trial", rows, tmp_path)
+    assert "ConfigError" in (tmp_path / "sweep.csv").read_text()
+
+
+def test_the_summary_counts_per_variant_and_takes_medians_of_successes():
+    rows = [row(0), row(1), row(2, success=False), row(0, "planner=astar", success=False)]
+    lines = {line["variant"]: line for line in summarise(rows)}
+    assert lines["planner=cvp"]["success_percent"] == 66.7
+    assert lines["planner=cvp"]["median_time_s"] == 10.5
+    assert lines["planner=cvp"]["runs_with_mishaps"] == 2
+    assert lines["planner=astar"]["median_time_s"] == ""
+
+
+@pytest.mark.parametrize(("text", "seeds"), [("0:3", [0, 1, 2]), ("7", [7]), ("1,5", [1, 5])])
+def test_seeds_are_a_range_or_a_list(text, seeds):
+    assert parse_seeds(text) == seeds
+
+
+@pytest.mark.parametrize("text", ["", "3:3", "a", "1,1", "-1,2", "1:2:3"])
+def test_nonsense_for_seeds_is_refused(text):
+    with pytest.raises(typer.BadParameter):
+        parse_seeds(text)
+
+
+def test_settings_list_their_values_and_nonsense_is_refused():
+    assert parse_settings(["planner=cvp,astar", "a.b=1"]) == {"planner": ["cvp", "astar"], "a.b": ["1"]}
+    for text in ("planner", "=1", "planner=", "planner=a,"):
+        with pytest.raises(typer.BadParameter):
+            parse_settings([text])
