@@ -1,8 +1,7 @@
-"""Shortest paths on an 8-connected grid: A* and the full distance field, with a bucketed open list.
+"""Shortest paths on an 8-connected grid: A* with a bucketed open list.
 
-When to use: any single-source question on a costmap. With a goal and a heuristic scale above 0 it is A*, with
-``goal = -1`` it is Dijkstra's field over everything reachable. When not: any-angle paths (``theta_star``), turning
-circles (``hybrid_astar``).
+When to use: the way from one cell to one goal. When not: the cost of all cells (``grid_field``), any-angle paths
+(``theta_star``), turning circles (``hybrid_astar``).
 
 The grid is handed over flat and padded by one blocked cell on every side, so the inner loop needs no border test.
 Entering or leaving a cell costs half its *traversal* ``table[cost]`` per cell of length, so a step between cells a
@@ -59,7 +58,7 @@ def search(
     cut_corners: bool,
     cancel_flag: NDArray[np.uint8],
 ) -> tuple[int, NDArray[np.float32]]:
-    """Settle cells around ``start`` until ``goal`` (or everything, if ``goal`` is -1) is settled.
+    """Settle cells around ``start`` until ``goal`` is settled, or everything reachable if it cannot be reached.
 
     Parameters
     ----------
@@ -72,7 +71,7 @@ def search(
     start, goal : int
         Flat padded indices.
     heuristic_scale : float
-        Least finite traversal (A*), or 0 for a field.
+        At most the least finite traversal; 0 is Dijkstra's order.
     cut_corners : bool
         Whether a diagonal step may pass a blocked cell at its side.
     cancel_flag : (1,) uint8
@@ -89,7 +88,7 @@ def search(
     g = np.full(cells.size, np.float32(np.inf), dtype=np.float32)
     steps = STEP_X + stride * STEP_Y
     halves = (np.float32(0.5) * table).astype(np.float32)
-    goal_y, goal_x = max(goal, 0) // stride, max(goal, 0) % stride
+    goal_y, goal_x = goal // stride, goal % stride
     scale = np.float32(heuristic_scale)
     inverse_width = np.float32(1.0) / BUCKET_WIDTH
 
@@ -121,7 +120,7 @@ def search(
         entry = heads[bucket & mask]
         if entry < 0:
             bucket += 1
-            if goal >= 0 and np.float32(bucket) * BUCKET_WIDTH >= g[goal]:
+            if np.float32(bucket) * BUCKET_WIDTH >= g[goal]:
                 return FOUND, g
             continue
         # 3. Take an entry out; it is stale if its cell has been improved since.
@@ -153,9 +152,7 @@ def search(
             if g_new >= g[neighbour]:
                 continue
             g[neighbour] = g_new
-            f = g_new
-            if goal >= 0:
-                f += scale * octile_distance(abs(x + STEP_X[k] - goal_x), abs(y + STEP_Y[k] - goal_y))
+            f = g_new + scale * octile_distance(abs(x + STEP_X[k] - goal_x), abs(y + STEP_Y[k] - goal_y))
             slot = max(int(f * inverse_width), bucket) & mask
             if free >= 0:
                 new = free
@@ -170,4 +167,4 @@ def search(
             pool_cell[new], pool_g[new], pool_next[new] = neighbour, g_new, heads[slot]
             heads[slot] = new
             waiting += 1
-    return (FOUND if goal >= 0 and g[goal] < np.inf else EXHAUSTED), g
+    return (FOUND if g[goal] < np.inf else EXHAUSTED), g

@@ -1,4 +1,4 @@
-"""The bucketed search against a heapq twin, and the paths traced out of its field."""
+"""The bucketed search and the near/far field against a heapq twin, and the paths traced out of its field."""
 
 import heapq
 import math
@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from mbf_costmap_nav.grid_planning import traversal_table
+from mbf_costmap_nav.kernels.grid_field import distance_field
 from mbf_costmap_nav.kernels.grid_line import line_cost
 from mbf_costmap_nav.kernels.grid_path import trace_cells, trace_gradient
 from mbf_costmap_nav.kernels.grid_search import CANCELED, EXHAUSTED, FOUND, pad_cells, search
@@ -51,9 +52,10 @@ def run(cells, start, goal, *, cost_factor=3.0, allow_unknown=False, cut_corners
     def index(cell):
         return (cell[0] + 1) * stride + cell[1] + 1
 
-    scale = 0.0 if goal is None else 1.0
-    target = -1 if goal is None else index(goal)
-    status, g = search(padded, stride, table, index(start), target, scale, cut_corners, flag)
+    if goal is None:
+        status, g = distance_field(padded, stride, table, index(start), -1, cut_corners, flag)
+    else:
+        status, g = search(padded, stride, table, index(start), index(goal), 1.0, cut_corners, flag)
     return status, g.reshape(-1, stride)[1:-1, 1:-1], (padded, stride, table, g), index
 
 
@@ -66,6 +68,14 @@ def test_field_equals_the_naive_dijkstra(cells, cut_corners, allow_unknown):
     for cell, g in naive_field(cells, traversal_table(3.0, 253, allow_unknown), (0, 0), cut_corners).items():
         expected[cell] = g
     np.testing.assert_allclose(field, expected, rtol=1e-5)
+
+
+def test_a_field_may_end_at_a_cell_that_has_its_final_value():
+    cells = np.zeros((80, 80), dtype=np.uint8)
+    _, _, (padded, stride, table, whole), index = run(cells, (5, 5), None)
+    status, g = distance_field(padded, stride, table, index((5, 5)), index((9, 12)), False, NO_CANCEL)
+    assert status == FOUND and g[index((9, 12))] == whole[index((9, 12))]
+    assert np.isinf(g[index((79, 79))])
 
 
 @settings(max_examples=60, deadline=None)
@@ -115,9 +125,10 @@ def test_gradient_path_in_the_open_is_nearly_straight():
     assert length <= 1.03 * math.hypot(80, 20)
 
 
-def test_a_set_cancel_flag_ends_the_search():
+@pytest.mark.parametrize("goal", [None, (299, 299)], ids=["field", "A*"])
+def test_a_set_cancel_flag_ends_the_search(goal):
     flag = np.ones(1, dtype=np.uint8)
-    status, _, _, _ = run(np.zeros((300, 300), dtype=np.uint8), (0, 0), (299, 299), flag=flag)
+    status, _, _, _ = run(np.zeros((300, 300), dtype=np.uint8), (0, 0), goal, flag=flag)
     assert status == CANCELED
 
 
