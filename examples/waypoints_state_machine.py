@@ -1,0 +1,120 @@
+"""Plan all legs of a tour first, choose the cheapest order, then drive the stored paths (Figure 4 of the MBF paper).
+
+Only separate planning and driving make this possible: every pair of waypoints is planned before the robot moves, the
+order follows from the costs the map gives, and while driving nothing is planned unless a leg fails. The same script
+runs on both maps::
+
+    python examples/waypoints_state_machine.py indoor costmap
+    python examples/waypoints_state_machine.py indoor mesh
+"""
+
+import sys
+from dataclasses import dataclass, field
+from itertools import permutations
+
+from py_trees.common import Status
+
+from mbf_abstract.actions.goals import GetPathGoal, GetPathResult
+from mbf_abstract.executives.conditions import Do
+from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
+from mbf_abstract.executives.state_machine import State, StateMachine
+from mbf_abstract.executives.tree_executive import TreeExecutive
+from mbf_abstract.geometry import Path, Pose
+from terrain.bench import Bench
+
+WAYPOINTS = [(7.5, 1.5), (1.5, 5.0), (6.0, 5.5), (3.5, 1.5)]  # x, y [m], all in the reception
+
+
+@dataclass
+class Tour:
+    """Places to visit; place 0 is where the robot starts. ``paths`` and ``costs`` are stored by (from, to)."""
+
+    places: list[Pose]
+    paths: dict[tuple[int, int], Path] = field(default_factory=dict)
+    costs: dict[tuple[int, int], float] = field(default_factory=dict)
+    order: list[int] = field(default_factory=list)
+    driven: list[int] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        numbers = range(len(self.places))
+        self.unplanned = [(i, j) for i in numbers for j in numbers if i != j and j != 0]
+
+    def choose_order(self, mission) -> bool:
+        """Take the order with the lowest sum of costs; legs without a path cannot be part of it."""
+
+        def cost(order: tuple[int, ...]) -> float:
+            return sum(self.costs.get(leg, float("inf")) for leg in zip((0, *order), order, strict=False))
+
+        best = min(permutations(range(1, len(self.places))), key=cost)
+        self.order = list(best)
+        print(f"order {self.order}, cost {cost(best):.1f}")
+        return cost(best) < float("inf")
+
+    def take_stored_path(self, mission) -> bool:
+        """Hand the stored path of the next leg to the mission; False when the tour is over."""
+        if not self.order:
+            return False
+        here = self.driven[-1] if self.driven else 0
+        mission.path, mission.feedback = self.paths[here, self.order[0]], None
+        mission.target = self.places[self.order[0]]
+        return True
+
+    def leg_is_done(self, mission) -> bool:
+        """Note the place the robot has reached."""
+        self.driven.append(self.order.pop(0))
+        print(f"at waypoint {self.driven[-1]}, {mission.drive.dist_to_goal:.2f} m from it")
+        return True
+
+
+class PlanLeg(GetPath):
+    """Plan the next leg nobody has planned yet, between two places where the robot is not."""
+
+    def __init__(self, tour: Tour) -> None:
+        super().__init__("plan leg")
+        self.tour = tour
+
+    def make_goal(self) -> GetPathGoal:
+        """Plan from one place to another."""
+        self.leg = self.tour.unplanned.pop()
+        start, end = (self.tour.places[i] for i in self.leg)
+        return GetPathGoal(end, start_pose=start)
+
+    def take_result(self, result: GetPathResult) -> None:
+        """Store the path; a leg without one is left out of the tour."""
+        if result.path is not None:
+            self.tour.paths[self.leg], self.tour.costs[self.leg] = result.path, result.cost
+
+
+def waypoint_machine(tour: Tour) -> StateMachine:
+    """Plan all legs - choose an order - drive leg by leg; a leg that fails is recovered and planned anew."""
+    success, failure = Status.SUCCESS, Status.FAILURE
+    return StateMachine(
+        "waypoints",
+        {
+            "legs left?": State(
+                Do("legs left?", lambda mission: bool(tour.unplanned)), {success: "plan leg", failure: "choose order"}
+            ),
+            "plan leg": State(PlanLeg(tour), {success: "legs left?", failure: "legs left?"}),
+            "choose order": State(Do("choose order", tour.choose_order), {success: "next leg", failure: failure}),
+            "next leg": State(Do("next leg", tour.take_stored_path), {success: "drive", failure: success}),
+            "drive": State(ExePath(), {success: "arrived", failure: "recover"}),
+            "arrived": State(Do("arrived", tour.leg_is_done), {success: "next leg", failure: failure}),
+            "recover": State(Recovery("clear"), {success: "plan anew", failure: "back up"}),
+            "back up": State(Recovery("back_up"), {success: "plan anew", failure: "plan anew"}),
+            "plan anew": State(GetPath("plan anew"), {success: "drive", failure: failure}),
+        },
+    )
+
+
+def main(scenario: str, backend: str) -> bool:
+    with Bench(scenario, backend) as bench:
+        start = bench.navigator.robot_pose()
+        poses = [Pose.planar(x, y, 0.0, bench.world.height_at(x, y)) for x, y in WAYPOINTS]
+        tour = Tour([start, *poses])
+        result = TreeExecutive(waypoint_machine(tour), bench.navigator).run()
+        print(f"{result.message}; visited {tour.driven} in {bench.clock.now():.0f} s")
+        return result.success and len(tour.driven) == len(poses)
+
+
+if __name__ == "__main__":
+    sys.exit(0 if main(sys.argv[1], sys.argv[2]) else 1)

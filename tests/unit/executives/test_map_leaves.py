@@ -1,0 +1,99 @@
+"""Leaves that ask the map, on a map that answers what the test says."""
+
+import pytest
+from py_trees.common import Status
+
+from mbf_abstract.executives.map_leaves import CheckPath, CheckPoint, CheckPose, ClearMap
+from mbf_abstract.executives.ready_trees import TreeOptions, navigation_tree
+from mbf_abstract.executives.tree_executive import TreeExecutive
+from mbf_abstract.geometry import Pose
+from mbf_abstract.map_queries import CellState, PathAnswer, PlaceAnswer
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
+from mbf_abstract.testing.bench import MapFreeServer
+from mbf_abstract.transforms import TransformError
+
+GOAL = Pose.planar(1.0, 0.0)
+
+
+class Map:
+    """Answers each question with the next state of a list, the last one for ever."""
+
+    def __init__(self):
+        self.states = [CellState.FREE]
+        self.cleared = 0
+        self.asked = []
+
+    def _state(self, *question):
+        self.asked.append(question)
+        state = self.states.pop(0) if len(self.states) > 1 else self.states[0]
+        if isinstance(state, Exception):
+            raise state
+        return state
+
+    def check_point(self, point, local=False):
+        return PlaceAnswer(self._state("point", point), 1.0)
+
+    def check_pose(self, pose, query):
+        return PlaceAnswer(self._state("pose", pose), 1.0)
+
+    def check_path(self, path, query, return_on, skip_poses):
+        return PathAnswer(0, self._state("path", return_on), 1.0)
+
+    def clear_map(self):
+        self.cleared += 1
+
+
+@pytest.fixture
+def world(monkeypatch):
+    answers = Map()
+    monkeypatch.setattr(MapFreeServer, "queries", answers)
+    return answers
+
+
+@pytest.fixture
+def run(make_bench, world):
+    bench = make_bench()
+    return lambda tree, **given: TreeExecutive(tree, bench.navigator).run(**given)
+
+
+@pytest.mark.parametrize(
+    ("state", "status"), [(CellState.INSCRIBED, Status.SUCCESS), (CellState.LETHAL, Status.FAILURE)]
+)
+@pytest.mark.parametrize("leaf", [CheckPoint, CheckPose])
+def test_a_place_must_not_be_worse_than_inscribed(run, world, leaf, state, status):
+    world.states = [state]
+    assert run(leaf("free?"), target=GOAL).status == status
+
+
+def test_the_code_says_whether_robot_or_goal_is_blocked(run, world):
+    world.states = [CellState.LETHAL]
+    at_robot = run(CheckPose("robot", at_robot=True))
+    assert at_robot.mission.failure_code == GetPathOutcome.BLOCKED_START
+    assert world.asked[-1] == ("pose", None)
+    assert run(CheckPose("goal"), target=GOAL).mission.failure_code == GetPathOutcome.BLOCKED_GOAL
+
+
+def test_a_path_is_checked_up_to_its_first_bad_pose(run, world, make_bench):
+    world.states = [CellState.LETHAL]
+    path = make_bench().path_to(1.0)
+    assert run(CheckPath("path free?"), path=path).mission.failure_code == ExePathOutcome.BLOCKED_PATH
+    assert world.asked[-1] == ("path", CellState.LETHAL)
+
+
+def test_an_unknown_frame_is_a_failure_not_a_crash(run, world):
+    world.states = [TransformError("no frame 'moon'")]
+    result = run(CheckPose("goal"), target=GOAL)
+    assert (result.mission.failure_code, result.status) == (GetPathOutcome.TF_ERROR, Status.FAILURE)
+
+
+def test_the_map_is_cleared(run, world):
+    assert run(ClearMap()).success
+    assert world.cleared == 1
+
+
+def test_navigation_frees_a_blocked_robot_before_it_plans(make_bench, world, recoveries):
+    bench = make_bench()
+    world.states = [CellState.LETHAL, CellState.LETHAL, CellState.FREE]
+    tree = navigation_tree(TreeOptions(second_planner_pause=0.0))
+    assert TreeExecutive(tree, bench.navigator).run(GOAL).success
+    assert recoveries(bench) == ["clear", "back_up"]
