@@ -12,7 +12,7 @@ import os
 import weakref
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -39,7 +39,7 @@ from mbf_abstract.navigation_parameters import NavigationParameters
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugin_table import PluginTable
 from mbf_abstract.plugins import ControlRequest, PlanRequest, Plugin, PluginContext, PluginKind
-from mbf_abstract.registry import PluginRegistry
+from mbf_abstract.registry import Adapter, PluginRegistry
 from mbf_abstract.robot import Robot, RobotInformation
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.sim_clock import SimClock
@@ -74,6 +74,8 @@ class AbstractNavigationServer(ABC):
     """Prefix of this server's plugin types, e.g. ``mesh``."""
     plugin_declaration: ClassVar[type[PluginDeclaration]] = PluginDeclaration
     """Items of the plugin lists, with the options this server knows."""
+    plugin_adapters: ClassVar[Sequence[Adapter]] = ()
+    """Asked about a class that is no MBF plugin, e.g. to wrap a nav_core-style one."""
     config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {}
     """Top-level blocks of a configuration that describe this server's map."""
 
@@ -136,6 +138,11 @@ class AbstractNavigationServer(ABC):
         """What the map looks like, for pictures; None if this server has nothing to show."""
         return None
 
+    @classmethod
+    def plugin_registry(cls, allow_module_types: bool = True) -> PluginRegistry:
+        """Registry of this server's plugin types."""
+        return PluginRegistry(cls.backend, allow_module_types=allow_module_types, adapters=cls.plugin_adapters)
+
     def map_problem(self) -> str:
         """Why the map must not be driven on right now; empty = it is current."""
         return ""
@@ -181,7 +188,7 @@ class AbstractNavigationServer(ABC):
         ServerError
             The name is taken, or the constructor raised.
         """
-        plugin_class = PluginRegistry(self.backend).load(kind, type_name)
+        plugin_class = self.plugin_registry().load(kind, type_name)
         values = plugin_class.Parameters.model_validate(parameters)  # type: ignore[attr-defined]
         self.load_plugin(PluginSpec(kind, name, type_name, plugin_class, values, options or {}))
 
@@ -200,7 +207,7 @@ class AbstractNavigationServer(ABC):
             No such plugin, a goal is using it, or the new constructor raised.
         """
         old = self._loaded(kind, name)
-        plugin_class = PluginRegistry(self.backend).reload(kind, old.spec.type_name)
+        plugin_class = self.plugin_registry().reload(kind, old.spec.type_name)
         present = old.instance.parameters.model_dump()
         values = plugin_class.Parameters.model_validate(present)  # type: ignore[attr-defined]
         try:

@@ -30,7 +30,7 @@ def read_config(path: str | os.PathLike[str]) -> tuple[type[AbstractNavigationSe
     """Read and validate a configuration file; raises ConfigError with all findings at once."""
     raw = load_config(path)
     cls = server_class(raw)
-    registry = PluginRegistry(cls.backend, allow_module_types=raw.allow_module_types)
+    registry = cls.plugin_registry(raw.allow_module_types)
     return cls, validate_config(raw, cls.config_sections, registry, cls.plugin_declaration)
 
 

@@ -8,7 +8,7 @@ Each map is updated at its own rate; before every control cycle the local one mu
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar, Literal, cast
@@ -20,11 +20,13 @@ from mbf_abstract.map_queries import MapQueries
 from mbf_abstract.map_view import GridView
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugins import PluginContext, PluginKind
+from mbf_abstract.registry import Adapter
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.server import AbstractNavigationServer
 from mbf_costmap_nav.costmap import INSCRIBED, UNKNOWN
 from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.nav_core import wrap_nav_core
 from mbf_costmap_nav.plugins import CostmapContext
 from mbf_costmap_nav.queries import CostmapQueries
 from mbf_costmap_nav.served_costmap import ServedCostmap
@@ -61,6 +63,7 @@ class CostmapNavigationServer(AbstractNavigationServer):
 
     backend: ClassVar[str] = "costmap"
     plugin_declaration: ClassVar[type[PluginDeclaration]] = CostmapPluginDeclaration
+    plugin_adapters: ClassVar[Sequence[Adapter]] = (wrap_nav_core,)
     config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {
         "global_costmap": CostmapParameters,
         "local_costmap": CostmapParameters,
