@@ -1,0 +1,29 @@
+"""Drive a scenario with a behaviour tree: the ready one with one branch of your own, on either map.
+
+The tree plans, drives while a second planner updates the path, recovers by outcome code, and, our addition, gives up
+when it takes too long::
+
+    python examples/navigation_tree.py indoor costmap
+    python examples/navigation_tree.py outdoor mesh
+"""
+
+import sys
+
+from mbf_abstract.executives.pacing import TimeLimit
+from mbf_abstract.executives.ready_trees import TreeOptions, navigation_tree
+from mbf_abstract.executives.tree_drawing import as_text
+from mbf_abstract.executives.tree_executive import TreeExecutive
+from terrain.bench import Bench
+
+
+def main(scenario: str, backend: str, time_limit: float = 600.0) -> bool:
+    tree = TimeLimit("in time", navigation_tree(TreeOptions(second_planner_pause=1.0)), time_limit)
+    print(as_text(tree))
+    with Bench(scenario, backend) as bench:
+        result = TreeExecutive(tree, bench.navigator).run(bench.goals[0])
+        print(f"{result.message}; at {bench.clock.now():.1f} s the robot is at {bench.navigator.robot_pose()}")
+    return result.success
+
+
+if __name__ == "__main__":
+    sys.exit(0 if main(sys.argv[1], sys.argv[2]) else 1)
