@@ -1,4 +1,4 @@
-"""Leaves that run an action: ``GetPath``, ``ExePath``, ``Recovery``, ``MoveBase``.
+"""Leaves that run an action: ``GetPath``, ``UpdatePath``, ``ExePath``, ``Recovery``, ``MoveBase``.
 
 A leaf sends its goal when it is entered, is RUNNING until the goal is final, and cancels the goal when the tree leaves
 it early. Results go to the mission: paths to follow, and failures whose code picks a recovery.
@@ -121,6 +121,15 @@ class GetPath(ActionLeaf):
         super().take_result(result)
         if isinstance(result, GetPathResult) and result.path is not None:
             self.mission.take_plan(result)
+
+
+class UpdatePath(GetPath):
+    """Plan beside a driving robot. Its failure does not become the mission's: the robot has a path."""
+
+    def take_result(self, result: ActionResult) -> None:
+        """Keep the path of a success only."""
+        if result.success:
+            super().take_result(result)
 
 
 class ExePath(ActionLeaf):

@@ -19,7 +19,7 @@ from py_trees.common import ParallelPolicy
 from py_trees.composites import Parallel, Sequence
 
 from mbf_abstract.executives.conditions import BEYOND_RECOVERY, recovery_would_help
-from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
+from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery, UpdatePath
 from mbf_abstract.executives.map_leaves import CheckPose
 from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import (
@@ -126,7 +126,7 @@ def _drive(options: TreeOptions) -> Behaviour:
     follow = ExePath("follow path", options.controller)
     drive: Behaviour = follow
     if options.second_planner_pause > 0.0:
-        second = GetPath("update path", options.second_planner or options.planner, slot=SECOND_PLANNER_SLOT)
+        second = UpdatePath("update path", options.second_planner or options.planner, slot=SECOND_PLANNER_SLOT)
         pause = f"every {options.second_planner_pause:g} s"
         background = InBackground("in the background", Delay(pause, second, options.second_planner_pause))
         policy = ParallelPolicy.SuccessOnSelected(children=[follow], synchronise=False)

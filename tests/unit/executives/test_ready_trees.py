@@ -135,6 +135,15 @@ def test_a_second_planner_that_fails_harms_nothing(make_bench, recoveries):
     assert recoveries(bench) == []
 
 
+def test_a_failing_second_planner_does_not_hide_why_driving_failed(make_bench, recoveries):
+    bench = make_bench()
+    bench.planner.play(straight_plan, NO_PATH)
+    bench.controller.play(*[drive(0.2)] * 10, COLLISION, bench.controller.follow)
+    options = TreeOptions(check_poses=False, second_planner_pause=0.05)
+    assert run(bench, navigation_tree(options)).success
+    assert recoveries(bench) == ["back_up"]
+
+
 def test_a_robot_without_progress_is_stopped_and_recovered(make_bench, recoveries):
     bench = make_bench(cmd_vel_ignored_tolerance=0.0)
     bench.robot.stuck = True
