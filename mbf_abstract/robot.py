@@ -6,12 +6,21 @@ its age limit raises ``RobotStateError`` with the measured age, so no command is
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mbf_abstract.clock import Clock
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.transforms import TransformBuffer, TransformError
+
+TRACK_SPACING = 0.05
+"""Least distance [m] between two points of the driven track."""
+TRACK_POINTS = 200
+"""Length of the track: ten metres of a slow robot."""
 
 
 class RobotStateError(Exception):
@@ -62,6 +71,7 @@ class RobotInformation:
         self.robot_frame = robot_frame
         self.max_pose_age = max_pose_age
         self.max_velocity_age = max_velocity_age
+        self._track: tuple[tuple[float, float, float], ...] = ()
 
     def pose(self) -> Pose:
         """Robot pose in the global frame, at most ``max_pose_age`` old.
@@ -76,7 +86,27 @@ class RobotInformation:
             transform = self._transforms.lookup(self.global_frame, self.robot_frame, now=now, max_age=self.max_pose_age)
         except TransformError as error:
             raise RobotStateError(f"no fresh robot pose: {error}") from error
-        return Pose(transform.translation, transform.rotation, self.global_frame, transform.stamp)
+        pose = Pose(transform.translation, transform.rotation, self.global_frame, transform.stamp)
+        self._extend_track(pose.position)
+        return pose
+
+    def recent_track(self) -> NDArray[np.float64]:
+        """Positions (n, 3) [m] in the global frame the robot came by, oldest first; what ``pose()`` was asked for.
+
+        A robot that drives back rolls its track up, so the last points always lead further back.
+        """
+        return np.array(self._track, dtype=np.float64).reshape(-1, 3)
+
+    def _extend_track(self, position: tuple[float, float, float]) -> None:
+        track = self._track  # replaced as a whole, because any thread may ask for a pose
+        if track and math.dist(position, track[-1]) < TRACK_SPACING:
+            return
+        if len(track) > 1 and math.dist(position, track[-2]) < math.dist(track[-1], track[-2]):
+            track = track[:-1]
+            if math.dist(position, track[-1]) < TRACK_SPACING:
+                self._track = track
+                return
+        self._track = (*track, position)[-TRACK_POINTS:]
 
     @property
     def has_odometry(self) -> bool:
