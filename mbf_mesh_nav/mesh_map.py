@@ -100,6 +100,7 @@ class MeshMap:
         self.input_to_internal = topology.input_to_internal
         self.internal_to_input = topology.internal_to_input
         self._version = -1
+        self._overridden: dict[str, tuple[LayerParameters, float]] = {}  # usual parameters, end of the override
         self._lock = threading.RLock()
         self.set_layers(LayerGraph(), None)
 
@@ -200,10 +201,23 @@ class MeshMap:
         """Change how much costs lengthen edges, at run time."""
         self.set_layers(self.layers, self.default_layer, edge_cost_factor)
 
-    def set_layer_parameters(self, name: str, parameters: LayerParameters) -> None:
-        """Change the parameters of one layer at run time; everything that depends on them follows."""
+    def set_layer_parameters(self, name: str, parameters: LayerParameters, until: float = np.inf) -> None:
+        """Change the parameters of one layer at run time; everything that depends on them follows.
+
+        With a time ``until`` [s] the change is an override: ``update`` restores the usual parameters once it is over.
+        """
         with self._lock:
+            usual = self.usual_parameters(name)
+            self._overridden.pop(name, None)
+            if until < np.inf:
+                self._overridden[name] = usual, until
             self._publish(self.layers.set_parameters(name, parameters))
+
+    def usual_parameters(self, name: str) -> LayerParameters:
+        """Parameters of a layer apart from a timed override."""
+        with self._lock:
+            usual: LayerParameters = self.layers[name].parameters
+            return self._overridden[name][0] if name in self._overridden else usual
 
     def insert_points(self, points: ArrayLike, sensor_origin: ArrayLike, stamp: float) -> None:
         """Feed a point cloud to the obstacle layers.
@@ -223,7 +237,10 @@ class MeshMap:
         self._apply(lambda layer: layer.insert_points(cloud, origin, stamp))
 
     def update(self, now: float) -> None:
-        """Forget obstacles that are too old at ``now`` [s]."""
+        """Forget obstacles that are too old at ``now`` [s], end overrides of parameters that are over."""
+        with self._lock:
+            for name in [name for name, (_, until) in self._overridden.items() if until <= now]:
+                self.set_layer_parameters(name, self.usual_parameters(name))
         self._apply(lambda layer: layer.expire(now))
 
     def clear(self) -> None:

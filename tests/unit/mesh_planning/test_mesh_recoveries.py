@@ -9,11 +9,14 @@ from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
-from mbf_mesh_nav.layer import NOTHING_CHANGED
+from mbf_mesh_nav.layer import NOTHING_CHANGED, LayerContext
+from mbf_mesh_nav.layer_graph import LayerGraph
+from mbf_mesh_nav.layers.inflation import InflationLayer
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.recoveries.back_up import BackUpRecovery
 from mbf_mesh_nav.recoveries.clear_layers import ClearLayersRecovery
 from mbf_mesh_nav.recoveries.escape import EscapeRecovery
+from mbf_mesh_nav.recoveries.relax import RelaxRecovery
 from mbf_mesh_nav.recoveries.rotate import RotateRecovery
 from mbf_mesh_nav.recoveries.wait import WaitRecovery
 
@@ -46,14 +49,31 @@ class SimulatedMotion:
         return self.stop_after > 0
 
 
+class TrackedRobot:
+    """A robot that knows how it came here."""
+
+    def __init__(self, track=()):
+        self.track = np.reshape(track, (-1, 3))
+
+    def recent_track(self):
+        return self.track
+
+
 @pytest.fixture
 def run(make_plugin, pose_on):
     """Factory: run a recovery on a map from a pose; returns the result and the simulated motion."""
 
     def run_it(
-        recovery_class, mesh_map, position=(3.0, 3.0, 0.0), heading=(1, 0, 0), motion=None, token=None, **params
+        recovery_class,
+        mesh_map,
+        position=(3.0, 3.0, 0.0),
+        heading=(1, 0, 0),
+        motion=None,
+        token=None,
+        track=(),
+        **params,
     ):
-        recovery = make_plugin(recovery_class, mesh_map, **params)
+        recovery = make_plugin(recovery_class, mesh_map, robot=TrackedRobot(track), **params)
         simulated = SimulatedMotion(mesh_map, pose_on, recovery.clock, position, heading, **(motion or {}))
         result = recovery.run_behavior(RecoveryRequest(simulated, token or CancelToken()))
         assert not simulated.commands or simulated.commands[-1] == Twist()
@@ -69,6 +89,23 @@ def test_backing_up_drives_the_distance_straight_back(run, plain):
     result, motion = run(BackUpRecovery, plain(), distance=0.6)
     assert result.success, result.message
     assert motion.current.x == pytest.approx(2.4, abs=0.05) and motion.current.y == pytest.approx(3.0, abs=1e-6)
+
+
+def test_backing_up_follows_the_driven_curve(run, plain):
+    angles = np.linspace(0.0, 1.2, 25)  # a left turn about (1.5, 4.5), radius 1.5
+    arc = np.column_stack([1.5 + 1.5 * np.sin(angles), 4.5 - 1.5 * np.cos(angles), np.zeros(25)])
+    heading = (math.cos(1.2), math.sin(1.2), 0)
+    result, motion = run(BackUpRecovery, plain(), tuple(arc[-1]), heading, track=arc, distance=1.5)
+    assert result.success, result.message
+    assert np.linalg.norm(np.asarray(motion.current.position) - arc[4]) < 0.15
+    off_the_arc = np.hypot(motion.current.x - 1.5, motion.current.y - 4.5) - 1.5
+    assert abs(off_the_arc) < 0.06
+
+
+def test_a_track_that_does_not_lie_behind_is_ignored(run, plain):
+    ahead = [(3.0 + 0.1 * step, 3.0, 0.0) for step in range(10, 0, -1)]
+    result, motion = run(BackUpRecovery, plain(), track=ahead, distance=0.6)
+    assert result.success and motion.current.x == pytest.approx(2.4, abs=0.05)
 
 
 @pytest.mark.parametrize("ground", ["border", "lethal"])
@@ -110,6 +147,33 @@ def test_clearing_layers_frees_what_was_sensed(run, plain, paint, monkeypatch):
     assert layer.update_from_inputs(NOTHING_CHANGED) is NOTHING_CHANGED
 
 
+def test_relaxed_inflation_comes_back_by_itself(run, plain, paint, make_plugin):
+    mesh_map = paint(plain(), lambda v: np.where(v[:, 0] > 5, np.inf, 0.0))
+    source = mesh_map.layers["painted"]
+    radii = InflationLayer.Parameters(inscribed_radius=0.5, inflation_radius=1.0)
+    inflation = InflationLayer(LayerContext("inflation", mesh_map.topology, mesh_map.locator, radii, (source,)))
+    inflation.recompute()
+    mesh_map.set_layers(LayerGraph([source, inflation]), "inflation")
+    usual = mesh_map.snapshot().costs
+    for _ in range(2):  # the second run relaxes the usual radii again, not the relaxed ones
+        result, _ = run(RelaxRecovery, mesh_map, scale=0.5, duration=20.0)
+        assert result.success and "inflation_radius 0.5 m" in result.message
+    relaxed = mesh_map.snapshot().costs
+    assert np.count_nonzero(relaxed) < np.count_nonzero(usual)
+    mesh_map.update(19.9)
+    np.testing.assert_array_equal(mesh_map.snapshot().costs, relaxed)
+    mesh_map.update(20.0)
+    np.testing.assert_array_equal(mesh_map.snapshot().costs, usual)
+
+
+def test_relaxing_a_layer_that_is_not_there_names_those_that_are(run, plain, paint):
+    mesh_map = paint(plain(), lambda v: np.zeros(len(v)))
+    result, _ = run(RelaxRecovery, mesh_map)
+    assert result.outcome == RecoveryOutcome.FAILURE and "its layers are: painted" in result.message
+    result, _ = run(RelaxRecovery, mesh_map, layer="painted")
+    assert result.outcome == RecoveryOutcome.FAILURE and "no radius" in result.message
+
+
 def test_escaping_leaves_a_lethal_disc_by_the_shortest_way(run, plain, paint):
     mesh_map = paint(plain(spacing=0.1), lambda v: np.where(np.hypot(v[:, 0] - 3, v[:, 1] - 3) < 0.8, np.inf, 0.0))
     result, motion = run(EscapeRecovery, mesh_map, (2.6, 3.0, 0.0), (1, 0, 0))
@@ -145,6 +209,6 @@ def test_a_robot_that_does_not_move_runs_into_the_time_limit(make_plugin, plain)
             recovery.clock.time += seconds
             return True
 
-    recovery, motion = make_plugin(BackUpRecovery, plain(), time_limit=2.0), StuckMotion()
+    recovery, motion = make_plugin(BackUpRecovery, plain(), robot=TrackedRobot(), time_limit=2.0), StuckMotion()
     result = recovery.run_behavior(RecoveryRequest(motion))
     assert result.outcome == RecoveryOutcome.PAT_EXCEEDED and motion.commands[-1] == Twist()
