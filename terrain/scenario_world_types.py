@@ -73,12 +73,17 @@ class HeightfieldWorld(TerrainWorld):
 
     type: Literal["heightfield"]
     file: Path = parameter(..., "The file; its lower left corner becomes the origin.")
+    crop: tuple[float, float, float, float] | None = parameter(
+        None, "Keep only x_min, x_max, y_min, y_max of the file; the rest keeps its coordinates.", unit="m"
+    )
     size: float | None = parameter(None, "Shrink or grow it isotropically to this length along x.", unit="m", gt=1.0)
     spacing: float | None = parameter(None, "Sample again at this distance.", unit="m", gt=0.01)
 
     def heightfield(self, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
         """Read the file."""
         terrain = read_dem(self.file)
+        if self.crop is not None:
+            terrain = terrain.crop(*self.crop)
         if self.size is not None:
             terrain = terrain.scaled(self.size / terrain.size[0])
         return terrain if self.spacing is None else terrain.resample(self.spacing)

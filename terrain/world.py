@@ -35,9 +35,10 @@ MAX_HEIGHTFIELD_SAMPLES = 2**21  # Bullet's upload buffer: 8 MiB of float32, the
 MAX_RAYS_PER_CALL = 16_000  # Bullet answers at most 16,383 rays and drops the next one silently
 RAY_MARGIN = 1.0  # metres above and below the world where vertical rays start and end
 
-# Collision groups. Bodies collide with all groups; a ray hits the groups in its mask.
-STATIC, ROBOT, MOVING = 1, 2, 4
-EVERY_GROUP = STATIC | ROBOT | MOVING
+# Collision groups. Fixed bodies do not collide with each other: Bullet would test every post against the ground under
+# it in each step. A ray is of Bullet's group 1 and hits the groups in its mask.
+RAY, STATIC, ROBOT, MOVING = 1, 2, 4, 8
+EVERY_GROUP = RAY | STATIC | ROBOT | MOVING
 
 
 @dataclass(frozen=True)
@@ -240,9 +241,10 @@ class BulletWorld:
         self.bullet.resetBasePositionAndOrientation(body, pose.position, pose.orientation, physicsClientId=self.client)
 
     def set_group(self, body: int, group: int) -> None:
-        """Put all links of a body into a collision group; it still collides with every group."""
+        """Put all links of a body into a collision group; it collides with every group, fixed with fixed excepted."""
+        collides_with = EVERY_GROUP & ~STATIC if group == STATIC else EVERY_GROUP
         for link in range(-1, self.bullet.getNumJoints(body, physicsClientId=self.client)):
-            self.bullet.setCollisionFilterGroupMask(body, link, group, EVERY_GROUP, physicsClientId=self.client)
+            self.bullet.setCollisionFilterGroupMask(body, link, group, collides_with, physicsClientId=self.client)
 
     def static_triangles(self) -> tuple[FloatArray, IntArray]:
         """All that is fixed as one mesh: vertices (n, 3) float64 [m], faces (m, 3) int32."""
