@@ -3,6 +3,7 @@
 import re
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -12,6 +13,7 @@ from typer.testing import CliRunner
 
 from mbf_abstract.clock import Priority
 from mbf_abstract.events import EventKind
+from mbf_abstract.executives.classic_move_base import ClassicMoveBase
 from mbf_abstract.executives.conditions import Do
 from mbf_abstract.executives.leaves import ExePath, GetPath, MoveBase, Recovery
 from mbf_abstract.executives.ready_trees import READY_TREES, TreeOptions, navigation_tree
@@ -22,6 +24,7 @@ from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
+from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.scripted import straight_plan
 
@@ -62,9 +65,11 @@ def eventful(bench):
 
 
 def assert_at_rest(bench):
-    server = bench.server
     assert bench.robot.command.is_stopped()
-    assert not any(a.busy for a in (server.get_path, server.exe_path, server.recovery, server.move_base))
+    ids = [
+        {e.data["goal_id"] for e in bench.events(kind)} for kind in (EventKind.GOAL_ACCEPTED, EventKind.GOAL_FINISHED)
+    ]
+    assert ids[0] == ids[1]
     now = bench.clock.now()
     bench.clock.sleep(2.0)
     assert bench.robot.moved_after(now) == []
@@ -90,6 +95,24 @@ def test_cancel_from_another_thread_does_the_same(make_bench, name, seconds):
     bench = make_bench()
     eventful(bench)
     executive = TreeExecutive(make_tree(name), bench.navigator)
+
+    def cancel_later():
+        bench.clock.sleep(seconds)
+        executive.cancel("enough")
+
+    bench.clock.spawn(cancel_later, "client", Priority.CLIENT)
+    executive.run(GOAL)
+    assert_at_rest(bench)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_cancel_holds_for_any_interleaving_of_the_threads(make_bench, seed):
+    rng = np.random.default_rng(seed)
+    bench = make_bench(clock=SimClock(schedule=rng))
+    eventful(bench)
+    tree = TreeExecutive(make_tree(["navigation", "move base", "machine"][seed % 3]), bench.navigator)
+    executive = ClassicMoveBase(bench.navigator) if seed % 4 == 3 else tree
+    seconds = float(rng.uniform(0.0, 5.0))
 
     def cancel_later():
         bench.clock.sleep(seconds)
