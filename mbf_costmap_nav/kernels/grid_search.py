@@ -48,6 +48,19 @@ def octile_distance(dx: int, dy: int) -> np.float32:
 
 
 @kernel
+def ring_size(table: NDArray[np.float32], steps: float) -> int:
+    """Buckets, a power of two, that hold a growth of f by ``steps`` of the heaviest diagonal steps."""
+    heaviest = np.float32(0.0)
+    for traversal in table:
+        if traversal < np.inf:
+            heaviest = max(heaviest, traversal)
+    ring = 4
+    while ring < steps * SQRT2 * heaviest / BUCKET_WIDTH + 4.0:
+        ring *= 2
+    return ring
+
+
+@kernel
 def search(
     cells: NDArray[np.uint8],
     stride: int,
@@ -93,13 +106,7 @@ def search(
     inverse_width = np.float32(1.0) / BUCKET_WIDTH
 
     # 1. The ring must hold the largest growth of f in one step: twice the heaviest step.
-    heaviest = np.float32(0.0)
-    for traversal in table:
-        if traversal < np.inf:
-            heaviest = max(heaviest, traversal)
-    ring = 4
-    while ring < 2.0 * SQRT2 * heaviest / BUCKET_WIDTH + 4.0:
-        ring *= 2
+    ring = ring_size(table, 2.0)
     heads = np.full(ring, -1, dtype=np.int32)
     mask = ring - 1
 
