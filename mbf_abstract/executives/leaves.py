@@ -14,6 +14,7 @@ from py_trees.common import Status
 from mbf_abstract.actions.goals import (
     ActionResult,
     ExePathGoal,
+    ExePathResult,
     GetPathGoal,
     GetPathResult,
     MoveBaseGoal,
@@ -164,7 +165,8 @@ class ExePath(ActionLeaf):
     def take_result(self, result: ActionResult) -> None:
         """Keep the result; a path that was driven to its end is done with."""
         super().take_result(result)
-        self.mission.drive = result  # type: ignore[assignment]
+        if isinstance(result, ExePathResult):
+            self.mission.drive = result
         if result.success:
             self.mission.path = None
 

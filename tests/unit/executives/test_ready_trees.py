@@ -1,5 +1,7 @@
 """The ready trees on a robot without walls: what they do when planning or driving fails."""
 
+import pytest
+
 from mbf_abstract.events import EventKind
 from mbf_abstract.executives.ready_trees import TreeOptions, control_tree, navigation_tree, planning_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
@@ -67,6 +69,15 @@ def test_recoveries_of_driving_are_picked_by_code_and_the_path_is_kept(make_benc
     assert run(bench, navigation_tree(OPTIONS)).success
     assert recoveries(bench) == ["back_up", "clear"]
     assert plans(bench) == 1
+
+
+def test_after_a_recovery_the_rest_of_the_path_is_driven(make_bench):
+    bench = make_bench()
+    bench.controller.play(*[bench.controller.follow] * 40, BLOCKED, bench.controller.follow)
+    assert run(bench, navigation_tree(OPTIONS)).success
+    whole, rest = bench.controller.paths
+    assert rest.length == pytest.approx(whole.length - 1.0, abs=0.3)  # 40 cycles at 0.5 m/s
+    assert rest[-1] == whole[-1]
 
 
 def test_the_same_failure_again_takes_the_next_recovery_for_its_code(make_bench, recoveries):
