@@ -1,0 +1,85 @@
+"""Conditions, steps of one's own, shortened paths, and what they say when the robot's pose is lost."""
+
+import pytest
+from py_trees.common import Status
+from py_trees.composites import Sequence
+
+from mbf_abstract.actions.goals import ActionResult
+from mbf_abstract.executives.classic_move_base import ClassicMoveBase, ClassicSettings
+from mbf_abstract.executives.conditions import Do, GoalReached, TruncatePath, WouldRecoveryHelp
+from mbf_abstract.executives.leaves import ExePath, GetPath
+from mbf_abstract.executives.tree_executive import TreeExecutive
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.outcomes import GetPathOutcome
+
+GOAL = Pose.planar(2.0, 0.0)
+
+
+@pytest.fixture
+def bench(make_bench):
+    return make_bench(tf_timeout=0.5)
+
+
+def run(bench, *nodes, **given):
+    return TreeExecutive(Sequence("all", memory=True, children=list(nodes)), bench.navigator).run(**given)
+
+
+def lose_the_pose(bench):
+    bench.robot.publishes_pose = False
+    bench.clock.sleep(1.0)
+
+
+def test_a_step_of_ones_own_reads_and_writes_the_mission(bench):
+    def aim(mission):
+        mission.target = GOAL
+        return True
+
+    assert run(bench, Do("aim", aim), GetPath()).mission.path[-1].distance_to(GOAL) < 1e-6
+
+
+def test_a_step_that_returns_false_fails(bench):
+    assert run(bench, Do("no", lambda mission: False)).status == Status.FAILURE
+
+
+@pytest.mark.parametrize(
+    ("outcome", "status"),
+    [(GetPathOutcome.NO_PATH_FOUND, Status.SUCCESS), (GetPathOutcome.INVALID_GOAL, Status.FAILURE)],
+)
+def test_the_filter_looks_at_the_last_failure(bench, outcome, status):
+    def fail(mission):
+        mission.failure = ActionResult(int(outcome), "")
+        return True
+
+    assert run(bench, Do("fail", fail), WouldRecoveryHelp()).status == status
+
+
+def test_the_robot_stops_before_the_end_of_a_shortened_path(bench):
+    result = run(bench, GetPath(), TruncatePath("keep away", 0.8), ExePath(), target=GOAL)
+    assert result.success
+    assert bench.robot.pose.distance_to(GOAL) == pytest.approx(0.8, abs=0.2)
+
+
+def test_a_short_path_is_left_as_it_is_and_no_path_is_a_failure(bench):
+    path = Path.from_points([(0.0, 0.0, 0.0), (0.3, 0.0, 0.0)])
+    assert run(bench, TruncatePath("keep away", 1.0), path=path).mission.path is path
+    assert run(bench, TruncatePath("keep away", 1.0)).status == Status.FAILURE
+
+
+def test_a_lost_pose_is_a_failure_with_a_text(bench):
+    lose_the_pose(bench)
+    node = GoalReached()
+    assert run(bench, node, target=GOAL).status == Status.FAILURE
+    assert "no fresh robot pose" in node.feedback_message
+
+
+def test_the_classic_machine_ends_without_a_pose(bench):
+    lose_the_pose(bench)
+    result = ClassicMoveBase(bench.navigator, ClassicSettings(max_planning_retries=0)).run(GOAL)
+    assert not result.success
+    assert result.final_pose is None
+
+
+@pytest.mark.parametrize(("node", "text"), [(GetPath(), "needs a target"), (ExePath(), "needs a path")])
+def test_a_mission_without_what_a_leaf_needs_is_misuse(bench, node, text):
+    with pytest.raises(ValueError, match=text):
+        TreeExecutive(node, bench.navigator).run()
