@@ -1,11 +1,14 @@
 """Every shipped scenario succeeds on its own backend."""
 
+import numpy as np
 import pytest
 
 from terrain.runner import RunOptions, run_scenario
 from terrain.scenario import load_scenario, shipped_scenarios
 
 RUN_ELSEWHERE = {"outdoor", "indoor"}  # test_run_scenarios.py
+
+TIME_TO_NOTICE = 2.0  # s; a second until the map counts as stale, then the robot brakes
 
 pytestmark = pytest.mark.timeout(300)
 
@@ -20,3 +23,15 @@ def test_at_least_twelve_scenarios_ship_and_each_says_what_it_proves():
 def test_the_shipped_scenario_succeeds(name, shipped, tmp_path):
     result = run_scenario(shipped(name), RunOptions(tmp_path, draw=False))
     assert result.success, result.message
+
+
+def test_the_robot_stands_still_while_its_lidar_is_silent(shipped, tmp_path):
+    scenario = shipped("sensor_blackout")
+    blackout = scenario.faults[0]
+    run_scenario(scenario, RunOptions(tmp_path, draw=False))
+    with np.load(tmp_path / "recording.npz") as recording:
+        times, forward = recording["times"], recording["twists"][:, 0]
+    silent = (times > blackout.start + TIME_TO_NOTICE) & (times < blackout.end)
+    assert np.abs(forward[silent]).max() < 0.02
+    assert np.abs(forward[times < blackout.start]).max() > 0.2
+    assert np.abs(forward[times > blackout.end]).max() > 0.2
