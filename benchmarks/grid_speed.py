@@ -21,7 +21,9 @@ from types import ModuleType
 
 import numpy as np
 
+from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.costmap import CellBox
+from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.grid_planning import traversal_table
 from mbf_costmap_nav.kernels.grid_field import distance_field
 from mbf_costmap_nav.kernels.grid_search import pad_cells, search
@@ -162,6 +164,32 @@ class Suite:
             self.line("field_over_skimage", self.field, lambda: graph.MCP_Geometric(costs).find_costs([(20, 20)]))
 
 
+def rolling_local_map(repeats: int) -> float:
+    """Median time [ms] of one full update of a rolling 10 m x 10 m map at 0.05 m: 720 beams cleared, marked, inflated."""
+    parameters = CostmapParameters(
+        rolling_window=True,
+        resolution=RESOLUTION,
+        robot_radius=0.22,
+        layers=({"name": "obstacles", "type": "obstacle"}, {"name": "inflation", "type": "inflation"}),
+    )
+    source = {"obstacle_max_range": 7.0, "raytrace_max_range": 7.0}
+    inflation = {"inflation_radius": 0.55, "cost_scaling_factor": 3.0}
+    blocks = {"obstacles": {"sources": {"scan": source}}, "inflation": inflation}
+    costmap = build_layered_costmap(parameters, blocks)
+    angles = np.arange(720) * (2.0 * np.pi / 720)
+    ranges = 3.5 + 1.5 * np.sin(5.0 * angles)  # a room with five niches
+    times = []
+    for step in range(repeats + 2):
+        x = 0.5 * step  # the window moves by ten cells
+        ends = np.column_stack([x + ranges * np.cos(angles), ranges * np.sin(angles), np.zeros(720)])
+        begin = thread_time()
+        costmap.insert_scan("scan", (x, 0.0, 0.0), ends, np.ones(720, dtype=bool), 0.1 * step)
+        box = costmap.update(Pose.planar(x, 0.0), 0.1 * step)
+        times.append((thread_time() - begin) * 1e3)
+        assert box == costmap.geometry.box, "the window moves, so all of it must be made anew"
+    return float(np.median(times[2:]))  # the first ones compile
+
+
 def tcod_field(tcod: ModuleType, costs: np.ndarray) -> np.ndarray:
     """Integer Dijkstra field of tcod with the octile weights 10 and 14."""
     distance = np.full(costs.shape, np.iinfo(np.int32).max, dtype=np.int32)
@@ -175,6 +203,8 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="last line is one JSON object")
     arguments = parser.parse_args()
     results: dict[str, float] = {}
+    results["rolling_local_map_ms"] = rolling_local_map(15 if arguments.quick else 101)
+    print(f"rolling local map, 200^2 cells, 720 beams: {results['rolling_local_map_ms']:.3f} ms a full update")
     for size in (384, 1000) if arguments.quick else (384, 1000, 4000):
         Suite(size, 3 if arguments.quick else 7, results).run()
     if arguments.json:

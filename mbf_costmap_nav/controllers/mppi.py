@@ -83,6 +83,7 @@ class MppiController(PathFollower):
         self._noise = correlated_noise(self.rng, shape, math.exp(-p.model_dt / p.noise_correlation_time))
         self._velocities = np.empty(shape[1:], dtype=np.float32)
         self._poses = np.empty(shape[1:], dtype=np.float32)
+        self._smoothing = smoothing_matrix(p.time_steps)
         self._nominal: Float32Array = np.zeros((3, p.time_steps), dtype=np.float32)
         self.parameters_changed()
 
@@ -139,7 +140,7 @@ class MppiController(PathFollower):
         if rollouts.collided.all():
             return None
         weights = np.exp(-(costs + self._control_cost(velocities) - costs.min()) / p.temperature)
-        controls = self._smoothed(velocities @ (weights / weights.sum()).astype(np.float32))[:, :, None]
+        controls = (velocities @ (weights / weights.sum()).astype(np.float32) @ self._smoothing)[:, :, None]
         self._clip(cycle, controls)
         checked_steps = max(1, round(p.footprint_check_time / p.model_dt))
         trajectory = np.empty_like(controls)
@@ -165,13 +166,6 @@ class MppiController(PathFollower):
         price = self._nominal[active, :1] * offset / self._deviation[active, None] ** 2
         return np.asarray(np.float32(self.parameters.gamma) * price.sum(axis=0))
 
-    def _smoothed(self, controls: Float32Array) -> Float32Array:
-        """Controls (3, steps) through the Savitzky-Golay filter, held at both ends."""
-        reach = len(SMOOTHING) // 2
-        padded = np.pad(controls, ((0, 0), (reach, reach)), mode="edge")
-        rows = [np.convolve(row, SMOOTHING, mode="valid") for row in padded]
-        return np.array(rows, dtype=np.float32)
-
     def _command(self, velocity: Float32Array) -> Command:
         """Twist, or steering angle by the single-track model for a robot with a wheelbase."""
         vx, vy, wz = (float(component) for component in velocity)
@@ -179,6 +173,15 @@ class MppiController(PathFollower):
             return Twist.planar(vx, vy, wz)
         angle = math.atan(self.parameters.wheelbase * wz / vx) if abs(vx) > 1e-3 else 0.0
         return AckermannCommand(vx, angle)
+
+
+def smoothing_matrix(steps: int) -> Float32Array:
+    """(steps, steps) matrix that takes a row of controls through the filter, the first and the last one held."""
+    reach = len(SMOOTHING) // 2
+    matrix = np.zeros((steps, steps), dtype=np.float32)
+    for offset, weight in enumerate(SMOOTHING, start=-reach):
+        np.add.at(matrix, (np.clip(np.arange(steps) + offset, 0, steps - 1), np.arange(steps)), weight)
+    return matrix
 
 
 def correlated_noise(rng: np.random.Generator, shape: tuple[int, int, int, int], correlation: float) -> Float32Array:

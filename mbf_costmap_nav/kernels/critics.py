@@ -159,5 +159,9 @@ def mean_of(values: Float32Array, negative_part: bool) -> Float32Array:
     for t in range(steps):
         row = values[t]
         for n in range(samples):
-            total[n] += max(-row[n], np.float32(0.0)) if negative_part else abs(row[n])
+            value = row[n]
+            counted = (
+                -value if value < 0.0 else (np.float32(0.0) if negative_part else value)
+            )  # max() blocks vectorising
+            total[n] += counted
     return total / np.float32(steps)

@@ -104,6 +104,9 @@ def add_noise(nominal: Float32Array, noise: Float32Array, deviation: Float32Arra
         scale = deviation[component]
         for t in range(steps):
             base = nominal[component, t]
+            if scale == 0.0:  # a direction this robot does not have
+                velocities[component, t] = base
+                continue
             row, out = noise[component, t], velocities[component, t]
             for n in range(samples):
                 out[n] = base + scale * row[n]
