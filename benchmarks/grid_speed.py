@@ -165,7 +165,7 @@ class Suite:
 
 
 def rolling_local_map(repeats: int) -> float:
-    """Median time [ms] of one full update of a rolling 10 m x 10 m map at 0.05 m: 720 beams cleared, marked, inflated."""
+    """Median time [ms] of a full update of a rolling 10 m x 10 m map at 0.05 m: 720 beams, inflation."""
     parameters = CostmapParameters(
         rolling_window=True,
         resolution=RESOLUTION,

@@ -104,6 +104,10 @@ def alignment(poses: Float32Array, path: Float32Array, spacing: float, stride: i
     per_spacing = np.float32(1.0 / spacing)
     travelled = np.zeros(samples, dtype=np.float32)
     last_x, last_y = np.zeros(samples, dtype=np.float32), np.zeros(samples, dtype=np.float32)
+    # As in map_costs: indices first, in a loop that vectorises, then the look-ups.
+    index = np.empty(samples, dtype=np.int32)
+    path_x, path_y = path[:, 0].copy(), path[:, 1].copy()
+    last, half = np.float32(path.shape[0] - 1), np.float32(0.5)
     looked = 0
     for t in range(stride - 1, steps, stride):
         looked += 1
@@ -112,8 +116,10 @@ def alignment(poses: Float32Array, path: Float32Array, spacing: float, stride: i
             dx, dy = xs[n] - last_x[n], ys[n] - last_y[n]
             travelled[n] += np.sqrt(dx * dx + dy * dy)
             last_x[n], last_y[n] = xs[n], ys[n]
-            index = min(int(travelled[n] * per_spacing + np.float32(0.5)), path.shape[0] - 1)
-            ex, ey = xs[n] - path[index, 0], ys[n] - path[index, 1]
+            at = travelled[n] * per_spacing + half
+            index[n] = np.int32(at if at < last else last)
+        for n in range(samples):
+            ex, ey = xs[n] - path_x[index[n]], ys[n] - path_y[index[n]]
             total[n] += np.sqrt(ex * ex + ey * ey)
     return total / np.float32(max(looked, 1))
 
