@@ -7,7 +7,7 @@ the data folder, crops of a real 1 m survey. On each, a simulated Husky drives f
 method: same controller on the mesh, pure pursuit on the flat map. ``feasible`` terrains are those where a way exists
 whose ground, seen over the robot's length, stays below 25 degrees with half a metre of room on both sides; rates are
 over these. Failures are of the planner (no plan), of physics (tipped over, stuck, high-centred) or of the controller
-(the rest); ``--replays`` drives one of each class again and keeps everything to look at.
+(the rest), or an error before the start; ``--replays`` drives one of each class again and keeps everything to look at.
 """
 
 from __future__ import annotations
@@ -125,6 +125,8 @@ def is_feasible(scenario: Scenario, seed: int) -> bool:
 def failure_class(row: dict[str, Any]) -> str:
     if row["success"]:
         return ""
+    if "time_s" not in row:
+        return "error"  # it could not even begin
     if PHYSICS & set(row.get("mishaps", ())):
         return "physics"
     return "planner" if row["outcome"] in PLANNER_OUTCOMES else "controller"
