@@ -4,6 +4,8 @@ Within a face the field is taken as linear, so the way down is a straight line t
 in the next face, in a valley it follows the edge, at a vertex it takes the steepest face or edge. The field falls
 strictly from crossing to crossing, so the trace ends at the source; where rounding makes the field stall, the wave's
 predecessors, which are acyclic, take over. Thus every reached point gets a path.
+
+Vectors of three go through ``_difference`` and ``_dot``: array expressions would take numba seconds to compile.
 """
 
 from __future__ import annotations
@@ -129,11 +131,25 @@ def _grown(points: Float64Array, capacity: int) -> Float64Array:
 
 
 @kernel
+def _difference(a: Float64Array, b: Float64Array) -> Float64Array:
+    result = np.empty(3)
+    for axis in range(3):
+        result[axis] = a[axis] - b[axis]
+    return result
+
+
+@kernel
+def _dot(a: Float64Array, b: Float64Array) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]  # type: ignore[no-any-return]
+
+
+@kernel
 def _best_corner(vertices: Float64Array, corners: Int32Array, distances: Float32Array, point: Float64Array) -> int:
     """Return the corner over which the way from ``point`` is shortest."""
     best, best_total = corners[0], np.inf
     for corner in corners:
-        total = distances[corner] + math.sqrt(np.sum((vertices[corner] - point) ** 2))
+        way = _difference(vertices[corner], point)
+        total = distances[corner] + math.sqrt(_dot(way, way))
         if total < best_total:
             best, best_total = corner, total
     return int(best)
@@ -143,23 +159,25 @@ def _best_corner(vertices: Float64Array, corners: Int32Array, distances: Float32
 def _descent_direction(vertices: Float64Array, corners: Int32Array, distances: Float32Array) -> Float64Array:
     """Negative gradient (3,) of the linear field on a face; its length is the slope of the field."""
     origin = vertices[corners[0]]
-    e1, e2 = vertices[corners[1]] - origin, vertices[corners[2]] - origin
+    e1, e2 = _difference(vertices[corners[1]], origin), _difference(vertices[corners[2]], origin)
     d1 = float(distances[corners[1]]) - float(distances[corners[0]])
     d2 = float(distances[corners[2]]) - float(distances[corners[0]])
-    g11, g12, g22 = np.sum(e1 * e1), np.sum(e1 * e2), np.sum(e2 * e2)
+    g11, g12, g22 = _dot(e1, e1), _dot(e1, e2), _dot(e2, e2)
     determinant = max(g11 * g22 - g12 * g12, 1e-300)
-    gradient: Float64Array = ((d1 * g22 - d2 * g12) * e1 + (d2 * g11 - d1 * g12) * e2) / determinant
-    return -gradient
+    descent = np.empty(3)
+    for axis in range(3):
+        descent[axis] = -((d1 * g22 - d2 * g12) * e1[axis] + (d2 * g11 - d1 * g12) * e2[axis]) / determinant
+    return descent
 
 
 @kernel
 def _barycentric_rates(vertices: Float64Array, corners: Int32Array, direction: Float64Array) -> Float64Array:
     """Change (3,) of the barycentric coordinates per unit of a direction in the face's plane."""
     origin = vertices[corners[0]]
-    e1, e2 = vertices[corners[1]] - origin, vertices[corners[2]] - origin
-    g11, g12, g22 = np.sum(e1 * e1), np.sum(e1 * e2), np.sum(e2 * e2)
+    e1, e2 = _difference(vertices[corners[1]], origin), _difference(vertices[corners[2]], origin)
+    g11, g12, g22 = _dot(e1, e1), _dot(e1, e2), _dot(e2, e2)
     determinant = max(g11 * g22 - g12 * g12, 1e-300)
-    p1, p2 = np.sum(direction * e1), np.sum(direction * e2)
+    p1, p2 = _dot(direction, e1), _dot(direction, e2)
     rates = np.empty(3)
     rates[1] = (p1 * g22 - p2 * g12) / determinant
     rates[2] = (p2 * g11 - p1 * g12) / determinant
@@ -176,19 +194,24 @@ def _leave_face(
     The share counts from the corner after the opposite one (counter-clockwise).
     """
     rates = _barycentric_rates(vertices, corners, _descent_direction(vertices, corners, distances))
-    weights = _barycentric_rates(vertices, corners, point - vertices[corners[0]])
+    weights = _barycentric_rates(vertices, corners, _difference(point, vertices[corners[0]]))
     weights[0] += 1.0
-    exit_corner, shortest = int(np.argmin(rates)), np.inf
+    exit_corner, shortest = 0, np.inf
+    for corner in range(1, 3):
+        exit_corner = corner if rates[corner] < rates[exit_corner] else exit_corner
     for corner in range(3):
         # A coordinate at zero belongs to the edge the way came in by.
         if rates[corner] < 0.0 and weights[corner] > 1e-9 and -weights[corner] / rates[corner] < shortest:
             exit_corner, shortest = corner, -weights[corner] / rates[corner]
     if shortest < np.inf:
-        weights += shortest * rates
+        for corner in range(3):
+            weights[corner] += shortest * rates[corner]
     after, before = (exit_corner + 1) % 3, (exit_corner + 2) % 3
     first, second = max(weights[after], 0.0), max(weights[before], 0.0)
     share = second / (first + second) if first + second > 0.0 else 0.5
-    exit_point = vertices[corners[after]] + share * (vertices[corners[before]] - vertices[corners[after]])
+    exit_point = _difference(vertices[corners[before]], vertices[corners[after]])
+    for axis in range(3):
+        exit_point[axis] = vertices[corners[after], axis] + share * exit_point[axis]
     return exit_point, exit_corner, share
 
 
@@ -231,10 +254,11 @@ def _steepest_way(
                 continue
             inside = inside and rates[corner] > 0.0
             fall = float(distances[vertex]) - float(distances[corners[corner]])
-            slope = fall / math.sqrt(np.sum((vertices[corners[corner]] - vertices[vertex]) ** 2))
+            edge = _difference(vertices[corners[corner]], vertices[vertex])
+            slope = fall / math.sqrt(_dot(edge, edge))
             if slope > best_slope:
                 best_slope, best_face, best_vertex = slope, face, corners[corner]
-        slope = math.sqrt(np.sum(descent * descent))
+        slope = math.sqrt(_dot(descent, descent))
         if inside and slope > best_slope:
             best_slope, best_face, best_vertex = slope, face, -1
     return best_face, best_vertex
