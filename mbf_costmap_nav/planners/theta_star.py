@@ -4,7 +4,7 @@ When to use: long straight runs matter (fast robots, smooth heading) and a car's
 exact optimum is asked for (``costmap.astar`` on the eight directions; Theta* is a heuristic, typically within 1 % of
 the any-angle optimum), or smooth corners are needed (put ``costmap.smoother`` behind it).
 
-Cost: about three times ``costmap.astar``.
+Cost: three to four times ``costmap.astar``.
 
 Formula: Lazy Theta* (Nash, Koenig, Tovey 2010), see ``kernels.theta_star``; lines end after a few cells during the
 search and are joined afterwards (``kernels.grid_line.pull_string``). ``spacing`` fills the pieces with poses, as
