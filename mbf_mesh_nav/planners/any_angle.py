@@ -4,6 +4,8 @@ Strengths: the shortest paths of all planners here (the traced path's small zigz
 gone), straight where the ground is, still through free faces only; where the taut line would cost more than the
 traced one (costs on the map), the traced one stays. Known failure: a local optimum, the strip itself is that of the
 wave; no vector field is handed on, it would not match the path. Cost: that of ``mesh.cvp`` plus about 2 us a face.
+When not: on coarse meshes, with faces as long as the way around an obstacle or a ridge. There the wave may choose the
+wrong side of a vertex, and the taut path stays on it; densify the map (``mesh_map.densify``) instead.
 """
 
 from __future__ import annotations
