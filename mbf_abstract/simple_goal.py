@@ -1,7 +1,7 @@
 """A bare goal pose in, the ``move_base`` action run: the adapter for tools that only know how to point at the map.
 
-Like the topic ``move_base_simple/goal``: the newest goal counts. Without the traps of the old relay: the planner and the
-controller are the server's defaults, whatever their names, and ``cancel`` reaches the goal.
+Like the topic ``move_base_simple/goal``: the newest goal counts. Without the traps of the old relay: the planner and
+the controller are the server's defaults, whatever their names, and ``cancel`` reaches the goal.
 """
 
 from __future__ import annotations
