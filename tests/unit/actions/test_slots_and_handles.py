@@ -148,7 +148,9 @@ def test_f248_f261_a_plan_that_succeeds_after_the_cancel_is_dropped_before_patie
 
 
 def test_f250_a_cancel_without_any_goal_is_no_error(make_bench):
-    make_bench().navigator.cancel_all()
+    bench = make_bench()
+    bench.navigator.cancel_all()
+    assert send(bench).wait().success
 
 
 # F251 to F262: the goal state machine
