@@ -77,6 +77,7 @@ class CostmapLayer(ABC):
     """One source of costs. ``geometry`` is the costmap's grid, set before the first update."""
 
     Parameters: ClassVar[type[LayerParameters]] = LayerParameters
+    contract_check: ClassVar[str] = "mbf_costmap_nav.testing:check_layer"
     geometry: GridGeometry
 
     def __init__(self, context: LayerContext) -> None:

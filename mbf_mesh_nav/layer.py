@@ -69,6 +69,7 @@ class MeshLayer(ABC):
     """Least and greatest number of inputs."""
     cacheable: ClassVar[bool] = False
     """Whether the values depend on mesh and parameters alone and are worth keeping in a file."""
+    contract_check: ClassVar[str] = "mbf_mesh_nav.testing:check_layer"
 
     parameters: Any
 

@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 
 from mbf_abstract.registry import PluginRegistry
-from mbf_abstract.testing.contract import ContractBroken
+from mbf_abstract.testing.contract import ContractBroken, check_layer
 from mbf_costmap_nav.costmap import CellBox
 from mbf_costmap_nav.layer import CostmapLayer
 from mbf_costmap_nav.sensor_data import Observation, SensorLayer
-from mbf_costmap_nav.testing import check_layer as check_costmap_layer
 from mbf_mesh_nav.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.layers.border import BorderLayer
 from mbf_mesh_nav.layers.steepness import SteepnessLayer
 from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.testing import check_layer as check_mesh_layer
 
 CORNERS = [(1.0, 1.0), (2.5, 1.0), (2.5, 2.0), (1.0, 2.0)]
 SOURCES = {"sources": {"laser": {"observation_persistence": 5.0}}}
@@ -56,7 +54,7 @@ def computed(layer_class, mesh_map, name):
 def test_mesh_layer(name, hill):
     layer_class = PluginRegistry("mesh").load("mesh_layers", name, MeshLayer)
     sources = [computed(BorderLayer, hill, "border"), computed(SteepnessLayer, hill, "steepness")]
-    check_mesh_layer(
+    check_layer(
         layer_class,
         hill,
         parameters=layer_class.Parameters.model_validate(MESH_PARAMETERS.get(name, {})),
@@ -70,7 +68,7 @@ def test_mesh_layer(name, hill):
 def test_costmap_layer(name):
     layer_class = PluginRegistry("costmap").load("costmap_layers", name, CostmapLayer)
     parameters = layer_class.Parameters.model_validate(COSTMAP_PARAMETERS.get(name, {}))
-    check_costmap_layer(layer_class, parameters=parameters, observations=[("laser", SCAN)])
+    check_layer(layer_class, parameters=parameters, observations=[("laser", SCAN)])
 
 
 class GoodMeshLayer(MeshLayer):
@@ -139,7 +137,7 @@ class NeedsItsOwnParameters(GoodMeshLayer):
 
 def check_with_an_input(layer_class, mesh_map):
     source = computed(BorderLayer, mesh_map, "border")
-    check_mesh_layer(layer_class, mesh_map, inputs=[source], points=CLOUD)
+    check_layer(layer_class, mesh_map, inputs=[source], points=CLOUD)
 
 
 def test_a_mesh_layer_that_keeps_the_contract_passes(hill):
@@ -167,7 +165,7 @@ def test_a_bad_mesh_layer_is_caught(layer_class, text, hill):
 
 def test_a_mesh_layer_without_its_inputs_is_a_mistake_of_the_caller(hill):
     with pytest.raises(ValueError, match="GoodMeshLayer takes 1 to 1 inputs, got 0"):
-        check_mesh_layer(GoodMeshLayer, hill)
+        check_layer(GoodMeshLayer, hill)
 
 
 class GoodCostmapLayer(SensorLayer):
@@ -242,7 +240,7 @@ class MovesTheHits(GoodCostmapLayer):
 
 
 def test_a_costmap_layer_that_keeps_the_contract_passes():
-    check_costmap_layer(GoodCostmapLayer, observations=[("laser", SCAN)])
+    check_layer(GoodCostmapLayer, observations=[("laser", SCAN)])
 
 
 @pytest.mark.parametrize(
@@ -262,5 +260,11 @@ def test_a_costmap_layer_that_keeps_the_contract_passes():
 def test_a_bad_costmap_layer_is_caught(layer_class, text):
     scan = Observation.of_scan(SCAN.origin, SCAN.ends, SCAN.hits, SCAN.stamp)
     with pytest.raises(ContractBroken, match=f"^{layer_class.__name__} breaks") as broken:
-        check_costmap_layer(layer_class, observations=[("laser", scan)])
+        check_layer(layer_class, observations=[("laser", scan)])
     assert text in str(broken.value)
+
+
+@pytest.mark.parametrize("no_layer", [dict, PluginRegistry, 5])
+def test_what_is_no_layer_is_refused(no_layer):
+    with pytest.raises(TypeError, match="is no layer: expected a class with contract_check"):
+        check_layer(no_layer)

@@ -9,9 +9,10 @@ exceptions where a result is asked for. What a good path or a smooth drive is, i
 """
 
 from mbf_abstract.testing.contract.controller import check_controller
+from mbf_abstract.testing.contract.layer import check_layer
 from mbf_abstract.testing.contract.planner import check_planner
 from mbf_abstract.testing.contract.recovery import check_recovery
 from mbf_abstract.testing.contract.refiner import check_refiner
 from mbf_abstract.testing.contract.report import ContractBroken
 
-__all__ = ["ContractBroken", "check_controller", "check_planner", "check_recovery", "check_refiner"]
+__all__ = ["ContractBroken", "check_controller", "check_layer", "check_planner", "check_recovery", "check_refiner"]
