@@ -60,6 +60,7 @@ class EventKind(str, Enum):
     LEASE_REVOKED = "lease_revoked"  # holder, reason
     FAULT = "fault"  # where, type, message, traceback
     QUARANTINE = "quarantine"  # plugin, slot, reason
+    TREE = "tree"  # tree, then nodes where a run of it begins, or tick and changes: [index, status, message] of each
     MAP = "map"  # what a map server did: cleared, updated, found stale
     PARAMETER_CHANGED = "parameter_changed"  # name, old, new
     SINK_FAILED = "sink_failed"  # sink, message

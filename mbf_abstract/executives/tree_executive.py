@@ -21,6 +21,7 @@ from py_trees.common import Status
 from mbf_abstract.events import EventKind
 from mbf_abstract.executives.conditions import TIME_RESOLUTION
 from mbf_abstract.executives.mission import MissionContext
+from mbf_abstract.executives.tree_events import TreeReporter
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.navigator import Navigator
 
@@ -67,6 +68,8 @@ class TreeExecutive:
         self._condition = self._runtime.clock.condition()
         self._cancel_reason = ""
         self._tip = ""
+        self._ticks = 0
+        self._reporter = TreeReporter(tree, self._runtime.events)
 
     def run(self, target: Pose | None = None, path: Path | None = None) -> TreeResult:
         """Tick until the tree has succeeded or failed, or ``cancel`` is called; then no goal of it runs.
@@ -82,10 +85,11 @@ class TreeExecutive:
         self._cancel_reason = ""
         for node in self.tree.iterate():
             node.setup(mission=mission)
+        self._reporter.begin()
         try:
             status = self._tick_until_done()
         finally:
-            self.tree.stop(Status.INVALID)
+            self._stop_tree()
             mission.end_goals(self._cancel_reason or "the tree has ended")
         return TreeResult(status, self._message(status, mission), mission)
 
@@ -97,17 +101,25 @@ class TreeExecutive:
 
     def _tick_until_done(self) -> Status:
         clock = self._runtime.clock
-        start, ticks = clock.now(), 0
+        start, self._ticks = clock.now(), 0
         while not self._cancel_reason:
             self.tree.tick_once()
-            ticks += 1
+            self._ticks += 1
             self._tell_tip()
+            self._reporter.report(self._ticks)
             for listener in self.on_tick:
-                listener(ticks)
+                listener(self._ticks)
             if self.tree.status != Status.RUNNING:
                 return self.tree.status
-            self._wait_until(start + ticks * self.period)
+            self._wait_until(start + self._ticks * self.period)
         return Status.INVALID
+
+    def _stop_tree(self) -> None:
+        """Make every node idle. The log keeps how a tree ended by itself; where it was broken off, it tells that."""
+        broken_off = self.tree.status == Status.RUNNING
+        self.tree.stop(Status.INVALID)
+        if broken_off:
+            self._reporter.report(self._ticks)
 
     def _wait_until(self, stamp: float) -> None:
         clock = self._runtime.clock
