@@ -80,6 +80,22 @@ def test_f244_goals_end_each_with_its_own_result(make_bench):
     assert results[1].message == "number 2"
 
 
+def test_f243_feedback_reaches_the_handle_it_was_published_for(make_bench):
+    bench = make_bench(planners(4), planner_patience=0.0)
+    busy(bench, 2.0)
+    handles = [send(bench, f"p{i}", i) for i in range(4)]
+    bench.clock.sleep(0.5)
+    heard = []
+    for number, handle in enumerate(handles):
+        handle.add_feedback_callback(lambda feedback, number=number: heard.append((number, feedback)))
+    for number, handle in reversed(list(enumerate(handles))):
+        handle.publish_feedback(number + 1)
+    bench.clock.sleep(0.1)
+    assert heard == [(3, 4), (2, 3), (1, 2), (0, 1)]
+    assert [handle.feedback for handle in handles] == [1, 2, 3, 4]
+    assert {handle.status for handle in handles} == {GoalStatus.ACTIVE}
+
+
 def test_f290_cancel_all_ends_ten_running_slots(make_bench):
     bench = make_bench(planners(10), planner_patience=0.0)
     busy(bench, 100.0)
@@ -166,6 +182,40 @@ def test_f251_to_f257_a_goal_goes_from_pending_over_active_and_canceling_to_its_
     handle.wait()
     seen.append(handle.status)
     assert [status.value for status in seen] == ["pending", "active", "canceling", "canceled"]
+
+
+def test_f258_a_pending_goal_can_only_be_canceled_before_it_runs(make_bench):
+    bench = make_bench()
+    bench.planner.play(slow(bench.clock, 1.0, straight_plan))
+    send(bench)
+    waiting = send(bench)
+    waiting.cancel()
+    assert (waiting.status, waiting.result) == (GoalStatus.PENDING, None)
+    assert waiting.wait().message == "canceled by the client before it started"
+    assert waiting.status is GoalStatus.CANCELED
+
+
+def test_f259_an_active_goal_is_not_started_again(make_bench):
+    bench = make_bench()
+    busy(bench, 1.0)
+    handle = send(bench)
+    bench.clock.sleep(0.1)
+    handle.activate()
+    assert handle.status is GoalStatus.ACTIVE
+    assert handle.wait().success
+    assert len(bench.planner.requests) == 1
+
+
+def test_f260_a_canceling_goal_is_neither_started_nor_canceled_again(make_bench):
+    bench = make_bench()
+    bench.planner.play(slow(bench.clock, 1.0, straight_plan))
+    handle = send(bench)
+    bench.clock.sleep(0.1)
+    for attempt in (handle.cancel, handle.activate, handle.cancel, handle.pause, handle.resume):
+        attempt()
+        assert handle.status is GoalStatus.CANCELING
+    handle.wait()
+    assert len(bench.events(EventKind.GOAL_CANCEL)) == 1
 
 
 def test_f262_a_final_goal_changes_no_more(make_bench):

@@ -1,4 +1,4 @@
-"""Every kind of broken mesh is refused with counts and indices, or repaired when the configuration allows it."""
+"""What is repaired, dropped, merged and split; that every defect is found is in tests/faults/test_malformed_mesh.py."""
 
 import numpy as np
 import pytest
@@ -12,112 +12,6 @@ from mbf_mesh_nav.repair import REPAIRS, MeshError, checked_mesh
 def good() -> tuple[np.ndarray, np.ndarray]:
     vertices, faces = heightfield_mesh(np.zeros((4, 4)), 1.0, 1.0)
     return vertices.copy(), faces.copy()
-
-
-def nan_vertex():
-    vertices, faces = good()
-    vertices[5, 1] = np.nan
-    return vertices, faces
-
-
-def infinite_vertex():
-    vertices, faces = good()
-    vertices[0, 2] = np.inf
-    return vertices, faces
-
-
-def index_too_large():
-    vertices, faces = good()
-    faces[7, 1] = 16
-    return vertices, faces
-
-
-def negative_index():
-    vertices, faces = good()
-    faces[7, 1] = -1
-    return vertices, faces
-
-
-def zero_area():
-    vertices, faces = good()
-    return vertices, np.vstack([faces, [0, 1, 2]])
-
-
-def twice_the_same_corner():
-    vertices, faces = good()
-    return vertices, np.vstack([faces, [0, 0, 1]])
-
-
-def duplicate_face():
-    vertices, faces = good()
-    return vertices, np.vstack([faces, faces[3][[1, 2, 0]]])
-
-
-def third_face_at_an_edge():
-    vertices, faces = good()
-    fin = np.vstack([vertices, [1.5, 1.5, 1.0]])
-    return fin, np.vstack([faces, [6, 9, 16]])
-
-
-def one_face_turned_over():
-    vertices, faces = good()
-    faces[8] = faces[8][::-1]
-    return vertices, faces
-
-
-def all_faces_turned_over():
-    vertices, faces = good()
-    return vertices, faces[:, ::-1].copy()
-
-
-DEFECTS = [
-    (nan_vertex, "non_finite", [5]),
-    (infinite_vertex, "non_finite", [0]),
-    (index_too_large, "index_out_of_range", [7]),
-    (negative_index, "index_out_of_range", [7]),
-    (zero_area, "zero_area", [18]),
-    (twice_the_same_corner, "zero_area", [18]),
-    (duplicate_face, "duplicate_faces", [18]),
-    (third_face_at_an_edge, "non_manifold", [18]),
-    (one_face_turned_over, "flipped_winding", [8]),
-    (all_faces_turned_over, "facing_down", list(range(18))),
-]
-
-
-@pytest.mark.parametrize(("make", "name", "indices"), DEFECTS, ids=lambda value: getattr(value, "__name__", None))
-def test_defect_is_refused_by_name_with_count_and_indices(make, name, indices):
-    with pytest.raises(MeshError) as error:
-        checked_mesh(*make(), file="broken.ply")
-
-    assert error.value.file == "broken.ply"
-    assert [reason.split(":")[0] for reason in error.value.reasons] == [name]
-    assert str(indices[0]) in str(error.value)
-
-
-@pytest.mark.parametrize(("make", "name", "indices"), DEFECTS, ids=lambda value: getattr(value, "__name__", None))
-def test_defect_is_repaired_on_request_and_the_input_is_left_alone(make, name, indices):
-    vertices, faces = make()
-    before = vertices.copy(), faces.copy()
-
-    mesh, report = checked_mesh(vertices, faces, [name])
-
-    assert report[name].repaired
-    assert report[name].indices.tolist() == indices
-    np.testing.assert_array_equal(vertices, before[0])
-    np.testing.assert_array_equal(faces, before[1])
-    _, second = checked_mesh(mesh.vertices, mesh.faces)
-    assert not second.refusals
-
-
-def test_all_defects_are_reported_at_once():
-    vertices, faces = nan_vertex()
-    faces = np.vstack([faces, [0, 1, 2], [0, 1, 99], faces[17]])
-
-    with pytest.raises(MeshError) as error:
-        checked_mesh(vertices, faces)
-
-    names = [reason.split(":")[0] for reason in error.value.reasons]
-    assert names == ["index_out_of_range", "non_finite", "zero_area", "duplicate_faces"]
 
 
 def test_unreferenced_vertices_and_components_are_reported_but_harmless():
@@ -175,20 +69,6 @@ def test_moebius_strip_cannot_be_wound_and_says_so():
 
     with pytest.raises(MeshError, match="one-sided"):
         checked_mesh(vertices, np.array(faces))
-
-
-@pytest.mark.parametrize(
-    ("vertices", "faces", "text"),
-    [
-        (np.zeros((3, 2)), np.array([[0, 1, 2]]), "vertices must be"),
-        (np.zeros((3, 3)), np.array([[0.0, 1.0, 2.0]]), "faces must be"),
-        (np.zeros((3, 3)), np.zeros((0, 3), int), "no face"),
-        (np.zeros((3, 3)), np.array([[0, 1, 2]]), "no area"),
-    ],
-)
-def test_arrays_that_are_no_mesh_are_refused(vertices, faces, text):
-    with pytest.raises(MeshError, match=text):
-        checked_mesh(vertices, faces)
 
 
 def test_unknown_repair_is_refused_with_the_known_ones():

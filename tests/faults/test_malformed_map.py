@@ -1,0 +1,117 @@
+"""Fault table, row 22: malformed maps: descriptions, images, and a server that is told to use one."""
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.navigator import Navigator
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.transforms import TransformBuffer
+from mbf_costmap_nav.map_description import MapError, read_description
+from mbf_costmap_nav.map_io import load_image, load_map
+
+GOOD = {"image": "map.pgm", "resolution": 0.05, "origin": [0.0, 0.0, 0.0]}
+BAD_DESCRIPTIONS = {
+    "no image": ({"image": None}, "image"),
+    "zero resolution": ({"resolution": 0.0}, "resolution"),
+    "tiny resolution": ({"resolution": 1e-300}, "resolution"),
+    "infinite resolution": ({"resolution": float("inf")}, "resolution"),
+    "origin of two": ({"origin": [0.0, 0.0]}, "origin"),
+    "origin with nan": ({"origin": [0.0, float("nan"), 0.0]}, "origin"),
+    "unknown mode": ({"mode": "binary"}, "mode"),
+    "thresholds swapped": ({"occupied_thresh": 0.1, "free_thresh": 0.9}, "free_thresh"),
+    "threshold too large": ({"occupied_thresh": 65}, "occupied_thresh"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_DESCRIPTIONS)
+def test_a_bad_description_is_refused_with_the_key(tmp_path, case):
+    change, key = BAD_DESCRIPTIONS[case]
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(GOOD | change))
+    with pytest.raises(MapError, match=key) as caught:
+        load_map(tmp_path / "map.yaml")
+    assert caught.value.file == tmp_path / "map.yaml"
+
+
+@pytest.mark.parametrize("text", ["", "just text", "[1, 2]", "image: [", "\x00", "a: !!python/object:os.system 1"])
+def test_a_file_that_is_no_mapping_is_refused(tmp_path, text):
+    (tmp_path / "map.yaml").write_text(text)
+    with pytest.raises(MapError):
+        load_map(tmp_path / "map.yaml")
+
+
+BAD_IMAGES = {
+    "empty": b"",
+    "no image": b"hello",
+    "bad header": b"P5\nten 10\n255\n" + bytes(100),
+    "short data": b"P5\n10 10\n255\n" + bytes(50),
+    "no pixels": b"P5\n0 10\n255\n",
+    "sixteen bit": b"P5\n2 2\n65535\n" + bytes(8),
+    "absurd size": b"P5\n100000 100000\n255\n",
+    "too many cells": b"P5\n9000 9000\n255\n",
+}
+
+
+@pytest.mark.parametrize("case", BAD_IMAGES)
+def test_a_bad_image_is_refused_before_memory_is_taken(tmp_path, case):
+    (tmp_path / "map.pgm").write_bytes(BAD_IMAGES[case])
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(GOOD))
+    with pytest.raises(MapError) as caught:
+        load_map(tmp_path / "map.yaml")
+    assert caught.value.file == tmp_path / "map.pgm" and caught.value.reason
+
+
+@given(st.binary(max_size=200), st.sampled_from([b"", b"P5\n", b"P5\n4 4\n255\n", b"\x89PNG\r\n\x1a\n", b"BM"]))
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_any_bytes_are_a_map_or_a_map_error(tmp_path, content, start):
+    file = tmp_path / "map.pgm"
+    file.write_bytes(start + content)
+    try:
+        assert load_image(file, 1.0).occupancy.size > 0
+    except MapError as error:
+        assert error.file == file and error.reason
+
+
+@given(
+    st.text(max_size=80)
+    | st.dictionaries(st.sampled_from([*GOOD, "mode"]), st.none() | st.floats() | st.text()).map(yaml.safe_dump)
+)
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_any_text_is_a_description_or_a_map_error(tmp_path, text):
+    file = tmp_path / "map.yaml"
+    file.write_text(text, encoding="utf-8")
+    try:
+        assert read_description(file).resolution > 0.0
+    except MapError as error:
+        assert error.file == file and error.reason
+
+
+CONFIG = """
+backend: costmap
+planners: [{name: planner, type: astar}]
+global_costmap: {layers: [{name: walls, type: static}], walls: {map_file: map.yaml}}
+local_costmap: {rolling_window: true, width: 2.0, height: 2.0, layers: [{name: area, type: keepout}], area: {zones: []}}
+"""
+
+
+def test_a_server_refuses_a_malformed_map_before_it_starts_and_starts_with_the_mended_one(tmp_path):
+    (tmp_path / "robot.yaml").write_text(CONFIG)
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(GOOD))
+    (tmp_path / "map.pgm").write_bytes(BAD_IMAGES["short data"])
+    clock, transforms = SimClock(), TransformBuffer()
+    robot = LoopbackRobot(clock, transforms, Pose.planar(0.5, 0.5))
+    with pytest.raises(MapError, match=r"map\.pgm"):
+        Navigator.from_file(tmp_path / "robot.yaml", robot, clock, transforms)
+    clock.sleep(0.1)
+    assert {who.name for who in clock._known} == {"main", "loopback robot"}, "no thread of the server is left"
+
+    Image.fromarray(np.full((40, 40), 255, np.uint8)).save(tmp_path / "map.pgm")
+    with Navigator.from_file(tmp_path / "robot.yaml", robot, clock, transforms) as navigator:
+        clock.sleep(0.5)
+        assert navigator.get_path(Pose.planar(1.5, 1.5)).success
+    robot.close()
