@@ -24,6 +24,7 @@ from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Command, Path, Pose, Twist
 from mbf_abstract.outcomes import is_success
 from mbf_abstract.parameters import PluginParameters
+from mbf_abstract.relaxation import Relaxation
 
 if TYPE_CHECKING:
     import numpy as np
@@ -57,6 +58,9 @@ class PluginContext:
         The plugin's own generator, seeded by the server from its seed and the plugin's name.
     robot : RobotInformation
         Fresh robot pose and velocity.
+    relaxation : Relaxation
+        Slack that recoveries of this server grant for a while. Planning and arrival take it into account by themselves;
+        a controller may widen limits of its own.
     """
 
     name: str
@@ -64,6 +68,7 @@ class PluginContext:
     clock: Clock
     rng: np.random.Generator
     robot: RobotInformation
+    relaxation: Relaxation = field(default_factory=Relaxation, kw_only=True)
 
 
 class Plugin(ABC):
@@ -80,6 +85,7 @@ class Plugin(ABC):
         self.clock = context.clock
         self.rng = context.rng
         self.robot = context.robot
+        self.relaxation = context.relaxation
 
     def cancel(self) -> bool:
         """Ask the running call to end; return whether the plugin supports this beside its cancel token."""

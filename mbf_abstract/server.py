@@ -34,7 +34,7 @@ from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.map_queries import MapQueries
-from mbf_abstract.map_view import MapView
+from mbf_abstract.map_view import FieldView, MapView
 from mbf_abstract.navigation_parameters import NavigationParameters
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugin_table import PluginTable
@@ -134,8 +134,17 @@ class AbstractNavigationServer(ABC):
         """Height [m] of the ground at a place of the global frame; 0 where the map has none there."""
         return 0.0
 
-    def map_view(self) -> MapView | None:
-        """What the map looks like, for pictures; None if this server has nothing to show."""
+    @property
+    def map_views(self) -> tuple[str, ...]:
+        """Names of what ``map_view`` can show: maps or layers, the one planners see first."""
+        return ()
+
+    def map_view(self, name: str = "") -> MapView | None:
+        """What the map, or one of ``map_views``, looks like; None if this server has nothing to show."""
+        return None
+
+    def field_view(self, path: Path) -> FieldView | None:
+        """Directions that a planner has found together with a path; None where it has only found the path."""
         return None
 
     @classmethod
@@ -221,9 +230,12 @@ class AbstractNavigationServer(ABC):
 
     def _construct(self, spec: PluginSpec) -> LoadedPlugin[Any]:
         rng = np.random.default_rng([self._seed, zlib.crc32(spec.name.encode())])
-        base = PluginContext(spec.name, spec.parameters, self.runtime.clock, rng, self.runtime.robot)
+        runtime = self.runtime
+        base = PluginContext(
+            spec.name, spec.parameters, runtime.clock, rng, runtime.robot, relaxation=runtime.relaxation
+        )
         instance: Plugin = spec.plugin_class(self.make_context(spec.kind, spec.options, base))
-        return LoadedPlugin(spec, instance, self.runtime)
+        return LoadedPlugin(spec, instance, runtime)
 
     def _loaded(self, kind: PluginKind, name: str) -> LoadedPlugin[Any]:
         plugin = self.plugins.find(kind, name) if name else None
@@ -295,6 +307,18 @@ class AbstractNavigationServer(ABC):
         """Cancel every running goal; never waits."""
         for action in self._actions():
             action.cancel_all(reason)
+
+    def pause_all(self) -> None:
+        """Pause every running goal: the robot stands, all goals are kept; idempotent, never waits."""
+        for action in self._actions():
+            for handle in action.unfinished:
+                handle.pause()
+
+    def resume_all(self) -> None:
+        """Let every paused goal go on."""
+        for action in self._actions():
+            for handle in action.unfinished:
+                handle.resume()
 
     def close(self) -> None:
         """Stop the robot for good, cancel everything, end the threads; idempotent, never waits for a plugin."""

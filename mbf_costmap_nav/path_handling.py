@@ -130,7 +130,23 @@ def to_base_frame(points: FloatArray, pose: Pose) -> FloatArray:
 
 @dataclass(frozen=True)
 class ControlCycle:
-    """What a controller works on in one cycle: request, plan, map, footprint, goal tolerance [m], speed limit [m/s]."""
+    """What a controller works on in one cycle.
+
+    Attributes
+    ----------
+    request : ControlRequest
+    tracker : PathTracker
+        The plan and the progress on it.
+    costmap : Costmap
+        Snapshot of this cycle.
+    footprint : FootprintCheck
+    goal_tolerance : float
+        Distance [m] from the goal that counts as arrived.
+    speed_limit : float
+        Largest speed [m/s] the maps allow here.
+    limit_factor : float
+        At least 1: how much wider the controller's own limits are while a recovery relaxes them.
+    """
 
     request: ControlRequest
     tracker: PathTracker
@@ -138,6 +154,7 @@ class ControlCycle:
     footprint: FootprintCheck
     goal_tolerance: float
     speed_limit: float
+    limit_factor: float = 1.0
 
 
 class PathFollower(CostmapController):
@@ -187,8 +204,8 @@ class PathFollower(CostmapController):
         if self._footprint.collides(costmap, pose.x, pose.y, pose.yaw):
             text = f"the footprint at ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad) touches a lethal cell"
             return ControlResult(ExePathOutcome.COLLISION, text)
-        limit = self._speed_limit(pose)
-        return ControlCycle(request, self.tracker, costmap, self._footprint, self.goal_dist_tolerance, limit)
+        limit, factor = self._speed_limit(pose), self.relaxation.slack(self.clock.now()).controller_factor
+        return ControlCycle(request, self.tracker, costmap, self._footprint, self.goal_dist_tolerance, limit, factor)
 
     def _speed_limit(self, pose: Pose) -> float:
         """Lowest speed [m/s] that the layers of either costmap allow at ``pose``."""

@@ -14,7 +14,7 @@ from mbf_costmap_nav.map_lifecycle import MapLifecycle, MapLifecycleParameters
 
 
 def _nothing() -> None:
-    """Starting and stopping needs no more than the flag the tick looks at."""
+    """Stopping needs no more than the flag the tick looks at."""
 
 
 class ServedCostmap:
@@ -30,7 +30,7 @@ class ServedCostmap:
         self.costmap = costmap
         self._runtime = runtime
         self._parameters = self._lifecycle_parameters()
-        self._lifecycle = MapLifecycle(runtime.clock, self._parameters, _nothing, _nothing, self._clear)
+        self._lifecycle = MapLifecycle(runtime.clock, self._parameters, self._update, _nothing, self._clear)
         self._ticker = Ticker(runtime.clock, runtime.events, self._tick, 1.0 / update_frequency, name)
 
     def in_use(self) -> AbstractContextManager[None]:
@@ -51,7 +51,10 @@ class ServedCostmap:
             self._update()
 
     def _update(self) -> None:
-        """One update; a rolling map keeps its place while the robot's pose is unknown."""
+        """One update, also at every start, as nobody may see the map of the last stop.
+
+        A rolling map keeps its place while the robot's pose is unknown.
+        """
         try:
             pose: Pose | None = self._in_map_frame(self._runtime.robot.pose())
         except (RobotStateError, TransformError):

@@ -79,10 +79,11 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
         def to_global(pose: Pose) -> Pose:
             return in_global_frame(pose, self.runtime)
 
+        relaxed = self.runtime.relaxation.slack(self.runtime.clock.now()).plan_distance
         return PlanRequest(
             start=to_global(goal.start_pose) if goal.start_pose else self.runtime.robot.pose(),
             goal=to_global(goal.target_pose),
-            dist_tolerance=goal.dist_tolerance,
+            dist_tolerance=max(goal.dist_tolerance, relaxed),
             angle_tolerance=goal.angle_tolerance,
             via=tuple(to_global(pose) for pose in goal.via),
             cancel_token=handle.cancel_token,

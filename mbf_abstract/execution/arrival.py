@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goal_area import GoalArea
+from mbf_abstract.relaxation import Slack
 
 ToleranceCheck = Literal["plugin", "either", "exclusive"]
 
@@ -33,6 +34,14 @@ class ArrivalCheck:
     angle_tolerance: float
     check: ToleranceCheck = "plugin"
     area: GoalArea | None = None
+
+    def relaxed(self, slack: Slack) -> ArrivalCheck:
+        """Return the same rule with tolerances at least as wide as the slack."""
+        return replace(
+            self,
+            dist_tolerance=max(self.dist_tolerance, slack.arrival_distance),
+            angle_tolerance=max(self.angle_tolerance, slack.arrival_angle),
+        )
 
     def reached(self, pose: Pose, ask_plugin: Callable[[], bool]) -> bool:
         """Apply the rule; ``ask_plugin`` is called only where its answer counts."""

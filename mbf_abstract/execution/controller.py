@@ -249,7 +249,8 @@ class ControllerExecution:
         assert self._plan is not None
         if self.state is ControllerState.STOPPING:
             return True
-        arrival, controller = self._plan.arrival, self._run.plugin.instance
+        slack = self._runtime.relaxation.slack(self._runtime.clock.now())
+        arrival, controller = self._plan.arrival.relaxed(slack), self._run.plugin.instance
 
         def ask_plugin() -> bool:
             return self._run.call(

@@ -14,6 +14,7 @@ from mbf_abstract.execution.callbacks import CallbackThread
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.navigation_parameters import NavigationParameters
 from mbf_abstract.plugins import PluginKind
+from mbf_abstract.relaxation import Relaxation
 from mbf_abstract.robot import RobotInformation
 from mbf_abstract.transforms import TransformBuffer
 from mbf_abstract.velocity_gate import VelocityGate
@@ -57,6 +58,8 @@ class Runtime:
     transforms: TransformBuffer
     parameters: NavigationParameters
     map_hooks: MapHooks = field(default_factory=NoMap)
+    relaxation: Relaxation = field(default_factory=Relaxation)
+    """Slack that recoveries grant for a while."""
     goal_ids: Iterator[int] = field(default_factory=lambda: count(1))
     """Goal ids, unique in this server."""
     runs: set[PluginRun[Any]] = field(default_factory=set)

@@ -142,7 +142,7 @@ class MppiController(PathFollower):
         weights = np.exp(-(costs + self._control_cost(velocities) - costs.min()) / p.temperature)
         controls = (velocities @ (weights / weights.sum()).astype(np.float32) @ self._smoothing)[:, :, None]
         self._clip(cycle, controls)
-        checked_steps = max(1, round(p.footprint_check_time / p.model_dt))
+        checked_steps = max(1, round(p.footprint_check_time / cycle.limit_factor / p.model_dt))
         trajectory = np.empty_like(controls)
         integrate(controls, cycle.request.pose.yaw, p.model_dt, trajectory)
         if is_free(cycle, trajectory[:, :checked_steps, 0]):

@@ -83,8 +83,9 @@ class RegulatedPurePursuitController(PathFollower):
         if isinstance(cycle, ControlResult):
             return cycle
         tracker = cycle.tracker
-        if tracker.cross_track > self.parameters.max_cross_track:
-            text = f"{tracker.cross_track:.2f} m off the path, limit {self.parameters.max_cross_track:.2f} m"
+        furthest = self.parameters.max_cross_track * cycle.limit_factor
+        if tracker.cross_track > furthest:
+            text = f"{tracker.cross_track:.2f} m off the path, limit {furthest:.2f} m"
             return ControlResult(ExePathOutcome.MISSED_PATH, text)
         turn = self._turn_at_goal(cycle)
         if turn is None:
@@ -175,7 +176,7 @@ class RegulatedPurePursuitController(PathFollower):
         """Refuse a command that leads into an obstacle within the check time, but not beyond the path's end."""
         if not self.parameters.collision_check:
             return ControlResult(ExePathOutcome.SUCCESS, "", command)
-        duration = self.parameters.collision_check_time
+        duration = self.parameters.collision_check_time / cycle.limit_factor
         if command.vx != 0.0:
             duration = min(duration, max(cycle.tracker.remaining, 0.0) / abs(command.vx))
         step = min(cycle.costmap.resolution / max(abs(command.vx), 1e-3), 0.1, max(duration, 1e-3))

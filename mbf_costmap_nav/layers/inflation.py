@@ -45,6 +45,8 @@ class InflationLayer(CostmapLayer):
         super().__init__(context)
         self._inscribed_radius = 0.0
         self._radius = 0
+        self._relief = (1.0, -math.inf)
+        self._factor = 1.0
         self._cost_of_square: NDArray[np.uint8] = np.array([LETHAL], dtype=np.uint8)
         self._seeds: NDArray[np.uint8] = np.zeros((0, 0), dtype=np.uint8)
 
@@ -59,19 +61,36 @@ class InflationLayer(CostmapLayer):
         self._inscribed_radius = footprint.inscribed_radius
         self._tabulate()
 
+    def relax(self, factor: float, until: float) -> None:
+        """Let the next updates up to the time ``until`` [s] keep ``factor`` of the radius, and decay faster by as much.
+
+        The first update after it restores the configured values. The inscribed radius stays as it is.
+        """
+        self._relief = (factor, until)
+
     def _tabulate(self) -> None:
-        self._radius = math.ceil(self.parameters.inflation_radius / self.geometry.resolution)
+        radius = self.parameters.inflation_radius * self._factor
+        self._radius = math.ceil(radius / self.geometry.resolution)
         if self._radius > LARGEST_RADIUS:
             raise ValueError(
                 f"layer {self.name!r}: inflation_radius is {self._radius} cells of {self.geometry.resolution:g} m, "
                 f"at most {LARGEST_RADIUS} are possible"
             )
         self._cost_of_square = cost_table(
-            self._radius, self.geometry.resolution, self._inscribed_radius, self.parameters.cost_scaling_factor
+            self._radius,
+            self.geometry.resolution,
+            self._inscribed_radius,
+            self.parameters.cost_scaling_factor / self._factor,
         )
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
-        """Grow the box by the radius: a new obstacle changes costs that far away."""
+        """Grow the box by the radius: a new obstacle changes costs that far away, another radius those of all cells."""
+        factor, until = self._relief
+        factor = factor if now < until else 1.0
+        if factor != self._factor:
+            self._factor = factor
+            self._tabulate()
+            return self.geometry.box
         return box.grown(self._radius)
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:

@@ -1,101 +1,85 @@
-"""Shrink the inflation for a while, so that planners and controllers dare to pass a narrow place.
+"""Be less strict for a while: smaller inflation, wider tolerances of planner and arrival, wider controller limits.
 
-When to use: NO_PATH_FOUND or NO_VALID_CMD in a passage that the robot really fits through. When not: the inscribed
-radius itself is too wide for the passage; it is never touched, so nothing becomes passable that the robot would hit.
+When to use: NO_PATH_FOUND or NO_VALID_CMD in a passage that the robot really fits through (inflation), a goal that is
+just occupied (planner tolerance), a controller that cannot reach its goal or its path exactly (arrival, controller
+factor). Two instances with different parameters make the "relax planner" and "relax controller" of the Move Base Flex
+paper. When not: the inscribed radius itself is too wide for the passage; it is never touched, so nothing becomes
+passable that the robot would hit.
 
-The behaviour returns at once, and the old inflation comes back by itself: each costmap gets a small layer of its own
-that puts the parameters back in the first update after ``duration``. Running it again while relaxed only prolongs it.
+The behaviour returns at once. What it changes ends by the clock, not by this plugin: the inflation with the map's first
+update after ``duration``, the tolerances at that very time, also if the goal was canceled or the plugin unloaded
+meanwhile. Running it again while relaxed only prolongs it.
 """
 
 from __future__ import annotations
 
 from typing import ClassVar
 
-from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+from mbf_abstract.relaxation import Slack
 from mbf_abstract.robot import RobotStateError
-from mbf_costmap_nav.costmap import CellArray, CellBox
-from mbf_costmap_nav.layer import CostmapLayer, LayerContext, LayerParameters
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
-from mbf_costmap_nav.layers.inflation import InflationLayer, InflationLayerParameters
-from mbf_costmap_nav.plugins import CostmapContext, CostmapRecovery
+from mbf_costmap_nav.layers.inflation import InflationLayer
+from mbf_costmap_nav.plugins import CostmapRecovery
 
 
 class RelaxParameters(PluginParameters):
     """Parameters of ``costmap.relax``."""
 
-    factor: float = parameter(
-        0.5, "What is left of the inflation radius, and what its decay is divided by.", gt=0.0, le=1.0
+    inflation_factor: float = parameter(
+        0.5, "What is left of the inflation radius, and what its decay is divided by; 1 = unchanged.", gt=0.0, le=1.0
+    )
+    planner_tolerance: float = parameter(
+        0.2, "Paths may end at least this far from the goal; 0 = unchanged.", unit="m", ge=0.0, le=100.0
+    )
+    dist_tolerance: float = parameter(
+        0.2, "This near to the goal counts as arrived; 0 = unchanged.", unit="m", ge=0.0, le=100.0
+    )
+    angle_tolerance: float = parameter(0.35, "The same for the heading; 0 = unchanged.", unit="rad", ge=0.0, le=3.2)
+    controller_factor: float = parameter(
+        2.0,
+        "Factor on the allowed distance from the path, divisor of the time ahead that must be free; 1 = unchanged.",
+        ge=1.0,
+        le=100.0,
     )
     duration: float = parameter(20.0, "How long.", unit="s", gt=0.0, le=3600.0)
 
 
 class RelaxRecovery(CostmapRecovery):
-    """Shrinks the inflation of both costmaps for a time."""
+    """Grants slack to planning and driving for a time."""
 
     Parameters: ClassVar[type[PluginParameters]] = RelaxParameters
     parameters: RelaxParameters
 
-    def __init__(self, context: CostmapContext) -> None:
-        super().__init__(context)
-        maps = {
-            id(costmap): costmap for costmap in (self.local_costmap, self.global_costmap)
-        }  # may be one and the same
-        self._keepers = [_RelaxedInflation(self.name, costmap) for costmap in maps.values()]
-
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
-        """Relax both maps and update them; moves nothing."""
+        """Relax the tolerances, then the inflation of both maps, and update these; moves nothing."""
         if request.cancel_token.cancelled:
             return RecoveryResult(RecoveryOutcome.CANCELED, request.cancel_token.reason)
-        relaxed = [keeper.relax(self.parameters.factor) for keeper in self._keepers]
-        if not any(relaxed):
-            return RecoveryResult(RecoveryOutcome.FAILURE, "no costmap has an inflation layer")
+        p = self.parameters
+        until = self.clock.now() + p.duration
+        slack = Slack(p.planner_tolerance, p.dist_tolerance, p.angle_tolerance, p.controller_factor)
+        self.relaxation.grant(self.name, slack, until)
         try:
-            for keeper in self._keepers:
-                keeper.until = self.clock.now() + self.parameters.duration
-                keeper.costmap.update(request.motion.pose(), self.clock.now())
+            for costmap in {id(costmap): costmap for costmap in (self.local_costmap, self.global_costmap)}.values():
+                self._relax_inflation(costmap, request, until)
         except RobotStateError as error:
             return RecoveryResult(RecoveryOutcome.TF_ERROR, str(error))
-        text = f"inflation at {self.parameters.factor:g} of its radius for {self.parameters.duration:g} s"
-        return RecoveryResult(RecoveryOutcome.SUCCESS, text)
+        return RecoveryResult(RecoveryOutcome.SUCCESS, f"for {p.duration:g} s: {self._says()}")
 
+    def _relax_inflation(self, costmap: LayeredCostmap, request: RecoveryRequest, until: float) -> None:
+        layers = [layer for layer in costmap.layers.values() if isinstance(layer, InflationLayer)]
+        if not layers or self.parameters.inflation_factor == 1.0:
+            return
+        for layer in layers:
+            layer.relax(self.parameters.inflation_factor, until)
+        costmap.update(request.motion.pose(), self.clock.now())
 
-class _RelaxedInflation(CostmapLayer):
-    """Remembers the inflation parameters of one costmap and puts them back when their time has come."""
-
-    def __init__(self, owner: str, costmap: LayeredCostmap) -> None:
-        super().__init__(LayerContext(f"{owner}.restore", LayerParameters(), costmap.frame_id, costmap.rolling_window))
-        self.costmap = costmap
-        self.until = 0.0
-        self._saved: dict[str, InflationLayerParameters] = {}
-        self.match_geometry(costmap.geometry)
-        costmap.layers.setdefault(self.name, self)
-
-    def relax(self, factor: float) -> bool:
-        """Shrink every inflation layer that is not shrunk yet; return whether there is one."""
-        inflation = self._inflation_layers()
-        for layer in inflation:
-            if layer.name not in self._saved:
-                old = self._saved[layer.name] = layer.parameters
-                shrunk = {"inflation_radius": old.inflation_radius * factor}
-                shrunk["cost_scaling_factor"] = old.cost_scaling_factor / factor
-                layer.parameters = old.model_copy(update=shrunk)
-        self.costmap.set_footprint(self.costmap.unpadded_footprint)  # makes all layers and cells new
-        return bool(inflation)
-
-    def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
-        """Restore after the time; then every cell changes."""
-        if not self._saved or now < self.until:
-            return box
-        for layer in self._inflation_layers():
-            layer.parameters = self._saved.pop(layer.name)
-            layer.set_footprint(self.costmap.footprint)
-        return self.geometry.box
-
-    def update_costs(self, cells: CellArray, box: CellBox) -> None:
-        """Write nothing."""
-
-    def _inflation_layers(self) -> list[InflationLayer]:
-        return [layer for layer in self.costmap.layers.values() if isinstance(layer, InflationLayer)]
+    def _says(self) -> str:
+        p = self.parameters
+        return (
+            f"inflation at {p.inflation_factor:g} of its radius, path ends within {p.planner_tolerance:g} m, "
+            f"arrival within {p.dist_tolerance:g} m and {p.angle_tolerance:g} rad, "
+            f"controller limits x {p.controller_factor:g}"
+        )

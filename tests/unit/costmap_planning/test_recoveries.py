@@ -9,17 +9,11 @@ from mbf_abstract.cancel import CancelToken
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
 from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.layer import LayerContext
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
-from mbf_costmap_nav.layers.inflation import InflationLayer
-from mbf_costmap_nav.layers.static import StaticLayer
 from mbf_costmap_nav.recoveries.back_up import BackUpRecovery
 from mbf_costmap_nav.recoveries.clear import ClearRecovery
 from mbf_costmap_nav.recoveries.drive_on_heading import DriveOnHeadingRecovery
 from mbf_costmap_nav.recoveries.escape import EscapeRecovery
 from mbf_costmap_nav.recoveries.move_away import MoveAwayRecovery
-from mbf_costmap_nav.recoveries.relax import RelaxRecovery
 from mbf_costmap_nav.recoveries.rotate import RotateRecovery
 from mbf_costmap_nav.recoveries.wait import WaitRecovery
 
@@ -158,22 +152,3 @@ def test_move_away_sideways_needs_an_omnidirectional_robot(run):
     assert result.outcome == RecoveryOutcome.IMPASSABLE
     result, robot, _ = run(MoveAwayRecovery, wall, omnidirectional=True)
     assert result.success and robot.state[1] < -0.2
-
-
-def test_relax_shrinks_the_inflation_and_puts_it_back(make_plugin, closed_loop):
-    grid = around((0.5, -1, 0.6, 1))
-    static = StaticLayer(LayerContext("static", StaticLayer.Parameters(), static_map=grid))
-    inflation = InflationLayer(LayerContext("inflation", InflationLayer.Parameters(inflation_radius=0.8)))
-    costmap = LayeredCostmap(grid.geometry, [static, inflation], Footprint.circle(0.2))
-    plugin = make_plugin(RelaxRecovery, grid, costmap=costmap, duration=5.0)
-    robot = closed_loop.robot(0, 0, 0)
-    costmap.update(robot.pose(), 0.0)
-    before = costmap.snapshot().cells
-
-    assert plugin.run_behavior(RecoveryRequest(robot)).success
-    assert costmap.snapshot().cells.sum() < before.sum()
-    plugin.clock.time = 4.9
-    costmap.update(robot.pose(), 4.9)
-    assert inflation.parameters.inflation_radius == 0.4
-    costmap.update(robot.pose(), 5.1)
-    assert (costmap.snapshot().cells == before).all()
