@@ -161,6 +161,7 @@ class Bench:
         path = handle.result.path if handle.result is not None else None
         if path is not None:
             self.recorder.path(self.simulation.time, path.positions)
+            self.recorder.map(self.simulation.time, self.navigator.server.map_view)
 
 
 def write_navigation_config(

@@ -76,18 +76,14 @@ def replay(
     folder: Path = typer.Argument(..., help="Folder of a run, e.g. runs/2030-01-02_03-04-05."),
     show: bool = typer.Option(True, "--open/--no-open", help="Open the page in the browser."),
 ) -> None:
-    """Write picture, report and replay of a run again from its recording, and open the replay."""
+    """Write picture, report, replay and MCAP log of a run again from its recording, and open the replay."""
     with readable_errors():
         from terrain.metrics import measure
         from terrain.recording import Recording
-        from terrain.viewer.picture import write_picture
-        from terrain.viewer.replay import write_replay
-        from terrain.viewer.report import write_report
+        from terrain.viewer.results import write_results
 
         recording = Recording.load(folder / "recording.npz")
-        write_picture(folder / "picture.png", recording)
-        write_report(folder / "report.html", recording, measure(recording).to_json())
-        write_replay(folder / "replay.html", recording)
+        write_results(folder, recording, measure(recording).to_json())
     page = (folder / "replay.html").resolve()
     typer.echo(page)
     if show:
@@ -112,4 +108,4 @@ def _tell(result: RunResult, as_json: bool) -> None:
         f"{metrics['path_length_m']:.1f} m in {metrics['time_s']:.1f} s simulated, "
         f"{metrics['wall_time_s']:.1f} s of wall time: {metrics['real_time_factor']:.1f} x real time"
     )
-    typer.echo(f"results in {result.folder}: replay.html, report.html, picture.png, metrics.json")
+    typer.echo(f"results in {result.folder}: replay.html, report.html, picture.png, run.mcap, metrics.json")

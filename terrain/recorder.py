@@ -6,7 +6,7 @@ Use one per run, on one thread: the runner's, which steps the simulator. Give it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +14,12 @@ from numpy.typing import ArrayLike
 
 from mbf_abstract.events import Event
 from mbf_abstract.geometry import Command, Pose, Twist
+from mbf_abstract.map_view import GridView, MapView
+from terrain.recorded_grid import RecordedGrid
 from terrain.recording import Recording, RobotShape, StampedPoints, Surface
+
+GRID_PERIOD = 5.0  # s at least between two recorded maps
+MAX_GRID_CELLS = 4_000_000  # larger maps are not recorded
 
 
 @dataclass(eq=False)
@@ -40,6 +45,7 @@ class Recorder:
     obstacles: Surface | None = None
     paths: list[StampedPoints] = field(default_factory=list)
     scans: list[StampedPoints] = field(default_factory=list)
+    grids: list[RecordedGrid] = field(default_factory=list)
     _samples: list[list[float]] = field(default_factory=list)
 
     def sample(self, time: float, pose: Pose, velocity: Twist, command: Command) -> None:
@@ -55,6 +61,14 @@ class Recorder:
     def scan(self, time: float, points: ArrayLike) -> None:
         """Add the points (k, 3) [m] of a range sensor, in the map."""
         self.scans.append((time, np.array(points, dtype=np.float64).reshape(-1, 3)))
+
+    def map(self, time: float, look: Callable[[], MapView | None]) -> None:
+        """Add what the map looks like now if it is a grid, not too large, and the last one is some seconds old."""
+        if self.grids and time - self.grids[-1].time < GRID_PERIOD:
+            return
+        view = look()
+        if isinstance(view, GridView) and view.costs.size <= MAX_GRID_CELLS:
+            self.grids.append(RecordedGrid.of(time, view))
 
     def finish(self, success: bool, outcome: str, message: str, events: Sequence[Event] = ()) -> Recording:
         """Return what was recorded."""
@@ -78,4 +92,5 @@ class Recorder:
             success=success,
             outcome=outcome,
             message=message,
+            grids=list(self.grids),
         )

@@ -8,7 +8,7 @@ or machine.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.events import Event
 from mbf_abstract.geometry import Pose
+from terrain.recorded_grid import RecordedGrid, grid_arrays, grids_from
 from terrain.robot_models import Drive, RobotSpec
 
 FloatArray = NDArray[np.float64]
@@ -104,6 +105,8 @@ class Recording:
     goals : tuple of Pose
         In the order they were given.
     events : tuple of Event
+    grids : list of RecordedGrid
+        The map the plans were made on, where it is a grid; seldom enough that the file stays small.
     """
 
     scenario: str
@@ -124,6 +127,7 @@ class Recording:
     success: bool
     outcome: str
     message: str
+    grids: list[RecordedGrid] = field(default_factory=list)
 
     @cached_property
     def tilt(self) -> FloatArray:
@@ -145,6 +149,7 @@ class Recording:
             arrays |= _surface_arrays(name, getattr(self, name))
         for name in ("paths", "scans"):
             arrays |= _stamped_arrays(name, getattr(self, name))
+        arrays |= grid_arrays(self.grids)
         words: dict[str, Any] = {
             name: getattr(self, name) for name in ("scenario", "backend", "success", "outcome", "message")
         }
@@ -227,4 +232,5 @@ def _recording_from(arrays: dict[str, Any]) -> Recording:
         success=words["success"],
         outcome=words["outcome"],
         message=words["message"],
+        grids=grids_from(arrays),
     )

@@ -1,7 +1,7 @@
 """Runs a scenario from start to last goal with ``move_base`` and writes what happened into a folder.
 
 In the folder: ``events.jsonl``, ``metrics.json``, ``recording.npz``, ``picture.png``, ``report.html``, ``replay.html``,
-``navigation.yaml`` and the world's map files. On simulated time the same scenario and seed write the same
+``run.mcap``, ``navigation.yaml`` and the world's map files. On simulated time the same scenario and seed write the same
 ``events.jsonl``, byte for byte; how long the run took on the wall stands in ``timing.json``.
 """
 
@@ -183,17 +183,10 @@ def _write_numbers(recording: Recording, bench: Bench, wall_time: float, folder:
 
 def _draw(recording: Recording, metrics: dict[str, Any], options: RunOptions) -> None:
     """Make everything that is looked at; without the packages that draw, a run still counts."""
-    from terrain.viewer.picture import ViewerMissing, write_picture
-    from terrain.viewer.replay import write_replay
-    from terrain.viewer.report import write_report
+    from terrain.viewer.picture import ViewerMissing
+    from terrain.viewer.results import write_results
 
-    folder = options.folder
     try:
-        options.on_step("drawing the picture")
-        write_picture(folder / "picture.png", recording)
-        options.on_step("writing the report")
-        write_report(folder / "report.html", recording, metrics)
-        options.on_step("writing the replay")
-        write_replay(folder / "replay.html", recording)
+        write_results(options.folder, recording, metrics, options.on_step)
     except ViewerMissing as missing:
         options.on_step(str(missing))

@@ -18,7 +18,8 @@ import typer
 from mbf_abstract.commands.reporting import FAILURE
 
 NEEDED = ("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "h5py")
-SIMULATION = ("pybullet", "embreex", "matplotlib", "viser")
+SIMULATION = ("pybullet", "embreex", "matplotlib", "viser", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf")
+DISTRIBUTIONS = {"yaml": "pyyaml", "mcap_protobuf": "mcap-protobuf-support"}  # where the names differ
 OLDEST_PYTHON = (3, 10)
 
 
@@ -42,9 +43,9 @@ def doctor() -> None:
     findings = list(examine())
     for finding in findings:
         mark = "ok" if not finding.cure else "--" if finding.optional else "!!"
-        typer.echo(f"{mark}  {finding.what:22} {finding.state}")
+        typer.echo(f"{mark}  {finding.what:26} {finding.state}")
         if finding.cure:
-            typer.echo(f"    {'':22} -> {finding.cure}")
+            typer.echo(f"    {'':26} -> {finding.cure}")
     if any(finding.cure and not finding.optional for finding in findings):
         raise typer.Exit(FAILURE)
 
@@ -70,7 +71,7 @@ def _package(name: str, cure: str, optional: bool) -> Finding:
     except Exception as error:
         return Finding(name, f"{type(error).__name__}: {error}", cure, optional)
     try:
-        return Finding(name, version("pyyaml" if name == "yaml" else name))
+        return Finding(name, version(DISTRIBUTIONS.get(name, name)))
     except PackageNotFoundError:
         return Finding(name, "importable")
 

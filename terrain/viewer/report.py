@@ -17,26 +17,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.events import Event, EventKind
+from mbf_abstract.events import EventKind
 from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.metrics import cross_track_errors
 from terrain.recording import Recording
+from terrain.viewer.event_text import NOTABLE, words
 from terrain.viewer.picture import ViewerMissing, picture_png
 from terrain.viewer.timeline import timeline_svg
 
 FloatArray = NDArray[np.float64]
 
-NOTABLE = {
-    EventKind.GOAL_REJECTED,
-    EventKind.GOAL_CANCEL,
-    EventKind.RECOVERY,
-    EventKind.ROBOT_STOPPED,
-    EventKind.COMMAND_DROPPED,
-    EventKind.GATE_CLOSED,
-    EventKind.FAULT,
-    EventKind.QUARANTINE,
-    EventKind.SINK_FAILED,
-}
 MAX_ROWS = 200
 
 STYLE = """
@@ -130,11 +120,7 @@ def _goals(recording: Recording) -> Iterable[tuple[str, ...]]:
 def _notable(recording: Recording) -> Iterable[tuple[str, ...]]:
     for event in recording.events:
         if event.kind in NOTABLE:
-            yield f"{event.time:.2f} s", event.kind.value, event.source, _words(event)
-
-
-def _words(event: Event) -> str:
-    return ", ".join(f"{key}: {value}" for key, value in event.data.items() if key not in ("traceback", "goal_id"))
+            yield f"{event.time:.2f} s", event.kind.value, event.source, words(event)
 
 
 def _table(header: tuple[str, ...], rows: Iterable[tuple[Any, ...]]) -> str:

@@ -27,11 +27,11 @@ from terrain.viewer.colours import (
     linear_for_viewer,
 )
 from terrain.viewer.shading import LIGHT, vertex_colours
+from terrain.viewer.shapes import cut_walls, prism
 
 FloatArray = NDArray[np.float64]
 Scene = Any  # viser.SceneApi; viser is imported only where a server is started
 
-WALL_CUT = 0.9  # m above the lowest point of the walls
 PIN_HEIGHT = 0.03  # of the length of the route
 LINE_LIFT = 0.12  # m that lines float above the ground, so that bumps do not hide them
 LINE_WIDTH = 4.0  # pixels
@@ -48,7 +48,7 @@ def add_world(scene: Scene, recording: Recording) -> None:
     if recording.ground is not None:
         _add_ground(scene, recording.ground)
     if recording.walls is not None:
-        _add_solid(scene, "/walls", _cut(recording.walls), WALL)
+        _add_solid(scene, "/walls", cut_walls(recording.walls), WALL)
     if recording.obstacles is not None:
         _add_solid(scene, "/obstacles", recording.obstacles, OBSTACLE)
     height = pin_height(recording)
@@ -73,12 +73,6 @@ def _add_ground(scene: Scene, ground: Surface) -> None:
     mesh = trimesh.Trimesh(ground.vertices, ground.faces, vertex_colors=colours, process=False)
     mesh.vertex_normals  # noqa: B018 - computing them makes the export carry them, else the viewer shades it flat
     scene.add_mesh_trimesh("/ground", mesh, cast_shadow=False, receive_shadow=False)
-
-
-def _cut(walls: Surface) -> Surface:
-    vertices = walls.vertices.copy()
-    vertices[:, 2] = np.minimum(vertices[:, 2], vertices[:, 2].min(initial=0.0) + WALL_CUT)
-    return Surface(vertices, walls.faces)
 
 
 def _add_solid(scene: Scene, name: str, surface: Surface, colour: Colour) -> None:
@@ -158,10 +152,10 @@ class RobotModel:
         self._shape = shape
         self._frame = scene.add_frame("/robot", show_axes=False)
         top = shape.height
-        body = _prism(shape.footprint * np.array([0.98, 0.78]), 0.6 * shape.wheel_radius, top)
+        body = prism(shape.footprint * np.array([0.98, 0.78]), 0.6 * shape.wheel_radius, top)
         _add_solid(scene, "/robot/body", body, BODY)
         forward = np.array([0.6 * shape.footprint[:, 0].max(), 0.0])
-        nose = _prism(shape.footprint * np.array([0.25, 0.5]) + forward, top, top + 0.03)
+        nose = prism(shape.footprint * np.array([0.25, 0.5]) + forward, top, top + 0.03)
         _add_solid(scene, "/robot/nose", nose, WHEEL)
         width = 0.64 * shape.wheel_radius
         self._wheels = [_add_wheel(scene, k, wheel, shape, width) for k, wheel in enumerate(shape.wheels)]
@@ -199,16 +193,3 @@ def _add_wheel(scene: Scene, index: int, centre: FloatArray, shape: RobotShape, 
     spoke = (1.5 * shape.wheel_radius, 1.04 * width, 0.3 * shape.wheel_radius)
     scene.add_box(f"/robot/wheel_{index}/spoke", dimensions=spoke, color=(170, 170, 175), cast_shadow=False)
     return frame
-
-
-def _prism(outline: FloatArray, z_min: float, z_max: float) -> Surface:
-    """An upright prism over a convex outline (n, 2), counter-clockwise."""
-    count = len(outline)
-    bottom = np.column_stack([outline, np.full(count, z_min)])
-    top = np.column_stack([outline, np.full(count, z_max)])
-    near = np.arange(count)
-    far = (near + 1) % count
-    sides = np.concatenate([np.stack([near, far, far + count], 1), np.stack([near, far + count, near + count], 1)])
-    fan = np.stack([np.zeros(count - 2, int), near[1:-1], near[2:]], axis=1)
-    faces = np.concatenate([sides, fan + count, fan[:, ::-1]])
-    return Surface(np.concatenate([bottom, top]), faces.astype(np.int32))

@@ -129,7 +129,7 @@ def test_no_import_cycle_inside_a_package():
 
 def test_the_plain_packages_import_without_simulator_and_plotting():
     """PyBullet is optional: nothing outside ``terrain`` may import it, nor any module that draws."""
-    optional = {"pybullet", "pybullet_data", "matplotlib", "viser", "embreex"}
+    optional = {"pybullet", "pybullet_data", "matplotlib", "viser", "embreex", "mcap", "foxglove_schemas_protobuf"}
     for file, name in zip(MODULES, NAMES, strict=True):
         if not name.startswith("terrain/"):
             assert not {module.split(".")[0] for module, _ in imports(parse(file))} & optional, name

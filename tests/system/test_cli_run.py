@@ -49,9 +49,10 @@ def test_a_run_through_a_real_building_reaches_its_goal_and_leaves_all_files(sha
     answer = json.loads(result.stdout)
     assert (result.exit_code, answer["success"]) == (0, True), result.output
     files = {file.name for file in (tmp_path / "run").iterdir()}
-    assert {"events.jsonl", "metrics.json", "picture.png", "report.html", "replay.html", "recording.npz"} <= files
+    assert {"picture.png", "report.html", "replay.html", "run.mcap"} <= files
+    assert {"events.jsonl", "metrics.json", "recording.npz"} <= files
     recording = Recording.load(tmp_path / "run" / "recording.npz")
-    assert recording.success and recording.paths and recording.scans
+    assert recording.success and recording.paths and recording.scans and recording.grids
     assert answer["metrics"]["distance_to_goal_m"] < 0.5
 
 
@@ -65,7 +66,7 @@ def test_a_replay_is_made_again_from_the_recording_alone(tmp_path):
     result = mbf("replay", tmp_path, "--no-open")
 
     assert result.exit_code == 0, result.output
-    assert {file.name for file in tmp_path.iterdir()} >= {"picture.png", "report.html", "replay.html"}
+    assert {file.name for file in tmp_path.iterdir()} >= {"picture.png", "report.html", "replay.html", "run.mcap"}
 
 
 def test_a_folder_without_a_recording_is_exit_code_2(tmp_path):

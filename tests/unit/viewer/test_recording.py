@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
-from terrain.recorder import Recorder
+from mbf_abstract.map_view import GridView, MeshView
+from terrain.recorder import GRID_PERIOD, MAX_GRID_CELLS, Recorder
 from terrain.recording import Recording, RecordingError, RobotShape
 from terrain.robot_models import CAR, HUSKY, TURTLEBOT
 
@@ -80,3 +81,29 @@ def test_wheels_stand_where_the_robot_has_them(spec, count, rear):
     assert wheels[:, 0].min() == pytest.approx(rear)
     np.testing.assert_allclose(np.abs(wheels[:, 1]), spec.track / 2)
     np.testing.assert_allclose(wheels[:, 2], spec.wheel_radius)
+
+
+def test_maps_are_recorded_every_few_seconds_and_come_back_from_the_file(tmp_path):
+    recorder = Recorder("mapped", "costmap", RobotShape.of(HUSKY), Pose.planar(0, 0), [])
+    views = [
+        GridView(np.array([[0.0, np.nan], [0.5, value]], np.float32), (0.0, 1.0, 0.0, 1.0)) for value in (0.2, 9.0)
+    ]
+    for time, view in ((0.0, views[0]), (GRID_PERIOD - 0.1, views[1]), (GRID_PERIOD, views[1])):
+        recorder.map(time, lambda view=view: view)
+    recorder.finish(True, "SUCCESS", "").save(tmp_path / "recording.npz")
+
+    grids = Recording.load(tmp_path / "recording.npz").grids
+
+    assert [(grid.time, grid.extent) for grid in grids] == [(0.0, (0.0, 1.0, 0.0, 1.0)), (5.0, (0.0, 1.0, 0.0, 1.0))]
+    np.testing.assert_allclose(grids[0].costs, views[0].costs, atol=0.005)
+    np.testing.assert_array_equal(grids[1].cells, [[0, 255], [50, 100]])
+
+
+def test_only_grids_of_a_sensible_size_are_recorded():
+    recorder = Recorder("mapped", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), [])
+    huge = GridView(np.broadcast_to(np.float32(0.0), (MAX_GRID_CELLS + 1, 1)), (0.0, 1.0, 0.0, 1.0))
+
+    for view in (None, MeshView(np.zeros((3, 3)), np.zeros((1, 3), np.int32), np.zeros(3, np.float32)), huge):
+        recorder.map(0.0, lambda view=view: view)
+
+    assert recorder.grids == []

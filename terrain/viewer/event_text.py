@@ -1,0 +1,23 @@
+"""Events in words: which of them a reader of a run must see, and one line for each."""
+
+from __future__ import annotations
+
+from mbf_abstract.events import Event, EventKind
+
+NOTABLE = {
+    EventKind.GOAL_REJECTED,
+    EventKind.GOAL_CANCEL,
+    EventKind.RECOVERY,
+    EventKind.ROBOT_STOPPED,
+    EventKind.COMMAND_DROPPED,
+    EventKind.GATE_CLOSED,
+    EventKind.FAULT,
+    EventKind.QUARANTINE,
+    EventKind.SINK_FAILED,
+}
+LEFT_OUT = ("traceback", "goal_id")
+
+
+def words(event: Event) -> str:
+    """What an event carries, as ``key: value`` pairs."""
+    return ", ".join(f"{key}: {value}" for key, value in event.data.items() if key not in LEFT_OUT)

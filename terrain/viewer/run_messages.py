@@ -1,0 +1,158 @@
+"""A recording as a stream of messages by topic, in Foxglove's schemas where there is one and as JSON where not.
+
+========== ================================ =====================================================
+topic      schema                           contents
+========== ================================ =====================================================
+/tf        foxglove.FrameTransforms         true pose of ``base_link`` and of the wheels
+/scene     foxglove.SceneUpdate             ground, walls, obstacles, start, goals, robot, track
+/plan      foxglove.PosesInFrame            every plan the robot followed
+/scan      foxglove.PointCloud              what a range sensor hit
+/map       foxglove.Grid                    the map, where it is a grid
+/log       foxglove.Log                     events in words
+/events    mbf.Event                        events as in events.jsonl
+/actions   mbf.ActionStates                 what each action does
+/motion    mbf.Motion                       speed, yaw rate, their commands, tilt, cross-track error
+========== ================================ =====================================================
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.Log_pb2 import Log
+
+from mbf_abstract.events import Event, EventKind
+from mbf_abstract.outcomes import is_success, outcome_name
+from terrain.metrics import cross_track_errors
+from terrain.recording import Recording
+from terrain.viewer import foxglove_messages as message
+from terrain.viewer import foxglove_scene as scene
+from terrain.viewer.event_text import NOTABLE, words
+from terrain.viewer.scene import wheel_angles
+from terrain.viewer.timeline import ACTIONS
+
+TRACK_PIECE = 5.0  # s
+GRID_LIFT = 0.02  # m that the map floats above the ground, so that both can be seen
+ERRORS = {EventKind.FAULT, EventKind.QUARANTINE, EventKind.SINK_FAILED}
+DETAILS = {EventKind.STATE_CHANGED, EventKind.PLUGIN_CALL_STARTED, EventKind.PLUGIN_CALL_ENDED, EventKind.FEEDBACK}
+NUMBER, TEXT = {"type": "number"}, {"type": "string"}
+MOTION = ("speed", "commanded_speed", "yaw_rate", "commanded_yaw_rate", "tilt_deg", "cross_track_error")
+JSON_FIELDS: dict[str, dict[str, Any]] = {
+    "mbf.Event": {"time": NUMBER, "kind": TEXT, "source": TEXT, "data": {"type": "object"}},
+    "mbf.ActionStates": dict.fromkeys(ACTIONS, TEXT),
+    "mbf.Motion": dict.fromkeys(MOTION, NUMBER),
+}
+
+
+@dataclass(frozen=True)
+class JsonMessage:
+    """A message of a schema of our own: ``values`` are written as JSON."""
+
+    schema: str
+    values: Mapping[str, Any]
+
+    def json_schema(self) -> dict[str, Any]:
+        """The schema's text: every field it may have."""
+        return {"title": self.schema, "type": "object", "properties": JSON_FIELDS[self.schema]}
+
+
+Stamped = tuple[float, str, Any]  # time [s], topic, a protobuf message or a JsonMessage
+
+
+def messages_of(recording: Recording) -> list[Stamped]:
+    """All messages of a run, in the order of time."""
+    frame, height = recording.start.frame_id, recording.start.z + GRID_LIFT
+    streams: list[Iterator[Stamped]] = [
+        iter([(0.0, "/scene", scene.world(recording)), (0.0, "/scene", scene.robot(recording.robot))]),
+        _transforms(recording),
+        _track(recording),
+        ((time, "/plan", message.poses_along(time, frame, line)) for time, line in recording.paths if len(line)),
+        ((time, "/scan", message.point_cloud(time, frame, points)) for time, points in recording.scans),
+        ((grid.time, "/map", message.grid(frame, grid, height)) for grid in recording.grids),
+        ((event.time, "/log", _log(event)) for event in recording.events if event.kind is not EventKind.FEEDBACK),
+        ((event.time, "/events", _event(event)) for event in recording.events),
+        action_states(recording.events),
+        _motion(recording),
+    ]
+    return sorted(itertools.chain(*streams), key=lambda stamped: stamped[0])
+
+
+def action_states(events: tuple[Event, ...]) -> Iterator[Stamped]:
+    """What every action does, whenever that changes: idle, active, or the outcome of its last goal."""
+    states, newest = dict.fromkeys(ACTIONS, "idle"), dict.fromkeys(ACTIONS)
+    yield 0.0, "/actions", JsonMessage("mbf.ActionStates", dict(states))
+    for event in events:
+        action, goal = event.source, event.data.get("goal_id")
+        if action not in states:
+            continue
+        if event.kind is EventKind.GOAL_ACCEPTED:
+            states[action], newest[action] = "active", goal
+        elif event.kind is EventKind.GOAL_FINISHED and goal == newest[action]:
+            code = event.data.get("outcome")
+            states[action] = outcome_name(code) if isinstance(code, int) else "finished"
+        else:
+            continue
+        yield event.time, "/actions", JsonMessage("mbf.ActionStates", dict(states))
+
+
+def _transforms(recording: Recording) -> Iterator[Stamped]:
+    shape, frame = recording.robot, recording.start.frame_id
+    angles = wheel_angles(shape, recording.times, recording.twists)
+    for time, row, turned in zip(recording.times.tolist(), recording.poses, angles, strict=True):
+        body = message.transform(time, frame, "base_link", row[:3], row[3:])
+        wheels = [
+            message.transform(time, "base_link", scene.wheel_frame(index), centre, _about_y(angle))
+            for index, (centre, angle) in enumerate(zip(shape.wheels, turned.tolist(), strict=True))
+        ]
+        yield time, "/tf", FrameTransforms(transforms=[body, *wheels])
+
+
+def _about_y(angle: float) -> message.FloatArray:
+    return np.array([0.0, math.sin(angle / 2.0), 0.0, math.cos(angle / 2.0)])
+
+
+def _track(recording: Recording) -> Iterator[Stamped]:
+    """Pieces of the driven track, each when it has been driven."""
+    ends = np.arange(TRACK_PIECE, recording.duration + TRACK_PIECE, TRACK_PIECE)
+    last = 0
+    for number, end in enumerate(np.searchsorted(recording.times, ends)):
+        index = min(int(end), len(recording.times) - 1)
+        if index > last:
+            time, line = float(recording.times[index]), recording.poses[last : index + 1, :3]
+            yield time, "/scene", scene.track_piece(recording.start.frame_id, number, time, line)
+        last = index
+
+
+def _log(event: Event) -> Log:
+    text = f"{event.kind.value}: {words(event)}"
+    return Log(timestamp=message.timestamp(event.time), level=_level(event), message=text, name=event.source)
+
+
+def _level(event: Event) -> Log.Level.ValueType:
+    if event.kind in ERRORS:
+        return Log.ERROR
+    code = event.data.get("outcome")
+    failed = event.kind is EventKind.GOAL_FINISHED and isinstance(code, int) and not is_success(code)
+    if event.kind in NOTABLE or failed:
+        return Log.WARNING
+    return Log.DEBUG if event.kind in DETAILS else Log.INFO
+
+
+def _event(event: Event) -> JsonMessage:
+    return JsonMessage("mbf.Event", json.loads(event.to_json()))
+
+
+def _motion(recording: Recording) -> Iterator[Stamped]:
+    twists, commands = recording.twists, recording.commands
+    tilt, off = np.degrees(recording.tilt), cross_track_errors(recording)
+    columns = (twists[:, 0], commands[:, 0], twists[:, 2], commands[:, 2], tilt, off)
+    for time, row in zip(recording.times.tolist(), np.column_stack(columns).round(6).tolist(), strict=True):
+        finite = {name: value for name, value in zip(MOTION, row, strict=True) if math.isfinite(value)}
+        yield time, "/motion", JsonMessage("mbf.Motion", finite)

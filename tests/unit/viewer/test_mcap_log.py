@@ -1,0 +1,185 @@
+"""run.mcap, read back with the MCAP library's own reader: schemas, order of time, and the numbers of the recording."""
+
+import json
+from collections import defaultdict
+
+import numpy as np
+import pytest
+from mcap.decoder import DecoderFactory
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory as ProtobufDecoderFactory
+
+from mbf_abstract.events import Event, EventKind
+from mbf_abstract.geometry import Pose
+from mbf_abstract.map_view import GridView
+from terrain.recorder import Recorder
+from terrain.recording import RobotShape
+from terrain.robot_models import HUSKY
+from terrain.viewer.foxglove_messages import nanoseconds
+from terrain.viewer.mcap_log import write_mcap
+from terrain.viewer.run_messages import action_states
+
+SCHEMAS = {
+    "/tf": "foxglove.FrameTransforms",
+    "/scene": "foxglove.SceneUpdate",
+    "/plan": "foxglove.PosesInFrame",
+    "/scan": "foxglove.PointCloud",
+    "/map": "foxglove.Grid",
+    "/log": "foxglove.Log",
+    "/events": "mbf.Event",
+    "/actions": "mbf.ActionStates",
+    "/motion": "mbf.Motion",
+}
+
+
+class JsonDecoderFactory(DecoderFactory):
+    def decoder_for(self, message_encoding, schema):
+        return json.loads if message_encoding == "json" and schema.encoding == "jsonschema" else None
+
+
+class Log:
+    """Every message of a file, decoded from the schemas in the file alone."""
+
+    def __init__(self, file):
+        self.schemas, self.times, self.messages = {}, [], defaultdict(list)
+        with file.open("rb") as stream:
+            reader = make_reader(
+                stream, validate_crcs=True, decoder_factories=[ProtobufDecoderFactory(), JsonDecoderFactory()]
+            )
+            self.metadata = {record.name: record.metadata for record in reader.iter_metadata()}
+            self.count = reader.get_summary().statistics.message_count
+            for schema, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
+                self.schemas[channel.topic] = schema.name
+                self.times.append(message.log_time)
+                self.messages[channel.topic].append((message.log_time, decoded))
+
+    def __getitem__(self, topic):
+        return [decoded for _, decoded in self.messages[topic]]
+
+
+@pytest.fixture
+def office(office_recording):
+    view = GridView(np.array([[0.0, 0.5, 1.0], [np.nan, np.inf, 0.25]], np.float32), (1.0, 2.5, -1.0, 0.0))
+    recorder = Recorder("", "", office_recording.robot, office_recording.start, [])
+    recorder.map(0.4, lambda: view)
+    office_recording.grids.extend(recorder.grids)
+    return office_recording
+
+
+@pytest.fixture
+def log(office, tmp_path):
+    write_mcap(tmp_path / "run.mcap", office)
+    return Log(tmp_path / "run.mcap")
+
+
+def test_every_topic_has_its_schema_and_every_message_can_be_decoded(log):
+    assert log.schemas == SCHEMAS
+    assert sum(len(messages) for messages in log.messages.values()) == log.count
+
+
+def test_messages_come_in_the_order_of_time(log):
+    assert log.times == sorted(log.times)
+
+
+def test_the_transforms_are_the_recorded_track(log, office):
+    stamps = [stamp for stamp, _ in log.messages["/tf"]]
+    bodies = [message.transforms[0] for message in log["/tf"]]
+    rows = [
+        [b.translation.x, b.translation.y, b.translation.z, b.rotation.x, b.rotation.y, b.rotation.z, b.rotation.w]
+        for b in bodies
+    ]
+
+    assert stamps == [nanoseconds(time) for time in office.times]
+    assert {(b.parent_frame_id, b.child_frame_id) for b in bodies} == {("map", "base_link")}
+    np.testing.assert_array_equal(rows, office.poses)
+
+
+def test_every_frame_that_is_drawn_in_has_a_transform(log):
+    known = {"map"} | {transform.child_frame_id for message in log["/tf"] for transform in message.transforms}
+    drawn = {entity.frame_id for message in log["/scene"] for entity in message.entities}
+
+    assert drawn == known == {"map", "base_link", "wheel_0", "wheel_1"}
+
+
+def test_the_scene_holds_the_world_the_robot_and_the_track(log, office):
+    entities = {entity.id: entity for message in log["/scene"] for entity in message.entities}
+    track = [entity.lines[0].points for name, entity in entities.items() if name.startswith("track")]
+
+    assert {"walls", "obstacles", "ground", "start", "goal", "body", "wheel 0", "wheel 1"} <= set(entities)
+    assert len(entities["walls"].triangles[0].indices) == office.walls.faces.size
+    assert (track[0][0].x, track[0][0].y) == tuple(office.poses[0, :2].round(6))
+    assert (track[-1][-1].x, track[-1][-1].y) == tuple(office.poses[-1, :2].round(6))
+
+
+def test_plans_look_along_themselves(log):
+    poses = log["/plan"][0].poses
+    yaws = [2.0 * np.arctan2(pose.orientation.z, pose.orientation.w) for pose in poses]
+
+    assert [(pose.position.x, pose.position.y) for pose in poses] == [(2, 3), (8, 6), (14, 9)]
+    np.testing.assert_allclose(yaws, np.arctan2(3, 6))
+
+
+def test_scans_and_maps_are_unpacked_to_what_was_recorded(log, office):
+    clouds = [np.frombuffer(message.data, "<f4").reshape(-1, 3) for message in log["/scan"]]
+    grid = log["/map"][0]
+    cells = np.frombuffer(grid.data, np.uint8).reshape(-1, grid.column_count, grid.cell_stride)
+
+    assert len(clouds) == len(office.scans)
+    np.testing.assert_allclose(clouds[3], office.scans[3][1], atol=1e-6)
+    assert [field.name for field in grid.fields] == ["red", "green", "blue", "alpha", "cost"]
+    np.testing.assert_array_equal(cells[..., 4], [[0, 50, 100], [255, 100, 25]])
+    assert (grid.pose.position.x, grid.pose.position.y) == (1.0, -1.0)
+    assert (grid.cell_size.x, grid.cell_size.y) == (0.5, 0.5)
+
+
+def test_events_and_the_log_tell_what_events_jsonl_tells(log, office):
+    levels = {message.message.split(":")[0]: message.level for message in log["/log"]}
+
+    assert [Event.from_json(json.dumps(values)) for values in log["/events"]] == list(office.events)
+    assert (levels["goal_accepted"], levels["robot_stopped"], levels["plugin_call_started"]) == (2, 3, 1)
+    assert log["/log"][-1].level == 3, "the goal failed"
+    assert log.metadata["run"]["outcome"] == "BLOCKED_PATH"
+
+
+def test_actions_are_active_from_acceptance_to_their_outcome(log):
+    states = [(stamp / 1e9, message["get_path"], message["exe_path"]) for stamp, message in log.messages["/actions"]]
+
+    assert states[0] == (0.0, "idle", "idle")
+    assert (0.4, "SUCCESS", "active") in states
+    assert states[-1] == (15.4, "SUCCESS", "BLOCKED_PATH")
+
+
+def test_a_goal_that_was_replaced_does_not_end_its_action():
+    events = (
+        Event(1.0, EventKind.GOAL_ACCEPTED, "exe_path", {"goal_id": 1}),
+        Event(2.0, EventKind.GOAL_ACCEPTED, "exe_path", {"goal_id": 2}),
+        Event(2.1, EventKind.GOAL_FINISHED, "exe_path", {"goal_id": 1, "outcome": 101}),
+        Event(3.0, EventKind.GOAL_FINISHED, "exe_path", {"goal_id": 2, "outcome": 0}),
+    )
+
+    states = [(time, message.values["exe_path"]) for time, _, message in action_states(events)]
+
+    assert states == [(0.0, "idle"), (1.0, "active"), (2.0, "active"), (3.0, "SUCCESS")]
+
+
+def test_the_motion_is_plotted_in_plain_numbers(log, office):
+    motion = log["/motion"]
+
+    assert [message["speed"] for message in motion] == office.twists[:, 0].tolist()
+    assert "cross_track_error" not in motion[0] and motion[-1]["cross_track_error"] >= 0.0
+
+
+def test_a_hill_of_ten_thousand_triangles_is_well_below_a_megabyte(hill_recording, tmp_path):
+    write_mcap(tmp_path / "run.mcap", hill_recording)
+
+    log = Log(tmp_path / "run.mcap")
+    ground = next(entity for entity in log["/scene"][0].entities if entity.id == "ground").triangles[0]
+    assert len(ground.points) == len(ground.colors) == len(hill_recording.ground.vertices)
+    assert (tmp_path / "run.mcap").stat().st_size < 1e6
+
+
+def test_a_run_that_never_began_has_a_log_too(tmp_path):
+    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(False, "FAILURE", "no robot")
+    write_mcap(tmp_path / "run.mcap", run)
+
+    assert Log(tmp_path / "run.mcap").metadata["run"]["message"] == "no robot"
