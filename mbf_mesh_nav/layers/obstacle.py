@@ -5,7 +5,8 @@ itself on a badly localised robot; raise ``ground_tolerance`` then.
 Rule of mesh_navigation: cast a ray from every point downwards and mark the three corners of the face it hits, cost
 inf. Deviations: points within ``ground_tolerance`` of the mesh are explained by it and mark nothing; the ray ends at
 ``robot_height``, which has a finite default, so nothing spills to the storey below; hits may be kept for
-``decay_time`` and are cleared when later rays pass through them.
+``decay_time`` and are cleared when later rays pass through them; a sensor that is silent for longer than
+``expected_update_rate`` makes the map not current, so that no controller drives on it.
 Cost: two tree queries a point, about 2 microseconds.
 """
 
@@ -42,7 +43,7 @@ class ObstacleParameters(LayerParameters):
     )
     clearing: bool = parameter(True, "Forget kept hits that later rays pass through.")
     expected_update_rate: float = parameter(
-        0.0, "Longest time between clouds before the map is stale; 0 = off.", unit="s", ge=0.0
+        1.0, "Longest allowed time between two clouds; 0 switches the check off.", unit="s", ge=0.0
     )
     down_axis: tuple[float, float, float] = parameter((0.0, 0.0, -1.0), "Direction of projection in the map's frame.")
 

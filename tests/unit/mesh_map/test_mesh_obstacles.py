@@ -172,7 +172,8 @@ def test_map_is_stale_when_no_cloud_came_within_the_expected_rate():
     mesh.insert_points(np.zeros((0, 3)), SENSOR, 10.0)
     assert mesh.is_current(10.4)
     assert not mesh.is_current(10.6)
-    assert floor_map().is_current(1e9)
+    assert floor_map(expected_update_rate=0.0).is_current(1e9)
+    assert not floor_map().is_current(1e9), "a silent sensor is noticed by default"
 
 
 def test_changed_robot_height_applies_to_the_next_cloud():
