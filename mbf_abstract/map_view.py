@@ -1,4 +1,4 @@
-"""What a map looks like from outside, for pictures and viewers: an image of costs, or a mesh with costs."""
+"""What a map looks like from outside, for pictures and viewers: an image of costs, a mesh with costs, directions."""
 
 from __future__ import annotations
 
@@ -40,6 +40,22 @@ class MeshView:
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
     costs: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class FieldView:
+    """Where a plan would lead the robot from places beside its path, too.
+
+    Attributes
+    ----------
+    points : (n, 3) float64
+        [m]
+    directions : (n, 3) float32
+        Unit vectors towards the goal.
+    """
+
+    points: NDArray[np.float64]
+    directions: NDArray[np.float32]
 
 
 MapView = GridView | MeshView

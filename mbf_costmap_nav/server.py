@@ -109,9 +109,14 @@ class CostmapNavigationServer(AbstractNavigationServer):
             if scan.source in costmap.source_names:
                 costmap.insert_scan(scan.source, origin, ends, scan.hits, scan.stamp)
 
-    def map_view(self) -> GridView:
-        """The costs of the global costmap, 1 for what the robot's middle must not touch."""
-        costmap = self.global_costmap.snapshot()
+    @property
+    def map_views(self) -> tuple[str, ...]:
+        """Both maps."""
+        return ("global_costmap", "local_costmap")
+
+    def map_view(self, name: str = "") -> GridView:
+        """The costs of a map, of the global one without a name; 1 for what the robot's middle must not touch."""
+        costmap = (self.local_costmap if name == "local_costmap" else self.global_costmap).snapshot()
         costs = (costmap.cells / np.float32(INSCRIBED)).astype(np.float32)
         costs[costmap.cells == UNKNOWN] = np.nan
         geometry = costmap.geometry

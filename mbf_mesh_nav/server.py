@@ -15,8 +15,9 @@ import numpy as np
 
 from mbf_abstract.config import Config
 from mbf_abstract.execution.ticker import Ticker
+from mbf_abstract.geometry import Path as PlannedPath
 from mbf_abstract.map_queries import MapQueries
-from mbf_abstract.map_view import MeshView
+from mbf_abstract.map_view import FieldView, MeshView
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.sensing import RangeScan
@@ -26,6 +27,7 @@ from mbf_mesh_nav.mesh_io import HDF5_FORMATS, TRIMESH_FORMATS
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.queries import MeshQueries
+from mbf_mesh_nav.vector_field import VectorField
 
 DECAY_PERIOD = 0.5  # s; how often obstacles are checked for their age
 
@@ -103,11 +105,24 @@ class MeshNavigationServer(AbstractNavigationServer):
         faces, distances = self.mesh_map.locator.cast_rays([[x, y, top]], [[0.0, 0.0, -1.0]])
         return top - float(distances[0]) if faces[0] >= 0 else 0.0
 
-    def map_view(self) -> MeshView:
-        """The mesh with the costs of the default layer."""
-        snapshot = self.mesh_map.snapshot()
-        costs = np.where(snapshot.lethal, np.inf, snapshot.costs).astype(np.float32)
+    @property
+    def map_views(self) -> tuple[str, ...]:
+        """Names of the layers, the default layer first."""
+        return tuple(sorted(self.mesh_map.layers, key=lambda name: name != self.mesh_map.default_layer))
+
+    def map_view(self, name: str = "") -> MeshView:
+        """The mesh with the costs of a layer, of the default layer without a name."""
+        source = self.mesh_map.layers[name] if name else self.mesh_map.snapshot()
+        costs = np.where(source.lethal, np.inf, source.costs).astype(np.float32)
         return MeshView(self.mesh_map.vertices, self.mesh_map.faces, costs)
+
+    def field_view(self, path: PlannedPath) -> FieldView | None:
+        """Directions at the vertices from which the path's first vector field leads to its goal."""
+        fields = path.guidance if isinstance(path.guidance, tuple) else ()
+        if not (fields and isinstance(fields[0], VectorField)):
+            return None
+        leads = np.isfinite(fields[0].distances) & fields[0].directions.any(axis=1)
+        return FieldView(self.mesh_map.vertices[leads], fields[0].directions[leads])
 
     def map_problem(self) -> str:
         """Name the obstacle layer whose sensor is silent, if there is one."""

@@ -147,7 +147,7 @@ class Bench:
         robot.settle()
         sensors = make_sensors(self.scenario.sensors, robot, self.world, self.seed)
         self.localization = make_localization(robot, self.seed)
-        FaultSchedule(self.world.bullet, sensors, self.localization, self.scenario.faults)
+        self.faults = FaultSchedule(self.world.bullet, sensors, self.localization, self.scenario.faults)
         return robot, Simulation(self.world.bullet, robot, sensors)
 
     def _make_recorder(self) -> Recorder:

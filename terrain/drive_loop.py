@@ -55,6 +55,12 @@ class DriveLoop:
     server : AbstractNavigationServer
         Gets the scans; its clock drives the loop.
     recorder : Recorder
+
+    Attributes
+    ----------
+    on_tick : list of callables
+        Called with the simulated time [s] after each step, 60 times a second, on the simulator's thread: while one of
+        them runs nothing else does and no simulated time passes.
     """
 
     def __init__(
@@ -74,6 +80,7 @@ class DriveLoop:
         self._scans = 0
         self._stopped = False
         self._origin = self._runtime.clock.now()
+        self.on_tick: list[Callable[[float], None]] = []
         simulation.on_measurement(self._take_measurement)
 
     def start(self, report: Report) -> None:
@@ -101,6 +108,8 @@ class DriveLoop:
             self.publish()
             if tick % TICKS_PER_SAMPLE == 0:
                 self._sample()
+            for listener in self.on_tick:
+                listener(self._simulation.time)
             tick += 1
             clock.sleep_until(self._origin + tick * PERIOD)
 

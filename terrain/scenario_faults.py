@@ -71,10 +71,26 @@ class FaultSchedule:
         self._world = world
         self._localization = localization
         self._sensors = {**sensors, LOCALIZATION: localization}
-        self._sensor_faults = [fault for fault in faults if isinstance(fault, SensorFault)]
-        self._jumps = [fault for fault in faults if isinstance(fault, LocalizationJump)]
-        if faults:
-            world.before_step(self._apply)
+        self._sensor_faults: list[SensorFault] = []
+        self._jumps: list[LocalizationJump] = []
+        for fault in faults:
+            self.add(fault)
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of what a sensor fault can befall."""
+        return tuple(self._sensors)
+
+    def add(self, fault: SensorFault | LocalizationJump) -> None:
+        """Let one more fault happen; raises ValueError for a sensor that does not exist."""
+        if isinstance(fault, SensorFault) and fault.sensor not in self._sensors:
+            raise ValueError(f"expected one of {', '.join(self._sensors)}, got {fault.sensor!r}")
+        if not (self._sensor_faults or self._jumps):
+            self._world.before_step(self._apply)
+        if isinstance(fault, SensorFault):
+            self._sensor_faults.append(fault)
+        else:
+            self._jumps.append(fault)
 
     def _apply(self) -> None:
         now = self._world.time

@@ -108,7 +108,7 @@ class Action(ABC, Generic[G, R, F]):
 
     def cancel_all(self, reason: str = "all goals canceled") -> None:
         """Cancel every goal that is not final; never waits."""
-        for handle in self._active_handles():
+        for handle in self.unfinished:
             handle.cancel(reason)
 
     def close(self) -> None:
@@ -121,6 +121,12 @@ class Action(ABC, Generic[G, R, F]):
             waiting = worker.close()
             if isinstance(waiting, GoalJob):
                 self.finish(waiting.handle, self.canceled_outcome, f"{SHUT_DOWN} before it started")
+
+    @property
+    def unfinished(self) -> list[GoalHandle[G, R, F]]:
+        """Goals that are not final, oldest first."""
+        with self._condition:
+            return list(self._unfinished.values())
 
     @property
     def busy(self) -> bool:
@@ -194,7 +200,3 @@ class Action(ABC, Generic[G, R, F]):
         if self.runtime.quarantined >= limit:
             return self.internal_error_outcome, f"{limit} plugin calls hang; no more goals until one returns"
         return self._check(goal)
-
-    def _active_handles(self) -> list[GoalHandle[G, R, F]]:
-        with self._condition:
-            return list(self._unfinished.values())

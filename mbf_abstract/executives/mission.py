@@ -91,6 +91,11 @@ class MissionContext:
         """Whether a canceled goal of this mission still holds the robot."""
         return any(goal.cancel_requested and goal.action != "get_path" for goal in self.running_goals())
 
+    @property
+    def paused(self) -> bool:
+        """Whether somebody holds a goal of this mission."""
+        return any(goal.paused for goal in self.running_goals())
+
     def end_goals(self, reason: str) -> None:
         """Cancel all goals of this mission and wait until each of them is final; the robot then stands."""
         for handle in self.running_goals():

@@ -20,7 +20,7 @@ from py_trees.composites import Parallel, Sequence
 
 from mbf_abstract.executives.conditions import BEYOND_RECOVERY, recovery_would_help
 from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery, UpdatePath
-from mbf_abstract.executives.map_leaves import CheckPose
+from mbf_abstract.executives.map_leaves import CheckPose, PathBlocked
 from mbf_abstract.executives.pacing import Delay, InBackground
 from mbf_abstract.executives.recovering import (
     InOrder,
@@ -53,6 +53,8 @@ class TreeOptions:
         Whether navigation first looks whether robot and goal stand free.
     second_planner_pause : float
         Pause of the second planner between two of its plans [s]; 0 = no second planner.
+    second_planner_look_ahead : float
+        The second planner plans only where the path is blocked within this length [m] ahead; 0 = in any case.
     control_retries : int
         Recoveries of driving before the tree falls back to planning.
     replans : int
@@ -75,6 +77,7 @@ class TreeOptions:
     move_away: str = ""
     check_poses: bool = True
     second_planner_pause: float = 2.0
+    second_planner_look_ahead: float = 0.0
     control_retries: int = 4
     replans: int = 3
     reuse_path: bool = True
@@ -126,7 +129,7 @@ def _drive(options: TreeOptions) -> Behaviour:
     follow = ExePath("follow path", options.controller)
     drive: Behaviour = follow
     if options.second_planner_pause > 0.0:
-        second = UpdatePath("update path", options.second_planner or options.planner, slot=SECOND_PLANNER_SLOT)
+        second = _second_planner(options)
         pause = f"every {options.second_planner_pause:g} s"
         background = InBackground("in the background", Delay(pause, second, options.second_planner_pause))
         policy = ParallelPolicy.SuccessOnSelected(children=[follow], synchronise=False)
@@ -138,6 +141,14 @@ def _drive(options: TreeOptions) -> Behaviour:
     if options.motor_timeout > 0.0:
         drive = MotorWatchdog("motors?", drive, options.motor_timeout)
     return drive
+
+
+def _second_planner(options: TreeOptions) -> Behaviour:
+    update = UpdatePath("update path", options.second_planner or options.planner, slot=SECOND_PLANNER_SLOT)
+    if options.second_planner_look_ahead <= 0.0:
+        return update
+    blocked = PathBlocked("path blocked?", options.second_planner_look_ahead)
+    return Sequence("update a blocked path", memory=True, children=[blocked, update])
 
 
 def _recovery(options: TreeOptions) -> Behaviour:
@@ -162,7 +173,7 @@ def _recoveries(*behaviors: str) -> list[Behaviour]:
     return [Recovery(behavior) for behavior in behaviors if behavior]
 
 
-READY_TREES: dict[str, Callable[[], Behaviour]] = {
+READY_TREES: dict[str, Callable[..., Behaviour]] = {
     "control": control_tree,
     "navigation": navigation_tree,
     "planning": planning_tree,

@@ -22,7 +22,7 @@ from mbf_abstract.robot import RobotStateError
 
 
 class Watchdog(Decorator):
-    """Fail and make the child idle once ``alarm`` has something to say."""
+    """Fail and make the child idle once ``alarm`` has something to say; a goal that is paused starts it anew."""
 
     outcome: ExePathOutcome = ExePathOutcome.ROBOT_STUCK
 
@@ -38,6 +38,9 @@ class Watchdog(Decorator):
         """Return the child's status unless there is an alarm."""
         if self.decorated.status != Status.RUNNING:
             return self.decorated.status
+        if self.mission.paused:
+            self.initialise()
+            return Status.RUNNING
         try:
             text = self.alarm()
         except RobotStateError:

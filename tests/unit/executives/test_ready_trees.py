@@ -173,6 +173,18 @@ def _free(bench):
     return RecoveryResult(RecoveryOutcome.SUCCESS, "free")
 
 
+def test_a_robot_that_is_held_raises_no_alarm_and_drives_on_when_released(make_bench, recoveries):
+    bench = make_bench()
+    options = TreeOptions(check_poses=False, second_planner_pause=0.0, progress_timeout=1.0, motor_timeout=1.0)
+    executive = TreeExecutive(navigation_tree(options), bench.navigator)
+    actions = {20: bench.server.pause_all, 120: bench.server.resume_all}
+    executive.on_tick.append(lambda tick: actions.get(tick, lambda: None)())
+
+    assert executive.run(GOAL).success
+    assert recoveries(bench) == []
+    assert bench.clock.now() > 100 * executive.period
+
+
 def test_a_robot_that_turns_on_the_spot_oscillates(make_bench):
     bench = make_bench()
     bench.controller.play(drive(0.0, 0.2))

@@ -71,6 +71,23 @@ def test_a_jump_shifts_the_pose_and_ends(localization):
     assert localization.measure(2.0).x == pytest.approx(1.0)
 
 
+def test_a_fault_can_be_added_while_the_world_goes_on(localization):
+    clock = ClockOnly()
+    schedule = FaultSchedule(clock, {}, localization, [])
+    assert localization.measure(0.0) is not None
+    schedule.add(SensorFault(type="silent", sensor="localization", start=1.0, end=2.0))
+    clock.at(1.5)
+    assert localization.measure(1.5) is None
+    clock.at(2.0)
+    assert localization.measure(2.0) is not None
+
+
+def test_a_fault_of_a_sensor_that_does_not_exist_is_refused_with_the_names_of_those_that_do(localization):
+    schedule = FaultSchedule(ClockOnly(), {}, localization, [])
+    with pytest.raises(ValueError, match="localization, got 'nose'"):
+        schedule.add(SensorFault(type="silent", sensor="nose", start=1.0))
+
+
 def test_a_scan_turns_and_moves_with_the_believed_pose():
     scan = RangeScan("lidar", "map", np.array([1.0, 2.0, 0.3]), np.array([[2.0, 2.0, 0.3]]), np.array([True]), 0.0)
     seen = seen_from(scan, Pose.planar(1.0, 2.0), Pose.planar(3.0, 0.0, math.pi / 2))
