@@ -70,6 +70,9 @@ class CostmapParameters(ParameterModel):
     max_age: float = parameter(
         2.0, "Time after the last update at which the map stops being current; 0 = never.", unit="s", ge=0.0
     )
+    confine_images: bool = parameter(
+        False, "Refuse maps and masks whose image lies out of their YAML file's folder.", dynamic=False
+    )
     layers: tuple[LayerEntry, ...] = parameter((), "Layers in order of writing.", dynamic=False)
 
     @field_validator("footprint")
@@ -159,6 +162,7 @@ def build_layered_costmap(
                     rolling_window=parameters.rolling_window,
                     track_unknown_space=parameters.track_unknown_space,
                     base_folder=Path(base_folder),
+                    confine_images=parameters.confine_images,
                     static_map=static_map,
                 )
             )

@@ -60,6 +60,8 @@ class LayerContext:
         Whether unknown is a value of its own; otherwise unknown cells count as free.
     base_folder : Path
         Relative file names of the configuration start here.
+    confine_images : bool
+        Whether the image of a map or mask must lie in the folder of its YAML file.
     static_map : Costmap, optional
         A map handed over by the program instead of a file.
     """
@@ -70,6 +72,7 @@ class LayerContext:
     rolling_window: bool = False
     track_unknown_space: bool = False
     base_folder: Path = field(default_factory=Path)
+    confine_images: bool = False
     static_map: Costmap | None = None
 
 

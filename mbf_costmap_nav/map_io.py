@@ -83,8 +83,13 @@ class OccupancyMap:
         return Costmap(table[flat.occupancy], flat.resolution, flat.origin[0], flat.origin[1], frame_id)
 
 
-def load_map(file: Path | str, max_cells: int = MAX_CELLS) -> OccupancyMap:
+def load_map(file: Path | str, max_cells: int = MAX_CELLS, *, confined: bool = False) -> OccupancyMap:
     """Read a map_server YAML file and the image it names.
+
+    Parameters
+    ----------
+    confined : bool
+        Refuse an image out of the YAML file's folder; for files that come from somebody else.
 
     Raises
     ------
@@ -93,10 +98,17 @@ def load_map(file: Path | str, max_cells: int = MAX_CELLS) -> OccupancyMap:
     """
     file = Path(file)
     description = read_description(file)
-    return _decode(_read_pixels(file.parent / description.image, max_cells), description)
+    image = file.parent / description.image
+    if confined and not image.resolve().is_relative_to(file.parent.resolve()):
+        raise MapError(
+            file, f"image: expected a file in the folder of the map (confine_images), got {description.image!r}"
+        )
+    return _decode(_read_pixels(image, max_cells), description)
 
 
-def load_costmap(file: Path | str, frame_id: str = "map", track_unknown_space: bool = True) -> Costmap:
+def load_costmap(
+    file: Path | str, frame_id: str = "map", track_unknown_space: bool = True, *, confined: bool = False
+) -> Costmap:
     """Read a map_server YAML file, or a bare image, as a costmap; see ``load_map`` and ``OccupancyMap.to_costmap``.
 
     A bare image is described by the YAML file of the same name beside it; without one its cells have
@@ -105,7 +117,7 @@ def load_costmap(file: Path | str, frame_id: str = "map", track_unknown_space: b
     file = Path(file)
     description = file.with_suffix(".yaml") if file.suffix.lower() in IMAGE_SUFFIXES else file
     bare = description != file and not description.is_file()
-    content = load_image(file, BARE_IMAGE_RESOLUTION) if bare else load_map(description)
+    content = load_image(file, BARE_IMAGE_RESOLUTION) if bare else load_map(description, confined=confined)
     return content.to_costmap(frame_id, track_unknown_space)
 
 

@@ -40,7 +40,10 @@ class KeepoutLayer(CostmapLayer):
         super().__init__(context)
         files = self.parameters
         self._zones = files.zones + (load_zones(context.base_folder / files.zones_file) if files.zones_file else ())
-        self._mask = load_costmap(context.base_folder / files.mask_file, context.frame_id) if files.mask_file else None
+        self._mask = None
+        if files.mask_file:
+            mask_file = context.base_folder / files.mask_file
+            self._mask = load_costmap(mask_file, context.frame_id, confined=context.confine_images)
         self._changed = EMPTY_BOX
 
     def match_geometry(self, geometry: GridGeometry) -> None:

@@ -44,7 +44,7 @@ class SpeedLimitLayer(CostmapLayer):
         self._zones = files.zones + (load_zones(context.base_folder / files.zones_file) if files.zones_file else ())
         self._mask: Costmap | None = None
         if files.mask_file:
-            mask = load_map(context.base_folder / files.mask_file).upright()
+            mask = load_map(context.base_folder / files.mask_file, confined=context.confine_images).upright()
             self._mask = Costmap(mask.occupancy, mask.resolution, mask.origin[0], mask.origin[1], context.frame_id)
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:

@@ -40,7 +40,10 @@ class StaticLayer(GridLayer):
         super().__init__(context)
         if self.parameters.map_file:
             self._map = load_costmap(
-                Path(context.base_folder) / self.parameters.map_file, context.frame_id, context.track_unknown_space
+                Path(context.base_folder) / self.parameters.map_file,
+                context.frame_id,
+                context.track_unknown_space,
+                confined=context.confine_images,
             )
         elif context.static_map is not None:
             self._map = context.static_map

@@ -1,4 +1,4 @@
-"""Fault table, row 22: malformed maps: descriptions, images, and a server that is told to use one."""
+"""Fault table, rows 22 and 30: malformed and hostile maps: descriptions, images, a server that is told to use one."""
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from mbf_abstract.navigator import Navigator
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.transforms import TransformBuffer
+from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map_description import MapError, read_description
 from mbf_costmap_nav.map_io import load_image, load_map
 
@@ -89,6 +90,25 @@ def test_any_text_is_a_description_or_a_map_error(tmp_path, text):
         assert read_description(file).resolution > 0.0
     except MapError as error:
         assert error.file == file and error.reason
+
+
+@pytest.mark.parametrize("layer", ["static", "keepout", "speed_limit"])
+@pytest.mark.parametrize("image", ["../secret.pgm", "link.pgm", "{folder}/secret.pgm"])
+def test_an_image_out_of_the_maps_folder_is_refused_where_that_is_asked_for(tmp_path, layer, image):
+    (tmp_path / "maps").mkdir()
+    Image.fromarray(np.full((4, 4), 255, np.uint8)).save(tmp_path / "secret.pgm")
+    (tmp_path / "maps" / "link.pgm").symlink_to(tmp_path / "secret.pgm")
+    description = GOOD | {"image": image.format(folder=tmp_path)}
+    (tmp_path / "maps" / "map.yaml").write_text(yaml.safe_dump(description))
+    key = "map_file" if layer == "static" else "mask_file"
+
+    def build(**parameters):
+        chosen = CostmapParameters(layers=({"name": "it", "type": layer},), **parameters)
+        return build_layered_costmap(chosen, {"it": {key: "maps/map.yaml"}}, base_folder=tmp_path)
+
+    build()
+    with pytest.raises(MapError, match="expected a file in the folder of the map"):
+        build(confine_images=True)
 
 
 CONFIG = """
