@@ -75,15 +75,19 @@ def scenarios() -> None:
 def replay(
     folder: Path = typer.Argument(..., help="Folder of a run, e.g. runs/2030-01-02_03-04-05."),
     show: bool = typer.Option(True, "--open/--no-open", help="Open the page in the browser."),
+    rrd: bool = typer.Option(False, "--rrd", help="Write run.rrd for Rerun too; needs the extra rerun."),
 ) -> None:
     """Write picture, report, replay and MCAP log of a run again from its recording, and open the replay."""
     with readable_errors():
         from terrain.metrics import measure
         from terrain.recording import Recording
+        from terrain.viewer.rerun_log import write_rrd
         from terrain.viewer.results import write_results
 
         recording = Recording.load(folder / "recording.npz")
         write_results(folder, recording, measure(recording).to_json())
+        if rrd:
+            write_rrd(folder / "run.rrd", recording)
     page = (folder / "replay.html").resolve()
     typer.echo(page)
     if show:

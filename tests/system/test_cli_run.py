@@ -66,7 +66,8 @@ def test_a_replay_is_made_again_from_the_recording_alone(tmp_path):
     result = mbf("replay", tmp_path, "--no-open")
 
     assert result.exit_code == 0, result.output
-    assert {file.name for file in tmp_path.iterdir()} >= {"picture.png", "report.html", "replay.html", "run.mcap"}
+    made = {"picture.png", "report.html", "replay.html", "run.mcap"}
+    assert {file.name for file in tmp_path.iterdir()} == {"recording.npz", *made}
 
 
 def test_a_folder_without_a_recording_is_exit_code_2(tmp_path):
