@@ -133,7 +133,7 @@ def vertex_path_leg(
     normals = np.concatenate(
         [mesh_map.face_normals[[start.face]], mesh_map.vertex_normals[chain], mesh_map.face_normals[[goal.face]]]
     )
-    return drop_repeated_points(Leg(positions, normals, float(totals[best])))
+    return Leg(positions, normals, float(totals[best]))
 
 
 def straight_leg(mesh_map: MeshMap, query: LegQuery) -> Leg:

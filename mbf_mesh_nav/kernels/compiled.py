@@ -1,15 +1,29 @@
-"""The one way kernels are compiled: lazily, cached on disk, without the interpreter lock, types kept for mypy."""
+"""The one way kernels are compiled: lazily, cached on disk, without the interpreter lock, types kept for mypy.
+
+Three habits keep compilation short: indices and counters start as ``Index(0)`` or ``Count(0)`` (a plain 0 passed on
+to another kernel makes numba compile that one for the literal first), rows of arrays are copied by loops (slices and
+array expressions bring in their error messages' string formatting), and arrays handed in are of one kind
+everywhere (read-only and writable ones are different types).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
+import numpy as np
 from numba import njit
 
 KernelFunction = TypeVar("KernelFunction", bound=Callable[..., Any])
 
+Index: Any = np.uint64
+"""Type of indices in hot loops: numba asks of every signed one whether it counts from the end, a fifth of a wave."""
+ONE: Any = Index(1)
+Count: Any = np.int64
+"""Type of counters and codes handed on to other kernels."""
+
 
 def kernel(function: KernelFunction) -> KernelFunction:
     """Compile ``function`` with numba at its first call; IEEE arithmetic throughout, also where it divides by zero."""
-    return cast(KernelFunction, njit(cache=True, nogil=True, error_model="numpy")(function))
+    compiled = njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function)
+    return cast(KernelFunction, compiled)

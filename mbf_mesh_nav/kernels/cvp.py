@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, kernel
 from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
 from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
@@ -68,13 +68,12 @@ def propagate_wave(
     int
         Number of settled vertices, -1 if cancelled.
     """
-    vertex_count = len(distances)
-    heap = np.empty(vertex_count, dtype=np.int64)
-    positions = np.full(vertex_count, -1, dtype=np.int32)
+    heap = np.empty(len(distances), dtype=np.uint64)
+    positions = np.full(len(distances), -1, dtype=np.int32)
     state = blocked.astype(np.uint8)  # _FREE or _BLOCKED
-    size = 0
+    size = Count(0)
     for seed in seeds:
-        size = push_or_decrease(heap, positions, size, seed, distances[seed])
+        size = push_or_decrease(heap, positions, size, Index(seed), distances[seed])
         state[seed] = _SETTLED  # the corners of the source's face: their distances are exact from the start
     limit = np.inf
     pops, targets_settled = 0, 0
@@ -89,8 +88,8 @@ def propagate_wave(
             targets_settled += 1
             if targets_settled == len(targets):
                 limit = distances[vertex] + overshoot
-        for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
-            first, second = corner_ends[record, 0], corner_ends[record, 1]
+        for record in range(Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + ONE])):
+            first, second = Index(corner_ends[record, 0]), Index(corner_ends[record, 1])
             if state[first] + state[second] != _FREE + _SETTLED:
                 continue
             known, free = first, second
@@ -105,7 +104,7 @@ def propagate_wave(
                 distances[free] = distance
                 predecessors[free] = vertex if abs(nearer) == 1 else known
                 cut_records[free] = record if nearer > 0 else ALONG_EDGE
-                size = push_or_decrease(heap, positions, size, free, distance)
+                size = push_or_decrease(heap, positions, size, free, np.float32(distance))
     return pops
 
 

@@ -1,11 +1,6 @@
-"""Exact shortest distances over a CSR graph with near/far work lists instead of a heap.
+"""Exact shortest distances over a CSR graph, with the work lists of ``near_far.py`` instead of a heap.
 
-Vertices below a moving threshold wait in the *near* list, the others in the *far* list. A vertex whose value drops
-is queued again, so the result is the same fixed point as Dijkstra's, bit for bit, whatever the step of the threshold;
-the step (a few edges) only keeps repeated visits rare. Compared with a heap nothing is sorted, which is
-about twice as fast on meshes. (The idea of delta-stepping: Meyer and Sanders, 2003, on one thread.)
-
-Use it for whole fields. For one goal far from the borders ``astar.py`` settles fewer vertices.
+Use it for whole fields. For one goal far from the borders ``astar.py`` visits fewer vertices.
 """
 
 from __future__ import annotations
@@ -13,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
+from mbf_mesh_nav.kernels.near_far import IN_FAR, IN_NEAR, UNQUEUED, after, raise_threshold
 
 BoolArray = NDArray[np.bool_]
 FlagArray = NDArray[np.uint8]
@@ -21,7 +17,6 @@ Float32Array = NDArray[np.float32]
 Int32Array = NDArray[np.int32]
 
 CANCEL_POLL_INTERVAL = 4096
-_UNQUEUED, _IN_NEAR, _IN_FAR = 0, 1, 2
 
 
 @kernel
@@ -62,19 +57,16 @@ def propagate_distances(
     bool
         False if cancelled.
     """
-    vertex_count = len(distances)
-    near = np.empty(vertex_count + 1, dtype=np.int32)  # ring buffer: a queued vertex sits in it once
-    far = np.empty(vertex_count, dtype=np.int32)
-    state = np.zeros(vertex_count, dtype=np.uint8)
-    head = 0
-    tail = 0
-    far_count = 0
+    near = np.empty(len(distances) + 1, dtype=np.int32)
+    far = np.empty(len(distances), dtype=np.int32)
+    state = np.zeros(len(distances), dtype=np.uint8)
+    head, tail, far_count = Index(0), Index(0), Index(0)
     for seed in seeds:
-        if state[seed] == _UNQUEUED:
-            state[seed] = _IN_FAR
+        if state[seed] == UNQUEUED:
+            state[seed] = IN_FAR
             far[far_count] = seed
-            far_count += 1
-    threshold = 0.0  # float64: adding the step must change it however far the wave is
+            far_count += ONE
+    threshold, step = np.float32(0.0), np.float32(threshold_step)
     visits = 0
     while True:
         # 1. Empty the near list; improved vertices go to the list their new distance belongs to.
@@ -82,56 +74,33 @@ def propagate_distances(
             visits += 1
             if visits % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
                 return False
-            vertex = near[head]
-            head += 1
-            if head > vertex_count:
-                head = 0
-            state[vertex] = _UNQUEUED
+            vertex = Index(near[head])
+            head = after(head, near)
+            state[vertex] = UNQUEUED
             base = distances[vertex]
-            for slot in range(neighbour_offsets[vertex], neighbour_offsets[vertex + 1]):
-                neighbour = neighbours[slot]
+            for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
+                neighbour = Index(neighbours[slot])
                 candidate = base + edge_weights[slot]
                 if candidate < distances[neighbour] and not blocked[neighbour]:
                     distances[neighbour] = candidate
                     predecessors[neighbour] = vertex
                     if candidate < threshold:
-                        if state[neighbour] != _IN_NEAR:
-                            state[neighbour] = _IN_NEAR
+                        if state[neighbour] != IN_NEAR:
+                            state[neighbour] = IN_NEAR
                             near[tail] = neighbour
-                            tail += 1
-                            if tail > vertex_count:
-                                tail = 0
-                    elif state[neighbour] == _UNQUEUED:
-                        state[neighbour] = _IN_FAR
+                            tail = after(tail, near)
+                    elif state[neighbour] == UNQUEUED:
+                        state[neighbour] = IN_FAR
                         far[far_count] = neighbour
-                        far_count += 1
+                        far_count += ONE
         # 2. Everything below the threshold is final: are the targets?
         if far_count == 0 or cancel_flag[0] != 0:
             return bool(cancel_flag[0] == 0)
         for i in range(len(targets)):
             if distances[targets[i]] + target_offsets[i] < threshold:
                 return True
-        # 3. Raise the threshold past the nearest far vertex and move what is below it to the near list.
-        lowest = np.inf
-        for i in range(far_count):
-            if state[far[i]] == _IN_FAR:
-                lowest = min(lowest, float(distances[far[i]]))
-        threshold = max(threshold, lowest) + threshold_step
-        kept = 0
-        for i in range(far_count):
-            vertex = far[i]
-            if state[vertex] != _IN_FAR:  # reached more cheaply meanwhile, handled by the near list
-                continue
-            if distances[vertex] < threshold:
-                state[vertex] = _IN_NEAR
-                near[tail] = vertex
-                tail += 1
-                if tail > vertex_count:
-                    tail = 0
-            else:
-                far[kept] = vertex
-                kept += 1
-        far_count = kept
+        # 3. Go on with what waits farther away.
+        tail, far_count, threshold = raise_threshold(near, far, state, distances, tail, far_count, threshold, step)
 
 
 @kernel

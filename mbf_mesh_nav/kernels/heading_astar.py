@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.astar import straight_line_bound
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import Count, Index, kernel
 from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
 from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
@@ -71,18 +71,18 @@ def search_with_heading(
         The best target state, -1 if there is none, -2 if cancelled.
     """
     state_count = len(distances)
-    heap = np.empty(state_count, dtype=np.int64)
+    heap = np.empty(state_count, dtype=np.uint64)
     positions = np.full(state_count, -1, dtype=np.int32)
-    size = 0
+    size = Count(0)
     for seed in seeds:
-        key = distances[seed] + straight_line_bound(vertices, seed // HEADINGS, goal)
-        size = push_or_decrease(heap, positions, size, seed, key)
+        key = distances[seed] + straight_line_bound(vertices, Index(seed // HEADINGS), goal)
+        size = push_or_decrease(heap, positions, size, Index(seed), key)
     best_state, best_total = -1, np.inf
     settled = 0
     while size > 0 and top_key(heap) < best_total:
         if settled % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
             return -2
-        state = top_item(heap)
+        state = Count(top_item(heap))
         size = remove_top(heap, positions, size)
         settled += 1
         vertex, heading = state // HEADINGS, state % HEADINGS
@@ -93,7 +93,7 @@ def search_with_heading(
                 if total < best_total:
                     best_state, best_total = state, total
         for slot in range(neighbour_offsets[vertex], neighbour_offsets[vertex + 1]):
-            neighbour, new_heading = neighbours[slot], edge_headings[slot]
+            neighbour, new_heading = neighbours[slot], Count(edge_headings[slot])
             if blocked[neighbour] or not allowed[neighbour, new_heading]:
                 continue
             turn = _shortest_turn(heading, new_heading)
@@ -105,8 +105,8 @@ def search_with_heading(
             if candidate < distances[following]:
                 distances[following] = candidate
                 predecessors[following] = state
-                key = float(candidate) + float(straight_line_bound(vertices, neighbour, goal))
-                size = push_or_decrease(heap, positions, size, following, key)
+                key = candidate + straight_line_bound(vertices, Index(neighbour), goal)
+                size = push_or_decrease(heap, positions, size, Index(following), key)
     return best_state
 
 

@@ -11,7 +11,7 @@ wrong side of a vertex, and the taut path stays on it; densify the map (``mesh_m
 from __future__ import annotations
 
 from mbf_mesh_nav.face_strip import FaceStrip
-from mbf_mesh_nav.leg_search import Leg, LegQuery, drop_repeated_points
+from mbf_mesh_nav.leg_search import Leg, LegQuery
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.surface_planner import SurfacePlanner
 from mbf_mesh_nav.wave_search import WaveSearch
@@ -32,4 +32,4 @@ class AnyAnglePlanner(SurfacePlanner):
         strip = FaceStrip(self.mesh_map, query.snapshot, query.blocked)
         positions, point_faces = strip.shorten(*self._search.trace(query, wave))
         normals = self.mesh_map.face_normals[point_faces]
-        return drop_repeated_points(Leg(positions, normals, self._search.potential(query, wave)))
+        return Leg(positions, normals, self._search.potential(query, wave))

@@ -21,7 +21,7 @@ class AStarPlanner(SurfacePlanner):
         mesh_map = self.mesh_map
         distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.start)
         targets, offsets = corner_distances(mesh_map, query.blocked, query.goal)
-        settled = search_towards(
+        visits = search_towards(
             mesh_map.vertices,
             mesh_map.neighbour_offsets,
             mesh_map.neighbours,
@@ -33,6 +33,7 @@ class AStarPlanner(SurfacePlanner):
             targets,
             offsets,
             query.goal.point,
+            mesh_map.topology.mean_edge_length,
             query.cancel_flag,
         )
-        return vertex_path_leg(mesh_map, query, distances, predecessors) if settled >= 0 else None
+        return vertex_path_leg(mesh_map, query, distances, predecessors) if visits >= 0 else None

@@ -10,7 +10,7 @@ Cost: about 0.4 us a vertex nearer than the goal. The C++ original's rule and de
 from __future__ import annotations
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.leg_search import Leg, LegQuery, drop_repeated_points
+from mbf_mesh_nav.leg_search import Leg, LegQuery
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.surface_planner import SurfacePlanner, SurfacePlannerParameters
 from mbf_mesh_nav.wave_search import WaveSearch
@@ -42,4 +42,4 @@ class CVPPlanner(SurfacePlanner):
         positions, point_faces = self._search.trace(query, wave)
         normals = self.mesh_map.face_normals[point_faces]
         cost = self._search.potential(query, wave)
-        return drop_repeated_points(Leg(positions, normals, cost, self._search.field(query, wave)))
+        return Leg(positions, normals, cost, self._search.field(query, wave))

@@ -16,7 +16,7 @@ from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors
 from mbf_mesh_nav.kernels.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
 from mbf_mesh_nav.layers.tilt import TiltLayer, heading_index
-from mbf_mesh_nav.leg_search import Leg, LegQuery, drop_repeated_points, straight_leg
+from mbf_mesh_nav.leg_search import Leg, LegQuery, straight_leg
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.surface_planner import SurfacePlanner, SurfacePlannerParameters
 from mbf_mesh_nav.surface_point import corner_distances
@@ -85,7 +85,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         positions = np.concatenate([[query.start.point], mesh_map.vertices[chain], [query.goal.point]])
         ends = mesh_map.face_normals[[query.start.face]], mesh_map.face_normals[[query.goal.face]]
         normals = np.concatenate([ends[0], mesh_map.vertex_normals[chain], ends[1]])
-        return drop_repeated_points(Leg(positions, normals, float(distances[best])))
+        return Leg(positions, normals, float(distances[best]))
 
     def _tilt(self) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
         """Allowed headings (V, 16) and roll (V, 16) [rad]: of the tilt layer, or of the vertex normals."""
