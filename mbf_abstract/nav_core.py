@@ -18,6 +18,7 @@ recovery behavior   nothing                     SUCCESS, always
 
 from __future__ import annotations
 
+import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any
@@ -72,10 +73,14 @@ class RecoveryBehavior(ABC):
 
 
 def plan_with(planner: BaseGlobalPlanner, request: PlanRequest) -> PlanResult:
-    """Ask an old planner; it knows neither tolerances nor cancel."""
-    poses = planner.make_plan(request.start, request.goal)
-    if not poses:
-        return PlanResult(GetPathOutcome.FAILURE, "Planner failed")
+    """Ask an old planner, once for each leg between via poses; it knows neither tolerances nor cancel."""
+    stops = (request.start, *request.via, request.goal)
+    poses: list[Pose] = []
+    for start, goal in itertools.pairwise(stops):
+        leg = planner.make_plan(start, goal)
+        if not leg:
+            return PlanResult(GetPathOutcome.FAILURE, "Planner failed")
+        poses += leg[1:] if poses else leg
     return PlanResult(GetPathOutcome.SUCCESS, "Plan found", Path.from_poses(poses))
 
 

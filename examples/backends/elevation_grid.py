@@ -88,7 +88,7 @@ class ElevationContext(PluginContext):
 
 
 class ElevationPlanner(AbstractPlanner):
-    """Dijkstra's search over the samples; the shortest way on the ground in eight directions. Via poses are ignored."""
+    """Dijkstra's search over the samples; the shortest way on the ground in eight directions."""
 
     def __init__(self, context: ElevationContext) -> None:
         super().__init__(context)
@@ -96,23 +96,27 @@ class ElevationPlanner(AbstractPlanner):
         self._graph = context.grid.graph().tocsr()
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
-        """Search from the sample next to the start to the sample next to the goal."""
+        """Search from the sample next to the start to the sample next to the goal, by those next to the via poses."""
         if request.cancel_token.cancelled:
             return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
-        for pose, code in ((request.start, GetPathOutcome.BLOCKED_START), (request.goal, GetPathOutcome.BLOCKED_GOAL)):
+        stops = (request.start, *request.via, request.goal)
+        for pose in stops:
             state, slope = self.grid.state(pose.x, pose.y)
             if state is not CellState.FREE:
+                code = GetPathOutcome.BLOCKED_START if pose is request.start else GetPathOutcome.BLOCKED_GOAL
                 return PlanResult(code, f"({pose.x:.2f}, {pose.y:.2f}) is {state.name}, slope {slope:.2f} rad")
-        start, goal = (self.grid.index(pose.x, pose.y) for pose in (request.start, request.goal))
-        (lengths,), (before,) = csgraph.dijkstra(self._graph, False, [start], return_predecessors=True)
-        if not np.isfinite(lengths[goal]):
+        ends = [self.grid.index(pose.x, pose.y) for pose in stops]
+        lengths, before = csgraph.dijkstra(self._graph, False, ends[:-1], return_predecessors=True)
+        if not np.isfinite(length := lengths[range(len(ends) - 1), ends[1:]].sum()):
             return PlanResult(GetPathOutcome.NO_PATH_FOUND, "start and goal are not connected")
-        samples = [goal]
-        while samples[0] != start:
-            samples.insert(0, before[samples[0]])
-        points = self.grid.points(np.array(samples))
-        path = Path.from_points(points, request.goal.orientation, frame_id=self.grid.frame_id)
-        return PlanResult(GetPathOutcome.SUCCESS, f"{lengths[goal]:.1f} m over ground", path, float(lengths[goal]))
+        samples = ends[-1:]
+        for came_from, start in zip(before[::-1], ends[-2::-1], strict=True):  # each leg from its end to its start
+            while samples[0] != start:
+                samples.insert(0, came_from[samples[0]])
+        path = Path.from_points(
+            self.grid.points(np.array(samples)), request.goal.orientation, frame_id=self.grid.frame_id
+        )
+        return PlanResult(GetPathOutcome.SUCCESS, f"{length:.1f} m over ground", path, float(length))
 
 
 class ElevationQueries:
@@ -157,9 +161,8 @@ class ElevationQueries:
         distances = np.hypot(points[:, 0] - there.x, points[:, 1] - there.y)
         if not len(free) or distances.min() > dist_tolerance:
             return PoseAnswer(*self._grid.state(there.x, there.y, query.safety_dist), None)
-        x, y, z = points[distances.argmin()].tolist()
-        found = Pose((x, y, z), there.orientation, there.frame_id)
-        return PoseAnswer(*self._grid.state(x, y, query.safety_dist), found)
+        found = Pose(tuple(points[distances.argmin()].tolist()), there.orientation, there.frame_id)
+        return PoseAnswer(*self._grid.state(found.x, found.y, query.safety_dist), found)
 
     def clear_map(self) -> None:
         """Nothing was sensed."""
@@ -195,5 +198,4 @@ class ElevationGridServer(AbstractNavigationServer):
 
     def ground_height(self, x: float, y: float) -> float:
         """Height of the next sample."""
-        index = self.grid.index(x, y)
-        return 0.0 if index < 0 else float(np.nan_to_num(self.grid.heights.flat[index]))
+        return 0.0 if (index := self.grid.index(x, y)) < 0 else float(np.nan_to_num(self.grid.heights.flat[index]))

@@ -1,6 +1,7 @@
 """The contract checks themselves: an honest plugin passes, and every kind of misbehaviour is found."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,9 +71,14 @@ def random_detour(self, request):
     return PlanResult(0, "", Path.from_points(points))
 
 
+def skip_the_via_poses(self, request):
+    return straight_plan(replace(request, via=()))
+
+
 @pytest.mark.parametrize(
     ("plan", "text"),
     [
+        (skip_the_via_poses, "via (3, 1, 0) and back: the path passes the via pose at 3.16 m"),
         (raise_error, "raised ValueError: boom"),
         (lambda self, request: None, "returned NoneType, not PlanResult"),
         (lambda self, request: (0, "found"), "returned tuple, not PlanResult"),

@@ -77,6 +77,7 @@ def check_planner(
             check.unreachable(start, goal)
         if problems:
             check.start_is_goal(problems[0][0])
+            check.there_and_back(*problems[0], end_tolerance)
             check.idle_cancel(*problems[0])
     check.report.finish()
 
@@ -128,6 +129,16 @@ class _PlannerCheck:
         if result is not None and result.success and result.path is not None:
             far = result.path.length > 1.0
             self.report.expect(not far, f"{situation}: the path is {result.path.length:.2f} m long")
+
+    def there_and_back(self, start: Pose, goal: Pose, tolerance: float) -> None:
+        """Ask for a way back to the start by a via pose: a path that ignores the pose must not pass for a success."""
+        situation = f"from {_short(start)} via {_short(goal)} and back"
+        request = PlanRequest(start, start, via=(goal,))
+        with self._fresh(start) as planner:
+            result = self.report.call(situation, lambda: planner.make_plan(request), PlanResult, GetPathOutcome, _SPAN)
+        if result is not None and result.success and result.path is not None:
+            gap = float(np.linalg.norm(result.path.positions - np.array(goal.position), axis=1).min())
+            self.report.expect(gap <= tolerance, f"{situation}: the path passes the via pose at {gap:.2f} m")
 
     def cancel(self, start: Pose, goal: Pose, duration: float, within: float) -> None:
         """Cancel before and, if the call is long enough, during the work."""

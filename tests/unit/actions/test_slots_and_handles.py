@@ -1,6 +1,7 @@
 """What all actions share: slots, preemption, handles in three styles, callbacks, closing; F-numbers are facts."""
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -144,6 +145,27 @@ def test_f239_to_f241_a_goal_succeeds_aborts_or_is_rejected_with_a_text(make_ben
     assert [h.status.name for h in (succeeded, aborted, rejected)] == ["SUCCEEDED", "ABORTED", "REJECTED"]
     assert all(handle.result.message for handle in (succeeded, aborted, rejected))
     assert repr(aborted) == "<get_path goal 2, aborted: FAILURE>"
+
+
+def test_f245_a_plugins_own_code_and_text_arrive_with_success_and_with_failure(make_bench):
+    bench = make_bench(planner_max_retries=0)
+    bench.planner.play(lambda request: replace(straight_plan(request), outcome=4, message="42"))
+    succeeded = send(bench).wait()
+    bench.planner.play(PlanResult(74, "42"))
+    aborted = send(bench).wait()
+    assert (succeeded.outcome, succeeded.message) == (4, "42")
+    assert (aborted.outcome, aborted.message) == (74, "42")
+
+
+def test_f246_a_canceled_goal_keeps_the_last_words_of_its_plugin(make_bench):
+    bench = make_bench()
+    busy(bench, 100.0)
+    handle = send(bench)
+    bench.clock.sleep(1.0)
+    handle.cancel()
+    result = handle.wait()
+    assert (handle.status, result.outcome) == (GoalStatus.CANCELED, Outcome.CANCELED)
+    assert result.plugin_message == "as told"
 
 
 def test_f247_a_plugin_that_raises_aborts_its_goal(make_bench):

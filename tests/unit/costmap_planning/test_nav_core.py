@@ -46,6 +46,12 @@ def test_an_old_planner_answers_through_get_path(navigator):
     assert (failed.outcome, failed.message) == (GetPathOutcome.FAILURE, "Planner failed")
 
 
+def test_an_old_planner_is_asked_once_for_each_leg_between_via_poses(navigator):
+    via = (Pose.planar(1.0, 1.0), Pose.planar(2.0, 1.0))
+    found = navigator.get_path(Pose.planar(3.0, 0.0), via=via)
+    assert found.path.positions[:, :2].tolist() == [[0.0, 0.0], [1.0, 1.0], [2.0, 1.0], [3.0, 0.0]]
+
+
 def test_an_old_controller_drives_a_plan_to_its_end(navigator):
     path = navigator.get_path(Pose.planar(1.5, 0.0)).path
     driven = navigator.exe_path(path)
