@@ -25,8 +25,6 @@ from mbf_abstract.sensing import RangeScan
 from mbf_abstract.server import AbstractNavigationServer
 from mbf_abstract.transforms import TransformBuffer
 
-ROBOT_AS_IT_IS = PlaceQuery()
-
 
 class ElevationGridParameters(ParameterModel):
     """The configuration's block ``elevation_grid``."""
@@ -41,8 +39,8 @@ class ElevationGrid:
     """The map: heights (ny, nx) [m] at ``resolution`` [m] with row 0 at y = 0, and what follows from them."""
 
     def __init__(self, heights: FloatArray, parameters: ElevationGridParameters, frame_id: str) -> None:
-        self.heights, self.frame_id = heights, frame_id
-        self.resolution, self.robot_radius = parameters.resolution, parameters.robot_radius
+        self.heights, self.frame_id, self.robot_radius = heights, frame_id, parameters.robot_radius
+        self.resolution = parameters.resolution
         rise = np.hypot(*np.gradient(heights, self.resolution))
         self.slope = np.arctan(np.nan_to_num(rise, nan=np.inf))  # unknown ground counts as a wall
         steps = distance_transform_edt(np.pad(self.slope <= parameters.max_slope, 1))[1:-1, 1:-1]
@@ -113,9 +111,8 @@ class ElevationPlanner(AbstractPlanner):
         for came_from, start in zip(before[::-1], ends[-2::-1], strict=True):  # each leg from its end to its start
             while samples[0] != start:
                 samples.insert(0, came_from[samples[0]])
-        path = Path.from_points(
-            self.grid.points(np.array(samples)), request.goal.orientation, frame_id=self.grid.frame_id
-        )
+        points, frame_id = self.grid.points(np.array(samples)), self.grid.frame_id
+        path = Path.from_points(points, request.goal.orientation, frame_id=frame_id)
         return PlanResult(GetPathOutcome.SUCCESS, f"{length:.1f} m over ground", path, float(length))
 
 
@@ -129,7 +126,7 @@ class ElevationQueries:
         """State and slope of one point."""
         return self.check_pose(point)
 
-    def check_pose(self, pose: Pose | None, query: PlaceQuery = ROBOT_AS_IT_IS) -> PlaceAnswer:
+    def check_pose(self, pose: Pose | None, query: PlaceQuery = PlaceQuery()) -> PlaceAnswer:
         """State and slope of the robot's disc."""
         there = self._transforms.transform_pose(pose or self._robot.pose(), self._grid.frame_id)
         return PlaceAnswer(*self._grid.state(there.x, there.y, query.safety_dist))
@@ -137,7 +134,7 @@ class ElevationQueries:
     def check_path(
         self,
         path: Path,
-        query: PlaceQuery = ROBOT_AS_IT_IS,
+        query: PlaceQuery = PlaceQuery(),
         return_on: CellState | None = None,
         skip_poses: int = 0,
         path_cells_only: bool = False,
@@ -152,7 +149,7 @@ class ElevationQueries:
         return PathAnswer(last, worst, total)
 
     def find_valid_pose(
-        self, pose: Pose | None, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery = ROBOT_AS_IT_IS
+        self, pose: Pose | None, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery = PlaceQuery()
     ) -> PoseAnswer:
         """Nearest free sample within the tolerance; the heading stays."""
         there = self._transforms.transform_pose(pose or self._robot.pose(), self._grid.frame_id)
