@@ -17,6 +17,7 @@ from mbf_abstract.geometry import Path, Pose, normalize_angle
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.footprint_check import FootprintCheck
 from mbf_costmap_nav.path_geometry import arc_lengths, closest_point
 from mbf_costmap_nav.plugins import CostmapContext, CostmapController
@@ -171,6 +172,10 @@ class PathFollower(CostmapController):
         """Largest speed [m/s] where no layer limits it; every controller that drives has one."""
         return math.inf
 
+    def checked_footprint(self) -> Footprint:
+        """Outline that must not touch a lethal cell; the costmap's padded one. A new object means a new outline."""
+        return self.costmap.footprint
+
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the frame of the costmap."""
         if len(path) == 0 or path.frame_id != self.costmap.frame_id:
@@ -198,8 +203,9 @@ class PathFollower(CostmapController):
         costmap = self.costmap.snapshot()
         if not costmap.contains(pose.x, pose.y):
             return ControlResult(ExePathOutcome.OUT_OF_MAP, f"robot ({pose.x:.2f}, {pose.y:.2f}) is outside {costmap}")
-        if self._footprint is None or self._footprint.footprint is not self.costmap.footprint:
-            self._footprint = FootprintCheck(self.costmap.footprint, costmap.resolution)
+        footprint = self.checked_footprint()
+        if self._footprint is None or self._footprint.footprint is not footprint:
+            self._footprint = FootprintCheck(footprint, costmap.resolution)
         self.tracker.update(pose)
         if self._footprint.collides(costmap, pose.x, pose.y, pose.yaw):
             text = f"the footprint at ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad) touches a lethal cell"

@@ -19,6 +19,7 @@ from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.costmap import FREE, INSCRIBED
+from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.footprint_check import arc_poses
 from mbf_costmap_nav.path_geometry import look_ahead_point
 from mbf_costmap_nav.path_handling import PATH_LENGTH_TOLERANCE, ControlCycle, PathFollower, to_base_frame
@@ -56,6 +57,9 @@ class RegulatedPurePursuitParameters(PluginParameters):
     max_cross_track: float = parameter(1.5, "Farther from the path than this it is missed.", unit="m", gt=0.0, le=100.0)
     collision_check: bool = parameter(True, "Simulate the footprint ahead along the arc.")
     collision_check_time: float = parameter(1.0, "How far ahead in time it is simulated.", unit="s", gt=0.0, le=10.0)
+    collision_check_padding: float | None = parameter(
+        None, "Padding of the footprint in that simulation; absent = the costmap's.", unit="m", ge=0.0, le=1.0
+    )
     control_period: float = parameter(0.05, "Time between two calls, for accelerations.", unit="s", gt=0.0, le=1.0)
 
 
@@ -66,11 +70,26 @@ class RegulatedPurePursuitController(PathFollower):
     parameters: RegulatedPurePursuitParameters
 
     _at_goal = False
+    _outline: tuple[Footprint, Footprint] | None = None
+    """The costmap's outline without padding, and what the collision check makes of it."""
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path and forget that the robot stood at the end of the last one."""
         self._at_goal = False
         return super().set_plan(path)
+
+    def parameters_changed(self) -> None:
+        """Forget the outline of the old padding."""
+        self._outline = None
+
+    def checked_footprint(self) -> Footprint:
+        """The costmap's outline, with the padding of the collision check where one is given."""
+        padding, bare = self.parameters.collision_check_padding, self.costmap.unpadded_footprint
+        if padding is None:
+            return self.costmap.footprint
+        if self._outline is None or self._outline[0] is not bare:
+            self._outline = bare, bare.padded(padding)
+        return self._outline[1]
 
     @property
     def full_speed(self) -> float:

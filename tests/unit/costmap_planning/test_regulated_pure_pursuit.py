@@ -10,8 +10,13 @@ from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.footprint import Footprint
+from mbf_costmap_nav.layer import LayerContext
+from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.layers.static import StaticLayer
 from mbf_costmap_nav.planners.astar import AStarPlanner
 
+SQUARE = Footprint([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]])
 FREE_MAP = Costmap(np.zeros((200, 200), dtype=np.uint8), 0.05, -5.0, -5.0)
 
 
@@ -109,6 +114,23 @@ def test_footprint_on_an_obstacle_is_a_collision(pursuit):
     cells[100, 103] = 254
     result = first_command(pursuit(Costmap(cells, 0.05, -5.0, -5.0)), straight())
     assert result.outcome == ExePathOutcome.COLLISION
+
+
+def test_the_collision_check_may_have_a_padding_of_its_own(make_plugin):
+    cells = np.zeros((200, 200), dtype=np.uint8)
+    cells[:92, :] = cells[109:, :] = 254  # a corridor 0.85 m wide for a robot of 0.4 m with 0.25 m of padding
+    corridor = Costmap(cells, 0.05, -5.0, -5.0)
+    walls = StaticLayer(LayerContext("walls", StaticLayer.Parameters(), static_map=corridor))
+    padded = LayeredCostmap(corridor.geometry, [walls], SQUARE, footprint_padding=0.25)
+    padded.update(None, 0.0)
+
+    def outcome(**parameters):
+        controller = make_plugin(RegulatedPurePursuitController, corridor, costmap=padded, **parameters)
+        return first_command(controller, straight()).outcome
+
+    assert outcome() == ExePathOutcome.COLLISION
+    assert outcome(collision_check_padding=0.1) == ExePathOutcome.SUCCESS
+    assert outcome(collision_check_padding=0.3) == ExePathOutcome.COLLISION
 
 
 def test_far_from_the_path_it_is_missed(pursuit):
