@@ -49,6 +49,7 @@ class EventKind(str, Enum):
     STATE_CHANGED = "state_changed"  # goal_id, old, new
     PLUGIN_CALL_STARTED = "plugin_call_started"  # goal_id, plugin, method
     PLUGIN_CALL_ENDED = "plugin_call_ended"  # goal_id, plugin, method, outcome, message
+    CONTROL_LOOP = "control_loop"  # goal_id, began, cycles, failed; source: plugin; a loop has ended
     PLAN = "plan"  # goal_id, plugin, cost, length, poses (count)
     RECOVERY = "recovery"  # goal_id, plugin, reason
     FEEDBACK = "feedback"  # goal_id, action-specific sample

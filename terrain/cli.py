@@ -1,4 +1,4 @@
-"""The commands ``mbf run``, ``mbf scenarios`` and ``mbf replay``, which need the simulator and the viewer."""
+"""The commands ``mbf run``, ``scenarios``, ``replay`` and ``compare``, which need the simulator and the viewer."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ def register(app: typer.Typer) -> None:
     app.command("run")(run)
     app.command("scenarios")(scenarios)
     app.command("replay")(replay)
+    app.command("compare")(compare)
 
 
 def run(
@@ -79,13 +80,12 @@ def replay(
 ) -> None:
     """Write picture, report, replay and MCAP log of a run again from its recording, and open the replay."""
     with readable_errors():
-        from terrain.metrics import measure
-        from terrain.recording import Recording
+        from terrain.run_folder import read_run
         from terrain.viewer.rerun_log import write_rrd
         from terrain.viewer.results import write_results
 
-        recording = Recording.load(folder / "recording.npz")
-        write_results(folder, recording, measure(recording).to_json())
+        recording, metrics = read_run(folder)
+        write_results(folder, recording, metrics)
         if rrd:
             write_rrd(folder / "run.rrd", recording)
     page = (folder / "replay.html").resolve()
@@ -110,6 +110,30 @@ def _tell(result: RunResult, as_json: bool) -> None:
     typer.echo(f"{result.outcome_name}: {result.message}")
     typer.echo(
         f"{metrics['path_length_m']:.1f} m in {metrics['time_s']:.1f} s simulated, "
+def compare(
+    left: Path = typer.Argument(..., help="Folder of a run."),
+    right: Path = typer.Argument(..., help="Folder of another run."),
+    out: Path = typer.Option(Path("compare.html"), "--out", help="The page to write."),
+) -> None:
+    """Lay two runs side by side: a table of their metrics here, and one page with everything."""
+    with readable_errors():
+        from rich.console import Console
+        from rich.markup import escape
+        from rich.table import Table
+
+        from terrain.run_folder import read_run
+        from terrain.viewer.comparison import compare_metrics, write_comparison
+
+        runs = read_run(left), read_run(right)
+        names = (left.name, right.name) if left.name != right.name else (str(left), str(right))
+        table = Table("metric", *names, "difference")
+        for row in compare_metrics(runs[0][1], runs[1][1]):
+            table.add_row(*map(escape, row))
+        Console().print(table)
+        write_comparison(out, names, *runs)
+    typer.echo(out.resolve())
+
+
         f"{metrics['wall_time_s']:.1f} s of wall time: {metrics['real_time_factor']:.1f} x real time"
     )
     typer.echo(f"results in {result.folder}: replay.html, report.html, picture.png, run.mcap, metrics.json")

@@ -43,8 +43,9 @@ class Metrics:
         Horizontal distance from the track to the plan that was followed at the time, None without a plan.
     stops : int
         How often the robot came to a standstill after it had moved.
-    plans, planner_calls, recoveries : int
-        Plans accepted, calls of planners and recovery runs, as the event log has them.
+    plans, planner_calls, control_cycles, failed_control_cycles, recoveries : int
+        Plans accepted, calls of planners and of controllers, those of the latter that gave no valid command, and
+        recovery runs, as the event log has them.
     gate_stops, faults : int
         Stops made by the velocity gate and not by a plugin; plugin faults.
     """
@@ -68,6 +69,8 @@ class Metrics:
     stops: int
     plans: int
     planner_calls: int
+    control_cycles: int
+    failed_control_cycles: int
     recoveries: int
     gate_stops: int
     faults: int
@@ -105,6 +108,8 @@ def measure(recording: Recording) -> Metrics:
         stops=count_stops(recording.twists),
         plans=_count(events, EventKind.PLAN),
         planner_calls=_calls(events, "make_plan"),
+        control_cycles=_cycles(events, "cycles"),
+        failed_control_cycles=_cycles(events, "failed"),
         recoveries=_count(events, EventKind.RECOVERY),
         gate_stops=sum(e.kind is EventKind.ROBOT_STOPPED and e.source == "velocity_gate" for e in events),
         faults=_count(events, EventKind.FAULT),
@@ -169,3 +174,8 @@ def _count(events: tuple[Event, ...], kind: EventKind) -> int:
 
 def _calls(events: tuple[Event, ...], method: str) -> int:
     return sum(e.kind is EventKind.PLUGIN_CALL_STARTED and e.data.get("method") == method for e in events)
+
+
+def _cycles(events: tuple[Event, ...], which: str) -> int:
+    counts = [event.data.get(which) for event in events if event.kind is EventKind.CONTROL_LOOP]
+    return sum(count for count in counts if isinstance(count, int))

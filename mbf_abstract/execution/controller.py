@@ -101,6 +101,8 @@ class ControllerExecution:
         self._on_cycle = on_cycle
         self._plan: Plan | None = None
         self._failures = 0
+        self._cycles = 0
+        self._failed_cycles = 0
         self._last_result: ControlResult | None = None
         self._hold_reason: tuple[int, str] | None = None
         self._ignored = Stopwatch(run.runtime.clock)
@@ -124,11 +126,13 @@ class ControllerExecution:
             holder = self._runtime.gate.holder or "nobody (the gate is closed)"
             return self._end(ControllerState.INTERNAL_ERROR, ExePathOutcome.FAILURE, f"the robot is driven by {holder}")
         end = ControllerEnd(ControllerState.STOPPED, ExePathOutcome.STOPPED, "stopped")
+        began = self._runtime.clock.now()
         try:
             end = self._loop(lease)
             return end
         finally:
             lease.release(stop=self._stops_at(end.state), reason=end.state.value)
+            self._tell_cycles(began)
 
     def stop_robot(self, reason: str) -> None:
         """Take the lease away from the loop, from another thread: its plugin hangs."""
@@ -291,6 +295,8 @@ class ControllerExecution:
         if result.success and result.command is None:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, "success, but no command")
         self._last_result = result
+        self._cycles += 1
+        self._failed_cycles += not result.success
         return result
 
     # ------------------------------------------------------------------------------- judging a command
@@ -364,6 +370,17 @@ class ControllerExecution:
         if state is ControllerState.CANCELED:
             return parameters.force_stop_on_cancel
         return True
+
+    def _tell_cycles(self, began: float) -> None:
+        """Record how often the plugin was asked; an event for each call would drown all others."""
+        self._runtime.events.emit(
+            EventKind.CONTROL_LOOP,
+            self._run.plugin.name,
+            goal_id=self._run.handle.id,
+            began=began,
+            cycles=self._cycles,
+            failed=self._failed_cycles,
+        )
 
     def _enter(self, state: ControllerState) -> None:
         """Record a change of state; the two states of a healthy cycle are not worth an event each."""

@@ -467,3 +467,14 @@ def test_feedback_tells_where_the_robot_is_on_its_path(make_bench):
     assert 0.0 < middle.time_to_goal < 10.0
     assert [f.distance_along_path for f in seen] == sorted((f.distance_along_path for f in seen), reverse=True)
     assert len(bench.events(EventKind.LEASE_GRANTED)) == 1
+
+
+def test_a_loop_ends_with_one_event_that_counts_its_cycles(make_bench):
+    bench = make_bench(controller_max_retries=-1)
+    bench.controller.play(FAILS, FAILS, drive())
+    bench.navigator.exe_path(bench.path_to(1.0))
+
+    (told,) = bench.memory.of_kind(EventKind.CONTROL_LOOP)
+    assert (told.source, told.data["failed"]) == ("controller", 2)
+    assert told.data["cycles"] == len(bench.controller.requests)
+    assert told.data["began"] < told.time

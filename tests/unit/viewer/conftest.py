@@ -28,13 +28,13 @@ def life_of_a_goal(duration: float, outcome: int, message: str) -> list[Event]:
     return [
         Event(0.0, EventKind.GOAL_ACCEPTED, "move_base", {"goal_id": 1}),
         Event(0.0, EventKind.GOAL_ACCEPTED, "get_path", {"goal_id": 2}),
-        Event(
-            0.0, EventKind.PLUGIN_CALL_STARTED, "get_path", {"goal_id": 2, "plugin": "dijkstra", "method": "make_plan"}
-        ),
+        Event(0.0, EventKind.PLUGIN_CALL_STARTED, "dijkstra", {"goal_id": 2, "method": "make_plan"}),
+        Event(0.4, EventKind.PLUGIN_CALL_ENDED, "dijkstra", {"goal_id": 2, "method": "make_plan", "outcome": 0}),
         Event(0.4, EventKind.PLAN, "get_path", {"goal_id": 2, "plugin": "dijkstra", "cost": 30.0, "length": 29.0}),
         Event(0.4, EventKind.GOAL_FINISHED, "get_path", {"goal_id": 2, "outcome": 0, "message": "plan found"}),
         Event(0.4, EventKind.GOAL_ACCEPTED, "exe_path", {"goal_id": 3}),
         Event(3.0, EventKind.ROBOT_STOPPED, "velocity_gate", {"reason": "no command for 0.5 s"}),
+        Event(duration, EventKind.CONTROL_LOOP, "follower", {"goal_id": 3, "began": 0.4, "cycles": 500, "failed": 12}),
         Event(duration, EventKind.GOAL_FINISHED, "exe_path", {"goal_id": 3, "outcome": outcome, "message": message}),
         Event(duration, EventKind.GOAL_FINISHED, "move_base", {"goal_id": 1, "outcome": outcome, "message": message}),
     ]

@@ -56,6 +56,7 @@ def test_events_are_counted(hill_recording):
     metrics = measure(hill_recording)
 
     assert (metrics.plans, metrics.planner_calls, metrics.gate_stops, metrics.faults) == (1, 1, 1, 0)
+    assert (metrics.control_cycles, metrics.failed_control_cycles) == (500, 12)
 
 
 def test_metrics_are_plain_json(office_recording):

@@ -12,8 +12,9 @@ from terrain.metrics import measure
 from terrain.recorder import Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import HUSKY
-from terrain.viewer.report import MAX_ROWS, report_html, write_report
-from terrain.viewer.timeline import Bar, bars_of, timeline_svg
+from terrain.viewer.page import MAX_ROWS
+from terrain.viewer.report import report_html, write_report
+from terrain.viewer.timeline import Bar, action_bars, plugin_bars, timeline_svg
 
 
 def report_of(recording):
@@ -58,12 +59,20 @@ def test_a_run_that_never_began_has_a_report_too():
 
 
 def test_every_accepted_goal_is_one_bar_with_its_outcome(office_recording):
-    bars = bars_of(office_recording.events)
-
-    assert bars == [
+    assert action_bars(office_recording.events) == [
         Bar("move_base", 0.0, 15.4, 110),
         Bar("get_path", 0.0, 0.4, 0),
         Bar("exe_path", 0.4, 15.4, 110),
+    ]
+
+
+def test_plugins_have_a_bar_for_each_call_and_one_for_a_whole_control_loop(office_recording):
+    hung = Event(9.0, EventKind.PLUGIN_CALL_STARTED, "theta", {"goal_id": 9, "method": "make_plan"})
+
+    assert plugin_bars((*office_recording.events, hung)) == [
+        Bar("dijkstra", 0.0, 0.4, 0, "make_plan"),
+        Bar("follower", 0.4, 15.4, None, "500 cycles, 12 without a valid command"),
+        Bar("theta", 9.0, None, None, "make_plan, no answer"),
     ]
 
 
@@ -72,6 +81,9 @@ def test_the_timeline_is_sound_svg_for_open_goals_too(office_recording, finished
     kinds = () if finished else (EventKind.GOAL_FINISHED,)
     events = tuple(event for event in office_recording.events if event.kind not in kinds)
 
-    svg = ElementTree.fromstring(timeline_svg(events))
+    nodes = list(ElementTree.fromstring(timeline_svg(events)).iter())
+    titles = [node.text for node in nodes if node.tag == "title"]
 
-    assert len([node for node in svg.iter() if node.tag.endswith("rect")]) == 3
+    assert len([node for node in nodes if node.tag == "rect"]) == 5
+    assert "move_base: BLOCKED_PATH, 0.00 s to 15.40 s" in titles or not finished
+    assert "3.00 s: velocity_gate: robot_stopped: reason: no command for 0.5 s" in titles

@@ -1,0 +1,53 @@
+"""The parts every page of a run is made of: the frame with its style, and tables. No script, nothing from a network."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from html import escape
+from typing import Any
+
+MAX_ROWS = 200
+FOLDED_FROM = 40
+
+STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; color: #222; margin: 2em auto; padding: 0 1em; }
+h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.15em; margin-top: 2em; }
+.outcome { font-size: 1.15em; font-weight: 600; } .good { color: #1a7f37; } .bad { color: #b42318; }
+table { border-collapse: collapse; } td, th { text-align: left; padding: 2px 14px 2px 0; vertical-align: top; }
+th { color: #555; font-weight: 600; border-bottom: 1px solid #ccc; } td:first-child { white-space: nowrap; }
+img { max-width: 100%; height: auto; } svg { width: 100%; height: auto; } summary { color: #555; cursor: pointer; }
+.beside { display: grid; grid-template-columns: 1fr 1fr; gap: 0 2em; align-items: start; } .beside > * { min-width: 0; }
+"""
+
+
+def page(title: str, parts: Iterable[str], width: int = 1000) -> str:
+    """A whole page with the parts, at most ``width`` pixels wide."""
+    head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{STYLE}body {{ max-width: {width}px }}</style>'
+    return "\n".join(["<!doctype html>", f'<html lang="en"><head>{head}</head><body>', *parts, "</body></html>"])
+
+
+def beside(left: str, right: str) -> str:
+    """Two parts in two columns."""
+    return f'<div class="beside"><div>{left}</div><div>{right}</div></div>'
+
+
+def table(header: tuple[str, ...], rows: Iterable[tuple[Any, ...]]) -> str:
+    """A table of at most ``MAX_ROWS`` rows, folded if it is long; what was left out is said."""
+    listed = list(rows)
+    if not listed:
+        return "<p>none</p>"
+    head = "".join(f"<th>{escape(name)}</th>" for name in header)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell(value))}</td>" for value in row) + "</tr>" for row in listed[:MAX_ROWS]
+    )
+    more = f"<p>and {len(listed) - MAX_ROWS} more, see events.jsonl</p>" if len(listed) > MAX_ROWS else ""
+    text = f"<table><tr>{head}</tr>{body}</table>{more}"
+    return text if len(listed) <= FOLDED_FROM else f"<details><summary>{len(listed)} rows</summary>{text}</details>"
+
+
+def cell(value: Any) -> str:
+    """A value in few letters."""
+    if isinstance(value, float) and math.isfinite(value):
+        return f"{value:.4g}"
+    return ", ".join(map(str, value)) or "none" if isinstance(value, list) else str(value)

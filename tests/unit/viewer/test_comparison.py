@@ -1,0 +1,61 @@
+"""Two runs side by side, on a page and in the terminal."""
+
+import json
+import re
+
+from typer.testing import CliRunner
+
+from mbf_abstract.cli import make_app
+from terrain.metrics import measure
+from terrain.viewer.comparison import compare_metrics, comparison_html
+
+
+def compare(*arguments):
+    return CliRunner(env={"COLUMNS": "120"}).invoke(make_app(), ["compare", *map(str, arguments)])
+
+
+def test_the_page_has_both_runs_in_two_columns_and_needs_nothing_else(hill_recording, office_recording):
+    runs = [(run, measure(run).to_json()) for run in (hill_recording, office_recording)]
+
+    page = comparison_html(("first", "second"), *runs)
+
+    assert page.count("<img") == 2 and page.count("<svg") == 4
+    for text in ("hill on mesh", "office on costmap", "BLOCKED_PATH: a box stands on the path", "<th>second</th>"):
+        assert text in page
+    assert "<script" not in page and re.findall(r'(?:src|href)="(?!data:|#)', page) == []
+
+
+def test_differences_are_right_minus_left_and_only_of_numbers():
+    left = {"time_s": 10.0, "success": True, "mishaps": [], "plans": 3, "energy_j": 5.0, "limit": None}
+    right = {"time_s": 12.5, "success": False, "mishaps": ["collision"], "plans": 3, "wall_time_s": 1.0, "limit": None}
+
+    assert compare_metrics(left, right) == [
+        ("time_s", "10", "12.5", "+2.5"),
+        ("success", "True", "False", "differs"),
+        ("mishaps", "none", "collision", "differs"),
+        ("plans", "3", "3", "0"),
+        ("energy_j", "5", "-", "differs"),
+        ("limit", "-", "-", ""),
+        ("wall_time_s", "-", "1", "differs"),
+    ]
+
+
+def test_the_command_prints_a_table_and_writes_the_page(hill_recording, office_recording, tmp_path):
+    for name, run in (("before", hill_recording), ("after", office_recording)):
+        (tmp_path / name).mkdir()
+        run.save(tmp_path / name / "recording.npz")
+    (tmp_path / "after" / "metrics.json").write_text(json.dumps({"slipped_m": 0.25}))
+
+    result = compare(tmp_path / "before", tmp_path / "after", "--out", tmp_path / "page.html")
+
+    assert result.exit_code == 0, result.output
+    lines = [re.split(r"\s*│\s*", line.strip("│ ")) for line in result.stdout.splitlines()]
+    assert ["slipped_m", "-", "0.25", "differs"] in lines
+    assert any(line[0] == "control_cycles" and line[1:] == ["500", "500", "0"] for line in lines)
+    assert "hill on mesh" in (tmp_path / "page.html").read_text()
+
+
+def test_a_folder_without_a_run_is_exit_code_2(tmp_path):
+    result = compare(tmp_path, tmp_path)
+
+    assert result.exit_code == 2 and "recording.npz" in result.output
