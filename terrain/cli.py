@@ -94,22 +94,6 @@ def replay(
         typer.launch(page.as_uri())
 
 
-def new_run_folder(parent: Path, now: datetime) -> Path:
-    """Return a folder name made of the time that does not exist yet."""
-    stamp = now.strftime("%Y-%m-%d_%H-%M-%S")
-    names = [stamp, *(f"{stamp}_{number}" for number in range(2, 1000))]
-    return next(parent / name for name in names if not (parent / name).exists())
-
-
-def _tell(result: RunResult, as_json: bool) -> None:
-    metrics = result.metrics
-    if as_json:
-        facts = {"outcome": result.outcome, "outcome_name": result.outcome_name, "message": result.message}
-        typer.echo(json.dumps({**facts, "success": result.success, "folder": str(result.folder), "metrics": metrics}))
-        return
-    typer.echo(f"{result.outcome_name}: {result.message}")
-    typer.echo(
-        f"{metrics['path_length_m']:.1f} m in {metrics['time_s']:.1f} s simulated, "
 def compare(
     left: Path = typer.Argument(..., help="Folder of a run."),
     right: Path = typer.Argument(..., help="Folder of another run."),
@@ -134,6 +118,22 @@ def compare(
     typer.echo(out.resolve())
 
 
+def new_run_folder(parent: Path, now: datetime) -> Path:
+    """Return a folder name made of the time that does not exist yet."""
+    stamp = now.strftime("%Y-%m-%d_%H-%M-%S")
+    names = [stamp, *(f"{stamp}_{number}" for number in range(2, 1000))]
+    return next(parent / name for name in names if not (parent / name).exists())
+
+
+def _tell(result: RunResult, as_json: bool) -> None:
+    metrics = result.metrics
+    if as_json:
+        facts = {"outcome": result.outcome, "outcome_name": result.outcome_name, "message": result.message}
+        typer.echo(json.dumps({**facts, "success": result.success, "folder": str(result.folder), "metrics": metrics}))
+        return
+    typer.echo(f"{result.outcome_name}: {result.message}")
+    typer.echo(
+        f"{metrics['path_length_m']:.1f} m in {metrics['time_s']:.1f} s simulated, "
         f"{metrics['wall_time_s']:.1f} s of wall time: {metrics['real_time_factor']:.1f} x real time"
     )
     typer.echo(f"results in {result.folder}: replay.html, report.html, picture.png, run.mcap, metrics.json")
