@@ -23,6 +23,7 @@ from typing import Any
 from pydantic import field_validator
 
 from mbf_abstract.parameters import ParameterModel, PluginParameters, parameter
+from mbf_abstract.transforms import TransformBuffer
 from mbf_costmap_nav.costmap import Costmap, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.layer import CostmapLayer, LayerContext, LayerParameters
@@ -123,6 +124,7 @@ def build_layered_costmap(
     resolve_layer: LayerResolver = builtin_layer,
     base_folder: Path | str = ".",
     static_map: Costmap | None = None,
+    transforms: TransformBuffer | None = None,
 ) -> LayeredCostmap:
     """Make a costmap with its layers.
 
@@ -138,6 +140,8 @@ def build_layered_costmap(
         Where relative file names in layer blocks start.
     static_map : Costmap, optional
         Map of static layers that name no file.
+    transforms : TransformBuffer, optional
+        For layers whose data is in another frame than the costmap.
 
     Raises
     ------
@@ -164,6 +168,7 @@ def build_layered_costmap(
                     base_folder=Path(base_folder),
                     confine_images=parameters.confine_images,
                     static_map=static_map,
+                    transforms=transforms,
                 )
             )
         )

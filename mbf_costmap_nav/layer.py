@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.transforms import TransformBuffer
 from mbf_costmap_nav.costmap import FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
 
@@ -64,6 +65,8 @@ class LayerContext:
         Whether the image of a map or mask must lie in the folder of its YAML file.
     static_map : Costmap, optional
         A map handed over by the program instead of a file.
+    transforms : TransformBuffer, optional
+        Where the frames of the layer's data are looked up; without it everything must be in the costmap's frame.
     """
 
     name: str
@@ -74,6 +77,7 @@ class LayerContext:
     base_folder: Path = field(default_factory=Path)
     confine_images: bool = False
     static_map: Costmap | None = None
+    transforms: TransformBuffer | None = None
 
 
 class CostmapLayer(ABC):

@@ -152,5 +152,6 @@ class CostmapNavigationServer(AbstractNavigationServer):
             {layer.name: cast(Any, layer.parameters) for layer in section.layers},
             resolve_layer=layer_classes.__getitem__,
             base_folder=config.path.parent,
+            transforms=self.runtime.transforms,
         )
         return ServedCostmap(costmap, self.runtime, parameters.update_frequency, key)

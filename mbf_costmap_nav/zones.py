@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from pydantic import ValidationError, field_validator
 
 from mbf_abstract.parameters import ParameterModel, parameter
-from mbf_costmap_nav.costmap import CellArray, CellBox, Costmap, GridGeometry
+from mbf_abstract.transform import Transform
+from mbf_costmap_nav.costmap import LETHAL, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.map_description import MapError
 
 
@@ -77,23 +78,29 @@ def load_zones(file: Path) -> tuple[Zone, ...]:
         raise MapError(file, findings) from error
 
 
-def sample_costmap(source: Costmap, geometry: GridGeometry, box: CellBox, outside: int) -> CellArray:
+def sample_costmap(
+    source: Costmap, geometry: GridGeometry, box: CellBox, outside: int, T_source_grid: Transform | None = None
+) -> CellArray:
     """Values of ``source`` at the centres of another grid's cells.
 
     Parameters
     ----------
     source : Costmap
-        In the same frame as ``geometry``.
     geometry : GridGeometry
     box : CellBox
         Cells of ``geometry`` to fill.
     outside : int
         Value of cells whose centre is not on ``source``.
+    T_source_grid : Transform, optional
+        From the grid's frame to the source's; none where they are the same. A turned grid can miss single cells, so
+        lethal ones are written once more into the grid's cell their own centre lies in.
 
     Returns
     -------
     (box rows, box columns) uint8
     """
+    if T_source_grid is not None:
+        return _sample_transformed(source, geometry, box, outside, T_source_grid)
     x = geometry.origin_x + (np.arange(box.x0, box.x1) + 0.5) * geometry.resolution
     y = geometry.origin_y + (np.arange(box.y0, box.y1) + 0.5) * geometry.resolution
     ix = np.floor((x - source.origin_x) / source.resolution).astype(np.int64)
@@ -102,3 +109,26 @@ def sample_costmap(source: Costmap, geometry: GridGeometry, box: CellBox, outsid
     values = np.full((len(y), len(x)), outside, dtype=np.uint8)
     values[np.ix_(rows, columns)] = source.cells[np.ix_(iy[rows], ix[columns])]
     return values
+
+
+def _sample_transformed(
+    source: Costmap, geometry: GridGeometry, box: CellBox, outside: int, T_source_grid: Transform
+) -> CellArray:
+    values = np.full((max(box.y1 - box.y0, 0), max(box.x1 - box.x0, 0)), outside, dtype=np.uint8)
+    lower = np.array([geometry.origin_x, geometry.origin_y]) + np.array([box.x0, box.y0]) * geometry.resolution
+    rows, columns = (axis.ravel() for axis in np.indices(values.shape))
+    centres = lower + (np.column_stack([columns, rows]) + 0.5) * geometry.resolution
+    cells, inside = source.world_to_cells(_mapped(T_source_grid, centres))
+    values[rows[inside], columns[inside]] = source.cells[cells[inside, 1], cells[inside, 0]]
+
+    lethal = np.argwhere(source.cells == LETHAL)[:, ::-1]
+    points = _mapped(T_source_grid.inverse(), source.cells_to_world(lethal))
+    x, y = np.floor((points - lower) / geometry.resolution).astype(np.int64).T
+    seen = (x >= 0) & (x < values.shape[1]) & (y >= 0) & (y < values.shape[0])
+    values[y[seen], x[seen]] = LETHAL
+    return values
+
+
+def _mapped(transform: Transform, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (n, 2) [m] of a flat world in the transform's parent frame."""
+    return transform.apply(np.pad(points, ((0, 0), (0, 1))))[:, :2]

@@ -5,8 +5,10 @@ When not: for areas a robot must not enter although they are free, use a keep-ou
 replaced. Cost: nothing after the first update, as its cells never change by themselves; in a rolling map one copy of
 the window for each move by a cell. Known failure: furniture moves; combine it with a layer that sees.
 
-The map's frame must be the costmap's. The interpretation of values is costmap_2d's static layer with
-``trinary_costmap`` off; map files in trinary mode give the same result as with it on.
+The map may be given in another frame (``map_frame``), for example under a local costmap in odom: it is then laid
+through the newest transform, and again whenever that changes. While the transform is unknown the layer holds nothing
+and the costmap is not current. The interpretation of values is costmap_2d's static layer with ``trinary_costmap`` off;
+map files in trinary mode give the same result as with it on.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from pathlib import Path
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
+from mbf_abstract.transform import Transform, TransformError
 from mbf_costmap_nav.costmap import EMPTY_BOX, UNKNOWN, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.layer import CombinationMethod, GridLayer, LayerContext, LayerParameters, combine
 from mbf_costmap_nav.map_io import load_costmap
@@ -27,6 +30,7 @@ class StaticLayerParameters(LayerParameters):
     map_file: str = parameter(
         "", "map_server YAML file or image, relative to the configuration's folder.", dynamic=False
     )
+    map_frame: str = parameter("", "Frame of the map file's origin; empty = the costmap's.", dynamic=False)
     use_maximum: bool = parameter(False, "Combine by the larger cost instead of replacing what is below.")
 
 
@@ -41,7 +45,7 @@ class StaticLayer(GridLayer):
         if self.parameters.map_file:
             self._map = load_costmap(
                 Path(context.base_folder) / self.parameters.map_file,
-                context.frame_id,
+                self.parameters.map_frame or context.frame_id,
                 context.track_unknown_space,
                 confined=context.confine_images,
             )
@@ -50,15 +54,23 @@ class StaticLayer(GridLayer):
         else:
             raise ValueError(f"static layer {context.name!r} needs map_file, or a map handed over by the program")
         self._changed = EMPTY_BOX
+        self._frame_id = context.frame_id
+        self._transforms = context.transforms
+        self._T_map_costmap: Transform | None = None
+        self._misplaced = "" if self._in_costmap_frame else "its map has not been placed yet"
+
+    @property
+    def _in_costmap_frame(self) -> bool:
+        return self._map.frame_id == self._frame_id
 
     @property
     def default_value(self) -> int:
         """Cells out of the map hold no information, whatever unknown means inside of it."""
         return UNKNOWN
 
-    def preferred_geometry(self) -> GridGeometry:
-        """Grid of the map."""
-        return self._map.geometry
+    def preferred_geometry(self) -> GridGeometry | None:
+        """Grid of the map, unless it is in another frame."""
+        return self._map.geometry if self._in_costmap_frame else None
 
     def match_geometry(self, geometry: GridGeometry) -> None:
         """Sample the map at the costmap's cells."""
@@ -74,9 +86,29 @@ class StaticLayer(GridLayer):
         self._sample(CellBox(0, box.y1 - dy, box.x1, box.y1) if dy > 0 else CellBox(0, 0, box.x1, -dy))
 
     def _sample(self, box: CellBox) -> None:
-        """Take each cell's value from the map cell at its centre."""
+        """Take each cell's value from the map cell at its centre; nothing while the map has no place."""
         box = box.clipped(self.geometry.box)
-        self.cells[box.slices] = sample_costmap(self._map, self.geometry, box, self.default_value)
+        if self._in_costmap_frame or self._T_map_costmap is not None:
+            self.cells[box.slices] = sample_costmap(
+                self._map, self.geometry, box, self.default_value, self._T_map_costmap
+            )
+
+    def _place(self) -> None:
+        """Look up where the map lies; sample it anew if it has moved."""
+        try:
+            if self._transforms is None:
+                raise TransformError(f"no transforms to place a map in {self._map.frame_id!r}")
+            found = self._transforms.lookup(self._map.frame_id, self._frame_id)
+        except TransformError as error:
+            self._misplaced = str(error)
+            return
+        last, self._T_map_costmap, self._misplaced = self._T_map_costmap, found, ""
+        if last is None or (last.translation, last.rotation) != (found.translation, found.rotation):
+            self.match_geometry(self.geometry)
+
+    def currency_problem(self, now: float) -> str:
+        """Say that the map's frame is unknown."""
+        return f"layer {self.name!r}: {self._misplaced}" if self._misplaced else ""
 
     def reset(self) -> None:
         """Return to the map as loaded, undoing cleared areas."""
@@ -84,6 +116,8 @@ class StaticLayer(GridLayer):
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Report the whole map once after sampling it."""
+        if not self._in_costmap_frame:
+            self._place()
         changed, self._changed = self._changed, EMPTY_BOX
         return box.union(changed)
 
