@@ -34,6 +34,18 @@ def run(
     out: Path | None = typer.Option(None, "--out", help="Folder for the results; runs/<time> if not given."),
     map_file: Path | None = typer.Option(None, "--map", help="Drive in the building of this map_server yaml instead."),
     wall_clock: bool = typer.Option(False, "--wall-clock", help="Real time instead of as fast as possible."),
+    executive: str = typer.Option(
+        "move_base", "--executive", help="Who decides: move_base, classic, or a tree (see mbf tree list)."
+    ),
+    view: bool = typer.Option(False, "--view", help="Serve a page to watch and steer the run, until Ctrl-C."),
+    view_port: int = typer.Option(8080, "--view-port", min=1, max=65535, help="Port of the page; the next free one."),
+    view_host: str = typer.Option(
+        "127.0.0.1", "--view-host", help="Interface of the page; who can reach it can drive the robot."
+    ),
+    view_speed: float = typer.Option(
+        1.0, "--view-speed", min=0.0, help="With --view: at most so many times real time; 0 = no limit."
+    ),
+    stay: bool = typer.Option(True, "--stay/--no-stay", help="With --view: wait for goals from the page at the end."),
     quiet: bool = typer.Option(False, "--quiet", help="Print only the outcome."),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object with outcome and metrics."),
 ) -> None:
@@ -43,6 +55,7 @@ def run(
         from terrain.runner import RunOptions, run_scenario
         from terrain.scenario import load_scenario
         from terrain.scenario_on_map import on_map
+        from terrain.viewer.live.options import ViewOptions
 
         loaded = load_scenario(scenario)
         if map_file is not None:
@@ -56,6 +69,9 @@ def run(
                 wall_clock=wall_clock,
                 on_progress=live.progress,
                 on_step=live.step,
+                executive=executive,
+                on_page=lambda address: live.note(f"live view at {address}"),
+                view=ViewOptions(view_host, view_port, view_speed, stay) if view else None,
             )
             result = run_scenario(loaded, options)
     _tell(result, as_json)

@@ -45,6 +45,10 @@ class LiveLine:
         elif self._show:
             self._console.print(text)
 
+    def note(self, text: str) -> None:
+        """Leave a line in the terminal that stays, also where nothing else is shown."""
+        self._console.print(text)
+
     def progress(self, progress: Progress) -> None:
         """Tell how the drive goes; without a terminal this is left out."""
         if self._status is not None:

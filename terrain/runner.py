@@ -1,4 +1,4 @@
-"""Runs a scenario from start to last goal with ``move_base`` and writes what happened into a folder.
+"""Runs a scenario from start to last goal with ``move_base``, or another executive, and writes what happened.
 
 In the folder: ``events.jsonl``, ``metrics.json``, ``recording.npz``, ``picture.png``, ``report.html``, ``replay.html``,
 ``run.mcap``, ``navigation.yaml`` and the world's map files. On simulated time the same scenario and seed write the same
@@ -9,25 +9,25 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mbf_abstract.actions.goals import MoveBaseGoal, MoveBaseResult
-from mbf_abstract.actions.handle import AnyGoalHandle
+from mbf_abstract.actions.goals import MoveBaseResult
 from mbf_abstract.clock import wall_seconds
 from mbf_abstract.events import JsonLinesSink
 from mbf_abstract.geometry import Pose
-from mbf_abstract.outcomes import MoveBaseOutcome
 from terrain.bench import Bench
+from terrain.goal_drivers import make_goal_driver
+from terrain.goal_tour import GoalTour
 from terrain.metrics import measure
 from terrain.recording import Recording
 from terrain.scenario import Scenario
 from terrain.scenario_limits import broken_limits
-
-CANCEL_WAIT = 10.0  # s a canceled goal is waited for at the time limit
+from terrain.viewer.live.options import ViewOptions
 
 
 @dataclass(frozen=True)
@@ -74,6 +74,12 @@ class RunOptions:
         Told the name of each step before and after the drive that may take a while.
     settings : mapping of str to str
         Changes of the navigation configuration, see ``terrain.scenario_settings``.
+    executive : str
+        Who decides on plans, drives and recoveries, a name of ``terrain.goal_drivers.EXECUTIVES``.
+    view : ViewOptions, optional
+        Serve a page on which the run can be watched and controlled.
+    on_page : callable
+        Told the address of that page.
     """
 
     folder: Path
@@ -84,6 +90,9 @@ class RunOptions:
     on_progress: Callable[[Progress], None] = lambda progress: None
     on_step: Callable[[str], None] = lambda text: None
     settings: Mapping[str, str] = field(default_factory=dict)
+    executive: str = "move_base"
+    view: ViewOptions | None = None
+    on_page: Callable[[str], None] = lambda address: None
 
 
 def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
@@ -107,60 +116,62 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
         options.settings,
     )
     try:
-        drive = _Drive(bench, options)
-        result = drive.visit_goals()
+        result, wall_time = _drive(bench, options)
     finally:
         bench.close()
     recording = bench.recorder.finish(result.success, result.outcome_name, result.message, list(bench.memory.events))
-    metrics = _write_numbers(recording, bench, drive.wall_time, options.folder)
+    metrics = _write_numbers(recording, bench, wall_time, options.folder)
     if options.draw:
         _draw(recording, metrics, options)
     message = "; ".join([result.message, *metrics["broken_limits"]])
     return RunResult(metrics["success"], result.outcome, result.outcome_name, message, options.folder, metrics)
 
 
-class _Drive:
-    """The executive of a run: one ``move_base`` goal after the other."""
+def _drive(bench: Bench, options: RunOptions) -> tuple[MoveBaseResult, float]:
+    """Visit the goals, watched or not; returns the last result and the wall time [s] it took."""
+    tour = GoalTour(bench, make_goal_driver(options.executive, bench.navigator), stay=_stays(options))
+    with _live_view(bench, tour, options):
+        started = wall_seconds()
+        bench.run(_ProgressReporter(bench, options.on_progress, started).report)
+        result = tour.visit_goals()
+        return result, wall_seconds() - started
 
-    def __init__(self, bench: Bench, options: RunOptions) -> None:
-        self._bench = bench
-        self._options = options
-        self._handle: AnyGoalHandle | None = None
-        self._started = wall_seconds()
-        self.wall_time = 0.0
 
-    def visit_goals(self) -> MoveBaseResult:
-        """Visit all goals; the first failure, or the time limit, ends the run."""
-        self._started = wall_seconds()
-        self._bench.run(self._report)
-        result = MoveBaseResult(MoveBaseOutcome.FAILURE, "the scenario has no goals")
-        for goal in self._bench.goals:
-            result = self._visit(goal)
-            if not result.success:
-                break
-        self.wall_time = wall_seconds() - self._started
-        return result
+def _stays(options: RunOptions) -> bool:
+    return options.view is not None and options.view.stay
 
-    def _visit(self, goal: Pose) -> MoveBaseResult:
-        limit = self._bench.scenario.time_limit
-        self._handle = handle = self._bench.navigator.send(MoveBaseGoal(goal))
-        try:
-            return handle.wait(max(0.0, limit - self._bench.clock.now()))
-        except TimeoutError:
-            handle.cancel(f"the time limit of {limit:g} s")
-            return handle.wait(CANCEL_WAIT)
 
-    def _report(self, time: float, pose: Pose, speed: float) -> None:
-        handle = self._handle
-        feedback = handle.feedback if handle is not None else None
-        self._options.on_progress(
+def _live_view(bench: Bench, tour: GoalTour, options: RunOptions) -> AbstractContextManager[object]:
+    """Serve the page while the run goes on, if it is wanted; raises ViewerMissing where it cannot be served."""
+    if options.view is None:
+        return nullcontext()
+    from terrain.viewer.live.session import LiveSession
+
+    return LiveSession(bench, tour, options.view, options.on_page)
+
+
+class _ProgressReporter:
+    """Makes a line of news from each sample of the robot."""
+
+    def __init__(self, bench: Bench, tell: Callable[[Progress], None], started: float) -> None:
+        self._server = bench.navigator.server
+        self._tell = tell
+        self._started = started
+
+    def report(self, time: float, pose: Pose, speed: float) -> None:
+        """Tell how far the action at work is; what drives comes before what only plans."""
+        server = self._server
+        at_work = [action.name for action in (server.exe_path, server.recovery, server.get_path) if action.busy]
+        driving = server.exe_path.unfinished
+        feedback = driving[0].feedback if driving else None
+        self._tell(
             Progress(
                 time=time,
                 wall_time=wall_seconds() - self._started,
                 distance_left=feedback.distance_along_path if feedback else float("nan"),
                 speed=speed,
                 tilt=float(np.arccos(np.clip(pose.rotation[2, 2], -1.0, 1.0))),
-                state=handle.status.value if handle is not None else "starting",
+                state=at_work[0] if at_work else "waiting",
             )
         )
 

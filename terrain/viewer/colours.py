@@ -42,6 +42,15 @@ def slope_legend() -> list[tuple[str, Colour]]:
     ]
 
 
+def cost_ramp(levels: ArrayLike) -> NDArray[np.float64]:
+    """Colours (n, 3) float64 0..255 of costs (n,) between free (0) and the highest there is (1); inf is forbidden."""
+    levels = np.asarray(levels, dtype=np.float64)
+    stops = np.linspace(0.0, 1.0, len(SLOPE_COLOURS))
+    colours = np.stack([np.interp(levels, stops, channel) for channel in SLOPE_COLOURS.T], axis=-1)
+    colours[np.isinf(levels)] = WALL
+    return colours
+
+
 def linear_for_viewer(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Vertex colours (n, 3) as glTF wants them: linear light; sRGB values look washed out there."""
     return np.asarray(np.round((colours / 255.0) ** 2.2 * 255.0), dtype=np.uint8)

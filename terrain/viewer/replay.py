@@ -9,9 +9,6 @@ Use ``terrain.viewer.picture`` where one look is enough.
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrain.recording import Recording
-from terrain.viewer.picture import ViewerMissing
+from terrain.viewer.page_server import page_server
 from terrain.viewer.scene import (
     RobotModel,
     add_path,
@@ -49,7 +46,7 @@ def write_replay(file: str | Path, recording: Recording) -> None:
 
 def replay_html(recording: Recording) -> str:
     """Return the text of the page; raises ViewerMissing where viser is not installed or cannot run."""
-    with _private_server() as server:
+    with page_server(FIRST_PORT) as server:
         look_at_route(server.initial_camera, recording)
         add_world(server.scene, recording)
         robot = RobotModel(server.scene, recording.robot, pin_height(recording))
@@ -58,25 +55,6 @@ def replay_html(recording: Recording) -> str:
             _Player(server, serializer, recording, robot).play()
         page: str = serializer.as_html()
     return page
-
-
-@contextmanager
-def _private_server() -> Iterator[Any]:
-    """Start a viser server on the loopback interface, and stop it afterwards."""
-    try:
-        import viser
-    except ImportError as error:
-        raise ViewerMissing(f"the replay needs viser: pip install 'mbf-flex[sim]' ({error})") from error
-    try:
-        with redirect_stdout(io.StringIO()):  # viser prints a banner, which is not for those who asked for JSON
-            server = viser.ViserServer(host="127.0.0.1", port=FIRST_PORT, verbose=False)
-    except (OSError, RuntimeError) as error:
-        raise ViewerMissing(f"viser cannot start a server on this machine: {error}") from error
-    try:
-        yield server
-    finally:
-        with redirect_stdout(io.StringIO()):
-            server.stop()
 
 
 class _Player:

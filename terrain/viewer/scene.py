@@ -43,19 +43,24 @@ CAMERA_SETBACK = 0.85
 
 def add_world(scene: Scene, recording: Recording) -> None:
     """Add what does not move: light, ground, walls, obstacles, start and goals."""
+    if recording.ground is not None:
+        add_ground(scene, recording.ground)
+    add_surroundings(scene, recording)
+
+
+def add_surroundings(scene: Scene, recording: Recording) -> None:
+    """Add what does not move apart from the ground."""
     scene.set_up_direction("+z")
     _add_light(scene)
-    if recording.ground is not None:
-        _add_ground(scene, recording.ground)
     if recording.walls is not None:
         _add_solid(scene, "/walls", cut_walls(recording.walls), WALL)
     if recording.obstacles is not None:
         _add_solid(scene, "/obstacles", recording.obstacles, OBSTACLE)
     height = pin_height(recording)
-    _add_pin(scene, "/start", recording.start, START, "start", height)
+    add_pin(scene, "/start", recording.start, START, "start", height)
     for index, goal in enumerate(recording.goals):
         label = "goal" if len(recording.goals) == 1 else f"goal {index + 1}"
-        _add_pin(scene, f"/goal_{index}", goal, GOAL, label, height)
+        add_pin(scene, f"/goal_{index}", goal, GOAL, label, height)
 
 
 def _add_light(scene: Scene) -> None:
@@ -66,13 +71,14 @@ def _add_light(scene: Scene) -> None:
     scene.add_light_directional("/light/sun", color=(255, 250, 240), intensity=3.2, position=tuple(100.0 * LIGHT))
 
 
-def _add_ground(scene: Scene, ground: Surface) -> None:
+def add_ground(scene: Scene, ground: Surface, name: str = "/ground") -> Any:
+    """Add a surface in its own colours or by its slope, smooth in the light."""
     import trimesh
 
     colours = linear_for_viewer(vertex_colours(ground))
     mesh = trimesh.Trimesh(ground.vertices, ground.faces, vertex_colors=colours, process=False)
     mesh.vertex_normals  # noqa: B018 - computing them makes the export carry them, else the viewer shades it flat
-    scene.add_mesh_trimesh("/ground", mesh, cast_shadow=False, receive_shadow=False)
+    return scene.add_mesh_trimesh(name, mesh, cast_shadow=False, receive_shadow=False)
 
 
 def _add_solid(scene: Scene, name: str, surface: Surface, colour: Colour) -> None:
@@ -82,14 +88,16 @@ def _add_solid(scene: Scene, name: str, surface: Surface, colour: Colour) -> Non
     )  # fmt: skip
 
 
-def _add_pin(scene: Scene, name: str, pose: Pose, colour: Colour, label: str, height: float) -> None:
-    """A stick with a ball, and its name."""
+def add_pin(scene: Scene, name: str, pose: Pose, colour: Colour, label: str, height: float) -> Any:
+    """Add a stick with a ball, and its name, on a frame of its own."""
+    frame = scene.add_frame(name, show_axes=False)
     x, y, z = pose.position
     ball = (x, y, z + height)
     segment = np.array([[pose.position, ball]])
     scene.add_line_segments(f"{name}/stick", segment, colour, thickness=LINE_WIDTH, thickness_units="screen")
     scene.add_icosphere(f"{name}/ball", radius=0.14 * height, color=colour, position=ball, cast_shadow=False)
     scene.add_label(f"{name}/label", label, position=(x, y, z + 1.25 * height), anchor="bottom-center")
+    return frame
 
 
 def add_path(scene: Scene, name: str, points: FloatArray, colour: Colour = PLANNED) -> Any:
@@ -108,7 +116,9 @@ def add_track_piece(scene: Scene, name: str, points: FloatArray) -> Any:
 
 def add_scan(scene: Scene, name: str, points: FloatArray) -> Any:
     """Add the points a range sensor hit, replacing a node of the same name."""
-    return scene.add_point_cloud(name, points.astype(np.float32), SCAN, point_size=SCAN_POINT, point_shape="circle")
+    return scene.add_point_cloud(
+        name, points, SCAN, point_size=SCAN_POINT, point_shape="circle", precision="float32"
+    )  # fmt: skip
 
 
 def pin_height(recording: Recording) -> float:
@@ -124,10 +134,10 @@ def _route(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
     return ends, points.min(axis=0), points.max(axis=0)
 
 
-def look_at_route(camera: Any, recording: Recording) -> None:
+def look_at_route(camera: Any, recording: Recording, farther: float = 1.0) -> None:
     """Put the first camera where start, goals and track are all in the picture, seen slantwise from the side."""
     ends, lower, upper = _route(recording)
-    middle, length = (lower + upper) / 2.0, max(float(np.linalg.norm(upper - lower)), 6.0)
+    middle, length = (lower + upper) / 2.0, farther * max(float(np.linalg.norm(upper - lower)), 6.0)
     along = ends[-1, :2] - ends[0, :2]
     side = np.array([along[1], -along[0]]) / max(float(np.linalg.norm(along)), 1e-9)
     if not side.any():

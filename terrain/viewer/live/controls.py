@@ -1,0 +1,113 @@
+"""What the page may ask of a run: a new goal, an end, a pause, other plugins, a fault.
+
+Threads of the page call ``post`` and nothing else. The simulator's thread calls ``work_off`` between two steps of the
+world; everything that is asked for happens there, while no other thread of the run works.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import FloatArray, Pose
+from terrain.bench import Bench
+from terrain.goal_tour import AskedGoal, GoalTour
+from terrain.rays import StaticRays
+from terrain.scenario_faults import LocalizationJump, SensorFault
+
+MAX_WAITING = 100  # commands; a page that sends more between two steps loses the oldest
+MAX_RANGE = 1e4  # m from the camera to the ground
+
+
+class LiveControls:
+    """Carries commands from the page to the run.
+
+    Parameters
+    ----------
+    bench : Bench
+    tour : GoalTour
+
+    Attributes
+    ----------
+    planner, controller : str
+        Plugins for the goals to come; empty = the first ones loaded.
+    holding : bool
+        Whether goals are paused, those to come as well.
+    """
+
+    def __init__(self, bench: Bench, tour: GoalTour) -> None:
+        self.planner = ""
+        self.controller = ""
+        self.holding = False
+        self._bench = bench
+        self._tour = tour
+        self._server = bench.navigator.server
+        self._waiting: deque[Callable[[], None]] = deque(maxlen=MAX_WAITING)
+        self._ground: StaticRays | None = None
+
+    def post(self, command: Callable[[], None]) -> None:
+        """Have ``command`` called between two steps of the world; from any thread, never waits."""
+        self._waiting.append(command)
+
+    def work_off(self) -> None:
+        """Do what was asked for; on the simulator's thread."""
+        while self._waiting:
+            self._waiting.popleft()()
+        if self.holding:
+            self._server.pause_all()  # again and again, for goals that an executive has sent meanwhile
+
+    # ------------------------------------------------------------------------------- commands, to be posted
+    def go_to(self, origin: FloatArray, direction: FloatArray) -> None:
+        """Go to where a ray (3,), (3,) [m] hits the ground, heading away from where the robot is now."""
+        place = self._where_it_hits(np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64))
+        if place is None:
+            self._tell("there is no ground where the click was")
+            return
+        x, y, z = place.tolist()
+        robot = self._bench.simulation.robot.pose()
+        yaw = math.atan2(y - robot.y, x - robot.x)
+        self._tell("new goal", x=round(x, 3), y=round(y, 3), z=round(z, 3))
+        self._tour.go_to(AskedGoal(Pose.planar(x, y, yaw, z), self.planner, self.controller))
+
+    def cancel(self) -> None:
+        """Cancel the present goal."""
+        self._tell("cancel")
+        self._tour.cancel("canceled in the live view")
+
+    def hold(self, holding: bool) -> None:
+        """Pause all goals, or let them go on."""
+        self._tell("pause" if holding else "resume")
+        self.holding = holding
+        if not holding:
+            self._server.resume_all()
+
+    def choose(self, planner: str, controller: str) -> None:
+        """Use these plugins for the goals to come."""
+        self.planner, self.controller = planner, controller
+
+    def inject(self, fault: SensorFault | LocalizationJump) -> None:
+        """Let a fault happen."""
+        self._tell("fault", **fault.model_dump())
+        self._bench.faults.add(fault)
+
+    def end(self, reason: str) -> None:
+        """End the run."""
+        self._tell("end", reason=reason)
+        self._tour.end(reason)
+
+    # -----------------------------------------------------------------------------------------------------
+    def _where_it_hits(self, origin: FloatArray, direction: FloatArray) -> FloatArray | None:
+        if self._ground is None:
+            ground = self._bench.world.ground
+            self._ground = StaticRays(ground.vertices, ground.faces)
+        direction = direction / np.linalg.norm(direction)
+        distance = float(self._ground.distances(origin[None], direction[None], MAX_RANGE)[0])
+        return origin + distance * direction if math.isfinite(distance) else None
+
+    def _tell(self, what: str, **facts: object) -> None:
+        """Write into the event log that somebody has interfered with the run."""
+        self._bench.events.emit(EventKind.CUSTOM, "live_view", what=what, **facts)

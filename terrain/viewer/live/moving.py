@@ -1,0 +1,148 @@
+"""What moves or changes in the live view: the robot, its plan, the way the present command leads, what sensors see."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.actions.handle import AnyGoalHandle
+from mbf_abstract.geometry import Command, Path, Pose, Twist
+from mbf_abstract.map_view import FieldView
+from mbf_abstract.sensing import RangeScan
+from terrain.bench import Bench
+from terrain.viewer.colours import GOAL, PLANNED
+from terrain.viewer.live.overlay import Overlay
+from terrain.viewer.scene import LINE_LIFT, RobotModel, add_path, add_pin, add_scan, add_track_piece, wheel_angles
+
+FloatArray = NDArray[np.float64]
+
+AHEAD = 2.0  # s that the way of the present command is drawn for
+AHEAD_STEPS = 20
+FIELD_ARROWS = 40  # along the longer side of the field
+FIELD_COLOUR = (120, 150, 215)
+AHEAD_COLOUR = (245, 60, 190)
+TRACK_PERIOD = 10  # samples of the recorder between two looks at the track
+MAX_TRACK = 2000  # points of the track that are drawn
+
+
+class MovingThings:
+    """Robot, goal, plan, vector field, local plan, scans and track.
+
+    Parameters
+    ----------
+    server_page : viser.ViserServer
+    bench : Bench
+    pin_height : float
+        Height [m] of markers.
+    """
+
+    def __init__(self, server_page: Any, bench: Bench, pin_height: float) -> None:
+        self._scene = server_page.scene
+        self._bench = bench
+        self._pin_height = pin_height
+        self._shape = bench.recorder.robot
+        self._robot = RobotModel(self._scene, self._shape, pin_height)
+        self._angles = np.zeros(len(self._shape.wheels))
+        self._time = 0.0
+        self._path: Path | None = None
+        self._goal: Pose | None = None  # one that is not marked yet
+        gui = server_page.gui
+        self._plan = Overlay(gui, "plan")
+        self._track = Overlay(gui, "driven track")
+        self._ahead = Overlay(gui, "local plan")
+        self._field = Overlay(gui, "vector field")
+        self._scan = Overlay(gui, "lidar")
+        bench.navigator.server.get_path.listeners.append(self._take_plan)
+
+    def show_goal(self, goal: Pose) -> None:
+        """Mark a goal that is none of the scenario's."""
+        self._goal = goal
+
+    def show(self, time: float, text: str, is_driving: bool) -> None:
+        """Draw the present state with ``text`` above the robot; a plan only while there is a goal."""
+        self._show_robot(time, text)
+        self._show_plan(self._path if is_driving else None)
+        self._show_scans()
+        track = self._bench.simulation.track
+        self._track.update(len(track) // TRACK_PERIOD, lambda: self._draw_track(track))
+        if self._goal is not None:
+            add_pin(self._scene, "/goal_asked_for", self._goal, GOAL, "new goal", self._pin_height)
+            self._goal = None
+
+    def _show_robot(self, time: float, text: str) -> None:
+        robot = self._bench.simulation.robot
+        pose, velocity = robot.pose(), robot.velocity()
+        times = np.array([self._time, time])
+        twists = np.tile([velocity.vx, velocity.vy, velocity.wz], (2, 1))
+        self._angles = self._angles + wheel_angles(self._shape, times, twists)[-1]
+        self._time = time
+        self._robot.place(np.array([*pose.position, *pose.orientation]), self._angles, text)
+        way = way_ahead(pose, self._bench.navigator.server.runtime.gate.last_command)
+        if way is None:
+            self._ahead.clear()
+        else:
+            self._ahead.update(time, lambda: add_path(self._scene, "/ahead", way, AHEAD_COLOUR))
+
+    def _take_plan(self, handle: AnyGoalHandle) -> None:
+        path = None if handle.result is None else handle.result.path
+        if path is not None:
+            self._path = path
+
+    def _show_plan(self, path: Path | None) -> None:
+        if path is None:
+            self._plan.clear()
+            self._field.clear()
+            return
+        self._plan.update(id(path), lambda: add_path(self._scene, "/plan", path.positions, PLANNED))
+        self._field.update(id(path), lambda: self._draw_field(path))
+
+    def _draw_field(self, path: Path) -> Any:
+        field = self._bench.navigator.server.field_view(path)
+        if field is None:
+            return None
+        segments, spacing = field_arrows(field)
+        return self._scene.add_arrows(
+            "/field", segments, FIELD_COLOUR, shaft_radius=0.03 * spacing, head_radius=0.1 * spacing,
+            head_length=0.25 * spacing,
+        )  # fmt: skip
+
+    def _draw_track(self, track: list[Pose]) -> Any:
+        every = max(1, len(track) // MAX_TRACK)
+        points = np.array([pose.position for pose in track[::every]])
+        return add_track_piece(self._scene, "/track", points)
+
+    def _show_scans(self) -> None:
+        scans = [scan for scan in self._bench.simulation.latest.values() if isinstance(scan, RangeScan)]
+        if scans:
+            points = np.concatenate([scan.points for scan in scans])
+            stamps = tuple(scan.stamp for scan in scans)
+            self._scan.update(stamps, lambda: add_scan(self._scene, "/scan", points))
+
+
+def way_ahead(pose: Pose, command: Command) -> FloatArray | None:
+    """Points (n, 3) [m] of the arc that a command leads along within ``AHEAD`` s, in the plane the robot stands on.
+
+    None for a command that moves nothing, and for one to a car, whose arc depends on the car.
+    """
+    if not isinstance(command, Twist) or command.is_stopped():
+        return None
+    times = np.linspace(0.0, AHEAD, AHEAD_STEPS)
+    turned = command.wz * times
+    rate = command.wz if abs(command.wz) > 1e-6 else 1e-6
+    along, across = np.sin(rate * times) / rate, (1.0 - np.cos(rate * times)) / rate
+    x = command.vx * along - command.vy * across
+    y = command.vx * across + command.vy * along
+    in_base = np.stack([x, y, np.zeros_like(turned)], axis=1)
+    return np.asarray(in_base @ pose.rotation.T + pose.position)
+
+
+def field_arrows(field: FieldView) -> tuple[FloatArray, float]:
+    """Arrows (k, 2, 3) [m] of a field, one for each square of a raster over it, and the side of a square [m]."""
+    low, high = field.points[:, :2].min(axis=0), field.points[:, :2].max(axis=0)
+    spacing = max(float((high - low).max()) / FIELD_ARROWS, 1e-3)
+    squares = np.floor((field.points - np.array([*low, 0.0])) / spacing).astype(int)
+    _, first = np.unique(squares, axis=0, return_index=True)
+    starts = field.points[first] + np.array([0.0, 0.0, LINE_LIFT])
+    return np.stack([starts, starts + 0.7 * spacing * field.directions[first]], axis=1), spacing

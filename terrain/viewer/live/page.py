@@ -1,0 +1,118 @@
+"""The page: the scene, the buttons, and what goes on in words and plots.
+
+It is made before the run begins and drawn by whoever calls ``show``; nothing here reads time or decides when.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mbf_abstract.geometry import Pose
+from terrain.bench import Bench
+from terrain.goal_tour import GoalTour
+from terrain.viewer.live.controls import LiveControls
+from terrain.viewer.live.follow import FollowCamera
+from terrain.viewer.live.ground import Ground
+from terrain.viewer.live.log import LiveLog
+from terrain.viewer.live.moving import MovingThings
+from terrain.viewer.live.panel import DrivePanel, FaultPanel
+from terrain.viewer.live.plots import History, Plots
+from terrain.viewer.live.status_html import SMALL, actions_html, headline_html, lines_html
+from terrain.viewer.scene import add_surroundings, look_at_route, pin_height
+from terrain.viewer.tree_html import tree_html
+
+PANEL_WIDTH = 320  # pixels
+FARTHER = 1.35  # than in a replay, because the panels leave less room for the scene
+NO_TREE = "No behaviour tree runs; start with --executive navigation to see one."
+PLOT_EVERY = 5  # frames
+
+
+class LivePage:
+    """Everything that a visitor sees.
+
+    Parameters
+    ----------
+    server_page : viser.ViserServer
+    bench : Bench
+    tour : GoalTour
+    controls : LiveControls
+    log : LiveLog
+    """
+
+    def __init__(self, server_page: Any, bench: Bench, tour: GoalTour, controls: LiveControls, log: LiveLog) -> None:
+        self._server = server_page
+        self._bench = bench
+        self._tour = tour
+        self._log = log
+        self._frame = 0
+        gui, start = server_page.gui, bench.recorder.finish(False, "", "")
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        add_surroundings(server_page.scene, start)
+        look_at_route(server_page.initial_camera, start, FARTHER)
+        with gui.add_folder("Drive"):
+            self._headline = gui.add_html("")
+            self._drive = DrivePanel(server_page, controls, bench)
+        with gui.add_folder("Show"):
+            self._camera = FollowCamera(server_page)
+            self._ground = Ground(server_page, bench.navigator.server, bench.world.ground)
+            self.things = MovingThings(server_page, bench, pin_height(start))
+        with gui.add_folder("Fault", expand_by_default=False):
+            FaultPanel(server_page, controls, bench)
+        self._add_left_panel(gui)
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether a browser shows the page."""
+        return bool(self._server.get_clients())
+
+    def show(self, time: float, history: History) -> None:
+        """Draw the present state; ``time`` is simulated time [s]."""
+        with self._server.atomic():
+            self.things.show(time, self._words(time), is_driving=self._tour.target is not None)
+            self._camera.show(np.array(self._bench.simulation.robot.pose().position))
+            self._ground.show()
+            self._drive.show()
+            self._show_words()
+            if self._frame % PLOT_EVERY == 0:
+                self._plots.show(history)
+        self._frame += 1
+
+    def _add_left_panel(self, gui: Any) -> None:
+        self._server.gui.main_panel.dock_right()
+        self._server.gui.main_panel.set_width(PANEL_WIDTH)
+        panel = gui.add_panel()
+        with panel.add_tab("What goes on"):
+            with gui.add_folder("Actions"):
+                self._actions = gui.add_html("")
+            with gui.add_folder("Last two minutes"):
+                self._plots = Plots(gui)
+            with gui.add_folder("Behaviour tree"):
+                self._tree = gui.add_html("")
+            with gui.add_folder("Log, newest first"):
+                self._lines = gui.add_html("")
+        panel.dock_left()
+        panel.set_width(PANEL_WIDTH)
+
+    def _show_words(self) -> None:
+        snapshot = self._log.snapshot()
+        tree = tree_html(snapshot.nodes) if snapshot.nodes else NO_TREE
+        for element, content in (
+            (self._headline, headline_html(self._tour)),
+            (self._actions, actions_html(self._bench.navigator.server, snapshot)),
+            (self._tree, f'<div style="{SMALL}">{tree}</div>'),
+            (self._lines, lines_html(snapshot.lines)),
+        ):
+            if element.content != content:
+                element.content = content
+
+    def _words(self, time: float) -> str:
+        """What stands above the robot."""
+        robot = self._bench.simulation.robot
+        return f"{time:.0f} s   {robot.velocity().speed:.1f} m/s   tilt {tilt_of(robot.pose()):.0f}°"
+
+
+def tilt_of(pose: Pose) -> float:
+    """Angle [degrees] between the robot's z axis and the vertical."""
+    return float(np.degrees(np.arccos(np.clip(pose.rotation[2, 2], -1.0, 1.0))))

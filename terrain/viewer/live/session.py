@@ -1,0 +1,142 @@
+"""Watches and steers one run: serves the page, works off what it asks for, and keeps the run from being too fast.
+
+All of it happens on the simulator's thread after a step of the world (``DriveLoop.on_tick``). Nothing is drawn while
+nobody watches. A page that fails is given up; the run goes on without it.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from types import FrameType
+
+from mbf_abstract.clock import WallClock
+from mbf_abstract.events import EventKind
+from terrain.bench import Bench
+from terrain.goal_tour import GoalTour
+from terrain.viewer.live.controls import LiveControls
+from terrain.viewer.live.log import LiveLog
+from terrain.viewer.live.options import ViewOptions
+from terrain.viewer.live.page import LivePage, tilt_of
+from terrain.viewer.live.plots import History
+from terrain.viewer.page_server import page_server
+
+FRAME_PERIOD = 0.1  # s of wall time between two drawings
+MAX_LAG = 0.5  # s; a run that is further behind its pace does not catch up
+
+
+class LiveSession:
+    """A context manager; the run goes on inside.
+
+    Parameters
+    ----------
+    bench : Bench
+        Made, not running yet.
+    tour : GoalTour
+    options : ViewOptions
+    tell : callable
+        Told where the page is.
+
+    Attributes
+    ----------
+    address : str
+        Where the page is, once the context has been entered.
+    controls : LiveControls
+        What the page may ask for.
+
+    Raises
+    ------
+    ViewerMissing
+        viser is not installed, or cannot listen where it is told to; from ``__enter__``.
+    """
+
+    def __init__(
+        self, bench: Bench, tour: GoalTour, options: ViewOptions, tell: Callable[[str], None] = lambda text: None
+    ) -> None:
+        self.address = ""
+        self.controls = LiveControls(bench, tour)
+        self._bench = bench
+        self._tour = tour
+        self._options = options
+        self._tell = tell
+        self._log = LiveLog()
+        self._history = History()
+        self._wall = WallClock()
+        self._next_frame = 0.0
+        self._origin = 0.0  # wall time [s] at which the simulated time was 0, had it always gone at its pace
+        self._page: LivePage | None = None
+        self._exits = ExitStack()
+
+    def __enter__(self) -> LiveSession:
+        bench, options = self._bench, self._options
+        with ExitStack() as exits:
+            server = exits.enter_context(page_server(options.port, options.host, "mbf " + bench.scenario.name))
+            self._page = page = LivePage(server, bench, self._tour, self.controls, self._log)
+            exits.enter_context(_ctrl_c(lambda: self.controls.post(lambda: self.controls.end("Ctrl-C"))))
+            self.address = f"http://{options.host}:{server.get_port()}"
+            self._exits = exits.pop_all()
+        self._tour.on_goal.append(page.things.show_goal)
+        bench.events.add_sink(self._log)
+        bench.loop.on_tick.append(self._after_step)
+        self._tell(self.address)
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._bench.loop.on_tick.remove(self._after_step)
+        self._bench.events.remove_sink(self._log)
+        self._exits.close()
+
+    def _after_step(self, time: float) -> None:
+        self.controls.work_off()
+        self._keep_pace(time)
+        if self._page is None:
+            return
+        try:
+            self._sample(time)
+            self._show(self._page, time)
+        except Exception as error:  # whatever the page's library may raise, the run does not depend on it
+            self._page = None
+            self._bench.events.emit(EventKind.FAULT, "live_view", type=type(error).__name__, message=str(error))
+
+    def _keep_pace(self, time: float) -> None:
+        """Wait, with the whole simulation, until wall time has come as far as simulated time may be."""
+        speed = self._options.speed or (1.0 if self._tour.is_waiting else 0.0)
+        if speed == 0.0 or isinstance(self._bench.clock, WallClock):
+            return
+        due = self._origin + time / speed
+        now = self._wall.now()
+        if not now - MAX_LAG < due < now + MAX_LAG:
+            self._origin += now - due
+        self._wall.sleep_until(due)
+
+    def _sample(self, time: float) -> None:
+        if self._history.is_due(time):
+            robot, queries = self._bench.simulation.robot, self._bench.navigator.server.queries
+            pose = robot.pose()
+            self._history.add(time, robot.velocity().speed, tilt_of(pose), queries.check_point(pose).cost)
+
+    def _show(self, page: LivePage, time: float) -> None:
+        if page.is_watched and self._wall.now() >= self._next_frame:
+            page.show(time, self._history)
+            self._next_frame = self._wall.now() + FRAME_PERIOD
+
+
+@contextmanager
+def _ctrl_c(end: Callable[[], None]) -> Iterator[None]:
+    """Let Ctrl-C end the run in order, so that its results are written; a second one breaks it off."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, before)
+        end()
+
+    signal.signal(signal.SIGINT, handle)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,61 @@
+"""The words of the page, as HTML: what every action does, how goals have ended, what has happened."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from mbf_abstract.server import AbstractNavigationServer
+from terrain.goal_tour import GoalTour
+from terrain.viewer.live.log import Line, Snapshot
+
+GOOD, BAD, NEITHER, BUSY = "#1a7f37", "#cf222e", "#6b7280", "#1f6feb"
+SHOWN_LINES = 12
+SMALL = "font-size:0.8em;line-height:1.35;padding:0 0.8em"
+
+
+def actions_html(server: AbstractNavigationServer, snapshot: Snapshot) -> str:
+    """One row for each action: the state of its running goals, else how its last goal has ended."""
+    actions = (server.move_base, server.get_path, server.exe_path, server.recovery, server.refine_path)
+    rows = []
+    for action in actions:
+        running = action.unfinished
+        end = snapshot.ends.get(action.name)
+        if running:
+            state = _coloured(", ".join(goal.status.value for goal in running), BUSY)
+        elif end is not None:
+            state = _coloured(end.text, _colour(end))
+        else:
+            state = _coloured("no goal yet", NEITHER)
+        rows.append(f'<tr><td style="padding-right:0.8em;vertical-align:top">{action.name}</td><td>{state}</td></tr>')
+    return f'<table style="{SMALL}">{"".join(rows)}</table>'
+
+
+def headline_html(tour: GoalTour) -> str:
+    """Where the run stands: the goal the robot goes to, or how the last one has ended."""
+    if tour.target is not None:
+        x, y, z = tour.target.position
+        text = _coloured(f"going to {x:.1f}, {y:.1f}, {z:.1f}", BUSY)
+    elif tour.last_result is not None:
+        result = tour.last_result
+        text = _coloured(f"{result.outcome_name}: {result.message}", GOOD if result.success else BAD)
+    else:
+        text = _coloured("not started yet", NEITHER)
+    return f'<div style="{SMALL};font-weight:600">{text}</div>'
+
+
+def lines_html(lines: Sequence[Line]) -> str:
+    """What has happened, newest first."""
+    rows = "".join(
+        f'<div style="color:{_colour(line)}">{line.time:.1f} s <b>{escape(line.source)}</b> {escape(line.text)}</div>'
+        for line in lines[:SHOWN_LINES]
+    )
+    return f'<div style="{SMALL}">{rows}</div>'
+
+
+def _colour(line: Line) -> str:
+    return NEITHER if line.good is None else (GOOD if line.good else BAD)
+
+
+def _coloured(text: str, colour: str) -> str:
+    return f'<span style="color:{colour}">{escape(text)}</span>'
