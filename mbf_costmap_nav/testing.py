@@ -8,22 +8,26 @@ It raises one ``ContractBroken`` with everything it found. Whether the costs are
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.testing.contract.report import ContractBroken, Report
-from mbf_costmap_nav.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, Costmap
+from mbf_costmap_nav.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.layer import CostmapLayer, LayerContext, LayerParameters
+from mbf_costmap_nav.layer import CostmapLayer, LayerContext, LayerParameters, shifted
 from mbf_costmap_nav.sensor_data import Observation, SensorLayer
 
 __all__ = ["ContractBroken", "check_layer"]
 
 COST_OF_LATER_LAYERS = 77
 """Stands out of the box, where layers after the checked one have written already."""
+SEEN_AT = 1.0
+"""Time [s] of the updates with observations."""
+REACH = 8
+"""Cells this near to a border or an area may take part in what happens there (a layer may inflate)."""
 
 Observations = Sequence[tuple[str, Observation]]
 
@@ -39,7 +43,9 @@ def check_layer(
     """Check a costmap layer against the contract, with and without unknown space.
 
     Writes inside its box only, legal values, two instances that agree, updates that change nothing while nothing has
-    changed, maps and observations left alone, parameters that can be set again, ``reset`` that forgets observations.
+    changed, maps and observations left alone, parameters that can be set again, ``reset`` that forgets observations,
+    ``shift`` that keeps what stays in a rolling window and forgets what leaves it, ``clear_area`` that forgets the area
+    and nothing else. Cells within 8 of a border or an area are left out of the last two, for layers that spread costs.
 
     Parameters
     ----------
@@ -63,16 +69,23 @@ def check_layer(
     report = Report(layer_class, [room.cells, *seen])
     chosen = layer_class.Parameters() if parameters is None else parameters
     for track_unknown_space in (False, True):
-        context = LayerContext(
-            "dut", chosen, room.frame_id, False, track_unknown_space, base_folder=Path(base_folder), static_map=room
-        )
+
+        def make(rolling: bool = False, unknown: bool = track_unknown_space) -> _Site:
+            context = LayerContext(
+                "dut", chosen, room.frame_id, rolling, unknown, base_folder=Path(base_folder), static_map=room
+            )
+            return _Site(layer_class(context), room, report)
+
         with report.no_exception("construction"):
-            site = _Site(layer_class(context), room, report)
-            twin = _Site(layer_class(context), room, report)
+            site, twin = make(), make()
             with report.no_exception("updating"):
                 _check_updates(site, twin, report)
             with report.no_exception("sensing"):
                 _check_sensing(site, twin, observations, report)
+            with report.no_exception("moving the window"):
+                _check_shift(make(rolling=True), make(rolling=True), observations, report)
+            with report.no_exception("clearing an area"):
+                _check_clear_area(make, observations, report)
     report.finish()
 
 
@@ -95,20 +108,54 @@ def _check_sensing(site: _Site, twin: _Site, observations: Observations, report:
     """Hand over observations and reset; the state without sensors must come back."""
     everything = site.layer.geometry.box
     unseen = site.update("update without observations", everything, 0.0)
-    for place in (site, twin):
-        if isinstance(place.layer, SensorLayer):
-            for source, observation in observations:
-                place.layer.insert(source, observation)
-    seen = site.update("update with observations", EMPTY_BOX, 1.0)
-    same = np.array_equal(seen, twin.update("update with observations", EMPTY_BOX, 1.0))
-    report.expect(same, "update with observations: two instances wrote different cells")
-    whole = site.update("whole update with observations", everything, 1.0)
+    seen = site.see(observations)
+    report.expect(
+        np.array_equal(seen, twin.see(observations)), "update with observations: two instances wrote different cells"
+    )
+    whole = site.update("whole update with observations", everything, SEEN_AT)
     report.expect(np.array_equal(whole, seen), "update_bounds returned a box that misses changed cells")
-    problem = site.layer.currency_problem(1.0)
+    problem = site.layer.currency_problem(SEEN_AT)
     report.expect(isinstance(problem, str), f"currency_problem returned {type(problem).__name__}, not a text")
     site.layer.reset()
-    reset = site.update("update after reset", everything, 1.0)
+    reset = site.update("update after reset", everything, SEEN_AT)
     report.expect(np.array_equal(reset, unseen), "reset did not bring back the state without sensors")
+
+
+def _check_shift(site: _Site, fresh: _Site, observations: Observations, report: Report) -> None:
+    """Move the window a little, then out of sight of everything that was seen."""
+    site.update("update of a rolling window", site.layer.geometry.box, 0.0)
+    before = site.see(observations)
+    dx, dy = 3, -2
+    site.shift(dx, dy)
+    after = site.update("update after shift", site.layer.geometry.box, SEEN_AT)
+    height, width = after.shape
+    inner = CellBox(REACH, REACH - dy, width - dx - REACH, height - REACH)
+    stayed = before[inner.y0 + dy : inner.y1 + dy, inner.x0 + dx : inner.x1 + dx]
+    same = inner.empty or np.array_equal(after[inner.slices], stayed)
+    report.expect(same, "shift: cells changed that stayed in the window")
+    site.shift(10 * width, 0)
+    fresh.shift(dx + 10 * width, dy)
+    fresh.layer.match_geometry(fresh.layer.geometry)
+    away = site.update("update far away", site.layer.geometry.box, SEEN_AT)
+    new = fresh.update("update far away", fresh.layer.geometry.box, SEEN_AT)
+    report.expect(np.array_equal(away, new), "shift: what left the window was not forgotten")
+
+
+def _check_clear_area(make: Callable[[], _Site], observations: Observations, report: Report) -> None:
+    """Clear the left half, and all but the left half: one part forgets, the other stays."""
+    for inside in (True, False):
+        site, name = make(), f"clear_area(inside={inside})"
+        grid = site.layer.geometry.box
+        unseen = site.update("update before clear_area", grid, 0.0)
+        seen = site.see(observations)
+        half = grid.x1 // 2
+        site.layer.clear_area(CellBox(grid.x0 - 5, grid.y0 - 5, half, grid.y1 + 5), inside)  # may reach beyond the grid
+        after = site.update(f"update after {name}", grid, SEEN_AT)
+        left, right = np.s_[:, : half - REACH], np.s_[:, half + REACH :]
+        area, rest = (left, right) if inside else (right, left)
+        forgotten = (after == unseen) | (after == site.background)
+        report.expect(bool(forgotten[area].all()), f"{name}: the area still shows what was seen there")
+        report.expect(np.array_equal(after[rest], seen[rest]), f"{name}: cells out of the area changed")
 
 
 class _Site:
@@ -124,6 +171,27 @@ class _Site:
         self.cells = self.background.copy()
         layer.match_geometry(room.geometry)
         layer.set_footprint(Footprint.circle(0.2))
+
+    def see(self, observations: Observations) -> CellArray:
+        """Hand all observations to a sensor layer and update what it reports."""
+        if isinstance(self.layer, SensorLayer):
+            for source, observation in observations:
+                self.layer.insert(source, observation)
+        return self.update("update with observations", EMPTY_BOX, SEEN_AT)
+
+    def shift(self, dx: int, dy: int) -> None:
+        """Move the window as a layered costmap does; free space comes into view."""
+        old = self.layer.geometry
+        new = GridGeometry(
+            old.width,
+            old.height,
+            old.resolution,
+            old.origin_x + dx * old.resolution,
+            old.origin_y + dy * old.resolution,
+        )
+        self.layer.shift(new, dx, dy)
+        self.report.expect(self.layer.geometry == new, "shift: the layer did not take over the new grid")
+        self.background, self.cells = shifted(self.background, dx, dy, FREE), shifted(self.cells, dx, dy, FREE)
 
     def update(self, situation: str, box: CellBox, now: float) -> CellArray:
         """Run both passes for a box that layers before it report; return a copy of all cells."""
@@ -146,10 +214,13 @@ class _Site:
 
 
 def _room() -> Costmap:
-    """Free space with a wall, a grey area, a lone cell and a corner nobody has seen."""
-    cells = np.full((40, 60), FREE, dtype=np.uint8)
-    cells[:25, 20] = LETHAL
-    cells[30:34, 30:40] = 100
-    cells[10, 45] = LETHAL
-    cells[30:, 50:] = UNKNOWN
-    return Costmap(cells, 0.1)
+    """Free space with a wall, a grey area, a lone cell and a corner nobody has seen.
+
+    The resolution is a power of two, so that a moved window rounds no point into another cell.
+    """
+    cells = np.full((32, 48), FREE, dtype=np.uint8)
+    cells[:20, 16] = LETHAL
+    cells[24:28, 24:32] = 100
+    cells[8, 36] = LETHAL
+    cells[24:, 40:] = UNKNOWN
+    return Costmap(cells, 0.125)

@@ -6,7 +6,7 @@ import pytest
 from mbf_abstract.registry import PluginRegistry
 from mbf_abstract.testing.contract import ContractBroken, check_layer
 from mbf_costmap_nav.costmap import CellBox
-from mbf_costmap_nav.layer import CostmapLayer
+from mbf_costmap_nav.layer import CombinationMethod, CostmapLayer, GridLayer, combine
 from mbf_costmap_nav.sensor_data import Observation, SensorLayer
 from mbf_mesh_nav.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.layers.border import BorderLayer
@@ -168,15 +168,15 @@ def test_a_mesh_layer_without_its_inputs_is_a_mistake_of_the_caller(hill):
         check_layer(GoodMeshLayer, hill)
 
 
-class GoodCostmapLayer(SensorLayer):
-    """Raises free cells left of the last observation; each bad layer breaks one rule of it."""
+class GoodCostmapLayer(GridLayer, SensorLayer):
+    """Raises free cells left of what was seen; each bad layer breaks one rule of it."""
 
     source_names = ("laser",)
-    columns = 0
     moved = False
 
     def insert(self, source, observation):
-        self.columns = int(observation.ends[:, 0].max() / self.geometry.resolution)
+        columns = int((observation.ends[:, 0].max() - self.geometry.origin_x) / self.geometry.resolution)
+        self.cells[:, : max(0, columns)] = 50
         self.moved = True
 
     def update_bounds(self, robot_pose, now, box):
@@ -184,11 +184,7 @@ class GoodCostmapLayer(SensorLayer):
         return box.union(self.geometry.box) if moved else box
 
     def update_costs(self, cells, box):
-        part = cells[box.slices][:, : max(0, self.columns - box.x0)]
-        part[part == 0] = 50
-
-    def reset(self):
-        self.columns = 0
+        combine(cells, self.cells, box, CombinationMethod.MAXIMUM)
 
 
 class WritesEverywhere(GoodCostmapLayer):
@@ -208,7 +204,7 @@ class SmallBox(GoodCostmapLayer):
 
 class CountsUpdates(GoodCostmapLayer):
     def update_costs(self, cells, box):
-        self.columns += 1
+        self.cells[:] = self.cells % 100 + 1
         super().update_costs(cells, box)
 
 
@@ -233,6 +229,32 @@ class Raises(GoodCostmapLayer):
         raise RuntimeError("no map")
 
 
+class IgnoresTheNewGrid(GoodCostmapLayer):
+    def shift(self, geometry, dx, dy):
+        pass
+
+
+class StaysBehind(GoodCostmapLayer):
+    def shift(self, geometry, dx, dy):
+        self.geometry = geometry
+
+
+class WrapsAround(GoodCostmapLayer):
+    def shift(self, geometry, dx, dy):
+        self.geometry = geometry
+        self.cells = np.roll(self.cells, (-dy, -dx), (0, 1))
+
+
+class NeverClearsAnArea(GoodCostmapLayer):
+    def clear_area(self, box, inside):
+        pass
+
+
+class ClearsTooMuch(GoodCostmapLayer):
+    def clear_area(self, box, inside):
+        self.reset()
+
+
 class MovesTheHits(GoodCostmapLayer):
     def insert(self, source, observation):
         super().insert(source, observation)
@@ -254,6 +276,11 @@ def test_a_costmap_layer_that_keeps_the_contract_passes():
         (InventsUnknownSpace, "wrote 255 (unknown) into a map without unknown space"),
         (NeverResets, "reset did not bring back the state without sensors"),
         (Raises, "updating: raised RuntimeError: no map (update_costs:"),
+        (IgnoresTheNewGrid, "shift: the layer did not take over the new grid"),
+        (StaysBehind, "shift: cells changed that stayed in the window"),
+        (WrapsAround, "shift: what left the window was not forgotten"),
+        (NeverClearsAnArea, "clear_area(inside=True): the area still shows what was seen there"),
+        (ClearsTooMuch, "clear_area(inside=False): cells out of the area changed"),
         (MovesTheHits, "it changed an array it was only shown"),
     ],
 )
