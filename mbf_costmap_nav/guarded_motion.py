@@ -17,6 +17,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_abstract.robot import RobotStateError
+from mbf_abstract.transforms import TransformError
 from mbf_costmap_nav.costmap import Costmap
 from mbf_costmap_nav.footprint_check import FootprintCheck, arc_poses
 from mbf_costmap_nav.plugins import CostmapRecovery
@@ -43,7 +44,7 @@ class GuardedRecovery(CostmapRecovery):
         """Run ``recover``, report a lost pose as TF_ERROR, and send zero velocity on every way out."""
         try:
             return self.recover(request)
-        except RobotStateError as error:
+        except (RobotStateError, TransformError) as error:
             return RecoveryResult(RecoveryOutcome.TF_ERROR, str(error))
         finally:
             request.motion.send(Twist())
@@ -80,7 +81,7 @@ class GuardedRecovery(CostmapRecovery):
 
     def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
         """Say where moving on would touch more lethal cells than now; empty if the way is free."""
-        costmap = self.costmap.snapshot()
+        costmap, pose = self.costmap.snapshot(), self.on_map(pose)
         check = FootprintCheck(self.costmap.footprint, costmap.resolution)
         touched = check.lethal_count(costmap, pose.x, pose.y, pose.yaw)
         for x, y, yaw in self._poses_ahead(pose, command, costmap):

@@ -1,14 +1,15 @@
 """Following a path: where the robot is on it, what lies ahead, and whether it has arrived. Shared by all controllers.
 
 A ``PathTracker`` owns one plan. Progress only grows and is searched in a window ahead of the last one, so a path that
-crosses itself or passes its own goal early is followed in order. The plan and the costmap must be in one frame (our
-server keeps both maps in the global frame); a plan in another frame is refused by ``PathFollower.set_plan``.
+crosses itself or passes its own goal early is followed in order. The plan stays in the frame it came in; where the
+costmap is in another one (a local map in odom), each cycle sees plan and pose through the newest transform.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +17,11 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import Path, Pose, normalize_angle
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_abstract.transforms import Transform, TransformError
 from mbf_costmap_nav.costmap import Costmap
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.footprint_check import FootprintCheck
+from mbf_costmap_nav.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.path_geometry import arc_lengths, closest_point
 from mbf_costmap_nav.plugins import CostmapContext, CostmapController
 
@@ -95,6 +98,13 @@ class PathTracker:
         self.progress = max(self.progress, float(along))
         nearest = self.point_at(self.progress)
         self.cross_track = math.hypot(pose.x - nearest[0], pose.y - nearest[1])
+
+    def seen_from(self, transform: Transform) -> PathTracker:
+        """Return the same plan and progress in the transform's parent frame."""
+        moved = copy(self)
+        moved.path = transform.apply_to_path(self.path)
+        moved.points = np.ascontiguousarray(moved.path.positions[:, :2])
+        return moved
 
     def point_at(self, length: float) -> FloatArray:
         """Point (2,) of the path at ``length`` [m] along it, clamped to its ends."""
@@ -177,8 +187,8 @@ class PathFollower(CostmapController):
         return self.costmap.footprint
 
     def set_plan(self, path: Path) -> bool:
-        """Take over a path of at least one pose in the frame of the costmap."""
-        if len(path) == 0 or path.frame_id != self.costmap.frame_id:
+        """Take over a path of at least one pose in a frame from which there is a way to the costmap's."""
+        if len(path) == 0 or not self.transforms.can_transform(self.costmap.frame_id, path.frame_id):
             return False
         self.tracker = PathTracker(path)
         return True
@@ -199,22 +209,34 @@ class PathFollower(CostmapController):
         """Update the progress and check what every controller needs; a result is the failure to hand on."""
         if self.tracker is None:
             return ControlResult(ExePathOutcome.INVALID_PATH, "no path has been set")
-        pose = request.pose
-        costmap = self.costmap.snapshot()
+        try:
+            request, tracker, limit = self._on_costmap(request, self.tracker)
+        except TransformError as error:
+            return ControlResult(ExePathOutcome.TF_ERROR, str(error))
+        pose, costmap = request.pose, self.costmap.snapshot()
         if not costmap.contains(pose.x, pose.y):
             return ControlResult(ExePathOutcome.OUT_OF_MAP, f"robot ({pose.x:.2f}, {pose.y:.2f}) is outside {costmap}")
         footprint = self.checked_footprint()
         if self._footprint is None or self._footprint.footprint is not footprint:
             self._footprint = FootprintCheck(footprint, costmap.resolution)
-        self.tracker.update(pose)
         if self._footprint.collides(costmap, pose.x, pose.y, pose.yaw):
             text = f"the footprint at ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad) touches a lethal cell"
             return ControlResult(ExePathOutcome.COLLISION, text)
-        limit, factor = self._speed_limit(pose), self.relaxation.slack(self.clock.now()).controller_factor
-        return ControlCycle(request, self.tracker, costmap, self._footprint, self.goal_dist_tolerance, limit, factor)
+        factor = self.relaxation.slack(self.clock.now()).controller_factor
+        return ControlCycle(request, tracker, costmap, self._footprint, self.goal_dist_tolerance, limit, factor)
 
-    def _speed_limit(self, pose: Pose) -> float:
-        """Lowest speed [m/s] that the layers of either costmap allow at ``pose``."""
-        maps = [costmap for costmap in (self.local_costmap, self.global_costmap) if costmap.frame_id == pose.frame_id]
-        limits = [costmap.speed_limit(pose.x, pose.y, self.full_speed) for costmap in maps]
-        return min([self.full_speed, *limits])
+    def _on_costmap(self, request: ControlRequest, tracker: PathTracker) -> tuple[ControlRequest, PathTracker, float]:
+        """Update the progress; return request and plan in the costmap's frame, and the speed limit [m/s] there."""
+        pose = self.transforms.transform_pose(request.pose, tracker.path.frame_id)
+        tracker.update(pose)
+        limit = min(self._speed_limit(pose, costmap) for costmap in (self.local_costmap, self.global_costmap))
+        frame_id = self.costmap.frame_id
+        if frame_id == pose.frame_id == request.pose.frame_id:
+            return request, tracker, limit
+        T_costmap_path = self.transforms.lookup(frame_id, pose.frame_id)
+        return replace(request, pose=T_costmap_path.apply_to_pose(pose)), tracker.seen_from(T_costmap_path), limit
+
+    def _speed_limit(self, pose: Pose, costmap: LayeredCostmap) -> float:
+        """Speed [m/s] that the layers of a costmap allow at ``pose``, at most the full one."""
+        there = self.on_map(pose, costmap)
+        return min(self.full_speed, costmap.speed_limit(there.x, there.y, self.full_speed))

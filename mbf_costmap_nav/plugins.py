@@ -7,8 +7,9 @@ update changes under you, and taking it costs nothing while the map does not cha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import (
     AbstractController,
     AbstractPlanner,
@@ -16,6 +17,7 @@ from mbf_abstract.plugins import (
     AbstractRefiner,
     PluginContext,
 )
+from mbf_abstract.transforms import TransformBuffer
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
 
 
@@ -30,11 +32,14 @@ class CostmapContext(PluginContext):
     costmap : LayeredCostmap
         The one this plugin is bound to: planners and refiners the global one, controllers and recoveries the local
         one, unless the plugin's block says ``costmap: local`` or ``costmap: global``.
+    transforms : TransformBuffer
+        The frames of the maps; a local map may be in another one than goals, paths and robot poses.
     """
 
     global_costmap: LayeredCostmap
     local_costmap: LayeredCostmap
     costmap: LayeredCostmap
+    transforms: TransformBuffer = field(default_factory=TransformBuffer, kw_only=True)
 
 
 class _OnCostmaps:
@@ -43,12 +48,18 @@ class _OnCostmaps:
     global_costmap: LayeredCostmap
     local_costmap: LayeredCostmap
     costmap: LayeredCostmap
+    transforms: TransformBuffer
 
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)  # type: ignore[call-arg]  # the abstract interface follows in the base list
         self.global_costmap = context.global_costmap
         self.local_costmap = context.local_costmap
         self.costmap = context.costmap
+        self.transforms = context.transforms
+
+    def on_map(self, pose: Pose, costmap: LayeredCostmap | None = None) -> Pose:
+        """Express a pose in the frame of a costmap, the plugin's own if none is given; raises TransformError."""
+        return self.transforms.transform_pose(pose, (costmap or self.costmap).frame_id)
 
 
 class CostmapPlanner(_OnCostmaps, AbstractPlanner):

@@ -82,8 +82,15 @@ class CostmapNavigationServer(AbstractNavigationServer):
         """Add both maps and the one this plugin is bound to."""
         own = "global" if kind in (PluginKind.PLANNER, PluginKind.REFINER) else "local"
         bound = self.global_costmap if (options.get("costmap") or own) == "global" else self.local_costmap
+        frame = self.runtime.parameters.global_frame
+        if own == "global" and bound.frame_id != frame:
+            raise ValueError(f"plans are made in the frame {frame!r}, but its costmap is in {bound.frame_id!r}")
         return CostmapContext(
-            **vars(base), global_costmap=self.global_costmap, local_costmap=self.local_costmap, costmap=bound
+            **vars(base),
+            global_costmap=self.global_costmap,
+            local_costmap=self.local_costmap,
+            costmap=bound,
+            transforms=self.runtime.transforms,
         )
 
     @property

@@ -12,6 +12,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_abstract.robot import RobotStateError
+from mbf_abstract.transforms import TransformError
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.plugins import CostmapRecovery
 
@@ -43,14 +44,14 @@ class ClearRecovery(CostmapRecovery):
         try:
             for costmap in chosen:
                 cleared += self._clear(costmap, request)
-        except RobotStateError as error:
+        except (RobotStateError, TransformError) as error:
             return RecoveryResult(RecoveryOutcome.TF_ERROR, str(error))
         except KeyError as error:
             return RecoveryResult(RecoveryOutcome.FAILURE, f"nothing to clear: {error}")
         return RecoveryResult(RecoveryOutcome.SUCCESS, f"cleared {', '.join(cleared)} ({p.costmaps})")
 
     def _clear(self, costmap: LayeredCostmap, request: RecoveryRequest) -> list[str]:
-        p, pose = self.parameters, request.motion.pose()
+        p, pose = self.parameters, self.on_map(request.motion.pose(), costmap)
         names = p.layers or None
         if p.radius > 0.0:
             cleared = costmap.clear_area(pose.x, pose.y, 2.0 * p.radius, layer_names=names, inside=not p.keep_inside)

@@ -67,7 +67,7 @@ class EscapeRecovery(GuardedRecovery):
 
     def _badness(self, pose: Pose, motion: Twist) -> tuple[int, int]:
         """Covered lethal points and cost of the centre after the probe distance; staying is judged where it is."""
-        costmap = self.costmap.snapshot()
+        costmap, pose = self.costmap.snapshot(), self.on_map(pose)
         check = FootprintCheck(self.costmap.footprint, costmap.resolution)
         duration = self.parameters.probe_distance / self.parameters.speed if motion != Twist() else 1e-3
         x, y, yaw = arc_poses((pose.x, pose.y, pose.yaw), motion.vx, 0.0, motion.wz, duration, duration)[-1].tolist()

@@ -59,7 +59,7 @@ class MoveAwayRecovery(GuardedRecovery):
 
     def _nearest_obstacle(self, pose: Pose) -> tuple[float, float]:
         """Position [m] of the nearest lethal cell in the base frame; infinite if it is beyond the clearance."""
-        costmap = self.costmap.snapshot()
+        costmap, pose = self.costmap.snapshot(), self.on_map(pose)
         reach = math.ceil(self.parameters.clearance / costmap.resolution) + 1
         ix, iy = costmap.world_to_cell_clamped(pose.x, pose.y)
         x0, y0 = max(ix - reach, 0), max(iy - reach, 0)

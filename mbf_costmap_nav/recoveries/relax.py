@@ -20,6 +20,7 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_abstract.relaxation import Slack
 from mbf_abstract.robot import RobotStateError
+from mbf_abstract.transforms import TransformError
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.layers.inflation import InflationLayer
 from mbf_costmap_nav.plugins import CostmapRecovery
@@ -64,7 +65,7 @@ class RelaxRecovery(CostmapRecovery):
         try:
             for costmap in {id(costmap): costmap for costmap in (self.local_costmap, self.global_costmap)}.values():
                 self._relax_inflation(costmap, request, until)
-        except RobotStateError as error:
+        except (RobotStateError, TransformError) as error:
             return RecoveryResult(RecoveryOutcome.TF_ERROR, str(error))
         return RecoveryResult(RecoveryOutcome.SUCCESS, f"for {p.duration:g} s: {self._says()}")
 
@@ -74,7 +75,7 @@ class RelaxRecovery(CostmapRecovery):
             return
         for layer in layers:
             layer.relax(self.parameters.inflation_factor, until)
-        costmap.update(request.motion.pose(), self.clock.now())
+        costmap.update(self.on_map(request.motion.pose(), costmap), self.clock.now())
 
     def _says(self) -> str:
         p = self.parameters

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.transforms import TransformBuffer
 from mbf_costmap_nav.costmap import Costmap, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
@@ -62,9 +63,19 @@ class StandingRobot:
 
 @pytest.fixture
 def make_plugin() -> Callable[..., Any]:
-    """``make_plugin(Class, cells or Costmap, resolution=.., footprint=.., seed=.., **parameters)``."""
+    """``make_plugin(Class, cells or Costmap, resolution=.., footprint=.., seed=.., transforms=.., **parameters)``."""
 
-    def make(plugin_class, cells, *, resolution=1.0, footprint=SQUARE_ROBOT, seed=0, costmap=None, **parameters):
+    def make(
+        plugin_class,
+        cells,
+        *,
+        resolution=1.0,
+        footprint=SQUARE_ROBOT,
+        seed=0,
+        costmap=None,
+        transforms=None,
+        **parameters,
+    ):
         grid = cells if isinstance(cells, Costmap) else Costmap(np.asarray(cells, dtype=np.uint8), resolution)
         costmap = costmap or FixedCostmap(grid, footprint)
         context = CostmapContext(
@@ -76,6 +87,7 @@ def make_plugin() -> Callable[..., Any]:
             costmap,
             costmap,
             costmap,
+            transforms=transforms or TransformBuffer(),
         )
         return plugin_class(context)
 
