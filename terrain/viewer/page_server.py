@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from typing import Any
@@ -25,6 +26,7 @@ def page_server(port: int, host: str = LOOPBACK, label: str | None = None) -> It
         import viser
     except ImportError as error:
         raise ViewerMissing(f"a page of a run needs viser: pip install 'mbf-flex[sim]' ({error})") from error
+    _check_interface(host)
     try:
         with redirect_stdout(io.StringIO()):  # viser prints a banner, which is not for those who asked for JSON
             server = viser.ViserServer(host=host, port=port, label=label, verbose=False)
@@ -35,3 +37,12 @@ def page_server(port: int, host: str = LOOPBACK, label: str | None = None) -> It
     finally:
         with redirect_stdout(io.StringIO()):
             server.stop()
+
+
+def _check_interface(host: str) -> None:
+    """Find out whether anything can listen there: viser would try port after port for ever."""
+    try:
+        with socket.create_server((host, 0)):
+            pass
+    except OSError as error:
+        raise ViewerMissing(f"cannot listen at {host!r}, which is no interface of this machine: {error}") from error

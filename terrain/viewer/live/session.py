@@ -19,12 +19,12 @@ from terrain.goal_tour import GoalTour
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.options import ViewOptions
+from terrain.viewer.live.pace import Pace
 from terrain.viewer.live.page import LivePage, tilt_of
 from terrain.viewer.live.plots import History
 from terrain.viewer.page_server import page_server
 
 FRAME_PERIOD = 0.1  # s of wall time between two drawings
-MAX_LAG = 0.5  # s; a run that is further behind its pace does not catch up
 
 
 class LiveSession:
@@ -65,7 +65,7 @@ class LiveSession:
         self._history = History()
         self._wall = WallClock()
         self._next_frame = 0.0
-        self._origin = 0.0  # wall time [s] at which the simulated time was 0, had it always gone at its pace
+        self._pace = Pace(self._wall)
         self._page: LivePage | None = None
         self._exits = ExitStack()
 
@@ -90,7 +90,7 @@ class LiveSession:
 
     def _after_step(self, time: float) -> None:
         self.controls.work_off()
-        self._keep_pace(time)
+        self._pace.wait(time, self._speed())
         if self._page is None:
             return
         try:
@@ -100,16 +100,11 @@ class LiveSession:
             self._page = None
             self._bench.events.emit(EventKind.FAULT, "live_view", type=type(error).__name__, message=str(error))
 
-    def _keep_pace(self, time: float) -> None:
-        """Wait, with the whole simulation, until wall time has come as far as simulated time may be."""
-        speed = self._options.speed or (1.0 if self._tour.is_waiting else 0.0)
-        if speed == 0.0 or isinstance(self._bench.clock, WallClock):
-            return
-        due = self._origin + time / speed
-        now = self._wall.now()
-        if not now - MAX_LAG < due < now + MAX_LAG:
-            self._origin += now - due
-        self._wall.sleep_until(due)
+    def _speed(self) -> float:
+        """Simulated seconds per second; who waits for a goal waits in real time. A wall clock keeps its own pace."""
+        if isinstance(self._bench.clock, WallClock):
+            return 0.0
+        return self._options.speed or (1.0 if self._tour.is_waiting else 0.0)
 
     def _sample(self, time: float) -> None:
         if self._history.is_due(time):

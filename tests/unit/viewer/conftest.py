@@ -12,6 +12,8 @@ from terrain.occupancy import OccupancyGrid, wall_triangles
 from terrain.recorder import Recorder
 from terrain.recording import Recording, RobotShape, Surface
 from terrain.robot_models import HUSKY, TURTLEBOT
+from terrain.scenario import PlanarPose, Scenario, Sensor, load_scenario
+from terrain.scenario_world_types import GeneratedWorld
 from terrain.solids import box_triangles
 
 RATE = 10.0
@@ -90,3 +92,11 @@ def hill_recording() -> Recording:
 @pytest.fixture
 def office_recording() -> Recording:
     return make_office_recording()
+
+
+@pytest.fixture
+def meadow() -> Scenario:
+    """Gentle open ground, six metres to go, for runs that are watched."""
+    world = GeneratedWorld(type="generated", size=(12.0, 10.0), spacing=0.25, median_slope=5.0)
+    places = {"start": PlanarPose(x=3.0, y=5.0), "goals": (PlanarPose(x=9.0, y=5.0),)}
+    return load_scenario("outdoor").model_copy(update={"world": world, "sensors": (Sensor(rays=90),), **places})

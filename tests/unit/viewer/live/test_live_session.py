@@ -1,0 +1,87 @@
+"""A run with a page that nobody looks at is the same run; Ctrl-C ends it in order."""
+
+import os
+import signal
+import urllib.request
+
+import pytest
+
+from mbf_abstract.events import EventKind, read_events
+from terrain.bench import Bench
+from terrain.goal_drivers import EXECUTIVES, make_goal_driver
+from terrain.goal_tour import GoalTour
+from terrain.runner import RunOptions, run_scenario
+from terrain.viewer.live.options import ViewOptions
+from terrain.viewer.live.session import LiveSession
+from terrain.viewer.picture import ViewerMissing
+
+
+def run(meadow, folder, **options):
+    return run_scenario(meadow, RunOptions(folder, draw=False, **options))
+
+
+def test_a_run_that_is_served_and_a_run_that_is_not_write_the_same_events(meadow, tmp_path):
+    addresses = []
+    run(meadow, tmp_path / "plain")
+    run(
+        meadow, tmp_path / "served", view=ViewOptions(port=18180, speed=0.0, stay=False), on_page=addresses.append
+    )  # fmt: skip
+
+    logs = [(tmp_path / name / "events.jsonl").read_bytes() for name in ("plain", "served")]
+    assert logs[0] == logs[1]
+    assert addresses[0].startswith("http://127.0.0.1:18")
+
+
+def test_the_page_answers_while_the_run_goes_on_and_is_gone_afterwards(meadow):
+    with Bench(meadow) as bench:
+        tour = GoalTour(bench, make_goal_driver("move_base", bench.navigator))
+        with LiveSession(bench, tour, ViewOptions(port=18190, speed=0.0)) as session:
+            address = session.address
+            with urllib.request.urlopen(address, timeout=10.0) as answer:
+                assert b"<html" in answer.read().lower()
+        with pytest.raises(OSError):
+            urllib.request.urlopen(address, timeout=10.0)
+
+
+def test_ctrl_c_ends_a_run_that_waits_for_goals_and_its_results_are_written(meadow, tmp_path):
+    pressed = []
+
+    def press(progress):
+        if progress.state == "waiting" and progress.time > 5.0 and not pressed:
+            pressed.append(progress.time)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    view = ViewOptions(port=18200, speed=0.0, stay=True)
+    result = run(meadow, tmp_path, view=view, on_progress=press)
+
+    assert result.success and pressed
+    assert (tmp_path / "metrics.json").is_file()
+    told = [event.data["reason"] for event in read_events(tmp_path / "events.jsonl") if event.source == "live_view"]
+    assert told == ["Ctrl-C"]
+
+
+def test_a_page_that_breaks_down_is_reported_once_and_the_run_goes_on(meadow):
+    with Bench(meadow) as bench:
+        tour = GoalTour(bench, make_goal_driver("move_base", bench.navigator))
+        with LiveSession(bench, tour, ViewOptions(port=18210, speed=0.0)) as session:
+            del session._history
+            bench.loop.on_tick.append(lambda time: tour.end("done") if tour.is_waiting else None)
+            assert tour.visit_goals().success
+        faults = [event for event in bench.memory.of_kind(EventKind.FAULT) if event.source == "live_view"]
+        assert len(faults) == 1
+
+
+def test_an_interface_that_does_not_exist_is_told_in_one_line(meadow, tmp_path):
+    with pytest.raises(ViewerMissing, match="203.0.113.1"):
+        run(meadow, tmp_path, view=ViewOptions(host="203.0.113.1"))
+
+
+@pytest.mark.parametrize("executive", EXECUTIVES)
+def test_every_executive_drives_a_run_or_plans_it(meadow, tmp_path, executive):
+    result = run(meadow, tmp_path, executive=executive)
+
+    assert result.success, result.message
+    arrived = result.metrics["distance_to_goal_m"] < 0.5
+    assert arrived == (executive != "planning")
+    trees = [event for event in read_events(tmp_path / "events.jsonl") if event.kind is EventKind.TREE]
+    assert bool(trees) == (executive not in ("move_base", "classic"))
