@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +20,27 @@ def _cost_at(cells: NDArray[np.uint8], x: float, y: float) -> int:
 
 
 @kernel
+def cost_along(cells: NDArray[np.uint8], x0: float, y0: float, x1: float, y1: float) -> int:
+    """Highest cost of the cells a line [cells] runs through, cell by cell as Amanatides and Woo (1987)."""
+    highest = _cost_at(cells, x0, y0)
+    ix, iy, last_x, last_y = math.floor(x0), math.floor(y0), math.floor(x1), math.floor(y1)
+    dx, dy = x1 - x0, y1 - y0
+    step_x, step_y = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
+    # The share of the line at which it crosses the next border on each axis.
+    next_x = ((ix + (dx > 0.0)) - x0) / dx if dx != 0.0 else math.inf
+    next_y = ((iy + (dy > 0.0)) - y0) / dy if dy != 0.0 else math.inf
+    for _ in range(abs(last_x - ix) + abs(last_y - iy)):
+        if next_x < next_y:
+            ix += step_x
+            next_x += abs(1.0 / dx)
+        else:
+            iy += step_y
+            next_y += abs(1.0 / dy)
+        highest = max(highest, _cost_at(cells, float(ix), float(iy)))
+    return highest
+
+
+@kernel
 def relax_path(
     cells: NDArray[np.uint8],
     points: NDArray[np.float64],
@@ -30,8 +53,8 @@ def relax_path(
 ) -> tuple[NDArray[np.float64], int]:
     """Gauss-Seidel sweeps of the classic path smoother: pull each point to its origin and to its neighbours' middle.
 
-    A point only moves where the cost is at most ``highest_cost`` or no higher than where it is, so a path never enters
-    lethal cells and gets no nearer to obstacles than that.
+    A point only moves where the lines to its neighbours have costs of at most ``highest_cost``, or lower ones than now,
+    so a path never enters lethal cells and gets no nearer to obstacles than that.
 
     Parameters
     ----------
@@ -63,8 +86,14 @@ def relax_path(
                 + data_weight * (points[i, 1] - y)
                 + smooth_weight * (smoothed[i - 1, 1] + smoothed[i + 1, 1] - 2.0 * y)
             )
-            cost = _cost_at(cells, x_new, y_new)
-            if cost > highest_cost and cost >= _cost_at(cells, x, y):
+            before, after = smoothed[i - 1], smoothed[i + 1]
+            cost = max(
+                cost_along(cells, before[0], before[1], x_new, y_new),
+                cost_along(cells, x_new, y_new, after[0], after[1]),
+            )
+            if cost > highest_cost and cost >= max(
+                cost_along(cells, before[0], before[1], x, y), cost_along(cells, x, y, after[0], after[1])
+            ):
                 continue
             smoothed[i, 0], smoothed[i, 1] = x_new, y_new
             largest = max(largest, max(abs(x_new - x), abs(y_new - y)))

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
 
 from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Path, Pose, Twist
@@ -11,6 +13,8 @@ from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
 from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.kernels.smoothing import cost_along
+from mbf_costmap_nav.path_geometry import resample
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.refiners.smoother import SmootherRefiner, curvatures
 
@@ -51,6 +55,46 @@ def test_the_smoothed_path_keeps_off_obstacles(make_plugin, room):
     assert np.sum(np.abs(np.diff(curvatures(result.path.positions[:, :2])))) < np.sum(
         np.abs(np.diff(curvatures(plan.path.positions[:, :2])))
     )
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_no_smoothed_line_crosses_a_lethal_cell_even_without_inflation(make_plugin, seed):
+    cells = np.where(np.random.default_rng(seed).random((40, 40)) < 0.2, 254, 0).astype(np.uint8)
+    cells[1:3, 1:3] = cells[37:39, 37:39] = 0
+    grid = Costmap(cells, 0.05)
+    plan = make_plugin(AStarPlanner, grid).make_plan(PlanRequest(Pose.planar(0.1, 0.1), Pose.planar(1.9, 1.9)))
+    assume(plan.success)
+    smoothed = smooth(make_plugin(SmootherRefiner, grid), plan.path).path
+    along = resample(smoothed.positions[:, :2], 0.001)
+    assert max(grid.cost_at(x, y) for x, y in along.tolist()) < 254
+
+
+def highest_cost_of_cells_cut(cells, line, slack):
+    """The slow way: clip the line to each square, made wider by ``slack``; out of the grid all squares are lethal."""
+    x0, y0, x1, y1 = line
+    highest = 0
+    for iy, ix in np.ndindex(14, 14):
+        start, stop = 0.0, 1.0
+        for begin, end, low in ((x0, x1, ix - 2), (y0, y1, iy - 2)):
+            low, high = low - slack, low + 1 + slack
+            if begin == end:
+                start, stop = (start, stop) if low < begin < high else (1.0, 0.0)
+            else:
+                first, last = sorted(((low - begin) / (end - begin), (high - begin) / (end - begin)))
+                start, stop = max(start, first), min(stop, last)
+        if start < stop:
+            inside = 2 <= ix < 12 and 2 <= iy < 12
+            highest = max(highest, int(cells[iy - 2, ix - 2]) if inside else 254)
+    return highest
+
+
+@given(st.tuples(*[st.floats(-1.0, 11.0)] * 4), st.integers(0, 2**32 - 1))
+@settings(max_examples=100, deadline=None)
+def test_the_cost_along_a_line_is_the_highest_of_the_cells_it_cuts(line, seed):
+    cells = np.random.default_rng(seed).integers(0, 254, (10, 10)).astype(np.uint8)
+    highest = cost_along(cells, *line)
+    assert highest_cost_of_cells_cut(cells, line, -1e-6) <= highest <= highest_cost_of_cells_cut(cells, line, 1e-6)
 
 
 def test_a_cancelled_refinement_says_so(make_plugin):
