@@ -9,15 +9,17 @@ from mbf_abstract.cancel import CancelToken
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
 from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.footprint_check import FootprintCheck
 from mbf_costmap_nav.recoveries.back_up import BackUpRecovery
 from mbf_costmap_nav.recoveries.clear import ClearRecovery
 from mbf_costmap_nav.recoveries.drive_on_heading import DriveOnHeadingRecovery
 from mbf_costmap_nav.recoveries.escape import EscapeRecovery
 from mbf_costmap_nav.recoveries.move_away import MoveAwayRecovery
+from mbf_costmap_nav.recoveries.relax import RelaxRecovery
 from mbf_costmap_nav.recoveries.rotate import RotateRecovery
 from mbf_costmap_nav.recoveries.wait import WaitRecovery
 
-MOVING = [RotateRecovery, BackUpRecovery, DriveOnHeadingRecovery]
+MOVING = [RotateRecovery, BackUpRecovery, DriveOnHeadingRecovery, EscapeRecovery, MoveAwayRecovery]
 
 
 def around(*boxes):
@@ -80,21 +82,45 @@ def test_a_robot_that_touches_a_wall_in_front_may_back_out(run):
     assert result.success and robot.state[0] < -0.25
 
 
-@pytest.mark.parametrize("recovery", [*MOVING, WaitRecovery, ClearRecovery])
+TOUCHING = (0.15, -1.0, 0.3, 1.0)  # a wall into which the front of the robot at the origin reaches
+
+
+@pytest.mark.parametrize("recovery", [*MOVING, WaitRecovery, ClearRecovery, RelaxRecovery])
 def test_a_token_set_before_is_honoured(run, recovery):
     token = CancelToken()
     token.cancel("no longer wanted")
-    result, robot, _ = run(recovery, token=token)
+    result, robot, _ = run(recovery, around(TOUCHING), token=token)
     assert result.outcome == RecoveryOutcome.CANCELED and "no longer wanted" in result.message
     assert all(command.is_stopped() for command in robot.commands)
 
 
 @pytest.mark.parametrize("recovery", MOVING)
 def test_cancel_while_moving_stops_the_robot(run, recovery):
+    # Only who has something to flee moves beside a wall; the others would not leave at all there.
+    world = around(TOUCHING) if recovery in (EscapeRecovery, MoveAwayRecovery) else around()
     token = CancelToken()
-    result, robot, _ = run(recovery, token=token, on_sleep=token.cancel)
+    result, robot, _ = run(recovery, world, token=token, on_sleep=token.cancel)
     assert result.outcome == RecoveryOutcome.CANCELED
-    assert len(robot.commands) == 2 and robot.commands[-1].is_stopped()
+    moving, stopped = robot.commands
+    assert not moving.is_stopped() and stopped.is_stopped()
+
+
+@pytest.mark.parametrize(
+    ("recovery", "boxes"),
+    [
+        (RotateRecovery, [(0.22, -1.0, 0.3, 1.0)]),
+        (BackUpRecovery, [(-0.35, -1.0, -0.3, 1.0)]),
+        (DriveOnHeadingRecovery, [(0.3, -1.0, 0.35, 1.0)]),
+        (EscapeRecovery, [TOUCHING, (-0.35, -1.0, -0.3, 1.0)]),
+        (MoveAwayRecovery, [(0.25, -1.0, 0.3, 1.0), (-0.35, -1.0, -0.3, 1.0)]),
+    ],
+)
+def test_no_recovery_drives_into_what_stands_in_its_way(run, closed_loop, recovery, boxes):
+    world = around(*boxes)
+    _, robot, plugin = run(recovery, world)
+    touched = FootprintCheck(plugin.costmap.footprint, world.resolution).lethal_count
+    deepest = max(touched(world, *state) for state in robot.trace)
+    assert deepest <= touched(world, 0.0, 0.0, 0.0)
 
 
 def test_a_robot_that_does_not_move_runs_into_the_time_limit(run, make_plugin, closed_loop):
