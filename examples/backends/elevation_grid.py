@@ -15,8 +15,9 @@ from scipy.ndimage import distance_transform_edt
 from scipy.sparse import coo_array, csgraph
 
 from mbf_abstract.config import Config
-from mbf_abstract.geometry import FloatArray, Path, Pose
-from mbf_abstract.map_queries import CellState, MapQueries, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.disc_queries import DiscQueries
+from mbf_abstract.geometry import FloatArray, Path
+from mbf_abstract.map_queries import CellState, MapQueries, PlaceAnswer
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginContext, PluginKind
@@ -116,56 +117,20 @@ class ElevationPlanner(AbstractPlanner):
         return PlanResult(GetPathOutcome.SUCCESS, f"{length:.1f} m over ground", path, float(length))
 
 
-class ElevationQueries:
+class ElevationQueries(DiscQueries):
     """The map-independent questions; the map never changes, so clearing and updating do nothing."""
 
     def __init__(self, grid: ElevationGrid, robot: RobotInformation, transforms: TransformBuffer) -> None:
-        self._grid, self._robot, self._transforms = grid, robot, transforms
+        super().__init__(grid.frame_id, robot, transforms)
+        self._grid = grid
 
-    def check_point(self, point: Pose, local: bool = False) -> PlaceAnswer:
-        """State and slope of one point."""
-        return self.check_pose(point)
-
-    def check_pose(self, pose: Pose | None, query: PlaceQuery = PlaceQuery()) -> PlaceAnswer:
+    def place(self, x: float, y: float, safety_dist: float) -> PlaceAnswer:
         """State and slope of the robot's disc."""
-        there = self._transforms.transform_pose(pose or self._robot.pose(), self._grid.frame_id)
-        return PlaceAnswer(*self._grid.state(there.x, there.y, query.safety_dist))
+        return PlaceAnswer(*self._grid.state(x, y, safety_dist))
 
-    def check_path(
-        self,
-        path: Path,
-        query: PlaceQuery = PlaceQuery(),
-        return_on: CellState | None = None,
-        skip_poses: int = 0,
-        path_cells_only: bool = False,
-    ) -> PathAnswer:
-        """Worst state and summed slope along a path."""
-        worst, total, last = CellState.FREE, 0.0, 0
-        for last in range(0, len(path), skip_poses + 1):
-            answer = self.check_pose(path[last], query)
-            worst, total = max(worst, answer.state), total + answer.cost
-            if return_on is not None and worst >= return_on:
-                break
-        return PathAnswer(last, worst, total)
-
-    def find_valid_pose(
-        self, pose: Pose | None, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery = PlaceQuery()
-    ) -> PoseAnswer:
-        """Nearest free sample within the tolerance; the heading stays."""
-        there = self._transforms.transform_pose(pose or self._robot.pose(), self._grid.frame_id)
-        free = np.flatnonzero(self._grid.clearance > self._grid.robot_radius + query.safety_dist)
-        points = self._grid.points(free)
-        distances = np.hypot(points[:, 0] - there.x, points[:, 1] - there.y)
-        if not len(free) or distances.min() > dist_tolerance:
-            return PoseAnswer(*self._grid.state(there.x, there.y, query.safety_dist), None)
-        found = Pose(tuple(points[distances.argmin()].tolist()), there.orientation, there.frame_id)
-        return PoseAnswer(*self._grid.state(found.x, found.y, query.safety_dist), found)
-
-    def clear_map(self) -> None:
-        """Nothing was sensed."""
-
-    def update_map(self) -> None:
-        """It is up to date."""
+    def candidates(self, x: float, y: float, dist_tolerance: float) -> FloatArray:
+        """All samples where the robot's middle may be."""
+        return self._grid.points(np.flatnonzero(self._grid.clearance > self._grid.robot_radius))
 
 
 class ElevationGridServer(AbstractNavigationServer):

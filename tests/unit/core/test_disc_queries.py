@@ -1,0 +1,66 @@
+"""The map-independent questions of a round robot, on a half plane: free on the left, a wall on the right."""
+
+import numpy as np
+import pytest
+
+from mbf_abstract.disc_queries import DiscQueries
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.map_queries import CellState, PlaceAnswer, PlaceQuery
+from mbf_abstract.transform import Transform
+from mbf_abstract.transforms import TransformBuffer, TransformError
+
+
+class HalfPlane(DiscQueries):
+    def place(self, x, y, safety_dist):
+        state = CellState.LETHAL if x > 0.0 else CellState.INSCRIBED if x + safety_dist > -0.5 else CellState.FREE
+        return PlaceAnswer(state, 2.0)
+
+    def candidates(self, x, y, dist_tolerance):
+        return np.column_stack([np.linspace(x - 4.0, x + 4.0, 81), np.full((81, 1), y), np.zeros(81)])
+
+
+class Robot:
+    def pose(self):
+        return Pose.planar(-3.0, 1.0)
+
+
+@pytest.fixture
+def queries():
+    transforms = TransformBuffer()
+    transforms.set(Transform((-1.0, 0.0, 0.0), parent="map", child="dock", static=True))
+    return HalfPlane("map", Robot(), transforms)
+
+
+def test_without_a_pose_the_robot_is_asked_for(queries):
+    assert queries.check_pose(None) == PlaceAnswer(CellState.FREE, 2.0)
+
+
+def test_poses_of_other_frames_are_brought_into_the_map(queries):
+    assert queries.check_point(Pose.planar(1.5, 0.0, frame_id="dock")).state is CellState.LETHAL
+    with pytest.raises(TransformError):
+        queries.check_point(Pose.planar(0.0, 0.0, frame_id="moon"))
+
+
+def test_a_path_is_as_bad_as_its_worst_pose_and_costs_their_sum(queries):
+    path = Path.from_points([(x, 0.0, 0.0) for x in (-2.0, -1.0, -0.2, 1.0, -3.0)])
+    whole, every_other = queries.check_path(path), queries.check_path(path, skip_poses=1)
+    early = queries.check_path(path, return_on=CellState.INSCRIBED)
+
+    assert (whole.state, whole.cost, whole.last_checked) == (CellState.LETHAL, 10.0, 4)
+    assert (every_other.state, every_other.cost) == (CellState.INSCRIBED, 6.0)
+    assert (early.state, early.last_checked) == (CellState.INSCRIBED, 2)
+
+
+def test_the_nearest_free_pose_within_the_tolerance_keeps_its_heading(queries):
+    wanted = Pose.planar(0.5, 2.0, 0.7)
+    found = queries.find_valid_pose(wanted, 1.5, 0.0)
+
+    assert found.pose.position == pytest.approx((-0.5, 2.0, 0.0))
+    assert (found.state, found.pose.orientation) == (CellState.FREE, wanted.orientation)
+    assert queries.find_valid_pose(wanted, 1.5, 0.0, PlaceQuery(safety_dist=0.25)).pose.x == pytest.approx(-0.8)
+
+
+def test_where_nothing_is_free_within_the_tolerance_the_place_itself_is_told(queries):
+    answer = queries.find_valid_pose(Pose.planar(0.5, 2.0), 0.9, 0.0)
+
+    assert (answer.pose, answer.state) == (None, CellState.LETHAL)
