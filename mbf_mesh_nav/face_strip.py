@@ -104,7 +104,8 @@ class FaceStrip:
     ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Take the taut path through the strip if it is not more expensive, else try its halves."""
         faces = np.array(strip, dtype=np.int32)
-        taut = pull_taut(self._mesh_map.vertices, self._mesh_map.faces, faces, positions[0], positions[-1])
+        ends = tuple(positions[0].tolist()), tuple(positions[-1].tolist())
+        taut = pull_taut(self._mesh_map.vertices, self._mesh_map.faces, faces, *ends)
         taut_faces = np.concatenate([point_faces[:1], faces])
         if self._cost(taut, taut_faces) <= self._cost(positions, point_faces):
             return taut, taut_faces

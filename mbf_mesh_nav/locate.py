@@ -73,7 +73,7 @@ class SurfaceLocator:
         max_distance : float
             Limit [m]; farther away there is no face.
         """
-        queries = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+        queries = np.array(points, dtype=np.float64).reshape(-1, 3)
         order = np.arange(len(queries)) if len(queries) < SORT_FROM else _locality_order(queries)
         return Location(*closest_faces(*self._tree, queries, order, float(max_distance)))
 
@@ -110,8 +110,9 @@ class SurfaceLocator:
         distances : (n,) float64
             Along the ray [m], inf without a hit.
         """
-        starts = np.ascontiguousarray(origins, dtype=np.float64).reshape(-1, 3)
-        headings = np.ascontiguousarray(np.broadcast_to(np.asarray(directions, dtype=np.float64), starts.shape))
+        starts = np.array(origins, dtype=np.float64).reshape(-1, 3)  # copies are writable, one type for the kernel
+        headings = np.empty(starts.shape)
+        headings[:] = directions
         return first_hits(*self._tree, starts, headings, float(max_distance))
 
 

@@ -18,7 +18,7 @@ def surface_point_at_vertex(mesh_map: MeshMap, vertex: int) -> SurfacePoint:
     """Return the surface point at a vertex, in one of its faces."""
     face = int(mesh_map.vertex_faces[mesh_map.vertex_face_offsets[vertex]])
     barycentric = (mesh_map.faces[face] == vertex).astype(np.float64)
-    return SurfacePoint(face, barycentric, mesh_map.vertices[vertex], 0.0)
+    return SurfacePoint(face, barycentric, mesh_map.vertices[vertex].copy(), 0.0)
 
 
 def corner_distances(

@@ -95,9 +95,9 @@ class WaveSearch:
             wave.distances,
             wave.predecessors,
             start.face,
-            start.point,
+            tuple(start.point.tolist()),
             goal.face,
-            goal.point,
+            tuple(goal.point.tolist()),
             4 * len(mesh_map.faces),
         )
 

@@ -22,7 +22,8 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.goal_approach import ArrivalLatch, braking_speed, clamp, heading_error, is_at_goal
 from mbf_mesh_nav.kernels.mppi import score_rollouts
-from mbf_mesh_nav.kernels.surface_walk import Vector, tangent
+from mbf_mesh_nav.kernels.surface_walk import tangent
+from mbf_mesh_nav.kernels.vectors import Vector
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.path_progress import PathProgress, PathProjection
 from mbf_mesh_nav.plugins import MeshContext, MeshController

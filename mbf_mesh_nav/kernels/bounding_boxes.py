@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import Count, kernel
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -187,7 +187,7 @@ def closest_faces(
     weights = np.full((count, 3), np.nan)
     surface = np.full((count, 3), np.nan)
     distances = np.full(count, np.inf)
-    hint = -1
+    hint = Count(-1)
     for index in order:
         x, y, z = points[index, 0], points[index, 1], points[index, 2]
         face, distance, v, w, px, py, pz = closest_face(vertices, faces, boxes, levels, x, y, z, max_distance, hint)

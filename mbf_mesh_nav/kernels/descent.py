@@ -4,21 +4,15 @@ Within a face the field is taken as linear, so the way down is a straight line t
 in the next face, in a valley it follows the edge, at a vertex it takes the steepest face or edge. The field falls
 strictly from crossing to crossing, so the trace ends at the source; where rounding makes the field stall, the wave's
 predecessors, which are acyclic, take over. Thus every reached point gets a path.
-
-Vectors of three go through ``_difference`` and ``_dot``: array expressions would take numba seconds to compile.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import Count, kernel
 from mbf_mesh_nav.kernels.dijkstra import Float32Array, Int32Array
-
-Float64Array = NDArray[np.float64]
+from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, between, difference, dot, norm, row, set_row
 
 _ON_VERTEX = 1e-6  # a crossing this near (as a share of the edge) to a vertex is the vertex
 
@@ -33,9 +27,9 @@ def trace_descent(
     distances: Float32Array,
     predecessors: Int32Array,
     start_face: int,
-    start: Float64Array,
+    start: Vector,
     goal_face: int,
-    goal: Float64Array,
+    goal: Vector,
     max_crossings: int,
 ) -> tuple[Float64Array, Int32Array]:
     """Trace the way down from ``start`` to the source of the field at ``goal``.
@@ -48,7 +42,7 @@ def trace_descent(
         The wave's result; at least one corner of ``start_face`` is reached.
     start_face, goal_face : int
         Different faces.
-    start, goal : (3,) float64
+    start, goal : (float, float, float)
         Points in them [m].
     max_crossings : int
         After that many edges only predecessors are followed.
@@ -60,36 +54,33 @@ def trace_descent(
     point_faces : (n,) int32
         The face the way to each point lies in (or on an edge of); the start's own face first.
     """
-    capacity = 256
+    capacity = Count(256)
     points = np.empty((capacity, 3))
     point_faces = np.empty(capacity, dtype=np.int32)
-    points[0], point_faces[0] = start, start_face
-    count = 1
-    face, vertex = start_face, -1
-    point = start.copy()
+    count = Count(0)
+    face, vertex, point = Count(start_face), Count(-1), start
+    _note(points, point_faces, count, point, face)
+    count += 1
     if not _is_reached(faces[face], distances):
         vertex = _best_corner(vertices, faces[face], distances, point)
     while True:
         # 1. In the goal's face, or at one of its corners, the rest is a straight line.
         if (vertex < 0 and face == goal_face) or (vertex >= 0 and _has_corner(faces[goal_face], vertex)):
             if vertex >= 0:
-                points[count], point_faces[count] = vertices[vertex], face
+                _note(points, point_faces, count, row(vertices, vertex), face)
                 count += 1
-            points[count], point_faces[count] = goal, goal_face
+            _note(points, point_faces, count, goal, Count(goal_face))
             return points[: count + 1].copy(), point_faces[: count + 1].copy()
         if count + 3 > capacity:
             capacity *= 2
-            points = _grown(points, capacity)
-            longer = np.empty(capacity, dtype=np.int32)
-            longer[:count] = point_faces[:count]
-            point_faces = longer
+            points, point_faces = _grown(points, point_faces, capacity)
         # 2. At a vertex: note it, then choose the steepest way on.
         if vertex >= 0:
-            point = vertices[vertex].copy()
-            points[count], point_faces[count] = point, face
+            point = row(vertices, vertex)
+            _note(points, point_faces, count, point, face)
             count += 1
             if count > max_crossings:
-                face, vertex = vertex_faces[vertex_face_offsets[vertex]], predecessors[vertex]
+                face, vertex = Count(vertex_faces[vertex_face_offsets[vertex]]), Count(predecessors[vertex])
                 continue
             face, vertex = _steepest_way(
                 vertices, faces, vertex_face_offsets, vertex_faces, distances, predecessors, vertex
@@ -99,18 +90,34 @@ def trace_descent(
         # 3. Straight down through the face to the edge opposite to corner `exit_corner`.
         corners = faces[face]
         point, exit_corner, share = _leave_face(vertices, corners, distances, point)
-        left, right = corners[(exit_corner + 1) % 3], corners[(exit_corner + 2) % 3]
+        left, right = Count(corners[(exit_corner + 1) % 3]), Count(corners[(exit_corner + 2) % 3])
         if share < _ON_VERTEX or share > 1.0 - _ON_VERTEX or count > max_crossings:
             vertex = left if share < 0.5 else right
             continue
-        points[count], point_faces[count] = point, face
+        _note(points, point_faces, count, point, face)
         count += 1
         # 4. Go on in the next face, or along the edge where the next face rises.
         following = face_neighbours[face, (exit_corner + 1) % 3]
         if following >= 0 and _leads_away_from_edge(vertices, faces[following], distances, left, right):
-            face = following
+            face = Count(following)
         else:
             vertex = left if distances[left] < distances[right] else right
+
+
+@kernel
+def _note(points: Float64Array, point_faces: Int32Array, count: int, point: Vector, face: int) -> None:
+    """Write the point that follows the first ``count``."""
+    set_row(points, count, point)
+    point_faces[count] = face
+
+
+@kernel
+def _grown(points: Float64Array, point_faces: Int32Array, capacity: int) -> tuple[Float64Array, Int32Array]:
+    more_points, more_faces = np.empty((capacity, 3)), np.empty(capacity, dtype=np.int32)
+    for i in range(len(points)):
+        set_row(more_points, i, row(points, i))
+        more_faces[i] = point_faces[i]
+    return more_points, more_faces
 
 
 @kernel
@@ -124,78 +131,58 @@ def _has_corner(corners: Int32Array, vertex: int) -> bool:
 
 
 @kernel
-def _grown(points: Float64Array, capacity: int) -> Float64Array:
-    longer = np.empty((capacity, 3))
-    longer[: len(points)] = points
-    return longer
-
-
-@kernel
-def _difference(a: Float64Array, b: Float64Array) -> Float64Array:
-    result = np.empty(3)
-    for axis in range(3):
-        result[axis] = a[axis] - b[axis]
-    return result
-
-
-@kernel
-def _dot(a: Float64Array, b: Float64Array) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]  # type: ignore[no-any-return]
-
-
-@kernel
-def _best_corner(vertices: Float64Array, corners: Int32Array, distances: Float32Array, point: Float64Array) -> int:
+def _best_corner(vertices: Float64Array, corners: Int32Array, distances: Float32Array, point: Vector) -> int:
     """Return the corner over which the way from ``point`` is shortest."""
-    best, best_total = corners[0], np.inf
-    for corner in corners:
-        way = _difference(vertices[corner], point)
-        total = distances[corner] + math.sqrt(_dot(way, way))
+    best, best_total = Count(corners[0]), np.inf
+    for k in range(3):
+        corner = Count(corners[k])
+        total = distances[corner] + norm(difference(row(vertices, corner), point))
         if total < best_total:
             best, best_total = corner, total
-    return int(best)
+    return best  # type: ignore[no-any-return]
 
 
 @kernel
-def _descent_direction(vertices: Float64Array, corners: Int32Array, distances: Float32Array) -> Float64Array:
-    """Negative gradient (3,) of the linear field on a face; its length is the slope of the field."""
-    origin = vertices[corners[0]]
-    e1, e2 = _difference(vertices[corners[1]], origin), _difference(vertices[corners[2]], origin)
+def _face_edges(vertices: Float64Array, corners: Int32Array) -> tuple[Vector, Vector]:
+    """Edge vectors from corner 0 of a face to corners 1 and 2."""
+    origin = row(vertices, Count(corners[0]))
+    return difference(row(vertices, Count(corners[1])), origin), difference(row(vertices, Count(corners[2])), origin)
+
+
+@kernel
+def _descent_direction(vertices: Float64Array, corners: Int32Array, distances: Float32Array) -> Vector:
+    """Negative gradient of the linear field on a face; its length is the slope of the field."""
+    e1, e2 = _face_edges(vertices, corners)
     d1 = float(distances[corners[1]]) - float(distances[corners[0]])
     d2 = float(distances[corners[2]]) - float(distances[corners[0]])
-    g11, g12, g22 = _dot(e1, e1), _dot(e1, e2), _dot(e2, e2)
+    g11, g12, g22 = dot(e1, e1), dot(e1, e2), dot(e2, e2)
     determinant = max(g11 * g22 - g12 * g12, 1e-300)
-    descent = np.empty(3)
-    for axis in range(3):
-        descent[axis] = -((d1 * g22 - d2 * g12) * e1[axis] + (d2 * g11 - d1 * g12) * e2[axis]) / determinant
-    return descent
+    s1, s2 = (d2 * g12 - d1 * g22) / determinant, (d1 * g12 - d2 * g11) / determinant
+    return s1 * e1[0] + s2 * e2[0], s1 * e1[1] + s2 * e2[1], s1 * e1[2] + s2 * e2[2]
 
 
 @kernel
-def _barycentric_rates(vertices: Float64Array, corners: Int32Array, direction: Float64Array) -> Float64Array:
-    """Change (3,) of the barycentric coordinates per unit of a direction in the face's plane."""
-    origin = vertices[corners[0]]
-    e1, e2 = _difference(vertices[corners[1]], origin), _difference(vertices[corners[2]], origin)
-    g11, g12, g22 = _dot(e1, e1), _dot(e1, e2), _dot(e2, e2)
+def _barycentric_rates(vertices: Float64Array, corners: Int32Array, direction: Vector) -> Vector:
+    """Change of the barycentric coordinates per unit of a direction in the face's plane."""
+    e1, e2 = _face_edges(vertices, corners)
+    g11, g12, g22 = dot(e1, e1), dot(e1, e2), dot(e2, e2)
     determinant = max(g11 * g22 - g12 * g12, 1e-300)
-    p1, p2 = _dot(direction, e1), _dot(direction, e2)
-    rates = np.empty(3)
-    rates[1] = (p1 * g22 - p2 * g12) / determinant
-    rates[2] = (p2 * g11 - p1 * g12) / determinant
-    rates[0] = -rates[1] - rates[2]
-    return rates
+    p1, p2 = dot(direction, e1), dot(direction, e2)
+    second, third = (p1 * g22 - p2 * g12) / determinant, (p2 * g11 - p1 * g12) / determinant
+    return -second - third, second, third
 
 
 @kernel
 def _leave_face(
-    vertices: Float64Array, corners: Int32Array, distances: Float32Array, point: Float64Array
-) -> tuple[Float64Array, int, float]:
+    vertices: Float64Array, corners: Int32Array, distances: Float32Array, point: Vector
+) -> tuple[Vector, int, float]:
     """Follow the descent through a face; the exit point, the corner opposite to its edge, its share of the edge.
 
     The share counts from the corner after the opposite one (counter-clockwise).
     """
     rates = _barycentric_rates(vertices, corners, _descent_direction(vertices, corners, distances))
-    weights = _barycentric_rates(vertices, corners, _difference(point, vertices[corners[0]]))
-    weights[0] += 1.0
+    offsets = _barycentric_rates(vertices, corners, difference(point, row(vertices, Count(corners[0]))))
+    weights = (offsets[0] + 1.0, offsets[1], offsets[2])
     exit_corner, shortest = 0, np.inf
     for corner in range(1, 3):
         exit_corner = corner if rates[corner] < rates[exit_corner] else exit_corner
@@ -203,15 +190,11 @@ def _leave_face(
         # A coordinate at zero belongs to the edge the way came in by.
         if rates[corner] < 0.0 and weights[corner] > 1e-9 and -weights[corner] / rates[corner] < shortest:
             exit_corner, shortest = corner, -weights[corner] / rates[corner]
-    if shortest < np.inf:
-        for corner in range(3):
-            weights[corner] += shortest * rates[corner]
     after, before = (exit_corner + 1) % 3, (exit_corner + 2) % 3
-    first, second = max(weights[after], 0.0), max(weights[before], 0.0)
+    travel = shortest if shortest < np.inf else 0.0
+    first, second = max(weights[after] + travel * rates[after], 0.0), max(weights[before] + travel * rates[before], 0.0)
     share = second / (first + second) if first + second > 0.0 else 0.5
-    exit_point = _difference(vertices[corners[before]], vertices[corners[after]])
-    for axis in range(3):
-        exit_point[axis] = vertices[corners[after], axis] + share * exit_point[axis]
+    exit_point = between(row(vertices, Count(corners[after])), row(vertices, Count(corners[before])), share)
     return exit_point, exit_corner, share
 
 
@@ -240,25 +223,26 @@ def _steepest_way(
     vertex: int,
 ) -> tuple[int, int]:
     """Choose the way down from a vertex: (face, -1) through a face, or (face, next vertex) along one of its edges."""
-    best_slope, best_face, best_vertex = 0.0, vertex_faces[vertex_face_offsets[vertex]], predecessors[vertex]
+    best_slope, best_face = 0.0, Count(vertex_faces[vertex_face_offsets[vertex]])
+    best_vertex = Count(predecessors[vertex])
     for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
-        face = vertex_faces[record]
+        face = Count(vertex_faces[record])
         corners = faces[face]
         if not _is_reached(corners, distances):
             continue
         descent = _descent_direction(vertices, corners, distances)
         rates = _barycentric_rates(vertices, corners, descent)
         inside = True
-        for corner in range(3):
-            if corners[corner] == vertex:
+        for k in range(3):
+            corner = Count(corners[k])
+            if corner == vertex:
                 continue
-            inside = inside and rates[corner] > 0.0
-            fall = float(distances[vertex]) - float(distances[corners[corner]])
-            edge = _difference(vertices[corners[corner]], vertices[vertex])
-            slope = fall / math.sqrt(_dot(edge, edge))
+            inside = inside and rates[k] > 0.0
+            fall = float(distances[vertex]) - float(distances[corner])
+            slope = fall / norm(difference(row(vertices, corner), row(vertices, vertex)))
             if slope > best_slope:
-                best_slope, best_face, best_vertex = slope, face, corners[corner]
-        slope = math.sqrt(_dot(descent, descent))
+                best_slope, best_face, best_vertex = slope, face, corner
+        slope = norm(descent)
         if inside and slope > best_slope:
-            best_slope, best_face, best_vertex = slope, face, -1
+            best_slope, best_face, best_vertex = slope, face, Count(-1)
     return best_face, best_vertex

@@ -127,7 +127,7 @@ def settle_footprints(
     wheels = np.zeros(4 * heading_count)
     seen = np.full(count, -1, dtype=np.int32)
     members = np.zeros(count, dtype=np.int32)
-    upward = np.array([0.0, 0.0, 1.0])
+    upward = (0.0, 0.0, 1.0)
     for vertex in range(count):
         start_face = upward_face(face_normals, face_offsets, incident, vertex)
         if start_face < 0:

@@ -13,9 +13,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import Count, kernel
 from mbf_mesh_nav.kernels.dijkstra import BoolArray, Float32Array, Int32Array
-from mbf_mesh_nav.kernels.surface_walk import Float64Array, Vector, cross, dot, row, turned, walk
+from mbf_mesh_nav.kernels.surface_walk import turned, walk
+from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, dot, row
 
 PATH, COST, TILT, TURN, GOAL, HEADING = range(6)
 """Positions of the critics in the weights array."""
@@ -73,7 +74,7 @@ def score_rollouts(
     for sequence in range(sequence_count):
         face, point, direction = start_face, start, heading
         was_forbidden = _is_forbidden(faces, blocked, face)
-        nearest = 0
+        nearest = Count(0)
         score = 0.0
         for step in range(step_count):
             # 1. Move: turn, then walk (backwards along the opposite direction).

@@ -10,10 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.vectors import Vector, row
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
 CostArray = NDArray[np.float32]
+
+_SPHERE = (0.0, 0.0, 0.0)
+"""Instead of a normal: distances count in all directions."""
 
 
 @kernel
@@ -23,7 +27,7 @@ def collect_neighbourhood(
     neighbours: IntArray,
     centre: int,
     radius: float,
-    normal: FloatArray,
+    normal: Vector,
     along_limit: float,
     seen: IntArray,
     members: IntArray,
@@ -70,7 +74,7 @@ def height_differences(
     seen = np.full(count, -1, dtype=np.int32)
     members = np.zeros(count, dtype=np.int32)
     for vertex in range(count):
-        normal = normals[vertex]
+        normal = row(normals, vertex)
         size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, normal, along_limit, seen, members)
         lowest = highest = 0.0
         for index in range(size):
@@ -108,9 +112,8 @@ def neighbourhood_means(
     means = np.zeros(count, dtype=np.float32)
     seen = np.full(count, -1, dtype=np.int32)
     members = np.zeros(count, dtype=np.int32)
-    sphere = np.zeros(3)
     for vertex in range(count):
-        size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, sphere, np.inf, seen, members)
+        size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, _SPHERE, np.inf, seen, members)
         total = values[vertex]
         for index in range(size):
             total += values[members[index]]
@@ -132,9 +135,8 @@ def normal_tip_distances(
     distances = np.zeros(count, dtype=np.float32)
     seen = np.full(count, -1, dtype=np.int32)
     members = np.zeros(count, dtype=np.int32)
-    sphere = np.zeros(3)
     for vertex in range(count):
-        size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, sphere, np.inf, seen, members)
+        size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, _SPHERE, np.inf, seen, members)
         total = 0.0
         for index in range(size):
             other = members[index]

@@ -7,15 +7,14 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.bounding_boxes import BRANCHES, STACK_SIZE
 from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.vectors import Vector, row
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
 
 
 @kernel
-def distance_to_triangle(
-    vertices: FloatArray, faces: IntArray, face: int, origin: FloatArray, direction: FloatArray
-) -> float:
+def distance_to_triangle(vertices: FloatArray, faces: IntArray, face: int, origin: Vector, direction: Vector) -> float:
     """Distance along a ray to a triangle, both sides count, inf without a hit (Moeller and Trumbore 1997)."""
     a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
     ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
@@ -89,7 +88,7 @@ def first_hits(
     depths = np.empty(STACK_SIZE, dtype=np.int64)
     enters = np.empty(STACK_SIZE)
     for index in range(count):
-        origin, direction = origins[index], directions[index]
+        origin, direction = row(origins, index), row(directions, index)
         x, y, z = origin[0], origin[1], origin[2]
         ix, iy, iz = (
             inverse_component(direction[0]),

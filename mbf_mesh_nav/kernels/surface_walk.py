@@ -9,33 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.compiled import kernel
 from mbf_mesh_nav.kernels.dijkstra import Int32Array
-
-Float64Array = NDArray[np.float64]
-Vector = tuple[float, float, float]
+from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, dot, row
 
 _MAX_CROSSINGS = 200
-
-
-@kernel
-def dot(a: Vector, b: Vector) -> float:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@kernel
-def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@kernel
-def row(array: Float64Array, index: int) -> Vector:
-    """One row of an (n, 3) array as a tuple: kernels are several times faster with tuples than with slices."""
-    return array[index, 0], array[index, 1], array[index, 2]
 
 
 @kernel

@@ -3,7 +3,7 @@
 When to use: slopes near the robot's limits. It may drive straight up what it must not cross sideways, and it does not
 fall into a ditch narrower than its wheelbase that ``steepness`` forbids. When not: flat floors, tracked or legged
 robots, and meshes coarser than half the footprint. It replaces the guard of the border: where a wheel has no ground,
-the heading is not allowed.
+the heading is not allowed. Planners that know no headings may come with any: let them need all (``needed_headings``).
 Rule: the four wheels stand on the surface, the body takes their plane of least squares (``footprint_settling``). A
 heading is allowed if roll, pitch up and pitch down keep their limits, the slope in every direction stays
 ``tip_over_margin`` below the angle at which the centre of mass leaves the wheels, and no vertex inside the footprint
@@ -12,6 +12,8 @@ Cost: about 10 microseconds a vertex, 144 bytes a vertex.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +39,9 @@ class TiltParameters(LayerParameters):
     ground_clearance: float = parameter(
         0.1, "Height of the belly above the ground; .inf = do not check.", unit="m", gt=0.0, allow_inf=True
     )
+    needed_headings: float = parameter(
+        0.0, "Least share of headings that must be allowed; 0 = any one, 1 = all of them.", ge=0.0, le=1.0
+    )
 
 
 class TiltLayer(MeshLayer):
@@ -61,7 +66,7 @@ class TiltLayer(MeshLayer):
         self.allowed: NDArray[np.bool_] = np.ones(shape, dtype=np.bool_)
 
     def compute(self) -> tuple[CostArray, LethalArray]:
-        """Cost = share of the limits that the best allowed heading uses, 1 and lethal where none is allowed."""
+        """Cost = share of the limits that the best headings use, as many as needed; 1 and lethal where too few can."""
         mesh, settings = self.topology, self.parameters
         self.roll, self.pitch, bump = settle_footprints(
             mesh.vertices,
@@ -78,8 +83,10 @@ class TiltLayer(MeshLayer):
         )
         usage = self._usage()
         self.allowed = (usage <= 1.0) & (bump < settings.ground_clearance)
-        costs = np.where(self.allowed, usage, 1.0).min(axis=1).astype(np.float32)
-        return costs, np.asarray(~self.allowed.any(axis=1))
+        last_needed = max(0, math.ceil(settings.needed_headings * HEADINGS) - 1)
+        ranked = np.partition(np.where(self.allowed, usage, np.inf), last_needed, axis=1)[:, last_needed]
+        lethal = np.isinf(ranked)
+        return np.where(lethal, 1.0, ranked).astype(np.float32), lethal
 
     def _usage(self) -> NDArray[np.float32]:
         """Greatest ratio (V, 16) of an angle to its limit."""

@@ -44,7 +44,7 @@ def test_the_taut_path_is_as_short_as_a_numeric_optimum(hills, seed):
     rng = np.random.default_rng(seed)
     strip = random_strip(hills, rng, 14)
     start, goal = hills.vertices[hills.faces[strip[[0, -1]]]].mean(axis=1)
-    points = pull_taut(hills.vertices, hills.faces, strip, start, goal)
+    points = pull_taut(hills.vertices, hills.faces, strip, tuple(start), tuple(goal))
     length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
     assert length == pytest.approx(optimised_length(hills, strip, start, goal), rel=2e-4)
     np.testing.assert_array_equal(points[[0, -1]], [start, goal])
