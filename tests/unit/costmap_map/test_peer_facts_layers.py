@@ -248,3 +248,47 @@ def test_clearing_outside_a_window_around_the_robot(build, seeing, layers, size,
     costmap.clear_area(0.0, 0.0, size, layer_names=layers)
     costmap.update(None, 0.1)
     assert count(costmap, LETHAL) == lethal
+
+
+# --------------------------------------------------------------------------------------------------- the list
+def test_f182_layers_keep_the_order_of_the_list_and_are_found_by_name(build):
+    order = ["voxel", "static", "obstacle"]
+    costmap = build(*order)
+    assert list(costmap.layers) == order
+    assert [type(costmap.layers[name]).__name__ for name in order] == ["VoxelLayer", "StaticLayer", "ObstacleLayer"]
+
+
+# ------------------------------------------------------------------------- two sources with limits of their own
+HEIGHTS = {"min_obstacle_height": 0.2, "max_obstacle_height": 0.5}
+RANGES = {"obstacle_min_range": 2.0, "obstacle_max_range": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("limits", "points", "marked"),
+    [
+        (HEIGHTS, [(2.5, 0.5, 0.1), (3.5, 0.5, 0.3), (4.5, 0.5, 0.6)], {(3, 0)}),
+        (RANGES, [(1.5, 0.5, 0.3), (3.0, 0.5, 0.3), (5.5, 0.5, 0.3)], {(3, 0)}),
+        ({"marking": False}, [(2.5, 0.5, 0.3)], set()),
+    ],
+    ids=["heights", "ranges", "no marking"],
+)
+def test_limits_hold_for_their_own_source_only(build, seeing, limits, points, marked):
+    low, wide = seeing["sources"]["laser"] | limits, seeing["sources"]["laser"]
+    costmap = build("obstacle", obstacle=seeing | {"sources": {"low": low, "wide": wide}}, width=10, height=10)
+    costmap.insert_points("low", points, (0.5, 0.5, 0.3), 0.0)
+    costmap.insert_points("wide", [(8.5, 8.5, 0.9)], (8.5, 7.5, 0.3), 0.0)
+    costmap.update(None, 0.0)
+    assert {(int(ix), int(iy)) for iy, ix in np.argwhere(costmap.snapshot().cells == 254)} == marked | {(8, 8)}
+
+
+def test_a_source_clears_from_its_least_to_its_largest_distance(build, seeing):
+    laser = seeing["sources"]["laser"] | {"raytrace_min_range": 2.0, "raytrace_max_range": 4.0}
+    costmap = build("obstacle", obstacle=seeing | {"sources": {"laser": laser}}, width=10, height=10)
+    wall = [(x + 0.5, 0.5, 0.0) for x in range(1, 8)]
+    costmap.insert_points("laser", wall, (0.5, 5.5, 0.0), 0.0)
+    costmap.update(None, 0.0)
+    before = set(map(int, np.flatnonzero(costmap.snapshot().cells[0] == 254)))
+    costmap.insert_scan("laser", (0.5, 0.5, 0.0), [(9.5, 0.5, 0.0)], [False], 20.0)
+    costmap.update(None, 20.0)
+    after = set(map(int, np.flatnonzero(costmap.snapshot().cells[0] == 254)))
+    assert (before, after) == ({1, 2, 3, 4, 5, 6, 7}, {1, 5, 6, 7})

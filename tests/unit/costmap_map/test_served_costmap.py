@@ -1,0 +1,114 @@
+"""The maps as the server runs them: updated at their rate, only while somebody needs them, current for a controller."""
+
+import pytest
+
+from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.map_queries import CellState
+from mbf_abstract.navigator import Navigator
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.sensing import RangeScan
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.transforms import TransformBuffer
+
+CONFIG = """
+backend: costmap
+controller_patience: 1.0
+shutdown_costmaps: SHUTDOWN
+shutdown_costmaps_delay: 1.0
+clear_on_shutdown: true
+planners: [{name: astar, type: astar}]
+controllers: [{name: pursuit, type: regulated_pure_pursuit}]
+global_costmap: &map
+  width: 20.0
+  height: 20.0
+  origin_x: -10.0
+  origin_y: -10.0
+  robot_radius: 0.2
+  update_frequency: 10.0
+  layers: [{name: obstacles, type: obstacle}]
+  obstacles: {sources: {scan: {obstacle_max_range: 5.0, expected_update_rate: RATE}}}
+local_costmap: *map
+"""
+BOX = Pose.planar(0.0, 3.05)
+
+
+@pytest.fixture
+def start(tmp_path):
+    """``start(shutdown="false", rate=0)``: a server on simulated time; it and its robot are closed at the end."""
+    clock, transforms, opened = SimClock(), TransformBuffer(), []
+
+    def start(shutdown="false", rate=0.0):
+        file = tmp_path / "maps.yaml"
+        file.write_text(CONFIG.replace("SHUTDOWN", shutdown).replace("RATE", str(rate)))
+        robot = LoopbackRobot(clock, transforms, Pose.planar(0.0, 0.0))
+        opened.extend([navigator := Navigator.from_file(file, robot, clock, transforms), robot])
+        return navigator, clock
+
+    yield start
+    for thing in opened:
+        thing.close()
+
+
+def see_the_box(navigator, clock):
+    navigator.server.take_scan(RangeScan("scan", "map", (0.0, 0.0, 0.0), [(0.0, 3.05, 0.0)], [True], clock.now()))
+
+
+def follow(length):
+    return ExePathGoal(Path.from_points([(0.0, 0.0, 0.0), (length / 2.0, 0.0, 0.0), (length, 0.0, 0.0)]))
+
+
+def ages(navigator, clock):
+    server = navigator.server
+    return [clock.now() - costmap.last_update for costmap in (server.global_costmap, server.local_costmap)]
+
+
+def test_maps_run_all_the_time_by_default(start):
+    navigator, clock = start()
+    clock.sleep(5.0)
+    assert max(ages(navigator, clock)) <= 0.1 + 1e-9
+
+
+def test_idle_maps_stop_and_forget_and_the_next_goal_gets_a_fresh_one(start):
+    navigator, clock = start(shutdown="true")
+    see_the_box(navigator, clock)
+    navigator.server.queries.update_map()
+    assert navigator.server.queries.check_point(BOX).state is CellState.LETHAL
+    clock.sleep(5.0)
+    assert min(ages(navigator, clock)) > 3.0
+    assert navigator.get_path(BOX).success
+    assert min(ages(navigator, clock)) == 0.0
+
+
+def test_a_goal_keeps_both_maps_running_to_its_end(start):
+    navigator, clock = start(shutdown="true")
+    oldest = []
+    handle = navigator.server.exe_path.send(follow(2.0))
+    while not handle.done:
+        clock.sleep(0.05)
+        oldest.extend(ages(navigator, clock))
+    assert handle.wait().success and len(oldest) > 60 and max(oldest) <= 0.1 + 1e-9
+    clock.sleep(2.0)
+    assert min(ages(navigator, clock)) > 0.5
+
+
+def test_maps_begin_and_cease_to_run_when_the_parameter_changes(start):
+    navigator, clock = start(shutdown="true")
+    clock.sleep(5.0)
+    navigator.server.set_parameters(shutdown_costmaps=False)
+    clock.sleep(0.3)
+    assert max(ages(navigator, clock)) <= 0.1 + 1e-9
+    navigator.server.set_parameters(shutdown_costmaps=True)
+    clock.sleep(3.0)
+    assert min(ages(navigator, clock)) > 1.5
+
+
+def test_a_silent_sensor_stops_the_robot_and_ends_the_goal(start):
+    navigator, clock = start(rate=0.5)
+    see_the_box(navigator, clock)
+    handle = navigator.server.exe_path.send(follow(8.0))
+    clock.sleep(3.0)
+    ended = handle.wait()
+    assert ended.outcome == ExePathOutcome.MAP_ERROR and "source 'scan' is silent" in ended.message
+    assert 0.1 < ended.final_pose.x < 1.0
