@@ -116,6 +116,28 @@ def test_stop_keeps_the_lease(scene):
     assert lease.send(FORWARD)
 
 
+def test_every_stop_and_every_change_of_the_lease_is_recorded_once(scene):
+    lease = scene.gate.acquire("a")
+    lease.send(FORWARD)
+    lease.stop()
+    lease.stop()
+    lease.send(FORWARD)
+    lease.pause()
+    lease.resume()
+    lease.release(reason="done")
+    lease.release()
+    scene.gate.close("the end")
+    scene.gate.close()
+    told = [(event.kind, event.data) for event in scene.memory.events]
+    assert told == [
+        (EventKind.LEASE_GRANTED, {"holder": "a"}),
+        (EventKind.ROBOT_STOPPED, {"reason": "asked by the lease's owner"}),
+        (EventKind.ROBOT_STOPPED, {"reason": "paused"}),
+        (EventKind.LEASE_REVOKED, {"holder": "a", "reason": "done"}),
+        (EventKind.GATE_CLOSED, {"holder": "", "reason": "the end"}),
+    ]
+
+
 def test_a_paused_lease_holds_the_robot_until_it_is_resumed(scene):
     lease = scene.gate.acquire("a")
     lease.send(FORWARD)
