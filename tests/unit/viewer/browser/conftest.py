@@ -66,6 +66,21 @@ class Page:
             await self.command(f"{domain}.enable")
         await self.command("Page.navigate", url=url)
 
+    async def click(self, x, y):
+        """Press and release the left mouse button at a place of the window, in pixels."""
+        for kind, button in (("mouseMoved", "none"), ("mousePressed", "left"), ("mouseReleased", "left")):
+            await self.command("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1)
+
+    async def press(self, label):
+        """Press the button with this label, once it is there."""
+        find = f"[...document.querySelectorAll('button')].find(b => b.textContent.trim() === {json.dumps(label)})"
+        await self.wait_for(f"{find} !== undefined")
+        await self.evaluate(f"{find}.click()")
+
+    async def read(self, text):
+        """Wait until the page shows a text."""
+        await self.wait_for(f"document.body.innerText.includes({json.dumps(text)})")
+
     async def screenshot(self):
         answer = await self.command("Page.captureScreenshot", format="png")
         return base64.b64decode(answer["data"])

@@ -72,7 +72,7 @@ def test_a_page_that_breaks_down_is_reported_once_and_the_run_goes_on(meadow):
 
 
 def test_an_interface_that_does_not_exist_is_told_in_one_line(meadow, tmp_path):
-    with pytest.raises(ViewerMissing, match="203.0.113.1"):
+    with pytest.raises(ViewerMissing, match=r"203\.0\.113\.1"):
         run(meadow, tmp_path, view=ViewOptions(host="203.0.113.1"))
 
 

@@ -1,0 +1,92 @@
+"""``mbf run --view`` in a real browser: the page shows the run, takes goals by a click, pauses, cancels and ends it."""
+
+import io
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+
+import terrain
+from mbf_abstract.events import EventKind, read_events
+
+CONFIG = f"{terrain.__path__[0]}/scenarios/config/outdoor_mesh.yaml"
+SCENARIO = {
+    "name": "meadow",
+    "proves": "A page can be used.",
+    "backend": "mesh",
+    "navigation": {"mesh": CONFIG},
+    "world": {"type": "generated", "size": [12.0, 10.0], "median_slope": 5.0},
+    "robot": "husky",
+    "start": {"x": 3.0, "y": 5.0},
+    "goals": [{"x": 9.0, "y": 5.0}],
+    "sensors": [{"name": "lidar", "rays": 90}],
+}
+CANVAS = "document.querySelector('canvas')"
+PLACE = f"(() => {{ const r = {CANVAS}.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
+
+
+@pytest.fixture
+def served_run(tmp_path):
+    """Start ``mbf run --view`` on open ground; returns the process, the page's address and the folder of results."""
+    (tmp_path / "meadow.yaml").write_text(yaml.safe_dump(SCENARIO))
+    start = [sys.executable, "-c", "from mbf_abstract.cli import main; main()", "run", tmp_path / "meadow.yaml"]
+    options = ["--out", tmp_path / "run", "--json", "--view", "--view-port", "18400", "--executive", "navigation"]
+    process = subprocess.Popen([*start, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    for line in process.stderr:
+        if "live view at " in line:
+            yield process, line.split()[-1], tmp_path / "run"
+            break
+    else:
+        pytest.fail("no page was served")
+    process.kill()
+    process.communicate()
+
+
+def test_the_page_shows_the_run_and_steers_it(chromium, served_run, tmp_path):
+    process, address, folder = served_run
+
+    async def steer(page):
+        await page.open(address)
+        await page.read("▶ follow path")  # the tree at work
+        await page.wait_for(f"{CANVAS} !== null && {CANVAS}.clientWidth > 300")
+        await page.click(*await page.evaluate(PLACE))
+        await page.read("what: new goal")
+        await page.read("going to ")
+        await page.press("Pause")
+        await page.read("paused")
+        png = await page.screenshot()
+        await page.press("Resume")
+        await page.press("Cancel")
+        await page.read("CANCELED: canceled in the live view")
+        await page.press("End the run")
+        return page.errors, png
+
+    errors, png = chromium.visit(steer)
+    answer = json.loads(process.stdout.read())
+
+    (tmp_path / "live_view.png").write_bytes(png)
+    assert errors == []
+    assert_the_log_tells_what_was_asked_for(list(read_events(folder / "events.jsonl")))
+    assert answer["outcome_name"] == "CANCELED"
+    assert (folder / "replay.html").is_file()
+    assert_the_ground_is_seen(png)
+
+
+def assert_the_log_tells_what_was_asked_for(events):
+    asked = [event for event in events if event.source == "live_view"]
+    assert [event.data["what"] for event in asked] == ["new goal", "pause", "resume", "cancel", "end"]
+    assert 0.0 < asked[0].data["x"] < 12.0 and 0.0 < asked[0].data["y"] < 10.0
+    begun = [event.time for event in events if event.kind is EventKind.TREE and "nodes" in event.data]
+    assert len(begun) == 2 and begun[1] >= asked[0].time
+    paused = [event.time for event in events if event.kind is EventKind.GOAL_PAUSED]
+    assert asked[1].time <= paused[0] < asked[2].time
+
+
+def assert_the_ground_is_seen(png):
+    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
+    greenish = (pixels[..., 1] > pixels[..., 2] + 20) & (pixels[..., 1] > pixels[..., 0] - 40)
+    assert greenish.mean() > 0.05, "green ground fills a good part of the picture"
