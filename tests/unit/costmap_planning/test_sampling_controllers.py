@@ -210,3 +210,40 @@ def test_an_omnidirectional_robot_drives_sideways(make_plugin):
     for _ in range(10):
         command = controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist())).command
     assert command.vy > 0.05
+
+
+BEND = Path.from_points(
+    [*[(x, 0.0, 0.0) for x in np.linspace(0, 2, 21)], *[(2.0, y, 0.0) for y in np.linspace(0.1, 2, 20)]]
+)
+
+
+def test_an_ackermann_robot_drives_a_bend_without_ever_turning_tighter_than_it_can(make_plugin, closed_loop):
+    radius = 0.6
+    controller = make_plugin(
+        MppiController, FREE_MAP, motion_model="ackermann", min_turning_radius=radius, batch_size=500
+    )
+    robot, outcome, _ = closed_loop.follow(
+        controller, BEND, FREE_MAP, start=(0, 0, 0), dist_tolerance=0.25, angle_tolerance=math.pi
+    )
+    assert outcome == 0
+    steps = np.diff(np.array(robot.trace), axis=0)
+    driven, turned = np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])
+    assert (turned <= driven / radius + 2e-3).all()
+
+
+def test_an_omnidirectional_robot_drives_a_bend_without_turning(make_plugin, closed_loop):
+    weights = {"twirling": 20.0, "path_angle": 0.0, "prefer_forward": 0.0}
+    controller = make_plugin(MppiController, FREE_MAP, motion_model="omni", batch_size=500, critics=weights)
+    robot, outcome, _ = closed_loop.follow(
+        controller, BEND, FREE_MAP, start=(0, 0, 0), dist_tolerance=0.2, angle_tolerance=math.pi
+    )
+    assert outcome == 0
+    assert max(abs(state[2]) for state in robot.trace) < 0.4
+
+
+def test_a_differential_robot_never_moves_sideways(make_plugin):
+    controller = make_plugin(MppiController, FREE_MAP, batch_size=500)
+    controller.set_plan(Path.from_points([(0, y, 0.0) for y in np.linspace(0, 3, 31)]))
+    for _ in range(5):
+        command = controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist())).command
+        assert command.vy == 0.0
