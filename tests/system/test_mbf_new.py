@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import sysconfig
+import venv
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from mbf_abstract.cli import make_app
 from mbf_abstract.registry import PluginRegistry
 
 REPOSITORY = Path(__file__).resolve().parents[2]
+INSTALL = ("install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation")
 KINDS = ("planner", "controller", "recovery", "layer")
 
 
@@ -44,6 +47,41 @@ def test_the_tests_of_new_packages_pass(map_name, tmp_path):
     assert result.returncode == 0, result.stdout + result.stderr
     for name in names:  # every package's own test ran
         assert f"{name}/tests/" in result.stdout
+
+
+@pytest.fixture
+def fresh_environment(tmp_path):
+    """Run programs of a new virtual environment that has this package, installed from a wheel, and nothing else.
+
+    Third-party packages are borrowed from the environment of the tests by a path file; path files in that folder are
+    not read, so neither the editable installation of this repository nor any plugin comes along.
+    """
+    venv.create(tmp_path / "venv", with_pip=True)
+    programs = tmp_path / "venv" / ("Scripts" if os.name == "nt" else "bin")
+    variables = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+
+    def run(program, *arguments):
+        command = [programs / program, *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=variables, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    own = run("python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip()
+    (Path(own) / "borrowed.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    run("pip", *INSTALL, REPOSITORY)
+    return run
+
+
+@pytest.mark.timeout(300)
+def test_a_new_plugin_is_installed_and_tested_in_a_fresh_virtual_environment(fresh_environment):
+    run = fresh_environment
+    run("mbf", "new", "planner", "fresh", "--map", "costmap")
+    run("pip", *INSTALL, "-e", "fresh")
+
+    listed = [line.split() for line in run("mbf", "plugins").splitlines()]
+    assert ["costmap.fresh", "planners", "fresh:Fresh", "fresh", "0.1.0"] in listed
+    assert "venv" in Path(run("python", "-c", "import mbf_abstract; print(mbf_abstract.__file__)")).parts
+    assert "1 passed" in run("python", "-m", "pytest", "-p", "no:cacheprovider", "fresh")
 
 
 def test_the_entry_point_leads_to_the_class(tmp_path, monkeypatch):
