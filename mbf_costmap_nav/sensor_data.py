@@ -101,7 +101,7 @@ class Observation:
 
 
 class SourceWatch:
-    """Notices when a source falls silent.
+    """Notices when a source falls silent, and when nothing of it is in the map yet, at the start or after clearing.
 
     Parameters
     ----------
@@ -114,10 +114,19 @@ class SourceWatch:
         self.name = name
         self._limit = timing.expected_update_rate
         self._newest: float | None = None
+        self._in_map = False
 
     def heard(self, stamp: float) -> None:
         """Note an observation made at ``stamp`` [s]."""
         self._newest = stamp if self._newest is None else max(self._newest, stamp)
+
+    def used(self) -> None:
+        """Note that an update has put an observation into the map."""
+        self._in_map = True
+
+    def cleared(self) -> None:
+        """Note that the map has forgotten the source: it must not be driven on before it sees again."""
+        self._in_map = False
 
     def currency_problem(self, now: float) -> str:
         """Say how late the source is at ``now`` [s]; empty while it is in time."""
@@ -126,9 +135,9 @@ class SourceWatch:
         if self._newest is None:
             return f"observation source {self.name!r} has not sent anything yet"
         age = now - self._newest
-        if age <= self._limit:
-            return ""
-        return f"observation source {self.name!r} is silent for {age:.2f} s, expected every {self._limit:.2f} s"
+        if age > self._limit:
+            return f"observation source {self.name!r} is silent for {age:.2f} s, expected every {self._limit:.2f} s"
+        return "" if self._in_map else f"nothing of observation source {self.name!r} is in the map since it was cleared"
 
 
 class ObservationBuffer:
@@ -155,15 +164,18 @@ class ObservationBuffer:
         self.watch.heard(observation.stamp)
 
     def current(self, now: float) -> list[Observation]:
-        """Observations in use at ``now`` [s], oldest first; older ones are forgotten."""
+        """Observations for an update at ``now`` [s], oldest first; older ones are forgotten."""
         persistence = self.parameters.observation_persistence
         while persistence > 0.0 and self._observations and self._observations[0].stamp < now - persistence:
             self._observations.popleft()
+        if self._observations:
+            self.watch.used()
         return list(self._observations)
 
     def forget(self) -> None:
         """Drop the kept observations, e.g. because the map is cleared."""
         self._observations.clear()
+        self.watch.cleared()
 
 
 class SensorLayer(CostmapLayer):

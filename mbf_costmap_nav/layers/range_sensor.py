@@ -60,7 +60,7 @@ class RangeSensorLayer(SensorLayer):
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
         self.watches = {name: SourceWatch(name, source) for name, source in self.parameters.sources.items()}
-        self._waiting: deque[tuple[RangeSourceParameters, Observation]] = deque(maxlen=MAX_OBSERVATIONS)
+        self._waiting: deque[tuple[str, Observation]] = deque(maxlen=MAX_OBSERVATIONS)
 
     def match_geometry(self, geometry: GridGeometry) -> None:
         """Start undecided everywhere."""
@@ -75,11 +75,17 @@ class RangeSensorLayer(SensorLayer):
     def reset(self) -> None:
         """Forget all readings."""
         self.probability.fill(UNDECIDED)
-        self._waiting.clear()
+        self._forget_waiting()
 
     def clear_area(self, box: CellBox, inside: bool) -> None:
-        """Forget the readings inside or outside of ``box``."""
+        """Forget the readings inside or outside of ``box``, and those that wait, which would mark them again."""
         clear_cells(self.probability, box.clipped(self.geometry.box), inside, UNDECIDED)
+        self._forget_waiting()
+
+    def _forget_waiting(self) -> None:
+        self._waiting.clear()
+        for watch in self.watches.values():
+            watch.cleared()
 
     @property
     def source_names(self) -> tuple[str, ...]:
@@ -89,7 +95,7 @@ class RangeSensorLayer(SensorLayer):
     def insert(self, source: str, observation: Observation) -> None:
         """Keep a reading for the next update; unlike points, every reading counts once."""
         self.watches[source].heard(observation.stamp)
-        self._waiting.append((self.parameters.sources[source], observation))
+        self._waiting.append((source, observation))
 
     def currency_problem(self, now: float) -> str:
         """Name the sensor that is late at ``now`` [s]."""
@@ -99,7 +105,9 @@ class RangeSensorLayer(SensorLayer):
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Take the waiting readings into the beliefs."""
         while self._waiting:
-            limits, seen = self._waiting.popleft()
+            source, seen = self._waiting.popleft()
+            limits = self.parameters.sources[source]
+            self.watches[source].used()
             for end, hit in zip(seen.ends, seen.hits, strict=True):
                 box = box.union(self._take(seen.origin, end, bool(hit), limits))
         return box

@@ -179,6 +179,26 @@ def test_a_silent_sensor_makes_the_map_not_current_by_default(build):
     assert "layer 'obstacle': observation source 'laser' is silent for 1.50 s" in costmap.currency_problem(1.5)
 
 
+@pytest.mark.parametrize("layer", ["obstacle", "voxel", "range_sensor"])
+@pytest.mark.parametrize("clear", [lambda m: m.clear(), lambda m: m.clear_area(5, 5, 4)], ids=["all", "area"])
+def test_a_cleared_map_is_not_current_before_it_sees_again(build, layer, clear):
+    costmap = build(layer, **{layer: {"sources": {"laser": {}}}}, width=10, height=10)
+
+    def see(now):
+        costmap.insert_points("laser", [(3.0, 3.0, 0.3)], (1.0, 3.0, 0.3), now)
+
+    see(0.0)
+    costmap.update(HERE, 0.0)
+    assert costmap.is_current(0.0)
+    clear(costmap)
+    costmap.update(HERE, 0.1)
+    assert "'laser' is in the map since it was cleared" in costmap.currency_problem(0.1)
+    see(0.2)
+    assert not costmap.is_current(0.2)
+    costmap.update(HERE, 0.2)
+    assert costmap.is_current(0.2)
+
+
 def test_an_unknown_source_is_refused_with_the_known_ones(build, seeing):
     costmap = build("obstacle", obstacle=seeing)
     with pytest.raises(ValueError, match=r"'lidar', known are \['laser'\]"):
