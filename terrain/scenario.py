@@ -56,6 +56,13 @@ class Scenario(ParameterModel):
     actors: tuple[Actor, ...] = parameter((), "What moves by itself.")
     faults: tuple[Fault, ...] = parameter((), "What goes wrong with sensors and localisation, and when.")
     limits: Limits = parameter(Limits(), "What must not happen.")
+    physics_rate: float = parameter(
+        240.0,
+        "Steps of the physics a second; 120 takes half as long and moves a robot almost alike.",
+        unit="Hz",
+        ge=60.0,
+        le=1000.0,
+    )
     time_limit: float = parameter(300.0, "Simulated time after which the run is ended.", unit="s", gt=0.0)
     seed: int = parameter(0, "Seed where the command line names none.", ge=0)
 

@@ -26,7 +26,8 @@ def set_stage(scenario: Scenario, folder: Path, seed: int) -> tuple[ScenarioWorl
         What stands in the world and is on no map, to look at.
     """
     keep_clear = coordinates((scenario.start, *scenario.goals))
-    world = build_world(scenario.world, folder, np.random.default_rng([seed, WORLD_STREAM]), keep_clear)
+    rng, time_step = np.random.default_rng([seed, WORLD_STREAM]), 1.0 / scenario.physics_rate
+    world = build_world(scenario.world, folder, rng, keep_clear, time_step)
     try:
         rng = np.random.default_rng([seed, FOREST_STREAM])
         posts = [post for forest in scenario.forests for post in forest.posts(rng, keep_clear)]

@@ -23,10 +23,9 @@ from terrain.occupancy import OccupancyGrid, wall_triangles
 from terrain.recording import Surface
 from terrain.scenario_places import Place
 from terrain.scenario_world_types import BuildingWorld, LevelsWorld, TerrainWorld
-from terrain.world import BulletWorld
+from terrain.slope_map import slope_grid, write_slope_map
+from terrain.world import TIME_STEP, BulletWorld
 
-MAX_SLOPE = 30.0  # degrees; steeper ground is an obstacle on a 2D map of a terrain
-BORDER = 2  # cells at a terrain's edge that a 2D map shows as obstacles
 STOREY = 1.0  # m; height of the walls in the mesh of a building
 MESH_CELL = 0.1  # m; edge length of that mesh
 
@@ -69,7 +68,11 @@ class ScenarioWorld:
 
 
 def build_world(
-    world: TerrainWorld | BuildingWorld | LevelsWorld, folder: Path, rng: np.random.Generator, keep_clear: FloatArray
+    world: TerrainWorld | BuildingWorld | LevelsWorld,
+    folder: Path,
+    rng: np.random.Generator,
+    keep_clear: FloatArray,
+    time_step: float = TIME_STEP,
 ) -> ScenarioWorld:
     """Put a world into Bullet and write its map files into ``folder``.
 
@@ -77,11 +80,13 @@ def build_world(
     ----------
     keep_clear : (n, 2) float
         Places [m] on which nothing that is drawn may stand.
+    time_step : float
+        Of the physics [s].
     """
-    bullet = BulletWorld()
+    bullet = BulletWorld(time_step)
     try:
         if isinstance(world, TerrainWorld):
-            return _build_terrain(world.heightfield(rng, keep_clear), bullet, folder)
+            return _build_terrain(world.heightfield(rng, keep_clear), world.lethal_slope, bullet, folder)
         if isinstance(world, BuildingWorld):
             return _build_building(world, bullet, folder)
         return _build_levels(world, bullet, folder)
@@ -90,12 +95,13 @@ def build_world(
         raise
 
 
-def _build_terrain(terrain: Heightfield, bullet: BulletWorld, folder: Path) -> ScenarioWorld:
+def _build_terrain(terrain: Heightfield, lethal_slope: float, bullet: BulletWorld, folder: Path) -> ScenarioWorld:
     bullet.add_heightfield(terrain)
-    grid, ground = slope_map(terrain), Surface(*terrain.triangles())
-    return ScenarioWorld(
-        bullet, _write_files(ground, folder, grid), lambda x, y: float(terrain.height_at(x, y)), ground, None, grid
-    )
+    ground, resolution = Surface(*terrain.triangles()), min(terrain.dx, terrain.dy)
+    files = _write_files(ground, folder)
+    files["$WORLD_MAP"] = write_slope_map(terrain, folder, "world", resolution, lethal_slope)
+    grid = slope_grid(terrain, resolution, lethal_slope)
+    return ScenarioWorld(bullet, files, lambda x, y: float(terrain.height_at(x, y)), ground, None, grid)
 
 
 def _build_building(world: BuildingWorld, bullet: BulletWorld, folder: Path) -> ScenarioWorld:
@@ -125,23 +131,6 @@ def _write_files(ground: Surface, folder: Path, grid: OccupancyGrid | None = Non
     if grid is not None:
         files["$WORLD_MAP"] = write_map(grid, folder, "world")
     return files
-
-
-def slope_map(terrain: Heightfield) -> OccupancyGrid:
-    """Draw a terrain as a 2D map: steep cells and the border are occupied, the rest is free.
-
-    Map cells are square, as wide as the finer spacing of the terrain; each takes the steeper of the two triangles
-    of the terrain's cell that its centre lies in.
-    """
-    slopes = terrain.slopes().reshape(terrain.ny - 1, terrain.nx - 1, 2).max(axis=2)
-    resolution = min(terrain.dx, terrain.dy)
-    columns, rows = (int(length / resolution) for length in terrain.size)
-    ix = np.minimum((np.arange(columns) + 0.5) * resolution / terrain.dx, terrain.nx - 2).astype(int)
-    iy = np.minimum((np.arange(rows) + 0.5) * resolution / terrain.dy, terrain.ny - 2).astype(int)
-    steep = slopes[np.ix_(iy, ix)] > MAX_SLOPE
-    for edge in (steep[:BORDER], steep[-BORDER:], steep[:, :BORDER], steep[:, -BORDER:]):
-        edge[...] = True
-    return OccupancyGrid(steep, ~steep, resolution, terrain.x0, terrain.y0)
 
 
 def storey_heights(grid: OccupancyGrid) -> Heightfield:

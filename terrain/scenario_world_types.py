@@ -24,10 +24,15 @@ from terrain.multi_level import MultiLevelWorld, bridge_over_road, parking_garag
 from terrain.occupancy import OccupancyGrid, read_occupancy
 from terrain.scenario_features import Feature
 from terrain.sheets import TriangleMesh
+from terrain.slope_map import LETHAL_SLOPE
 
 
 class TerrainWorld(ParameterModel):
     """Open ground."""
+
+    lethal_slope: float = parameter(
+        LETHAL_SLOPE, "Ground steeper than this is an obstacle on the 2D map.", unit="deg", gt=5.0, lt=90.0
+    )
 
     @abstractmethod
     def heightfield(self, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:

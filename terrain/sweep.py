@@ -43,6 +43,9 @@ class SweepRun:
         return f"{scenario_hash}/{self.seed}/{self.variant}"
 
 
+Job = tuple[Scenario, SweepRun]
+
+
 def hash_of(scenario: Scenario) -> str:
     """Return a short hash of everything a scenario's files say."""
     digest = hashlib.sha256(scenario.model_dump_json(exclude={"navigation"}).encode())
@@ -72,40 +75,38 @@ def run_once(scenario: Scenario, run: SweepRun) -> dict[str, Any]:
     return {**result.metrics, "message": result.message}
 
 
-def run_all(scenario: Scenario, runs: Sequence[SweepRun], workers: int) -> Iterator[tuple[SweepRun, dict[str, Any]]]:
-    """Run in ``workers`` processes and yield each run with its metrics as it finishes.
+def run_all(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, dict[str, Any]]]:
+    """Do all jobs in ``workers`` processes and yield each with its metrics as it finishes.
 
     Raises
     ------
     BrokenProcessPool
         Workers died again and again.
     """
-    left = list(runs)
+    left = list(jobs)
     for attempt in range(MAX_POOLS):
         try:
-            for run, metrics in _run_in_pool(scenario, tuple(left), workers):
-                left.remove(run)
-                yield run, metrics
+            for job, metrics in _run_in_pool(tuple(left), workers):
+                left.remove(job)
+                yield job, metrics
             return
         except BrokenProcessPool:
             if attempt == MAX_POOLS - 1:
                 raise
 
 
-def _run_in_pool(
-    scenario: Scenario, runs: Sequence[SweepRun], workers: int
-) -> Iterator[tuple[SweepRun, dict[str, Any]]]:
+def _run_in_pool(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, dict[str, Any]]]:
     """Keep a pool busy; no more runs are handed out than it can work on, so that a stop is quick."""
-    waiting, running = iter(runs), dict[Future[dict[str, Any]], SweepRun]()
+    waiting, running = iter(jobs), dict[Future[dict[str, Any]], Job]()
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_the_sweep, (os.getpid(),))
     try:
-        for run in itertools.islice(waiting, workers):
-            running[pool.submit(run_once, scenario, run)] = run
+        for job in itertools.islice(waiting, workers):
+            running[pool.submit(run_once, *job)] = job
         while running:
             for done in wait(running, return_when=FIRST_COMPLETED).done:
                 yield running.pop(done), done.result()
-                for run in itertools.islice(waiting, 1):
-                    running[pool.submit(run_once, scenario, run)] = run
+                for job in itertools.islice(waiting, 1):
+                    running[pool.submit(run_once, *job)] = job
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 

@@ -21,6 +21,9 @@ def sweep(
         [], "--set", help="KEY=VALUE,VALUE: planner, controller, backend, or a dotted path of the configuration."
     ),
     workers: int = typer.Option(1, "--workers", min=1, help="Worker processes."),
+    scheduler: str | None = typer.Option(
+        None, "--scheduler", help="Address of a Dask scheduler, whose workers are used instead of own processes."
+    ),
     out: Path = typer.Option(..., "--out", help="Folder for the results; runs that it holds are not run again."),
 ) -> None:
     """Run a scenario with many seeds and variants and put all results into one table."""
@@ -31,6 +34,7 @@ def sweep(
 
         from terrain.scenario import load_scenario
         from terrain.sweep import hash_of, plan_sweep, run_all
+        from terrain.sweep_cluster import run_on_cluster
         from terrain.sweep_log import SweepLog
         from terrain.sweep_report import summarise, write_tables
 
@@ -40,8 +44,9 @@ def sweep(
         with SweepLog(out / "runs.jsonl") as log:
             left = [run for run in planned if run.key(hashed) not in log.rows]
             console.print(f"{len(planned)} runs, {len(planned) - len(left)} of them done before")
-            finished = run_all(loaded, left, workers)
-            for run, metrics in track(finished, loaded.name, total=len(left), console=console):
+            jobs = [(loaded, run) for run in left]
+            finished = run_all(jobs, workers) if scheduler is None else run_on_cluster(jobs, scheduler)
+            for (_, run), metrics in track(finished, loaded.name, total=len(left), console=console):
                 log.append(run.key(hashed), {**metrics, "seed": run.seed, "variant": run.variant})
                 console.print(f"seed {run.seed} {run.variant}: {metrics['outcome']}", markup=False, highlight=False)
             rows = [log.rows[run.key(hashed)] for run in planned]

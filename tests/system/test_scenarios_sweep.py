@@ -1,4 +1,4 @@
-"""A sweep that is killed in the middle goes on where it was: no run lost, none done twice."""
+"""A sweep that is killed in the middle, or loses a worker, goes on where it was: no run lost, none done twice."""
 
 import csv
 import json
@@ -6,8 +6,13 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import ExitStack
 
 import pytest
+from distributed import Client, LocalCluster
+from pyarrow import parquet
+
+from terrain.sweep_cluster import ClusterError, run_on_cluster
 
 pytestmark = pytest.mark.timeout(300)
 
@@ -37,8 +42,32 @@ mesh_map: {mesh_file: $WORLD_MESH, layers: []}
 def arguments(tmp_path):
     (tmp_path / "nav.yaml").write_text(NAVIGATION)
     (tmp_path / "trial.yaml").write_text(SCENARIO)
-    plan = ["--seeds", "0:2", "--set", "planner=dijkstra,astar", "--workers", "2", "--out", str(tmp_path / "out")]
+    plan = ["--seeds", "0:2", "--set", "planner=dijkstra,astar", "--out", str(tmp_path / "out")]
     return [sys.executable, "-c", COMMAND, str(tmp_path / "trial.yaml"), *plan]
+
+
+@pytest.fixture
+def cluster():
+    """A Dask scheduler with two worker processes: its address, and the workers by name."""
+    with ExitStack() as processes:
+
+        def start(*arguments, wait_for):
+            process = subprocess.Popen(
+                [sys.executable, "-m", "dask", *arguments], stderr=subprocess.PIPE, text=True, start_new_session=True
+            )
+            processes.callback(process.wait)
+            processes.callback(process.kill)
+            processes.callback(process.stderr.close)
+            return process, next(line for line in process.stderr if wait_for in line)
+
+        line = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", wait_for="Scheduler at")[1]
+        address = line.split()[-1]
+        single = ("--nthreads", "1", "--no-nanny", "--no-dashboard")
+        workers = {
+            name: start("worker", address, *single, "--name", name, wait_for="Starting established connection")[0]
+            for name in ("one", "two")
+        }
+        yield address, workers
 
 
 def logged(folder):
@@ -46,6 +75,7 @@ def logged(folder):
 
 
 def test_a_killed_sweep_is_resumed_without_losing_or_doubling_a_run(arguments, tmp_path):
+    arguments += ["--workers", "2"]
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
         for line in process.stdout:
             if line.startswith("seed "):
@@ -66,3 +96,38 @@ def test_a_killed_sweep_is_resumed_without_losing_or_doubling_a_run(arguments, t
     assert {(row["seed"], row["variant"]) for row in table} == {
         (seed, variant) for seed in ("0", "1") for variant in ("planner=astar", "planner=dijkstra")
     }
+
+
+def test_a_cluster_that_loses_a_worker_at_work_does_every_run_once(arguments, cluster, tmp_path):
+    address, workers = cluster
+    with subprocess.Popen([*arguments, "--scheduler", address], stdout=subprocess.PIPE, text=True) as process:
+        next(line for line in process.stdout if line.startswith("seed "))  # every run is handed out by now
+        with Client(address, set_as_default=False) as client:
+            victim = next(name for name in workers if client.processing()[client_address(client, name)])
+        workers[victim].kill()
+        process.stdout.read()
+
+    assert process.returncode == 0
+    rows = logged(tmp_path / "out")
+    assert len(rows) == len({row["key"] for row in rows}) == 4
+    assert all(row["success"] for row in rows)
+    table = parquet.read_table(tmp_path / "out" / "sweep.parquet")
+    assert sorted(zip(table["seed"].to_pylist(), table["variant"].to_pylist(), strict=True)) == [
+        (seed, variant) for seed in (0, 1) for variant in ("planner=astar", "planner=dijkstra")
+    ]
+
+
+def client_address(client, name):
+    workers = client.scheduler_info(n_workers=-1)["workers"]
+    return next(address for address, worker in workers.items() if worker["name"] == name)
+
+
+def test_a_scheduler_that_does_not_answer_is_told():
+    with pytest.raises(ClusterError, match="no scheduler answers at nonsense://here"):
+        list(run_on_cluster([], "nonsense://here"))
+
+
+def test_workers_with_several_threads_are_refused():
+    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as local:
+        with pytest.raises(ClusterError, match="one thread"):
+            list(run_on_cluster([], local.scheduler_address))

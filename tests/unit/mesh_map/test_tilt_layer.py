@@ -143,3 +143,19 @@ def test_wheels_stay_on_their_storey():
 
     assert (layer.roll[inside(mesh)] == 0.0).all()
     assert not layer.lethal[inside(mesh)].any()
+
+
+def test_the_share_of_headings_that_is_needed_decides_what_is_lethal_and_what_it_costs():
+    mesh = ramp(0.4)
+    limits = {"max_roll": 0.2, "max_pitch_up": 0.45, "max_pitch_down": 0.45}
+
+    any_one, half, all_of_them = (computed(mesh, needed_headings=share, **limits) for share in (0.0, 0.375, 1.0))
+
+    middle = inside(mesh)
+    share = any_one.allowed[middle].mean(axis=1)
+    assert np.allclose(share, 6 / 16)  # up and down the slope, and the headings beside these
+    assert not any_one.lethal[middle].any() and not half.lethal[middle].any()
+    assert all_of_them.lethal[middle].all()
+    assert (half.costs[middle] > any_one.costs[middle]).all()
+    worst = np.arctan(np.tan(0.4)) / 0.45  # straight up uses most of the limits
+    assert half.costs[middle] == pytest.approx(worst, abs=1e-4)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from mbf_abstract.findings import ConfigError
 from terrain.scenario import load_scenario
@@ -127,3 +128,23 @@ def test_a_forest_is_the_same_for_the_same_seed_and_leaves_room(tmp_path):
     assert surfaces[0].shape != surfaces[2].shape or not np.array_equal(surfaces[0], surfaces[2])
     from_start = np.linalg.norm(surfaces[0][:, :2] - (3.0, 3.0), axis=1)
     assert from_start.min() > 1.5 - 0.15 - 1e-9
+
+
+def test_the_2d_map_of_a_terrain_has_every_shade_of_slope_up_to_the_lethal_one(tmp_path):
+    hill = {"type": "ridge", "points": ((6.0, -5.0), (6.0, 15.0)), "height": 2.0, "width": 12.0}
+    shades = {}
+    for lethal_slope in (20.0, 60.0):
+        world = GeneratedWorld(
+            type="generated", size=(12.0, 10.0), spacing=0.5, features=(hill,), lethal_slope=lethal_slope
+        )
+        with built(world, tmp_path).bullet:
+            shades[lethal_slope] = np.asarray(Image.open(tmp_path / "world.png"))[5:-5, 5:-5]
+    assert shades[20.0].max() == 100 and shades[60.0].max() < 100
+    assert len(np.unique(shades[60.0])) > 3
+
+
+def test_the_steps_of_the_physics_are_as_long_as_the_scenario_says(tmp_path):
+    text = PLAIN + "physics_rate: 120.0\n"
+    world, _ = set_stage(load_scenario(scenario_file(tmp_path, text)), tmp_path, 0)
+    with world.bullet:
+        assert world.bullet.time_step == pytest.approx(1.0 / 120.0)
