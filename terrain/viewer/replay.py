@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from terrain.recording import Recording
 from terrain.viewer.page_server import page_server
+from terrain.viewer.replay_panel import with_panel
 from terrain.viewer.scene import (
     RobotModel,
     add_path,
@@ -54,7 +55,7 @@ def replay_html(recording: Recording) -> str:
         if len(recording.times):
             _Player(server, serializer, recording, robot).play()
         page: str = serializer.as_html()
-    return page
+    return with_panel(page, recording.events)
 
 
 class _Player:

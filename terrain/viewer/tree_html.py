@@ -1,23 +1,36 @@
-"""A behaviour tree as HTML: one line for each node, indented, coloured by its status; for the live view and replays."""
+"""A behaviour tree as HTML: one line for each node, indented, coloured by its status; for the live view and replays.
+
+Idle nodes are shown only below a node that runs; what might have run below the others, ``mbf tree show`` tells.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from html import escape
 
 from mbf_abstract.executives.tree_events import IDLE, SYMBOLS, NodeState
 
-COLOURS = {IDLE: "#8a8f98", "RUNNING": "#1f6feb", "SUCCESS": "#1a7f37", "FAILURE": "#cf222e"}
+RUNNING = "RUNNING"
+COLOURS = {IDLE: "#8a8f98", RUNNING: "#1f6feb", "SUCCESS": "#1a7f37", "FAILURE": "#cf222e"}
 INDENT = 12  # pixels
 
 
 def tree_html(nodes: Iterable[NodeState]) -> str:
     """Return the lines; what a node said stands as a tooltip on it, and beside it where it has failed."""
-    return "".join(_line(node) for node in nodes)
+    return "".join(_line(node) for node in worth_showing(nodes))
+
+
+def worth_showing(nodes: Iterable[NodeState]) -> Iterator[NodeState]:
+    """Leave out nodes that are idle, as those above them are or have become."""
+    branch: list[str] = []  # statuses from the root down to the node
+    for node in nodes:
+        branch[node.depth :] = [node.status]
+        if node.status != IDLE or node.depth == 0 or branch[node.depth - 1] == RUNNING:
+            yield node
 
 
 def _line(node: NodeState) -> str:
-    at_work = "font-weight:600;" if node.status == "RUNNING" else ""
+    at_work = "font-weight:600;" if node.status == RUNNING else ""
     said = f' <span style="opacity:0.75">{escape(node.message)}</span>' if node.status == "FAILURE" else ""
     tip = escape(f"{node.type}: {node.message}", quote=True)
     style = f"padding-left:{INDENT * node.depth}px;color:{COLOURS[node.status]};{at_work}"

@@ -11,21 +11,9 @@ from dataclasses import dataclass, field
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import NodeState, TreeState
-from mbf_abstract.outcomes import is_success, outcome_name
-from terrain.viewer.event_text import NOTABLE, words
+from terrain.viewer.event_lines import TOLD, Line, line_of
 
 MAX_LINES = 60
-TOLD = NOTABLE | {EventKind.GOAL_FINISHED, EventKind.GOAL_PAUSED, EventKind.GOAL_RESUMED, EventKind.CUSTOM}
-
-
-@dataclass(frozen=True)
-class Line:
-    """One thing that happened: time [s], who tells it, what, and whether that is good (None = neither)."""
-
-    time: float
-    source: str
-    text: str
-    good: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -72,16 +60,3 @@ class LiveLog:
         with self._lock:
             nodes = tuple(NodeState(**vars(node)) for node in self._tree.nodes)
             return Snapshot(tuple(self._lines), dict(self._ends), self._tree.name, nodes)
-
-
-def line_of(event: Event) -> Line:
-    """Put an event into words."""
-    if event.kind is EventKind.GOAL_FINISHED:
-        outcome = event.data.get("outcome")
-        code = outcome if isinstance(outcome, int) else 0
-        name = outcome_name(code)
-        good = None if name == "CANCELED" else is_success(code)
-        return Line(event.time, event.source, f"{name}: {event.data.get('message', '')}", good)
-    what = "" if event.kind is EventKind.CUSTOM else event.kind.value.replace("_", " ")
-    text = " ".join(part for part in (what, words(event)) if part)
-    return Line(event.time, event.source, text, False if event.kind is EventKind.FAULT else None)

@@ -7,9 +7,10 @@ from html import escape
 
 from mbf_abstract.server import AbstractNavigationServer
 from terrain.goal_tour import GoalTour
-from terrain.viewer.live.log import Line, Snapshot
+from terrain.viewer.event_lines import BAD, GOOD, NEITHER, Line
+from terrain.viewer.live.log import Snapshot
 
-GOOD, BAD, NEITHER, BUSY = "#1a7f37", "#cf222e", "#6b7280", "#1f6feb"
+BUSY = "#1f6feb"
 SHOWN_LINES = 12
 SMALL = "font-size:0.8em;line-height:1.35;padding:0 0.8em"
 
@@ -24,7 +25,7 @@ def actions_html(server: AbstractNavigationServer, snapshot: Snapshot) -> str:
         if running:
             state = _coloured(", ".join(goal.status.value for goal in running), BUSY)
         elif end is not None:
-            state = _coloured(end.text, _colour(end))
+            state = _coloured(end.text, end.colour)
         else:
             state = _coloured("no goal yet", NEITHER)
         rows.append(f'<tr><td style="padding-right:0.8em;vertical-align:top">{action.name}</td><td>{state}</td></tr>')
@@ -47,14 +48,10 @@ def headline_html(tour: GoalTour) -> str:
 def lines_html(lines: Sequence[Line]) -> str:
     """What has happened, newest first."""
     rows = "".join(
-        f'<div style="color:{_colour(line)}">{line.time:.1f} s <b>{escape(line.source)}</b> {escape(line.text)}</div>'
+        f'<div style="color:{line.colour}">{line.time:.1f} s <b>{escape(line.source)}</b> {escape(line.text)}</div>'
         for line in lines[:SHOWN_LINES]
     )
     return f'<div style="{SMALL}">{rows}</div>'
-
-
-def _colour(line: Line) -> str:
-    return NEITHER if line.good is None else (GOOD if line.good else BAD)
 
 
 def _coloured(text: str, colour: str) -> str:

@@ -13,6 +13,8 @@ from PIL import Image
 import terrain
 from mbf_abstract.events import EventKind, read_events
 
+pytestmark = pytest.mark.timeout(300)
+
 CONFIG = f"{terrain.__path__[0]}/scenarios/config/outdoor_mesh.yaml"
 SCENARIO = {
     "name": "meadow",

@@ -2,10 +2,12 @@
 
 import asyncio
 import io
+from dataclasses import replace
 
 import numpy as np
 from PIL import Image
 
+from mbf_abstract.events import Event, EventKind
 from terrain.viewer.replay import write_replay
 
 DRAWN = "document.querySelector('canvas') !== null && document.querySelector('canvas').clientWidth > 300"
@@ -29,3 +31,26 @@ def test_a_replay_opens_from_disk_and_plays(chromium, hill_recording, tmp_path):
     pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
     greenish = (pixels[..., 1] > pixels[..., 2] + 20) & (pixels[..., 1] > pixels[..., 0] - 40)
     assert greenish.mean() > 0.05, "the hills fill a good part of the picture"
+
+
+def test_a_replay_tells_the_state_of_the_tree_along_its_time_bar(chromium, hill_recording, tmp_path):
+    nodes = [{"name": "get there", "type": "Sequence", "depth": 0}, {"name": "plan", "type": "GetPath", "depth": 1}]
+    events = [
+        Event(0.0, EventKind.TREE, "tree", {"tree": "get there", "nodes": nodes}),
+        Event(0.0, EventKind.TREE, "tree", {"tree": "get there", "tick": 1, "changes": [[0, "RUNNING", ""]]}),
+        Event(1.0, EventKind.TREE, "tree", {"tree": "get there", "tick": 2, "changes": [[1, "FAILURE", "walled in"]]}),
+        *hill_recording.events,
+    ]
+    write_replay(tmp_path / "replay.html", replace(hill_recording, events=tuple(events)))
+
+    async def watch(page):
+        await page.open((tmp_path / "replay.html").as_uri())
+        await page.read("▶ get there")
+        await page.read("✗ plan walled in")
+        await page.read("get_path SUCCESS: plan found")
+        return page.errors, await page.screenshot()
+
+    errors, png = chromium.visit(watch)
+
+    (tmp_path / "screenshot.png").write_bytes(png)
+    assert errors == []

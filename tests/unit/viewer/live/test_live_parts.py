@@ -143,10 +143,12 @@ def test_words_from_outside_cannot_become_part_of_the_page():
 
 
 def test_a_tree_is_indented_and_says_why_a_node_has_failed():
-    lines = tree_html([NodeState("root", "Sequence", 0, "FAILURE", "no way"), NodeState("leaf", "GetPath", 1)])
+    lines = tree_html(
+        [NodeState("root", "Sequence", 0, "FAILURE", "no way"), NodeState("leaf", "GetPath", 1, "SUCCESS")]
+    )
 
     assert "✗ root" in lines and "no way" in lines
-    assert "padding-left:12px" in lines and "· leaf" in lines
+    assert "padding-left:12px" in lines and "✓ leaf" in lines
 
 
 def test_the_legend_names_both_ends():

@@ -1,0 +1,105 @@
+"""The words of a replay: a panel that tells, along the time bar, what has happened and how the behaviour tree stands.
+
+The page of a replay is made by viser and knows scenes only. The panel is HTML and a few lines of script that read the
+time from the time bar; what it shows lies in the page as JSON, so it works from disk and without network.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from typing import Any
+
+from mbf_abstract.events import Event, EventKind
+from mbf_abstract.executives.tree_events import SYMBOLS
+from terrain.viewer.event_lines import TOLD, line_of
+from terrain.viewer.tree_html import COLOURS, INDENT
+
+SHOWN_LINES = 8
+MAX_LINES = 2000  # a run with more leaves out the oldest
+
+STYLE = """
+#run { position: fixed; left: 10px; top: 10px; width: 300px; max-height: calc(100vh - 90px); overflow: auto;
+  font: 12px/1.4 system-ui, sans-serif; background: rgba(255, 255, 255, 0.88); color: #444; padding: 6px 12px;
+  border-radius: 6px; box-shadow: 0 1px 6px rgba(0, 0, 0, 0.2); z-index: 10; }
+#run summary { font-weight: 600; cursor: pointer; color: #222; margin: 4px 0; }
+"""
+
+SCRIPT = """
+const run = JSON.parse(document.getElementById('run-data').textContent);
+const add = (parent, text, style) => {
+  const line = document.createElement('div');
+  line.textContent = text; line.style.cssText = style; parent.append(line);
+};
+function showTree(time) {
+  const begun = run.trees.filter(tree => tree.time <= time), tree = begun[begun.length - 1];
+  const place = document.getElementById('run-tree');
+  place.replaceChildren();
+  if (!tree) return;
+  const now = tree.nodes.map(() => ['INVALID', '']);
+  for (const [at, index, status, said] of tree.changes) { if (at > time) break; now[index] = [status, said]; }
+  const branch = [];
+  tree.nodes.forEach(([name, depth], index) => {
+    const [status, said] = now[index];
+    branch[depth] = status;
+    if (status === 'INVALID' && depth > 0 && branch[depth - 1] !== 'RUNNING') return;
+    const failed = status === 'FAILURE' && said ? '  ' + said : '';
+    add(place, run.symbols[status] + ' ' + name + failed, 'padding-left:' + depth * run.indent + 'px;color:' +
+      run.colours[status] + (status === 'RUNNING' ? ';font-weight:600' : ''));
+  });
+}
+function showLines(time) {
+  const place = document.getElementById('run-lines');
+  place.replaceChildren();
+  const past = run.lines.filter(line => line[0] <= time);
+  past.slice(-run.shown).reverse().forEach(([at, text, colour]) => add(place, at.toFixed(1) + ' s  ' + text,
+    'color:' + colour));
+}
+let shown = null;
+setInterval(() => {
+  const bar = document.querySelector('input'), time = bar ? Number(bar.value) : 0;
+  if (time === shown) return;
+  shown = time; showLines(time);
+  if (run.trees.length) showTree(time);
+}, 100);
+"""
+
+
+def with_panel(page: str, events: Iterable[Event]) -> str:
+    """Put the panel into the text of a page, before the end of its body."""
+    contents = _data(tuple(events))
+    data = json.dumps(contents, separators=(",", ":")).replace("<", "\\u003c")
+    tree = "<details open><summary>Behaviour tree</summary><div id='run-tree'></div></details>"
+    tree = tree if contents["trees"] else ""
+    panel = (
+        f"<style>{STYLE}</style><div id='run'><details open><summary>What happened</summary>"
+        f"<div id='run-lines'></div></details>{tree if contents['trees'] else ''}</div>"
+        f"<script type='application/json' id='run-data'>{data}</script><script>{SCRIPT}</script>"
+    )
+    head, end, tail = page.rpartition("</body>")
+    return head + panel + end + tail if end else page + panel
+
+
+def _data(events: tuple[Event, ...]) -> dict[str, Any]:
+    """What the script goes through: the runs of trees with their changes, and the lines, all by time [s]."""
+    lines = [line_of(event) for event in events if event.kind in TOLD]
+    trees: list[dict[str, Any]] = []
+    for event in events:
+        if event.kind is EventKind.TREE:
+            _take_tree_event(trees, event.time, dict(event.data))
+    return {
+        "trees": trees,
+        "lines": [[line.time, f"{line.source} {line.text}", line.colour] for line in lines[-MAX_LINES:]],
+        "symbols": SYMBOLS,
+        "colours": COLOURS,
+        "indent": INDENT,
+        "shown": SHOWN_LINES,
+    }
+
+
+def _take_tree_event(trees: list[dict[str, Any]], time: float, data: dict[str, Any]) -> None:
+    if "nodes" in data:
+        nodes = [[node["name"], node["depth"]] for node in data["nodes"]]
+        trees.append({"time": time, "nodes": nodes, "changes": []})
+    elif trees:
+        trees[-1]["changes"] += [[time, *change] for change in data["changes"]]

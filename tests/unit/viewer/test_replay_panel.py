@@ -1,0 +1,75 @@
+"""The words beside a replay: what lies in the page, and that nothing in it can become part of the page."""
+
+import json
+import re
+
+from mbf_abstract.events import Event, EventKind
+from mbf_abstract.executives.tree_events import NodeState
+from terrain.viewer.replay_panel import with_panel
+from terrain.viewer.tree_html import worth_showing
+
+PAGE = "<html><body><p>scene</p></body></html>"
+NODES = [{"name": "root", "type": "Sequence", "depth": 0}, {"name": "leaf", "type": "GetPath", "depth": 1}]
+
+
+def tree(time, **data):
+    return Event(time, EventKind.TREE, "tree", {"tree": "root", **data})
+
+
+def contents(page):
+    return json.loads(re.search(r"id='run-data'>(.*?)</script>", page).group(1))
+
+
+def test_the_page_carries_each_run_of_a_tree_and_its_changes_with_their_times():
+    events = [
+        tree(1.0, nodes=NODES),
+        tree(1.2, tick=1, changes=[[0, "RUNNING", ""], [1, "RUNNING", "pending"]]),
+        tree(2.0, tick=9, changes=[[1, "FAILURE", "walled in"]]),
+        tree(5.0, nodes=NODES),
+    ]
+
+    first, second = contents(with_panel(PAGE, events))["trees"]
+
+    assert first["nodes"] == [["root", 0], ["leaf", 1]]
+    assert first["changes"] == [
+        [1.2, 0, "RUNNING", ""],
+        [1.2, 1, "RUNNING", "pending"],
+        [2.0, 1, "FAILURE", "walled in"],
+    ]
+    assert (second["time"], second["changes"]) == (5.0, [])
+
+
+def test_the_panel_lies_inside_the_body_and_has_no_tree_where_none_ran():
+    page = with_panel(PAGE, [])
+
+    assert page.startswith("<html><body><p>scene</p><style>") and page.endswith("</script></body></html>")
+    assert "Behaviour tree" not in page
+    assert "Behaviour tree" in with_panel(PAGE, [tree(0.0, nodes=NODES)])
+
+
+def test_words_of_an_event_cannot_end_the_script():
+    said = "</script><script>alert(1)</script>"
+    page = with_panel(PAGE, [Event(0.0, EventKind.FAULT, "x", {"message": said})])
+
+    assert "alert(1)</script>" not in page
+    assert said in contents(page)["lines"][0][1]
+
+
+def test_idle_nodes_are_shown_below_a_running_one_only():
+    def node(name, depth, status):
+        return NodeState(name, "T", depth, status)
+
+    nodes = [
+        node("root", 0, "RUNNING"),
+        node("done", 1, "SUCCESS"),
+        node("below done", 2, "INVALID"),
+        node("failed below done", 2, "FAILURE"),
+        node("waits", 1, "INVALID"),
+        node("below what waits", 2, "INVALID"),
+        node("works", 1, "RUNNING"),
+        node("next", 2, "INVALID"),
+    ]
+
+    assert [node.name for node in worth_showing(nodes)] == [
+        "root", "done", "failed below done", "waits", "works", "next"
+    ]  # fmt: skip
