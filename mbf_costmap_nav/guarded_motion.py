@@ -55,7 +55,7 @@ class GuardedRecovery(CostmapRecovery):
         velocity: Callable[[Pose], Twist],
         finished: Callable[[Pose], bool],
     ) -> RecoveryResult:
-        """Command ``velocity(pose)`` each period until ``finished(pose)``.
+        """Command ``velocity(pose)`` each period until ``finished(pose)``; stand while the map is not current.
 
         Returns
         -------
@@ -67,11 +67,12 @@ class GuardedRecovery(CostmapRecovery):
             pose = request.motion.pose()
             if finished(pose):
                 return RecoveryResult(RecoveryOutcome.SUCCESS)
+            blind = self.costmap.currency_problem(self.clock.now())
             if self.clock.now() >= end:
-                return RecoveryResult(RecoveryOutcome.FAILURE, f"not done after {self.parameters.time_limit:g} s")
-            command = velocity(pose)
-            obstacle = self.obstacle_ahead(pose, command)
-            if obstacle:
+                text = f"not done after {self.parameters.time_limit:g} s{f': {blind}' if blind else ''}"
+                return RecoveryResult(RecoveryOutcome.FAILURE, text)
+            command = Twist() if blind else velocity(pose)
+            if obstacle := self.obstacle_ahead(pose, command):
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, obstacle)
             if not request.motion.send(command):
                 return RecoveryResult(RecoveryOutcome.CANCELED, "the velocity gate refused the command")

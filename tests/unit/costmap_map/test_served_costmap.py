@@ -1,12 +1,14 @@
 """The maps as the server runs them: updated at their rate, only while somebody needs them, current for a controller."""
 
+from dataclasses import replace
+
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.actions.goals import ExePathGoal, RecoveryGoal
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.map_queries import CellState
 from mbf_abstract.navigator import Navigator
-from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
@@ -19,7 +21,11 @@ shutdown_costmaps: SHUTDOWN
 shutdown_costmaps_delay: 1.0
 clear_on_shutdown: true
 planners: [{name: astar, type: astar}]
-controllers: [{name: pursuit, type: regulated_pure_pursuit}]
+controllers:
+  - {name: pursuit, type: regulated_pure_pursuit}
+  - {name: far_sighted, type: regulated_pure_pursuit, costmap: global}
+recovery_behaviors: [{name: back_up, type: back_up}]
+back_up: {time_limit: 3.0, speed: 0.2}
 global_costmap: &map
   width: 20.0
   height: 20.0
@@ -39,9 +45,10 @@ def start(tmp_path):
     """``start(shutdown="false", rate=0)``: a server on simulated time; it and its robot are closed at the end."""
     clock, transforms, opened = SimClock(), TransformBuffer(), []
 
-    def start(shutdown="false", rate=0.0):
+    def start(shutdown="false", rate=0.0, local="*map"):
         file = tmp_path / "maps.yaml"
-        file.write_text(CONFIG.replace("SHUTDOWN", shutdown).replace("RATE", str(rate)))
+        text = CONFIG.replace("SHUTDOWN", shutdown).replace("RATE", str(rate))
+        file.write_text(text.replace("local_costmap: *map", f"local_costmap: {local}"))
         robot = LoopbackRobot(clock, transforms, Pose.planar(0.0, 0.0))
         opened.extend([navigator := Navigator.from_file(file, robot, clock, transforms), robot])
         return navigator, clock
@@ -112,3 +119,24 @@ def test_a_silent_sensor_stops_the_robot_and_ends_the_goal(start):
     ended = handle.wait()
     assert ended.outcome == ExePathOutcome.MAP_ERROR and "source 'scan' is silent" in ended.message
     assert 0.1 < ended.final_pose.x < 1.0
+
+
+def test_a_controller_on_the_global_map_needs_that_one_to_be_current(start):
+    navigator, clock = start(rate=0.5, local="{rolling_window: true, width: 4.0, height: 4.0, robot_radius: 0.2}")
+    clock.sleep(1.0)
+    ended = navigator.server.exe_path.send(replace(follow(1.0), controller="far_sighted")).wait()
+    assert not ended.success and ended.plugin_outcome == ExePathOutcome.MAP_ERROR
+    assert "source 'scan' has not sent anything yet" in ended.plugin_message and ended.final_pose.x == 0.0
+    assert navigator.server.exe_path.send(follow(1.0)).wait().success
+
+
+def test_a_recovery_stands_while_its_map_is_not_current(start):
+    navigator, clock = start(rate=0.5)
+    ended = navigator.recover("back_up")
+    assert ended.outcome == RecoveryOutcome.FAILURE and "source 'scan' has not sent anything yet" in ended.message
+    assert navigator.robot_pose().x == 0.0
+    handle = navigator.send(RecoveryGoal("back_up"))
+    while not handle.done:
+        see_the_box(navigator, clock)
+        clock.sleep(0.2)
+    assert handle.wait().success and navigator.robot_pose().x < -0.25

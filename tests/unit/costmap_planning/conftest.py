@@ -28,6 +28,9 @@ class FixedCostmap(LayeredCostmap):
     def snapshot(self) -> Costmap:
         return self.fixed
 
+    def currency_problem(self, now):
+        return ""
+
     def clear(self, layer_names=None):
         self.cleared.append("all")
         return []
