@@ -94,8 +94,10 @@ class LayerGraph(Mapping[str, MeshLayer]):
         """
         changed: dict[str, IntArray] = {}
         for name, layer in self._layers.items():
-            from_inputs = _union([changed[read.name] for read in layer.inputs if read.name in changed])
-            own = _union([layer.update_from_inputs(from_inputs) if len(from_inputs) else NOTHING_CHANGED, event(layer)])
+            from_inputs = union_of([changed[read.name] for read in layer.inputs if read.name in changed])
+            own = union_of(
+                [layer.update_from_inputs(from_inputs) if len(from_inputs) else NOTHING_CHANGED, event(layer)]
+            )
             if len(own):
                 changed[name] = own
         return changed
@@ -119,7 +121,8 @@ class LayerGraph(Mapping[str, MeshLayer]):
         return self.apply(event)
 
 
-def _union(sets: Sequence[IntArray]) -> IntArray:
+def union_of(sets: Sequence[IntArray]) -> IntArray:
+    """Vertices that are in any of the sets, ascending."""
     filled = [changed for changed in sets if len(changed)]
     if not filled:
         return NOTHING_CHANGED

@@ -18,13 +18,16 @@ from numpy.typing import ArrayLike, NDArray
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.kernels.edge_weights import set_edge_weights
 from mbf_mesh_nav.layer import CostArray, IntArray, LayerParameters, LethalArray, MeshLayer
-from mbf_mesh_nav.layer_graph import LayerGraph
+from mbf_mesh_nav.layer_graph import LayerGraph, union_of
 from mbf_mesh_nav.locate import Location, SurfaceLocator, SurfacePoint
 from mbf_mesh_nav.repair import MeshReport, checked_mesh
 from mbf_mesh_nav.topology import MeshTopology, build_topology
 
 if TYPE_CHECKING:
     import networkx
+
+REMEMBERED_CHANGES = 100
+"""Number of changes of the default layer a planner may have missed and still repair its last result."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +103,7 @@ class MeshMap:
         self.input_to_internal = topology.input_to_internal
         self.internal_to_input = topology.internal_to_input
         self._version = -1
+        self._changes: dict[int, IntArray] = {}  # version -> vertices that differ from the version before
         self._overridden: dict[str, tuple[LayerParameters, float]] = {}  # usual parameters, end of the override
         self._lock = threading.RLock()
         self.set_layers(LayerGraph(), None)
@@ -158,6 +162,16 @@ class MeshMap:
         """Return the current state; cheap, call it once per plan or control cycle."""
         return self._snapshot
 
+    def changes_between(self, old_version: int, new_version: int) -> IntArray | None:
+        """Vertices whose cost or flag may differ between two snapshots; None if that is not remembered.
+
+        The last ``REMEMBERED_CHANGES`` changes of the layers are; new layers or a new edge cost factor begin anew.
+        """
+        with self._lock:
+            steps = [self._changes.get(version) for version in range(old_version + 1, new_version + 1)]
+        known = [changed for changed in steps if changed is not None]
+        return union_of(known) if len(known) == len(steps) else None
+
     def to_input_order(self, values: NDArray[Any], missing: float = np.nan) -> NDArray[Any]:
         """Bring per-vertex values (V, ...) into the caller's numbering; dropped vertices get ``missing``."""
         result = np.full((len(self.input_to_internal), *values.shape[1:]), missing, dtype=np.float64)
@@ -195,6 +209,7 @@ class MeshMap:
             self.edge_cost_factor = edge_cost_factor
             lethal = np.zeros(count, np.bool_) if default_layer is None else layers[default_layer].lethal
             weights = np.zeros(len(self.neighbours), np.float32)
+            self._changes.clear()
             self._snapshot = self._weighted(costs, lethal, weights, np.arange(count, dtype=np.int32))
 
     def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
@@ -234,24 +249,25 @@ class MeshMap:
         cloud = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         cloud = cloud[np.isfinite(cloud).all(axis=1)]
         origin = np.asarray(sensor_origin, dtype=np.float64).reshape(3)
-        self._apply(lambda layer: layer.insert_points(cloud, origin, stamp))
+        self.apply(lambda layer: layer.insert_points(cloud, origin, stamp))
 
     def update(self, now: float) -> None:
         """Forget obstacles that are too old at ``now`` [s], end overrides of parameters that are over."""
         with self._lock:
             for name in [name for name, (_, until) in self._overridden.items() if until <= now]:
                 self.set_layer_parameters(name, self.usual_parameters(name))
-        self._apply(lambda layer: layer.expire(now))
+        self.apply(lambda layer: layer.expire(now))
 
     def clear(self) -> None:
         """Forget all sensed obstacles."""
-        self._apply(lambda layer: layer.clear())
+        self.apply(lambda layer: layer.clear())
 
     def is_current(self, now: float) -> bool:
         """Whether every obstacle layer got data within its expected update rate at ``now`` [s]."""
         return all(layer.is_current(now) for layer in self.layers.values())
 
-    def _apply(self, event: Callable[[MeshLayer], IntArray]) -> None:
+    def apply(self, event: Callable[[MeshLayer], IntArray]) -> None:
+        """Give an event to every layer, see ``LayerGraph.apply``, and show plugins the map that follows."""
         with self._lock:
             self._publish(self.layers.apply(event))
 
@@ -262,6 +278,8 @@ class MeshMap:
         layer = self.layers[self.default_layer]
         weights = self._snapshot.edge_weights.copy()
         self._snapshot = self._weighted(layer.costs, layer.lethal, weights, changed[self.default_layer])
+        self._changes[self._version] = changed[self.default_layer]
+        self._changes.pop(self._version - REMEMBERED_CHANGES, None)
 
     def _weighted(self, costs: CostArray, lethal: LethalArray, weights: CostArray, changed: IntArray) -> MeshSnapshot:
         costs, lethal = costs.copy(), lethal.copy()

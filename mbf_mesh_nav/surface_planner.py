@@ -15,10 +15,11 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Path, Pose, quaternions_from_axes
+from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
+from mbf_mesh_nav.kernels.path_poses import orientations_along
 from mbf_mesh_nav.leg_search import Leg, LegQuery, drop_repeated_points, spread_from
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshSnapshot
@@ -158,8 +159,7 @@ class SurfacePlanner(MeshPlanner):
             positions[-1] = goal.position
         whole = drop_repeated_points(Leg(positions, normals, 0.0))
         # Every pose looks to the next one and stands on the surface; the last one is as requested.
-        ahead = np.diff(whole.positions, axis=0, append=whole.positions[-1:])
-        orientations = quaternions_from_axes(ahead, whole.normals)
+        orientations = orientations_along(whole.positions, whole.normals)
         orientations[-1] = goal.orientation
         guidance = tuple(leg.guidance for leg in legs if leg.guidance is not None) or None
         return Path(whole.positions, orientations, self.mesh_map.frame_id, self.clock.now(), guidance)

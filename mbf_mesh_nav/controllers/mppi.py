@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
 from mbf_mesh_nav.goal_approach import ArrivalLatch, braking_speed, clamp, heading_error, is_at_goal
 from mbf_mesh_nav.kernels.mppi import score_rollouts
 from mbf_mesh_nav.kernels.surface_walk import tangent
@@ -114,6 +114,13 @@ class MPPIController(MeshController):
         self._nominal = np.concatenate([motion[1:], motion[-1:]])
         return ControlResult(ExePathOutcome.SUCCESS, "", self._as_command(float(motion[0, 0]), float(motion[0, 1])))
 
+    def planned_motion(self) -> PlannedMotion | None:
+        """Return the last motion, without its first step."""
+        if self._goal is None:
+            return None
+        speed, yaw_rate = np.moveaxis(self._as_motions(self._nominal), -1, 0)
+        return PlannedMotion(np.stack([speed, np.zeros_like(speed), yaw_rate], axis=1), self.parameters.step_time)
+
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the last pose of the plan is reached."""
         return self._goal is not None and is_at_goal(pose, self._goal, dist_tolerance, angle_tolerance)
@@ -162,10 +169,7 @@ class MPPIController(MeshController):
         if snapshot.version != self._blocked_version:
             self._blocked = snapshot.lethal | ~(snapshot.costs < p.cost_limit)
             self._blocked_version = snapshot.version
-        motions = controls
-        if p.motion_model == "ackermann":
-            yaw_rates = controls[..., 0] * np.tan(controls[..., 1]) / p.wheelbase
-            motions = np.stack([controls[..., 0], yaw_rates], axis=-1)
+        motions = self._as_motions(controls)
         reach = p.max_lin_velocity * p.horizon_steps * p.step_time + 1.0
         along = np.arange(projection.travelled, min(projection.travelled + reach, self._progress.length), _PATH_SPACING)
         along = np.append(along, min(projection.travelled + reach, self._progress.length))
@@ -187,6 +191,13 @@ class MPPIController(MeshController):
             np.array(weights),
             (p.roll_limit, p.pitch_limit),
         )
+
+    def _as_motions(self, controls: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Turn controls (..., 2) into speed and yaw rate (..., 2), where a car has a steering angle."""
+        if self.parameters.motion_model != "ackermann":
+            return controls
+        yaw_rates = controls[..., 0] * np.tan(controls[..., 1]) / self.parameters.wheelbase
+        return np.stack([controls[..., 0], yaw_rates], axis=-1)
 
     def _as_command(self, speed: float, turn: float) -> Command:
         if self.parameters.motion_model == "differential":

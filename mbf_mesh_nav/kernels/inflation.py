@@ -9,16 +9,20 @@ gives the same values as a new start.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
 CostArray = NDArray[np.float32]
 
 RIGHT_ANGLE_TOLERANCE = 1e-9
+_WAITING: Any = np.uint8(1)
+_LOWERED: Any = np.uint8(2)
 
 
 @kernel
@@ -82,53 +86,53 @@ def spread(
     start: IntArray,
     distances: CostArray,
     sources: IntArray,
-) -> None:
+) -> IntArray:
     """Lower ``distances`` (V,) and set ``sources`` (V, 2) until no vertex has a better offer from within ``radius``.
 
     Vertices to work off, at first ``start``, wait in a near list (below a threshold) or a far list; the threshold
-    grows by ``step`` [m]. One ring of vertices beyond the radius gets a distance, too.
+    grows by ``step`` [m]. One ring of vertices beyond the radius gets a distance, too. Returns the vertices whose
+    distance was lowered.
     """
-    count = vertices.shape[0]
-    waiting = np.zeros(count, dtype=np.bool_)
-    near = np.zeros(count, dtype=np.int32)
-    far = np.zeros(count, dtype=np.int32)
-    near_size = far_size = 0
-    for index in range(start.shape[0]):
-        if not waiting[start[index]]:
-            waiting[start[index]] = True
-            far[far_size] = start[index]
-            far_size += 1
+    count = len(vertices)
+    state = np.zeros(count, dtype=np.uint8)
+    near, far, lowered = np.empty(count, np.int32), np.empty(count, np.int32), np.empty(count, np.int32)
+    near_size, far_size, lowered_size = Index(0), Index(0), Index(0)
+    for vertex in start:
+        if state[vertex] & _WAITING == 0:
+            state[vertex] |= _WAITING
+            far[far_size] = vertex
+            far_size += ONE
     while far_size > 0:
         # The next threshold starts at the least waiting distance, so empty ranges cost nothing.
-        threshold = np.inf
+        threshold = np.float32(np.inf)
         for index in range(far_size):
-            threshold = min(threshold, float(distances[far[index]]))
-        threshold += step
-        kept = 0
+            threshold = min(threshold, distances[Index(far[index])])
+        threshold += np.float32(step)
+        kept = Index(0)
         for index in range(far_size):
-            if distances[far[index]] <= threshold:
+            if distances[Index(far[index])] <= threshold:
                 near[near_size] = far[index]
-                near_size += 1
+                near_size += ONE
             else:
                 far[kept] = far[index]
-                kept += 1
+                kept += ONE
         far_size = kept
         # The near list is a stack of everything below the threshold.
         while near_size > 0:
-            near_size -= 1
-            vertex = near[near_size]
-            waiting[vertex] = False
+            near_size -= ONE
+            vertex = Index(near[near_size])
+            state[vertex] &= ~_WAITING
             reached = distances[vertex]
             if reached > radius:
                 continue
-            for position in range(face_offsets[vertex], face_offsets[vertex + 1]):
-                face = incident[position]
+            for position in range(Index(face_offsets[vertex]), Index(face_offsets[vertex + ONE])):
+                face = Index(incident[position])
                 for corner in range(3):
-                    other = faces[face, corner]
+                    other = Index(faces[face, corner])
                     if distances[other] <= reached:
                         continue
                     # Corners in the order of the winding, so that rounding does not depend on who came first.
-                    v1, v2 = faces[face, (corner + 1) % 3], faces[face, (corner + 2) % 3]
+                    v1, v2 = Index(faces[face, (corner + 1) % 3]), Index(faces[face, (corner + 2) % 3])
                     d1 = float(distances[v1]) if distances[v1] <= radius else np.inf
                     d2 = float(distances[v2]) if distances[v2] <= radius else np.inf
                     exact, first, second = face_offer(vertices, other, v1, d1, v2, d2)
@@ -137,15 +141,20 @@ def spread(
                         continue
                     distances[other] = offer
                     sources[other, 0], sources[other, 1] = first, second
-                    if waiting[other]:
+                    if state[other] & _LOWERED == 0:
+                        state[other] |= _LOWERED
+                        lowered[lowered_size] = other
+                        lowered_size += ONE
+                    if state[other] & _WAITING != 0:
                         continue
-                    waiting[other] = True
+                    state[other] |= _WAITING
                     if offer <= threshold:
                         near[near_size] = other
-                        near_size += 1
+                        near_size += ONE
                     else:
                         far[far_size] = other
-                        far_size += 1
+                        far_size += ONE
+    return lowered[:lowered_size].copy()
 
 
 @kernel
@@ -153,7 +162,7 @@ def forget_dependents(
     offsets: IntArray, neighbours: IntArray, removed: IntArray, distances: CostArray, sources: IntArray
 ) -> IntArray:
     """Set to inf every distance that came, directly or not, from the ``removed`` seeds; return those vertices."""
-    forgotten = np.zeros(distances.shape[0], dtype=np.int32)
+    forgotten = np.empty(distances.shape[0], dtype=np.int32)
     size = 0
     for index in range(removed.shape[0]):
         distances[removed[index]] = np.inf
@@ -171,7 +180,7 @@ def forget_dependents(
                 sources[other, 0] = sources[other, 1] = -1
                 forgotten[size] = other
                 size += 1
-    return forgotten[:size]
+    return forgotten[:size].copy()
 
 
 @kernel
@@ -180,11 +189,11 @@ def finite_rim(offsets: IntArray, neighbours: IntArray, forgotten: IntArray, dis
     size = 0
     for index in range(forgotten.shape[0]):
         size += offsets[forgotten[index] + 1] - offsets[forgotten[index]]
-    rim = np.zeros(size, dtype=np.int32)
+    rim = np.empty(size, dtype=np.int32)
     size = 0
     for index in range(forgotten.shape[0]):
         for entry in range(offsets[forgotten[index]], offsets[forgotten[index] + 1]):
             if distances[neighbours[entry]] < np.inf:
                 rim[size] = neighbours[entry]
                 size += 1
-    return rim[:size]
+    return rim[:size].copy()

@@ -20,7 +20,7 @@ def forget_changed_ways(
     blocked: BoolArray,
     distances: Float32Array,
     predecessors: Int32Array,
-    is_root: BoolArray,
+    roots: Int32Array,
     changed: Int32Array,
 ) -> Int32Array:
     """Reset, in place, all vertices whose way leads over a changed vertex; return the seeds of the repair.
@@ -32,8 +32,8 @@ def forget_changed_ways(
         The new blocked vertices.
     distances, predecessors : (V,) float32, (V,) int32
         The old field; reset vertices get inf and -1.
-    is_root : (V,) bool
-        Seeds of the field, which keep their distance.
+    roots : (r,) int32
+        Seeds of the field, a few, which keep their distance.
     changed : (c,) int32
         Vertices whose cost or flag changed, i.e. at which the weight of any edge may have changed.
 
@@ -64,7 +64,7 @@ def forget_changed_ways(
                 was_reset[child] = True
                 stack[depth] = child
                 depth += 1
-        if not is_root[vertex]:
+        if not _is_among(roots, vertex):
             distances[vertex] = np.inf
             predecessors[vertex] = -1
     # 2. The wave starts again from what is intact around them.
@@ -72,7 +72,7 @@ def forget_changed_ways(
     is_seed = np.zeros(len(distances), dtype=np.bool_)
     for index in range(count):
         vertex = reset[index]
-        if is_root[vertex] and not blocked[vertex] and not is_seed[vertex]:
+        if _is_among(roots, vertex) and not blocked[vertex] and not is_seed[vertex]:
             is_seed[vertex] = True
             stack[seed_count] = vertex
             seed_count += 1
@@ -83,3 +83,11 @@ def forget_changed_ways(
                 stack[seed_count] = other
                 seed_count += 1
     return stack[:seed_count].copy()
+
+
+@kernel
+def _is_among(roots: Int32Array, vertex: int) -> bool:
+    for root in roots:
+        if root == vertex:
+            return True
+    return False

@@ -74,17 +74,22 @@ class InflationLayer(MeshLayer):
         flipped = changed[lethal[changed] != self._lethal[changed]]
         if len(flipped) == 0:
             return NOTHING_CHANGED
-        before = self.distances.copy()
         mesh = self.topology
         graph = (mesh.neighbour_offsets, mesh.neighbours)
         added, removed = flipped[lethal[flipped]], flipped[~lethal[flipped]]
         forgotten = forget_dependents(*graph, removed, self.distances, self._sources)
         self.distances[added] = 0.0
         self._sources[added] = -1
-        self._spread(np.concatenate([added, finite_rim(*graph, forgotten, self.distances)]))
+        lowered = self._spread(np.concatenate([added, finite_rim(*graph, forgotten, self.distances)]))
         self._lethal[flipped] = lethal[flipped]
-        moved = np.flatnonzero(self.distances != before).astype(np.int32)
-        self._costs[moved] = self.cost_of_distance(self.distances[moved])
+        is_touched = np.zeros(mesh.vertex_count, dtype=np.bool_)
+        is_touched[added] = is_touched[forgotten] = is_touched[lowered] = True
+        touched = np.flatnonzero(is_touched).astype(np.int32)
+        self._costs[flipped] = np.nan  # differs from everything: a new flag is a change even if the cost is the same
+        costs = self.cost_of_distance(self.distances[touched])
+        differs = costs != self._costs[touched]
+        moved: IntArray = touched[differs]
+        self._costs[moved] = costs[differs]
         return moved
 
     def cost_of_distance(self, distances: NDArray[np.float32]) -> CostArray:
@@ -100,9 +105,9 @@ class InflationLayer(MeshLayer):
         self.distances = np.full(self.topology.vertex_count, np.inf, dtype=np.float32)
         self._sources = np.full((self.topology.vertex_count, 2), -1, dtype=np.int32)
 
-    def _spread(self, start: IntArray) -> None:
+    def _spread(self, start: IntArray) -> IntArray:
         mesh = self.topology
-        spread(
+        return spread(
             mesh.vertices,
             mesh.faces,
             mesh.vertex_face_offsets,

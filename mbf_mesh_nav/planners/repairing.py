@@ -24,8 +24,8 @@ from mbf_mesh_nav.leg_search import (
     threshold_step,
     vertex_path_leg,
 )
-from mbf_mesh_nav.mesh_map import MeshSnapshot
 from mbf_mesh_nav.surface_planner import SurfacePlanner
+from mbf_mesh_nav.surface_point import corner_distances
 
 
 @dataclass
@@ -33,10 +33,9 @@ class RememberedWave:
     """A finished field and what it was computed for."""
 
     goal: tuple[float, ...]
+    cost_limit: float
+    version: int
     roots: NDArray[np.int32]
-    snapshot: MeshSnapshot
-    blocked: NDArray[np.bool_]
-    edge_cost_factor: float
     distances: NDArray[np.float32]
     predecessors: NDArray[np.int32]
 
@@ -49,11 +48,13 @@ class RepairingPlanner(SurfacePlanner):
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Bring the remembered wave up to date, or start a new one, and read the way off it."""
         wave, self._wave = self._wave, None  # a cancelled repair leaves no half-finished wave behind
-        if wave is None or not self._fits(wave, query):
-            wave, seeds = self._new_wave(query)
+        changed = self._changes_since(wave, query) if wave is not None else None
+        if wave is None or changed is None:
+            wave = self._new_wave(query)
+            seeds = wave.roots
         else:
-            seeds = self._outdated(wave, query)
-            wave.snapshot, wave.blocked = query.snapshot, query.blocked
+            seeds = self._forget(changed, wave, query)
+            wave.version = query.snapshot.version
         finished = propagate_distances(
             self.mesh_map.neighbour_offsets,
             self.mesh_map.neighbours,
@@ -72,34 +73,27 @@ class RepairingPlanner(SurfacePlanner):
         self._wave = wave
         return vertex_path_leg(self.mesh_map, query, wave.distances, wave.predecessors, rooted_at_goal=True)
 
-    def _fits(self, wave: RememberedWave, query: LegQuery) -> bool:
-        """Whether the wave leads to this goal, from the same free corners, with the same weighting."""
-        return (
-            wave.goal == tuple(query.goal.point)
-            and not query.blocked[wave.roots].any()
-            and wave.edge_cost_factor == self.mesh_map.edge_cost_factor
-        )
+    def _changes_since(self, wave: RememberedWave, query: LegQuery) -> NDArray[np.int32] | None:
+        """Vertices that changed since the wave; None if it leads elsewhere, or nobody remembers what changed."""
+        roots, _ = corner_distances(self.mesh_map, query.blocked, query.goal)
+        same_source = wave.goal == tuple(query.goal.point) and np.array_equal(wave.roots, roots)
+        if not same_source or wave.cost_limit != self.parameters.cost_limit:
+            return None
+        return self.mesh_map.changes_between(wave.version, query.snapshot.version)
 
-    def _new_wave(self, query: LegQuery) -> tuple[RememberedWave, NDArray[np.int32]]:
+    def _new_wave(self, query: LegQuery) -> RememberedWave:
         distances, predecessors, seeds = seeded_arrays(self.mesh_map, query.blocked, query.goal)
-        goal, factor = tuple(query.goal.point), self.mesh_map.edge_cost_factor
-        wave = RememberedWave(goal, seeds, query.snapshot, query.blocked, factor, distances, predecessors)
-        return wave, seeds
+        goal, version = tuple(query.goal.point), query.snapshot.version
+        return RememberedWave(goal, self.parameters.cost_limit, version, seeds, distances, predecessors)
 
-    def _outdated(self, wave: RememberedWave, query: LegQuery) -> NDArray[np.int32]:
-        """Forget what hung on vertices that changed since the wave; return the seeds of the repair."""
-        old, new = wave.snapshot, query.snapshot
-        if old.version == new.version:
-            return np.zeros(0, dtype=np.int32)
-        changed = (old.costs != new.costs) | (old.lethal != new.lethal) | (wave.blocked != query.blocked)
-        is_root = np.zeros(len(changed), dtype=np.bool_)
-        is_root[wave.roots] = True
+    def _forget(self, changed: NDArray[np.int32], wave: RememberedWave, query: LegQuery) -> NDArray[np.int32]:
+        """Forget what hung on changed vertices; return the seeds of the repair."""
         return forget_changed_ways(
             self.mesh_map.neighbour_offsets,
             self.mesh_map.neighbours,
             query.blocked,
             wave.distances,
             wave.predecessors,
-            is_root,
-            np.flatnonzero(changed).astype(np.int32),
+            wave.roots,
+            changed,
         )

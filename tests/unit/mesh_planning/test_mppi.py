@@ -55,6 +55,26 @@ def test_an_ackermann_robot_gets_steering_and_reaches_the_goal(make_plugin, plai
     assert controller.is_goal_reached(pose, 0.2, math.pi), pose
 
 
+@pytest.mark.parametrize("model", ["differential", "ackermann"])
+def test_it_tells_what_it_means_to_drive_next_with_the_turns_of_a_car_as_yaw_rates(make_plugin, plain, model):
+    controller = make_plugin(MPPIController, plain(), motion_model=model, wheelbase=0.4)
+    assert controller.planned_motion() is None
+    controller.set_plan(Path.from_points([(0.8, 1.0, 0.0), (3.0, 3.2, 0.0), (3.0, 5.0, 0.0)]))
+    pose = Pose.planar(0.8, 1.0)
+    for _ in range(30):
+        controller.compute_velocity_commands(ControlRequest(pose, Twist()))
+
+    motion = controller.planned_motion()
+
+    assert motion.velocities.shape == (controller.parameters.horizon_steps, 3)
+    assert motion.step_time == controller.parameters.step_time
+    forward, sideways, turn = motion.velocities.sum(axis=0) * motion.step_time
+    assert forward > 0.1 and sideways == 0.0 and turn > 0.1  # to the left, where the path leads
+    if model == "ackermann":
+        limit = np.abs(motion.velocities[:, 0]) * math.tan(controller.parameters.max_steering_angle) / 0.4
+        assert (np.abs(motion.velocities[:, 2]) <= limit + 1e-9).all()
+
+
 def test_walled_in_on_all_sides_it_finds_no_valid_command(make_plugin, plain, paint):
     def ring(v):
         distance = np.hypot(v[:, 0] - 1.0, v[:, 1] - 1.0)

@@ -1,0 +1,27 @@
+"""Orientations along a path on the surface."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbf_abstract.geometry import quaternions_from_axes
+from mbf_mesh_nav.kernels.path_poses import orientations_along
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=30, deadline=None)
+def test_every_pose_but_the_last_equals_the_frame_of_normal_and_way_ahead(seed):
+    rng = np.random.default_rng(seed)
+    positions, normals = rng.normal(size=(2, 12, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    ahead = np.diff(positions, axis=0)
+    expected = quaternions_from_axes(ahead, normals[:-1])
+    found = orientations_along(positions, normals)
+    same_sign = np.sign(np.sum(found[:-1] * expected, axis=1, keepdims=True))
+    np.testing.assert_allclose(found[:-1] * same_sign, expected, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
+
+
+def test_a_way_straight_up_the_normal_still_gives_a_pose():
+    found = orientations_along(np.array([[0.0, 0, 0], [0, 0, 1]]), np.array([[0.0, 0, 1], [0, 0, 1]]))
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
