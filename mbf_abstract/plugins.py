@@ -21,7 +21,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from mbf_abstract.cancel import CancelToken
-from mbf_abstract.geometry import Command, Path, Pose, Twist
+from mbf_abstract.geometry import Command, FloatArray, Path, Pose, Twist
 from mbf_abstract.outcomes import is_success
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.relaxation import Relaxation
@@ -172,6 +172,22 @@ class ControlResult:
         return is_success(self.outcome)
 
 
+@dataclass(frozen=True, eq=False)
+class PlannedMotion:
+    """What a controller means to do beyond its present command.
+
+    Attributes
+    ----------
+    velocities : (n, 3) float
+        vx [m/s], vy [m/s], wz [rad/s] in the base frame, one step after the other.
+    step_time : float
+        How long each of them lasts [s].
+    """
+
+    velocities: FloatArray
+    step_time: float
+
+
 class AbstractController(Plugin):
     """Follows a path: one velocity command a cycle."""
 
@@ -190,6 +206,10 @@ class AbstractController(Plugin):
     def cancel(self) -> bool:
         """Return True to slow down by yourself and answer CANCELED (101) when stopped; False = stop me now."""
         return False
+
+    def planned_motion(self) -> PlannedMotion | None:
+        """Return what shall follow the present command, for viewers; None where nothing is planned beyond it."""
+        return None
 
 
 # --------------------------------------------------------------------------------------------------- recovery

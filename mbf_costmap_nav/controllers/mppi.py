@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
 from mbf_costmap_nav.critics import CriticParameters
 from mbf_costmap_nav.critics.obstacle import COLLISION
 from mbf_costmap_nav.kernels.rollout import add_noise, clip_velocities, integrate
@@ -125,6 +125,10 @@ class MppiController(PathFollower):
                 self._nominal[:] = 0.0  # start over from standing still: the old sequence may be what collides
         text = f"none of {self.parameters.batch_size} sampled trajectories is free of collision"
         return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
+
+    def planned_motion(self) -> PlannedMotion:
+        """Return the nominal sequence."""
+        return PlannedMotion(self._nominal.T.astype(np.float64), self.parameters.model_dt)
 
     # -------------------------------------------------------------------------------------------- optimisation
     def _optimise(self, cycle: ControlCycle) -> Float32Array | None:

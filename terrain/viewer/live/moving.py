@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mbf_abstract.actions.handle import AnyGoalHandle
 from mbf_abstract.geometry import Command, Path, Pose, Twist
 from mbf_abstract.map_view import FieldView
+from mbf_abstract.plugins import PlannedMotion, PluginKind
 from mbf_abstract.sensing import RangeScan
 from terrain.bench import Bench
 from terrain.viewer.colours import GOAL, PLANNED
@@ -79,11 +80,23 @@ class MovingThings:
         self._angles = self._angles + wheel_angles(self._shape, times, twists)[-1]
         self._time = time
         self._robot.place(np.array([*pose.position, *pose.orientation]), self._angles, text)
-        way = way_ahead(pose, self._bench.navigator.server.runtime.gate.last_command)
-        if way is None:
+        motion = self._next_motion()
+        if motion is None:
             self._ahead.clear()
         else:
-            self._ahead.update(time, lambda: add_path(self._scene, "/ahead", way, AHEAD_COLOUR))
+            self._ahead.update(time, lambda: add_path(self._scene, "/ahead", way_ahead(pose, motion), AHEAD_COLOUR))
+
+    def _next_motion(self) -> PlannedMotion | None:
+        """What the controller at work has planned, or else its present command, for a while."""
+        server = self._bench.navigator.server
+        driving = server.exe_path.unfinished
+        if driving:
+            names = server.plugins.names(PluginKind.CONTROLLER)
+            controller = server.plugins.find(PluginKind.CONTROLLER, driving[0].goal.controller or names[0])
+            motion: PlannedMotion | None = None if controller is None else controller.instance.planned_motion()
+            if motion is not None:
+                return motion
+        return motion_of(server.runtime.gate.last_command)
 
     def _take_plan(self, handle: AnyGoalHandle) -> None:
         path = None if handle.result is None else handle.result.path
@@ -121,20 +134,21 @@ class MovingThings:
             self._scan.update(stamps, lambda: add_scan(self._scene, "/scan", points))
 
 
-def way_ahead(pose: Pose, command: Command) -> FloatArray | None:
-    """Points (n, 3) [m] of the arc that a command leads along within ``AHEAD`` s, in the plane the robot stands on.
-
-    None for a command that moves nothing, and for one to a car, whose arc depends on the car.
-    """
+def motion_of(command: Command) -> PlannedMotion | None:
+    """Return a command held for ``AHEAD`` s; None for one that moves nothing, or to a car, whose arc depends on it."""
     if not isinstance(command, Twist) or command.is_stopped():
         return None
-    times = np.linspace(0.0, AHEAD, AHEAD_STEPS)
-    turned = command.wz * times
-    rate = command.wz if abs(command.wz) > 1e-6 else 1e-6
-    along, across = np.sin(rate * times) / rate, (1.0 - np.cos(rate * times)) / rate
-    x = command.vx * along - command.vy * across
-    y = command.vx * across + command.vy * along
-    in_base = np.stack([x, y, np.zeros_like(turned)], axis=1)
+    return PlannedMotion(np.tile([command.vx, command.vy, command.wz], (AHEAD_STEPS, 1)), AHEAD / AHEAD_STEPS)
+
+
+def way_ahead(pose: Pose, motion: PlannedMotion) -> FloatArray:
+    """Points (n + 1, 3) [m] that a motion leads through, in the plane the robot stands on."""
+    vx, vy, wz = motion.velocities.T * motion.step_time
+    heading = np.cumsum(wz) - 0.5 * wz  # in the middle of each step
+    x = np.cumsum(vx * np.cos(heading) - vy * np.sin(heading))
+    y = np.cumsum(vx * np.sin(heading) + vy * np.cos(heading))
+    in_base = np.zeros((len(x) + 1, 3))
+    in_base[1:, :2] = np.stack([x, y], axis=1)
     return np.asarray(in_base @ pose.rotation.T + pose.position)
 
 

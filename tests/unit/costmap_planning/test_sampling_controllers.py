@@ -203,6 +203,20 @@ def test_an_ackermann_robot_gets_steering_angles_within_its_turning_circle(make_
     assert 0.0 < command.steering_angle <= math.atan(0.4 / 0.8) + 1e-3
 
 
+def test_mppi_tells_the_sequence_it_means_to_drive_next_and_dwa_tells_none(make_plugin):
+    controller = make_plugin(MppiController, FREE_MAP, batch_size=500)
+    controller.set_plan(straight())
+    for _ in range(20):
+        controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist.planar(0.3)))
+
+    motion = controller.planned_motion()
+
+    assert motion.velocities.shape == (controller.parameters.time_steps, 3)
+    forward, sideways, turn = motion.velocities.sum(axis=0) * motion.step_time
+    assert forward > 0.3 and sideways == 0.0 and abs(turn) < 0.2
+    assert make_plugin(DwaController, FREE_MAP).planned_motion() is None
+
+
 def test_an_omnidirectional_robot_drives_sideways(make_plugin):
     weights = {"twirling": 20.0, "path_angle": 0.0}
     controller = make_plugin(MppiController, FREE_MAP, motion_model="omni", batch_size=1000, critics=weights)

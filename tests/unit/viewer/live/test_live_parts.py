@@ -12,7 +12,7 @@ from terrain.viewer.colours import FLOOR, WALL, cost_ramp
 from terrain.viewer.live.follow import first_direction
 from terrain.viewer.live.ground import costs_at, legend_html
 from terrain.viewer.live.log import LiveLog
-from terrain.viewer.live.moving import AHEAD, AHEAD_STEPS, field_arrows, way_ahead
+from terrain.viewer.live.moving import AHEAD, AHEAD_STEPS, field_arrows, motion_of, way_ahead
 from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.overlay import Overlay
 from terrain.viewer.live.pace import MAX_LAG, Pace
@@ -33,16 +33,16 @@ def test_the_way_ahead_is_what_small_steps_of_the_command_lead_to(command):
         y += (command.vx * np.sin(yaw) + command.vy * np.cos(yaw)) * AHEAD / steps
         yaw += command.wz * AHEAD / steps
 
-    way = way_ahead(pose, command)
+    way = way_ahead(pose, motion_of(command))
 
-    assert len(way) == AHEAD_STEPS
+    assert len(way) == AHEAD_STEPS + 1
     np.testing.assert_allclose(way[0], pose.position)
-    np.testing.assert_allclose(way[-1], [x, y, 0.5], atol=1e-3)
+    np.testing.assert_allclose(way[-1], [x, y, 0.5], atol=2e-3)
 
 
 def test_there_is_no_way_ahead_of_a_robot_that_stands_and_none_is_guessed_for_a_car():
-    assert way_ahead(Pose.planar(0.0, 0.0), Twist()) is None
-    assert way_ahead(Pose.planar(0.0, 0.0), AckermannCommand(1.0, 0.2)) is None
+    assert motion_of(Twist()) is None
+    assert motion_of(AckermannCommand(1.0, 0.2)) is None
 
 
 def test_a_field_has_one_arrow_for_each_square_and_it_points_as_the_field_does():
