@@ -9,6 +9,7 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.map_queries import CellState
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
+from mbf_abstract.plugins import PluginKind
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
@@ -69,6 +70,16 @@ def follow(length):
 def ages(navigator, clock):
     server = navigator.server
     return [clock.now() - costmap.last_update for costmap in (server.global_costmap, server.local_costmap)]
+
+
+def test_all_plugins_share_the_two_maps_and_work_on_the_one_they_are_bound_to(start):
+    navigator, _ = start()
+    server = navigator.server
+    plugins = {plugin.name: plugin.instance for kind in PluginKind for plugin in server.plugins.all_of(kind)}
+    assert all(plugin.global_costmap is server.global_costmap for plugin in plugins.values())
+    assert all(plugin.local_costmap is server.local_costmap for plugin in plugins.values())
+    bound = {name: "global" if plugin.costmap is server.global_costmap else "local" for name, plugin in plugins.items()}
+    assert bound == {"astar": "global", "pursuit": "local", "far_sighted": "global", "back_up": "local"}
 
 
 def test_maps_run_all_the_time_by_default(start):
