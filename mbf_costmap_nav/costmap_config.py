@@ -54,7 +54,9 @@ class LayerEntry(ParameterModel):
 class CostmapParameters(ParameterModel):
     """Parameters of one costmap, with costmap_2d's names and defaults."""
 
-    frame_id: str = parameter("map", "Frame of the grid.", dynamic=False)
+    frame_id: str = parameter(
+        "map", "Frame of the grid; plans are made in global_frame, a local map may be in odom.", dynamic=False
+    )
     rolling_window: bool = parameter(False, "Keep the grid centred on the robot.", dynamic=False)
     width: float = parameter(10.0, "Extent along x; a static map replaces it.", unit="m", gt=0.0, dynamic=False)
     height: float = parameter(10.0, "Extent along y; a static map replaces it.", unit="m", gt=0.0, dynamic=False)
