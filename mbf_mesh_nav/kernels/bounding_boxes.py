@@ -6,15 +6,18 @@ and node i of a level covers nodes 4i to 4i+3 of the level below. ``levels`` hol
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, kernel
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
 
 BRANCHES = 4
+_BRANCHES: Any = Index(BRANCHES)
 STACK_SIZE = 128
 
 
@@ -123,41 +126,44 @@ def closest_face(
 
     ``hint_face`` (or -1) is looked at first, so that a good guess prunes nearly the whole tree.
     """
-    best_face, best, best_v, best_w = -1, max_distance * max_distance, 0.0, 0.0
+    best_face, best, best_v, best_w = Count(-1), max_distance * max_distance, 0.0, 0.0
     if hint_face >= 0:
-        squared, v, w = closest_on_face(vertices, faces, hint_face, x, y, z)
+        squared, v, w = closest_on_face(vertices, faces, Index(hint_face), x, y, z)
         if squared <= best:
             best_face, best, best_v, best_w = hint_face, squared, v, w
-    nodes = np.empty(STACK_SIZE, dtype=np.int64)
-    depths = np.empty(STACK_SIZE, dtype=np.int64)
+    nodes = np.empty(STACK_SIZE, dtype=np.uint64)
+    depths = np.empty(STACK_SIZE, dtype=np.uint64)
     bounds = np.empty(STACK_SIZE)
-    nodes[0], depths[0] = levels[-1] - 1, levels.shape[0] - 2
+    face_count = Index(len(faces))
+    nodes[0], depths[0] = Index(levels[-1] - 1), Index(len(levels) - 2)
     bounds[0] = squared_distance_to_box(boxes, nodes[0], x, y, z)
-    top = 1
+    top = ONE
     while top > 0:
-        top -= 1
+        top -= ONE
         if bounds[top] > best:
             continue
         node, depth = nodes[top], depths[top]
-        first = BRANCHES * (node - levels[depth])
+        first = _BRANCHES * (node - Index(levels[depth]))
         if depth == 0:
-            for face in range(first, min(first + BRANCHES, faces.shape[0])):
+            for face in range(first, min(first + _BRANCHES, face_count)):
                 squared, v, w = closest_on_face(vertices, faces, face, x, y, z)
                 if squared < best or (best_face < 0 and squared <= best):
-                    best_face, best, best_v, best_w = face, squared, v, w
+                    best_face, best, best_v, best_w = Count(face), squared, v, w
             continue
         # Push the children so that the nearest is on top: insertion into the short run above ``base``.
         base = top
-        for child in range(levels[depth - 1] + first, min(levels[depth - 1] + first + BRANCHES, levels[depth])):
+        first += Index(levels[depth - ONE])
+        for child in range(first, min(first + _BRANCHES, Index(levels[depth]))):
             bound = squared_distance_to_box(boxes, child, x, y, z)
             if bound > best:
                 continue
             place = top
-            while place > base and bounds[place - 1] < bound:
-                nodes[place], depths[place], bounds[place] = nodes[place - 1], depths[place - 1], bounds[place - 1]
-                place -= 1
-            nodes[place], depths[place], bounds[place] = child, depth - 1, bound
-            top += 1
+            while place > base and bounds[place - ONE] < bound:
+                below = place - ONE
+                nodes[place], depths[place], bounds[place] = nodes[below], depths[below], bounds[below]
+                place = below
+            nodes[place], depths[place], bounds[place] = child, depth - ONE, bound
+            top += ONE
     if best_face < 0:
         return -1, np.inf, 0.0, 0.0, 0.0, 0.0, 0.0
     a, b, c = faces[best_face, 0], faces[best_face, 1], faces[best_face, 2]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import Count, kernel
 from mbf_mesh_nav.kernels.dijkstra import Int32Array
 
 
@@ -32,9 +32,9 @@ def build_corner_slots(
             while face[corner] != vertex:
                 corner += 1
             first, second = face[(corner + 1) % 3], face[(corner + 2) % 3]
-            slots[record, 0] = _slot(neighbour_offsets, neighbours, vertex, first)
-            slots[record, 1] = _slot(neighbour_offsets, neighbours, vertex, second)
-            slots[record, 2] = _slot(neighbour_offsets, neighbours, first, second)
+            slots[record, 0] = _slot(neighbour_offsets, neighbours, Count(vertex), Count(first))
+            slots[record, 1] = _slot(neighbour_offsets, neighbours, Count(vertex), Count(second))
+            slots[record, 2] = _slot(neighbour_offsets, neighbours, Count(first), Count(second))
     return slots
 
 

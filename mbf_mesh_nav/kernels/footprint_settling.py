@@ -84,6 +84,23 @@ def upward_face(normals: FloatArray, offsets: IntArray, incident: IntArray, vert
     return best
 
 
+def wheel_directions(heading_count: int, wheelbase: float, track: float) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Directions of the wheels seen from the middle, for headings ``h * 2 pi / heading_count``.
+
+    Returns
+    -------
+    angles : (4 heading_count,) float64
+        Ascending [rad]; all wheels stand on one circle.
+    order : (4 heading_count,) int64
+        Which wheel that is: 4 h plus 0 front left, 1 rear left, 2 rear right, 3 front right.
+    """
+    spread = np.arctan2(track, wheelbase)
+    yaws = 2.0 * np.pi * np.arange(heading_count) / heading_count
+    wheels = (yaws[:, None] + [spread, np.pi - spread, np.pi + spread, -spread]).ravel() % (2.0 * np.pi)
+    order = np.argsort(wheels, kind="stable")
+    return wheels[order], order
+
+
 @kernel
 def settle_footprints(
     vertices: FloatArray,
@@ -94,11 +111,17 @@ def settle_footprints(
     incident: IntArray,
     offsets: IntArray,
     neighbours: IntArray,
-    heading_count: int,
+    wheel_angles: FloatArray,
+    wheel_order: NDArray[np.int64],
     wheelbase: float,
     track: float,
 ) -> tuple[AngleArray, AngleArray, AngleArray]:
-    """Settle a robot at every vertex and heading ``h * 2 pi / heading_count``.
+    """Settle a robot at every vertex and heading.
+
+    Parameters
+    ----------
+    wheel_angles, wheel_order : (4 heading_count,)
+        Where the wheels of all headings stand, see ``wheel_directions``.
 
     Returns
     -------
@@ -108,34 +131,26 @@ def settle_footprints(
         How far [m] the surface inside the footprint rises above the plane of the wheels; inf likewise.
     """
     count = vertices.shape[0]
-    roll = np.full((count, heading_count), np.inf, dtype=np.float32)
-    pitch = np.full((count, heading_count), np.inf, dtype=np.float32)
-    bump = np.full((count, heading_count), np.inf, dtype=np.float32)
+    heading_count = len(wheel_order) // 4
+    roll = np.empty((count, heading_count), dtype=np.float32)
+    pitch = np.empty((count, heading_count), dtype=np.float32)
+    bump = np.empty((count, heading_count), dtype=np.float32)
     radius = 0.5 * np.hypot(wheelbase, track)
-    spread = np.arctan2(track, wheelbase)
-    # Front left, rear left, rear right, front right of every heading, all on one circle, sorted by direction.
-    unsorted = np.zeros(4 * heading_count)
-    for heading in range(heading_count):
-        yaw = 2.0 * np.pi * heading / heading_count
-        unsorted[4 * heading] = (yaw + spread) % (2.0 * np.pi)
-        unsorted[4 * heading + 1] = (yaw + np.pi - spread) % (2.0 * np.pi)
-        unsorted[4 * heading + 2] = (yaw + np.pi + spread) % (2.0 * np.pi)
-        unsorted[4 * heading + 3] = (yaw - spread) % (2.0 * np.pi)
-    order = np.argsort(unsorted)
-    angles = unsorted[order]
     ring = np.zeros(4 * heading_count)
     wheels = np.zeros(4 * heading_count)
     seen = np.full(count, -1, dtype=np.int32)
     members = np.zeros(count, dtype=np.int32)
     upward = (0.0, 0.0, 1.0)
     for vertex in range(count):
+        for heading in range(heading_count):
+            roll[vertex, heading] = pitch[vertex, heading] = bump[vertex, heading] = np.inf
         start_face = upward_face(face_normals, face_offsets, incident, vertex)
         if start_face < 0:
             continue
         centre = vertices[vertex]
-        wheel_heights(vertices, faces, face_normals, face_neighbours, start_face, centre, angles, radius, ring)
-        for index in range(order.shape[0]):
-            wheels[order[index]] = ring[index]
+        wheel_heights(vertices, faces, face_normals, face_neighbours, start_face, centre, wheel_angles, radius, ring)
+        for index in range(len(wheel_order)):
+            wheels[wheel_order[index]] = ring[index]
         # The vertices the belly could touch; neither a storey above nor one below is connected within the radius.
         size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, upward, radius, seen, members)
         for heading in range(heading_count):

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.kernels.footprint_settling import settle_footprints
+from mbf_mesh_nav.kernels.footprint_settling import settle_footprints, wheel_directions
 from mbf_mesh_nav.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
 
 HEADINGS = 16
@@ -77,7 +77,7 @@ class TiltLayer(MeshLayer):
             mesh.vertex_faces,
             mesh.neighbour_offsets,
             mesh.neighbours,
-            HEADINGS,
+            *wheel_directions(HEADINGS, settings.wheelbase, settings.track),
             settings.wheelbase,
             settings.track,
         )
