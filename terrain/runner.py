@@ -27,6 +27,8 @@ from terrain.metrics import measure
 from terrain.recording import Recording
 from terrain.scenario import Scenario
 from terrain.scenario_limits import broken_limits
+from terrain.scenario_world import ScenarioWorld
+from terrain.shortest_way import shortest_way
 from terrain.viewer.live.options import ViewOptions
 
 
@@ -74,6 +76,8 @@ class RunOptions:
         Told the name of each step before and after the drive that may take a while.
     settings : mapping of str to str
         Changes of the navigation configuration, see ``terrain.scenario_settings``.
+    geodesic : bool
+        Measure the shortest way over the ground too, which takes up to some seconds.
     executive : str
         Who decides on plans, drives and recoveries, a name of ``terrain.goal_drivers.EXECUTIVES``.
     view : ViewOptions, optional
@@ -90,6 +94,7 @@ class RunOptions:
     on_progress: Callable[[Progress], None] = lambda progress: None
     on_step: Callable[[str], None] = lambda text: None
     settings: Mapping[str, str] = field(default_factory=dict)
+    geodesic: bool = False
     executive: str = "move_base"
     view: ViewOptions | None = None
     on_page: Callable[[str], None] = lambda address: None
@@ -120,7 +125,7 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     finally:
         bench.close()
     recording = bench.recorder.finish(result.success, result.outcome_name, result.message, list(bench.memory.events))
-    metrics = _write_numbers(recording, bench, wall_time, options.folder)
+    metrics = _write_numbers(recording, bench, wall_time, options)
     if options.draw:
         _draw(recording, metrics, options)
     message = "; ".join([result.message, *metrics["broken_limits"]])
@@ -176,8 +181,10 @@ class _ProgressReporter:
         )
 
 
-def _write_numbers(recording: Recording, bench: Bench, wall_time: float, folder: Path) -> dict[str, Any]:
-    metrics = measure(recording).to_json()
+def _write_numbers(recording: Recording, bench: Bench, wall_time: float, options: RunOptions) -> dict[str, Any]:
+    metrics, folder = measure(recording).to_json(), options.folder
+    if options.geodesic and recording.success:
+        metrics |= _compare_with_geodesic(recording, bench.world)
     metrics["mishaps"] = sorted({mishap.kind.value for mishap in bench.simulation.mishaps})
     metrics["energy_j"] = round(bench.simulation.monitor.energy, 3)
     metrics["slipped_m"] = round(bench.simulation.monitor.slipped, 6)
@@ -190,6 +197,17 @@ def _write_numbers(recording: Recording, bench: Bench, wall_time: float, folder:
         (folder / name).write_text(json.dumps(numbers, indent=2, sort_keys=True) + "\n")
     recording.save(folder / "recording.npz")
     return {**metrics, **timing}
+
+
+def _compare_with_geodesic(recording: Recording, world: ScenarioWorld) -> dict[str, float]:
+    """Return the shortest way over all goals to where the robot stopped, and how many times as far it drove."""
+    goals = [goal.position for goal in recording.goals[:-1]]
+    stops = [recording.start.position, *goals, tuple(recording.poses[-1, :3].tolist())]
+    shortest = shortest_way(world.open_surface(), stops)
+    if not 0.0 < shortest < float("inf"):
+        return {}
+    driven = measure(recording).path_length_m
+    return {"geodesic_m": round(shortest, 6), "path_over_geodesic": round(driven / shortest, 6)}
 
 
 def _draw(recording: Recording, metrics: dict[str, Any], options: RunOptions) -> None:

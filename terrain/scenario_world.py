@@ -23,6 +23,7 @@ from terrain.occupancy import OccupancyGrid, wall_triangles
 from terrain.recording import Surface
 from terrain.scenario_places import Place
 from terrain.scenario_world_types import BuildingWorld, LevelsWorld, TerrainWorld
+from terrain.shortest_way import free_floor
 from terrain.slope_map import slope_grid, write_slope_map
 from terrain.world import TIME_STEP, BulletWorld
 
@@ -55,6 +56,10 @@ class ScenarioWorld:
     walls: Surface | None = None
     grid: OccupancyGrid | None = None
     places: Mapping[str, Pose] = field(default_factory=dict)
+
+    def open_surface(self) -> Surface:
+        """Return what a robot may drive on: the ground, in a building only its free cells."""
+        return self.ground if self.grid is None or self.walls is None else free_floor(self.grid)
 
     def pose_of(self, place: Place) -> Pose:
         """Return the pose on the ground that a place means, upright; raises ConfigError for an unknown name."""

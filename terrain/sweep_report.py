@@ -19,6 +19,8 @@ COLUMNS = (
     "time_s",
     "path_length_m",
     "planned_length_m",
+    "geodesic_m",
+    "path_over_geodesic",
     "max_roll_deg",
     "max_pitch_deg",
     "energy_j",
@@ -57,6 +59,7 @@ def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
     for variant in sorted({row["variant"] for row in rows}):
         runs = [row for row in rows if row["variant"] == variant]
         arrived = [row for row in runs if row["success"]]
+        ratios = [row["path_over_geodesic"] for row in arrived if row.get("path_over_geodesic")]
         lines.append(
             {
                 "variant": variant or "as it is",
@@ -64,6 +67,7 @@ def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
                 "success_percent": round(100.0 * len(arrived) / len(runs), 1),
                 "median_time_s": round(median(row["time_s"] for row in arrived), 1) if arrived else "",
                 "median_length_m": round(median(row["path_length_m"] for row in arrived), 1) if arrived else "",
+                "median_path_over_geodesic": round(median(ratios), 3) if ratios else "",
                 "runs_with_mishaps": sum(bool(row["mishaps"]) for row in runs),
             }
         )

@@ -84,10 +84,11 @@ def test_a_run_that_could_not_begin_has_a_row_too(tmp_path):
 
 
 def test_the_summary_counts_per_variant_and_takes_medians_of_successes():
-    rows = [row(0), row(1), row(2, success=False), row(0, "planner=astar", success=False)]
+    rows = [row(0), row(1, path_over_geodesic=1.1), row(2, success=False), row(0, "planner=astar", success=False)]
     lines = {line["variant"]: line for line in summarise(rows)}
     assert lines["planner=cvp"]["success_percent"] == 66.7
     assert lines["planner=cvp"]["median_time_s"] == 10.5
+    assert lines["planner=cvp"]["median_path_over_geodesic"] == 1.1
     assert lines["planner=cvp"]["runs_with_mishaps"] == 2
     assert lines["planner=astar"]["median_time_s"] == ""
 
