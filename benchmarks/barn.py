@@ -24,7 +24,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path as FilePath
 
 import numpy as np
-from barn_world import GOAL, START, World, drive
+from barn_world import GOAL, START, World, drive, warm_up
 from scipy.spatial import cKDTree
 
 from mbf_abstract.plugins import PlanRequest
@@ -85,7 +85,7 @@ def drive_all(
     done = [run for run in _finished(results, settings) if (run.controller, run.world) in wanted]
     yield from done
     missing = [pair for pair in wanted if pair not in {(run.controller, run.world) for run in done}]
-    with ProcessPoolExecutor(workers) as pool:
+    with ProcessPoolExecutor(workers, initializer=warm_up, initargs=(CONFIGURATION,)) as pool:
         futures = [pool.submit(_drive, controller, number, worlds[number], settings) for controller, number in missing]
         for future in as_completed(futures):
             run = future.result()

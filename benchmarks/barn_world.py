@@ -118,6 +118,17 @@ def beam_ranges(offsets: np.ndarray, radius: float, beams: int) -> np.ndarray:
     return ranges
 
 
+def warm_up(configuration: FilePath) -> None:
+    """Compile all kernels beforehand; a first call that compiles could run into the guard for hung plugins."""
+    clock, transforms = SimClock(), TransformBuffer()
+    robot = BarnRobot(clock, transforms, World(np.array([[0.0, 0.0]]), 0.1, 10.0))
+    with Navigator.from_file(configuration, robot, clock, transforms) as navigator:
+        navigator.server.take_scan(robot.scan())
+        navigator.server.queries.update_map()
+        navigator.server.warm_up(START, GOAL)
+    robot.close()
+
+
 def drive(world: World, configuration: FilePath, controller: str, seed: int) -> tuple[str, float, str]:
     """Drive one world.
 
