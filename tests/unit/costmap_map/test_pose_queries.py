@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.map_queries import CellState, PlaceQuery
@@ -189,3 +191,30 @@ def test_path_cells_only_ignores_the_footprint(costmap, path):
 def test_a_pose_in_another_frame_is_refused(costmap):
     with pytest.raises(ValueError, match="'map', got 'odom'"):
         check_pose(costmap, UNIT_SQUARE, Pose.planar(5.0, 5.0, frame_id="odom"))
+
+
+@given(st.integers(0, 2**32 - 1), st.tuples(st.floats(0.5, 11.5), st.floats(0.5, 11.5)), st.floats(-3.0, 3.0))
+@settings(max_examples=25, deadline=None)
+def test_no_cell_nearer_than_the_one_found_fits(seed, place, yaw):
+    rng = np.random.default_rng(seed)
+    grid = Costmap(rng.choice([0, 100, 254, 255], (12, 12), p=[0.7, 0.1, 0.15, 0.05]).astype(np.uint8), 1.0)
+    outline = Footprint(rng.uniform(0.2, 1.2, (4, 2)) * [[1, 1], [-1, 1], [-1, -1], [1, -1]])
+    asked = Pose.planar(*place, yaw)
+    found = find_valid_pose(grid, outline, asked, 4.0, 0.0)
+
+    def fits(x, y):
+        return check_pose(grid, outline, Pose.planar(x, y, yaw)).state in (CellState.FREE, CellState.INSCRIBED)
+
+    home = grid.world_to_cell(*place)
+    fitting = {
+        math.dist(home, (ix, iy))
+        for iy, ix in np.ndindex(12, 12)
+        if math.dist(place, grid.cell_to_world(ix, iy)) <= 4.0 and fits(*grid.cell_to_world(ix, iy))
+    }
+    if fits(*place):
+        assert found.pose == asked
+    elif fitting:
+        assert fits(found.pose.x, found.pose.y)
+        assert math.dist(home, grid.world_to_cell(found.pose.x, found.pose.y)) == min(fitting)
+    else:
+        assert found.state not in (CellState.FREE, CellState.INSCRIBED)
