@@ -39,19 +39,34 @@ def test_it_goes_round_an_obstacle_that_appeared_after_planning(make_plugin, pla
     assert min(math.hypot(pose.x - 3.0, pose.y - 3.0) for pose in poses) > 0.4
 
 
+def drive_car(controller, pose, wheelbase, angle_tolerance):
+    """A kinematic car under a controller, for 20 s at most; the pose it comes to."""
+    for _ in range(400):
+        if controller.is_goal_reached(pose, 0.2, angle_tolerance):
+            break
+        command = controller.compute_velocity_commands(ControlRequest(pose, Twist())).command
+        assert isinstance(command, AckermannCommand) and abs(command.steering_angle) <= 0.5
+        yaw = pose.yaw + 0.05 * command.speed * math.tan(command.steering_angle) / wheelbase
+        step = 0.05 * command.speed
+        pose = Pose.planar(pose.x + step * math.cos(yaw), pose.y + step * math.sin(yaw), yaw)
+    return pose
+
+
+@pytest.mark.parametrize("heading", [math.pi / 2, -math.pi / 4, 2.5])
+def test_an_ackermann_robot_arrives_with_the_heading_of_the_goal(make_plugin, plain, heading):
+    controller = make_plugin(MPPIController, plain(), motion_model="ackermann", wheelbase=0.4)
+    points = [(x, 2.5, 0.0) for x in np.linspace(0.8, 4.4, 37)]
+    goal = Pose.planar(4.4, 2.5, heading)
+    controller.set_plan(Path.from_points(points, goal.orientation))
+    pose = drive_car(controller, Pose.planar(0.8, 2.5), 0.4, angle_tolerance=0.25)
+    assert controller.is_goal_reached(pose, 0.2, 0.25), (pose, heading)
+
+
 def test_an_ackermann_robot_gets_steering_and_reaches_the_goal(make_plugin, plain, pose_on):
     mesh_map = plain()
     controller = make_plugin(MPPIController, mesh_map, motion_model="ackermann", wheelbase=0.4)
     controller.set_plan(Path.from_points([(0.8, 1.0, 0.0), (3.0, 1.2, 0.0), (4.5, 2.5, 0.0), (4.8, 4.8, 0.0)]))
-    pose = Pose.planar(0.8, 1.0)
-    for _ in range(400):
-        if controller.is_goal_reached(pose, 0.2, math.pi):
-            break
-        command = controller.compute_velocity_commands(ControlRequest(pose, Twist())).command
-        assert isinstance(command, AckermannCommand) and abs(command.steering_angle) <= 0.5
-        yaw = pose.yaw + 0.05 * command.speed * math.tan(command.steering_angle) / 0.4
-        step = 0.05 * command.speed
-        pose = Pose.planar(pose.x + step * math.cos(yaw), pose.y + step * math.sin(yaw), yaw)
+    pose = drive_car(controller, Pose.planar(0.8, 1.0), 0.4, angle_tolerance=math.pi)
     assert controller.is_goal_reached(pose, 0.2, math.pi), pose
 
 

@@ -1,0 +1,117 @@
+"""The last stretch of a path for a robot that cannot turn on the spot: it has to come in along the goal's heading.
+
+Where the path arrives otherwise, its end is replaced by the shortest curve of two arcs and a line between (Dubins 1957;
+the lengths after Shkel and Lumelsky, "Classification of the Dubins set", 2001), laid out in the goal's tangent plane
+and put onto the surface.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Path
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.path_progress import PathProgress
+
+_SMALL_CORNER = 0.2  # [rad] between the path's end and the goal's heading: driven without an approach
+_LEAVING = (1.0, 2.0, 3.0, 4.0, 6.0)  # turning radii before the goal at which the curve may leave the path
+_STRAIGHT = 0.3  # [m] straight ahead at the end, to settle in
+_SPACING = 0.1  # [m]
+_SIDES = {"L": 1.0, "S": 0.0, "R": -1.0}
+
+
+def with_final_approach(path: Path, mesh_map: MeshMap, blocked: NDArray[np.bool_], turning_radius: float) -> Path:
+    """Bend the end of a path so that it arrives with the heading of its last pose.
+
+    The path stays as it is where it arrives that way already, or where no curve fits on the free surface.
+
+    Parameters
+    ----------
+    blocked : (V,) bool
+        Vertices the curve must not come near.
+    turning_radius : float
+        Of the arcs [m].
+    """
+    progress = PathProgress(path, window=0.0)
+    if progress.length < _SPACING or _corner_at_goal(path) < _SMALL_CORNER:
+        return path
+    best, best_length = path, np.inf
+    for distance in [radii * turning_radius for radii in _LEAVING]:
+        leaves_at = max(progress.length - distance, 0.0)
+        curve = _curve_to_goal(path, progress, leaves_at, turning_radius)
+        spots = mesh_map.locate(curve, distance + turning_radius)
+        fits = (spots.faces >= 0).all() and not blocked[mesh_map.faces[spots.faces]].any()
+        length = leaves_at + _SPACING * len(curve)
+        if fits and length < best_length:
+            kept = path.positions[progress.arc_lengths < leaves_at]
+            positions = np.concatenate([kept, spots.points, path.positions[-1:]])
+            best = Path.from_points(positions, path[-1].orientation, frame_id=path.frame_id, stamp=path.stamp)
+            best_length = length
+    return best
+
+
+def _corner_at_goal(path: Path) -> float:
+    """Angle [rad] between the last step of a path and the heading of its last pose."""
+    step = path.positions[-1] - path.positions[-2]
+    cosine = float(step @ path[-1].rotation[:, 0]) / max(float(np.linalg.norm(step)), 1e-9)
+    return math.acos(min(max(cosine, -1.0), 1.0))
+
+
+def _curve_to_goal(path: Path, progress: PathProgress, leaves_at: float, radius: float) -> NDArray[np.float64]:
+    """Points (n, 3) in the goal's tangent plane, from ``leaves_at`` [m] of the path to the straight piece at its end."""
+    goal = path[-1]
+    start, ahead = progress.points_at(np.array([leaves_at, leaves_at + 0.5 * _SPACING])) @ goal.rotation
+    end = path.positions[-1] - _STRAIGHT * goal.rotation[:, 0]
+    x, y, _ = start - end @ goal.rotation
+    yaw = math.atan2(ahead[1] - start[1], ahead[0] - start[0])
+    flat = dubins_curve((x, y, yaw), radius, _SPACING)
+    flat = np.concatenate([flat, [[0.0, 0.0]]])
+    return np.asarray(np.column_stack([flat, np.zeros(len(flat))]) @ goal.rotation.T + end)
+
+
+def dubins_curve(start: tuple[float, float, float], radius: float, spacing: float) -> NDArray[np.float64]:
+    """Shortest arc, line, arc from a pose (x, y, yaw) to the origin looking along x.
+
+    Returns
+    -------
+    (n, 2) float64
+        Points [m] every ``spacing`` [m], the start included, the origin not.
+    """
+    x, y, yaw = start
+    distance, bearing = math.hypot(x, y) / radius, math.atan2(-y, -x)
+    words = _words(distance, (yaw - bearing) % math.tau, -bearing % math.tau)
+    name, lengths = min(words.items(), key=lambda word: sum(word[1]))
+    # Turn rate along the curve, sampled in the middle of every step.
+    along = np.arange(0.0, sum(lengths) * radius, spacing)
+    edges = np.cumsum(lengths) * radius
+    sides = np.array([_SIDES[side] for side in name])
+    corners = np.concatenate([[0.0], edges])
+    headings = yaw + np.concatenate([[0.0], np.cumsum(sides * np.diff(corners) / radius)])
+    points = [np.array([x, y])]
+    for begin, end in itertools.pairwise(along):
+        heading = float(np.interp(0.5 * (begin + end), corners, headings))
+        points.append(points[-1] + (end - begin) * np.array([math.cos(heading), math.sin(heading)]))
+    return np.array(points)
+
+
+def _words(d: float, a: float, b: float) -> dict[str, tuple[float, float, float]]:
+    """Lengths in radii of the curves that exist between the headings a and b [rad], ``d`` radii apart."""
+    words = {}
+    for name, side in (("LSL", 1.0), ("RSR", -1.0)):
+        squared = 2.0 + d * d - 2.0 * math.cos(a - b) + 2.0 * d * side * (math.sin(a) - math.sin(b))
+        turn = math.atan2(side * (math.cos(b) - math.cos(a)), d + side * (math.sin(a) - math.sin(b)))
+        arcs = side * (turn - a) % math.tau, side * (b - turn) % math.tau
+        words[name] = arcs[0], math.sqrt(max(squared, 0.0)), arcs[1]
+    for name, side in (("LSR", 1.0), ("RSL", -1.0)):
+        squared = d * d - 2.0 + 2.0 * math.cos(a - b) + 2.0 * d * side * (math.sin(a) + math.sin(b))
+        if squared < 0.0:
+            continue
+        line = math.sqrt(squared)
+        turn = math.atan2(-side * (math.cos(a) + math.cos(b)), d + side * (math.sin(a) + math.sin(b)))
+        turn -= math.atan2(-2.0 * side, line)
+        words[name] = side * (turn - a) % math.tau, line, side * (turn - b) % math.tau
+    return words

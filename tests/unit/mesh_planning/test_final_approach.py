@@ -1,0 +1,54 @@
+"""The curve on which a car comes in along the heading of the goal."""
+
+import math
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbf_abstract.geometry import Path, Pose
+from mbf_mesh_nav.final_approach import dubins_curve, with_final_approach
+
+PLACES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-math.pi, math.pi))
+
+
+@given(start=PLACES, radius=st.floats(0.3, 1.5))
+@settings(max_examples=80, deadline=None)
+def test_the_curve_leads_to_the_origin_along_x_and_never_turns_tighter_than_the_radius(start, radius):
+    curve = np.concatenate([dubins_curve(start, radius, 0.01), [[0.0, 0.0]]])
+    steps = np.diff(curve, axis=0)
+    assert np.linalg.norm(steps, axis=1).max() < 0.02
+    if len(curve) > 3:
+        headings = np.unwrap(np.arctan2(steps[:-1, 1], steps[:-1, 0]))
+        assert abs(math.remainder(headings[-1], math.tau)) < 0.02 / radius + 1e-6
+        assert abs(math.remainder(headings[0] - start[2], math.tau)) < 0.02 / radius + 1e-6
+        assert np.abs(np.diff(headings)).max() <= 0.01 / radius + 1e-6
+
+
+def straight_path(heading):
+    points = [(x, 2.5, 0.0) for x in np.linspace(0.8, 4.4, 37)]
+    return Path.from_points(points, Pose.planar(4.4, 2.5, heading).orientation)
+
+
+def test_the_path_keeps_its_beginning_and_its_last_pose(plain):
+    mesh_map = plain()
+    path = straight_path(math.pi / 2)
+    bent = with_final_approach(path, mesh_map, mesh_map.snapshot().lethal, 0.7)
+    np.testing.assert_allclose(bent.positions[0], path.positions[0])
+    assert bent.positions[-1].tolist() == path.positions[-1].tolist()
+    last = bent.positions[-2] - bent.positions[-5]
+    assert math.atan2(last[1], last[0]) > math.pi / 2 - 0.3
+
+
+def test_a_path_that_arrives_with_the_heading_is_left_alone(plain):
+    mesh_map = plain()
+    path = straight_path(0.1)
+    assert with_final_approach(path, mesh_map, mesh_map.snapshot().lethal, 0.7) is path
+
+
+def test_a_curve_that_does_not_fit_between_walls_is_not_taken(plain, paint):
+    corridor = paint(plain(), lambda v: np.where(abs(v[:, 1] - 2.5) > 0.45, np.inf, 0.0))
+    path = straight_path(math.pi / 2)
+    blocked = corridor.snapshot().lethal
+    assert with_final_approach(path, corridor, blocked, 0.7) is path
+    assert with_final_approach(path, corridor, np.zeros_like(blocked), 0.7) is not path
