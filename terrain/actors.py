@@ -1,4 +1,4 @@
-"""Things that move by themselves: people and carts on routes, doors that close. Only sensors see them.
+"""Things that move by themselves: people and other robots on routes, doors that close. Only sensors see them.
 
 Their positions are functions of the world's time and of what they were made with, nothing else; seeds go into the
 routes. They are as heavy as walls: a robot in their way is pushed.
@@ -9,23 +9,48 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from mbf_abstract.geometry import Pose
+from terrain.mishaps import Thing
 from terrain.occupancy import OccupancyGrid
+from terrain.recording import RobotShape
+from terrain.robot_models import RobotSpec
+from terrain.solids import box_triangles, cylinder_triangles, joined
 from terrain.world import BulletWorld
 
 FloatArray = NDArray[np.float64]
 
+Triangles = tuple[FloatArray, NDArray[np.int32]]
+
 PERSON_RADIUS, PERSON_HEIGHT = 0.25, 1.7
+PERSON_SIZE = (PERSON_RADIUS, PERSON_HEIGHT)
 MAX_ROUTE_DRAWS = 10_000
 
 
+class Actor(Protocol):
+    """What ``Recorder`` needs to know of a thing that moves.
+
+    Attributes
+    ----------
+    thing : Thing
+    looks : (V, 3) float64, (F, 3) int32
+        Triangles in the actor's own frame [m].
+    """
+
+    thing: Thing
+    looks: Triangles
+
+    def pose(self) -> Pose:
+        """Pose of the actor's frame now."""
+
+
 class RouteWalker:
-    """An upright cylinder that walks a closed route of straight lines at constant speed.
+    """Somebody or something that follows a closed route of straight lines at constant speed.
 
     Parameters
     ----------
@@ -36,6 +61,11 @@ class RouteWalker:
         [m/s]
     start : float
         How far along the route [m] it is at time 0.
+    size : (2,) or (3,) float
+        Radius and height of an upright cylinder, or length, width and height of a box [m].
+    thing : Thing
+    looks : triangles, optional
+        In the frame of its middle; those of the cylinder or box where absent.
     """
 
     def __init__(
@@ -44,8 +74,9 @@ class RouteWalker:
         route: FloatArray,
         speed: float,
         start: float = 0.0,
-        radius: float = PERSON_RADIUS,
-        height: float = PERSON_HEIGHT,
+        size: Sequence[float] = PERSON_SIZE,
+        thing: Thing = Thing.PERSON,
+        looks: Triangles | None = None,
     ) -> None:
         corners = np.asarray(route, dtype=float)
         if corners.shape[1] == 2:
@@ -55,12 +86,20 @@ class RouteWalker:
         self._world = world
         self._speed = speed
         self._start = start
-        self._lift = 0.5 * height
-        self.body = world.add_cylinder(self.pose(), radius, height, moving=True)
+        self._lift = 0.5 * size[-1]
+        self.thing = thing
+        if len(size) == 2:
+            radius, height = size
+            self.body = world.add_cylinder(self.pose(), radius, height, moving=True)
+            self.looks = looks or cylinder_triangles(radius, height)
+        else:
+            self.body = world.add_box(self.pose(), size, moving=True)
+            self.looks = looks or box_triangles(size)
+        world.things[self.body] = thing
         world.before_step(self._move)
 
     def pose(self) -> Pose:
-        """Pose of the cylinder's middle now."""
+        """Pose of its middle now."""
         length = float(self._travelled[-1])
         along = (self._start + self._speed * self._world.time) % length if length > 0.0 else 0.0
         x, y, z = (float(np.interp(along, self._travelled, self._corners[:, k])) for k in range(3))
@@ -99,7 +138,9 @@ class SlidingDoor:
         self._orientation = closed.orientation
         self._closes_at = closes_at
         self._duration = duration
+        self.thing, self.looks = Thing.DOOR, box_triangles(size)
         self.body = world.add_box(opened, size, moving=True)
+        world.things[self.body] = self.thing
         world.before_step(self._move)
 
     def pose(self) -> Pose:
@@ -110,6 +151,28 @@ class SlidingDoor:
 
     def _move(self) -> None:
         self._world.place_body(self.body, self.pose())
+
+
+def other_robot(
+    world: BulletWorld, spec: RobotSpec, route: FloatArray, speed: float, start: float = 0.0
+) -> RouteWalker:
+    """Put in another robot that follows a route: a box as large as the model, with its body and wheels to look at."""
+    length, width = np.ptp(spec.footprint_array(), axis=0).tolist()
+    size = (length, width, spec.height)
+    return RouteWalker(world, route, speed, start, size, Thing.ROBOT, _robot_looks(spec, size))
+
+
+def _robot_looks(spec: RobotSpec, size: tuple[float, float, float]) -> Triangles:
+    """A narrower body above the axles, and the wheels, in the frame of the middle of the box of ``size``."""
+    length, width, height = size
+    radius = spec.wheel_radius
+    body, body_faces = box_triangles((length, 0.7 * width, height - radius))
+    drum, drum_faces = cylinder_triangles(radius, 0.64 * radius)
+    drum = drum[:, [0, 2, 1]] * (1.0, -1.0, 1.0)  # a quarter turn about x lays its axis along y
+    middle = 0.5 * (spec.footprint_array().min(axis=0) + spec.footprint_array().max(axis=0))  # base_link may be off it
+    wheels = RobotShape.of(spec).wheels - np.array([*middle, 0.5 * height])
+    raised = body + np.array([0.0, 0.0, 0.5 * radius])
+    return joined([(raised, body_faces), *((drum + wheel, drum_faces) for wheel in wheels)])
 
 
 def random_route(

@@ -154,7 +154,7 @@ class Bench:
         shape = RobotShape.of(self.robot.spec)
         recorder = Recorder(self.scenario.name, self.backend, shape, self.robot.pose(), self.goals)
         recorder.ground, recorder.walls = self.world.ground, self.world.walls
-        recorder.obstacles = self._obstacles
+        recorder.obstacles, recorder.actors = self._obstacles, self.world.actors
         return recorder
 
     def _record_plan(self, handle: AnyGoalHandle) -> None:

@@ -17,7 +17,7 @@ from mbf_abstract.geometry import Command, Pose, Twist, normalize_angle
 from mbf_abstract.robot import Odometry
 from terrain.drive import commanded_twist
 from terrain.heightfield import Heightfield
-from terrain.mishaps import MotionSample
+from terrain.mishaps import MotionSample, Thing
 from terrain.occupancy import OccupancyGrid, wall_triangles
 from terrain.robot_models import RobotSpec
 
@@ -184,7 +184,8 @@ class KinematicRobot:
         """Collect what ``MishapMonitor`` looks at."""
         commanded = commanded_twist(self.spec, self._command)
         velocity = self.velocity()
-        return MotionSample(self.pose(), velocity, commanded, velocity, body_on_obstacle=self._blocked)
+        touched = frozenset({Thing.WALL}) if self._blocked else frozenset()
+        return MotionSample(self.pose(), velocity, commanded, velocity, touched=touched)
 
 
 def _approach(value: float, target: float, most: float) -> float:

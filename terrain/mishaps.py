@@ -15,14 +15,27 @@ from enum import Enum
 from mbf_abstract.geometry import Pose, Twist
 
 
+class Thing(Enum):
+    """What the robot can touch that is not the ground; everything fixed is a wall."""
+
+    WALL = "wall"
+    DOOR = "door"
+    PERSON = "person"
+    ROBOT = "robot"
+
+
 class MishapKind(Enum):
-    """What went wrong."""
+    """What went wrong; a collision counts as such and by what was hit."""
 
     TIPPED_OVER = "tipped_over"
     SLIPPING = "slipping"
     HIGH_CENTRED = "high_centred"
     STUCK = "stuck"
     COLLISION = "collision"
+    COLLISION_WITH_WALL = "collision_with_wall"
+    COLLISION_WITH_DOOR = "collision_with_door"
+    COLLISION_WITH_PERSON = "collision_with_person"
+    COLLISION_WITH_ROBOT = "collision_with_robot"
 
 
 @dataclass(frozen=True)
@@ -37,8 +50,10 @@ class MotionSample:
         Motion asked for.
     rolling : Twist
         Motion that the turning wheels would make without slip.
-    body_on_ground, body_on_obstacle : bool
-        Whether the body touches the ground, or any part touches something that is not ground.
+    body_on_ground : bool
+        Whether the body touches the ground.
+    touched : frozenset of Thing
+        What any part touches that is not ground.
     power : float
         Mechanical power of the motors [W], losses counted positive.
     """
@@ -48,7 +63,7 @@ class MotionSample:
     commanded: Twist
     rolling: Twist
     body_on_ground: bool = False
-    body_on_obstacle: bool = False
+    touched: frozenset[Thing] = frozenset()
     power: float = 0.0
 
 
@@ -140,7 +155,8 @@ class MishapMonitor:
             (MishapKind.SLIPPING, limits.slip_hold, lambda s: slip_speed(s) > limits.slip_speed),
             (MishapKind.HIGH_CENTRED, 0.0, lambda s: s.body_on_ground and standing >= limits.high_centred_hold),
             (MishapKind.STUCK, 0.0, lambda s: standing >= limits.stuck_hold),
-            (MishapKind.COLLISION, 0.0, lambda s: s.body_on_obstacle),
+            (MishapKind.COLLISION, 0.0, lambda s: bool(s.touched)),
+            *((MishapKind(f"collision_with_{t.value}"), 0.0, lambda s, t=t: t in s.touched) for t in Thing),
         ]
         return [
             Mishap(kind, sample.pose.stamp, sample.pose)

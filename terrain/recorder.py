@@ -15,6 +15,8 @@ from numpy.typing import ArrayLike
 from mbf_abstract.events import Event
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.map_view import GridView, MapView
+from terrain.actor_track import ActorTrack
+from terrain.actors import Actor
 from terrain.recorded_grid import RecordedGrid
 from terrain.recording import Recording, RobotShape, StampedPoints, Surface
 
@@ -33,6 +35,8 @@ class Recorder:
     start : Pose
     goals : sequence of Pose
         More may be added to ``goals`` during the run.
+    actors : sequence of Actor
+        What moves by itself; looked at with every sample.
     """
 
     scenario: str
@@ -46,6 +50,8 @@ class Recorder:
     paths: list[StampedPoints] = field(default_factory=list)
     scans: list[StampedPoints] = field(default_factory=list)
     grids: list[RecordedGrid] = field(default_factory=list)
+    actors: Sequence[Actor] = ()
+    _actor_poses: list[list[list[float]]] = field(default_factory=list)
     _samples: list[list[float]] = field(default_factory=list)
 
     def sample(self, time: float, pose: Pose, velocity: Twist, command: Command) -> None:
@@ -53,6 +59,7 @@ class Recorder:
         asked = [command.vx, command.vy, command.wz] if isinstance(command, Twist) else [command.speed, 0.0, 0.0]
         row = [time, *pose.position, *pose.orientation, velocity.vx, velocity.vy, velocity.wz, *asked]
         self._samples.append(row)
+        self._actor_poses.append([[*p.position, *p.orientation] for p in (actor.pose() for actor in self.actors)])
 
     def path(self, time: float, points: ArrayLike) -> None:
         """Add a plan (m, 3) [m] that the robot follows from now on."""
@@ -93,4 +100,9 @@ class Recorder:
             outcome=outcome,
             message=message,
             grids=list(self.grids),
+            actors=self._actor_tracks(),
         )
+
+    def _actor_tracks(self) -> list[ActorTrack]:
+        poses = np.array(self._actor_poses, dtype=np.float64).reshape(len(self._samples), len(self.actors), 7)
+        return [ActorTrack(a.thing.value, *a.looks, poses[:, number]) for number, a in enumerate(self.actors)]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.events import Event
 from mbf_abstract.geometry import Pose
+from terrain.actor_track import ActorTrack, track_arrays, tracks_from
 from terrain.recorded_grid import RecordedGrid, grid_arrays, grids_from
 from terrain.robot_models import Drive, RobotSpec
 
@@ -107,6 +108,8 @@ class Recording:
     events : tuple of Event
     grids : list of RecordedGrid
         The map the plans were made on, where it is a grid; seldom enough that the file stays small.
+    actors : list of ActorTrack
+        What moved by itself.
     """
 
     scenario: str
@@ -128,6 +131,7 @@ class Recording:
     outcome: str
     message: str
     grids: list[RecordedGrid] = field(default_factory=list)
+    actors: list[ActorTrack] = field(default_factory=list)
 
     @cached_property
     def tilt(self) -> FloatArray:
@@ -149,7 +153,7 @@ class Recording:
             arrays |= _surface_arrays(name, getattr(self, name))
         for name in ("paths", "scans"):
             arrays |= _stamped_arrays(name, getattr(self, name))
-        arrays |= grid_arrays(self.grids)
+        arrays |= grid_arrays(self.grids) | track_arrays(self.actors)
         words: dict[str, Any] = {
             name: getattr(self, name) for name in ("scenario", "backend", "success", "outcome", "message")
         }
@@ -233,4 +237,5 @@ def _recording_from(arrays: dict[str, Any]) -> Recording:
         outcome=words["outcome"],
         message=words["message"],
         grids=grids_from(arrays),
+        actors=tracks_from(arrays),
     )

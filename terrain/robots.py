@@ -23,7 +23,7 @@ from mbf_abstract.geometry import (
 from mbf_abstract.robot import Odometry
 from terrain.bullet import quiet_native_output
 from terrain.drive import commanded_twist, twist_from_wheels, wheel_targets
-from terrain.mishaps import MotionSample
+from terrain.mishaps import MotionSample, Thing
 from terrain.robot_models import Drive, RobotSpec
 from terrain.world import ROBOT, BulletWorld
 
@@ -213,13 +213,13 @@ class WheeledRobot:
         pose, velocity = self._state()
         left, right, steering, power = self.wheel_state()
         rolling = twist_from_wheels(self.spec, left, right, steering)
-        on_ground, on_obstacle = self._contacts()
+        on_ground, touched = self._contacts()
         commanded = commanded_twist(self.spec, self._command)
-        return MotionSample(pose, velocity, commanded, rolling, on_ground, on_obstacle, power)
+        return MotionSample(pose, velocity, commanded, rolling, on_ground, touched, power)
 
-    def _contacts(self) -> tuple[bool, bool]:
-        """Whether the body lies on the ground, and whether any part touches something that is not ground."""
-        on_ground = on_obstacle = False
+    def _contacts(self) -> tuple[bool, frozenset[Thing]]:
+        """Whether the body lies on the ground, and what any part touches that is not ground."""
+        on_ground, touched = False, set[Thing]()
         for contact in self._bullet.getContactPoints(bodyA=self.body, physicsClientId=self.world.client):
             other, link, distance = contact[2], contact[3], contact[8]
             if distance > TOUCHING_DISTANCE or other == self.body:
@@ -227,8 +227,8 @@ class WheeledRobot:
             if other in self.world.ground_bodies:
                 on_ground |= link == BODY_LINK
             else:
-                on_obstacle = True
-        return on_ground, on_obstacle
+                touched.add(self.world.things.get(other, Thing.WALL))
+        return on_ground, frozenset(touched)
 
 
 def _vector(values: np.ndarray[Any, Any]) -> Vector3:

@@ -1,4 +1,4 @@
-"""What moves by itself in a scenario: walkers on a route, a crowd on routes drawn from the seed, sliding doors."""
+"""What moves by itself in a scenario: walkers and other robots on routes, a crowd on drawn routes, sliding doors."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
-from terrain.actors import PERSON_HEIGHT, PERSON_RADIUS, RouteWalker, SlidingDoor, random_route
+from terrain.actors import PERSON_HEIGHT, PERSON_RADIUS, RouteWalker, SlidingDoor, other_robot, random_route
 from terrain.occupancy import OccupancyGrid
+from terrain.robot_models import ROBOTS
 from terrain.scenario_places import PlanarPose
 from terrain.scenario_world import ScenarioWorld
 
@@ -25,6 +26,16 @@ class Walker(ParameterModel):
     start: float = parameter(0.0, "How far along the route it starts.", unit="m", ge=0.0)
     radius: float = parameter(PERSON_RADIUS, "Of the upright cylinder it is.", unit="m", gt=0.0)
     height: float = parameter(PERSON_HEIGHT, "Of the upright cylinder it is.", unit="m", gt=0.0)
+
+
+class OtherRobot(ParameterModel):
+    """Another robot that drives a closed route again and again, whatever is in its way."""
+
+    type: Literal["robot"]
+    model: Literal["husky", "turtlebot", "car"] = parameter("turtlebot", "Its size and looks.")
+    route: tuple[tuple[float, float], ...] = parameter(..., "Corners; the last leg leads back to the first.", unit="m")
+    speed: float = parameter(0.5, "Speed.", unit="m/s", ge=0.0, le=5.0)
+    start: float = parameter(0.0, "How far along the route it starts.", unit="m", ge=0.0)
 
 
 class Crowd(ParameterModel):
@@ -48,28 +59,38 @@ class Door(ParameterModel):
     duration: float = parameter(2.0, "How long it takes to close.", unit="s", gt=0.0)
 
 
-Actor = Annotated[Walker | Crowd | Door, Field(discriminator="type")]
+Actor = Annotated[Walker | OtherRobot | Crowd | Door, Field(discriminator="type")]
 
 
-def add_actors(world: ScenarioWorld, actors: Sequence[Walker | Crowd | Door], rng: np.random.Generator) -> None:
-    """Put the actors of a scenario into its world; routes of crowds come from ``rng``."""
+def add_actors(
+    world: ScenarioWorld, actors: Sequence[Walker | OtherRobot | Crowd | Door], rng: np.random.Generator
+) -> None:
+    """Put the actors of a scenario into its world and its list; routes of crowds come from ``rng``."""
     for actor in actors:
-        if isinstance(actor, Walker):
-            corners = [(x, y, world.height_at(x, y)) for x, y in actor.route]
-            RouteWalker(world.bullet, np.array(corners), actor.speed, actor.start, actor.radius, actor.height)
-        elif isinstance(actor, Crowd):
-            _add_crowd(world, actor, rng)
-        else:
+        if isinstance(actor, Crowd):
+            world.actors.extend(_crowd(world, actor, rng))
+        elif isinstance(actor, Door):
             opened, closed = (_leaf_pose(world, place, actor.size[2]) for place in (actor.opened, actor.closed))
-            SlidingDoor(world.bullet, opened, closed, actor.size, actor.closes_at, actor.duration)
+            world.actors.append(SlidingDoor(world.bullet, opened, closed, actor.size, actor.closes_at, actor.duration))
+        else:
+            route = np.array([(x, y, world.height_at(x, y)) for x, y in actor.route])
+            world.actors.append(_on_route(world, actor, route))
 
 
-def _add_crowd(world: ScenarioWorld, crowd: Crowd, rng: np.random.Generator) -> None:
+def _on_route(world: ScenarioWorld, actor: Walker | OtherRobot, route: FloatArray) -> RouteWalker:
+    if isinstance(actor, OtherRobot):
+        return other_robot(world.bullet, ROBOTS[actor.model], route, actor.speed, actor.start)
+    return RouteWalker(world.bullet, route, actor.speed, actor.start, (actor.radius, actor.height))
+
+
+def _crowd(world: ScenarioWorld, crowd: Crowd, rng: np.random.Generator) -> list[RouteWalker]:
     if world.grid is None:
         raise ValueError("a crowd needs a world with a 2D map to draw its routes on")
     grid = _part_of(world.grid, crowd)
-    for _ in range(crowd.count):
+    return [
         RouteWalker(world.bullet, random_route(grid, rng), crowd.speed, float(rng.uniform(0.0, 20.0)))
+        for _ in range(crowd.count)
+    ]
 
 
 def _part_of(grid: OccupancyGrid, crowd: Crowd) -> OccupancyGrid:

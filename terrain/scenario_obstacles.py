@@ -7,12 +7,11 @@ from collections.abc import Callable, Iterable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.recording import Surface
-from terrain.solids import box_triangles, cylinder_triangles
+from terrain.solids import box_triangles, cylinder_triangles, joined
 from terrain.world import BulletWorld
 
 DRAWS_PER_POST = 100
@@ -56,8 +55,7 @@ def add_obstacles(
     bullet: BulletWorld, obstacles: Iterable[Obstacle], height_at: Callable[[float, float], float]
 ) -> Surface | None:
     """Stand the obstacles on the ground; return them as one surface to look at."""
-    vertices: list[FloatArray] = []
-    faces: list[NDArray[np.integer]] = []
+    parts = []
     for obstacle in obstacles:
         length, _, height = obstacle.size
         pose = Pose.planar(obstacle.x, obstacle.y, obstacle.yaw, height_at(obstacle.x, obstacle.y) + 0.5 * height)
@@ -67,8 +65,5 @@ def add_obstacles(
         else:
             bullet.add_cylinder(pose, 0.5 * length, height)
             corners, triangles = cylinder_triangles(0.5 * length, height)
-        faces.append(triangles + sum(len(part) for part in vertices))
-        vertices.append(corners @ pose.rotation.T + np.array(pose.position))
-    if not vertices:
-        return None
-    return Surface(np.concatenate(vertices), np.concatenate(faces).astype(np.int32))
+        parts.append((corners @ pose.rotation.T + np.array(pose.position), triangles))
+    return Surface(*joined(parts)) if parts else None

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray, Pose
+from terrain.actors import Actor
 from terrain.floor_plan import write_map
 from terrain.heightfield import Heightfield
 from terrain.indoor import add_building
@@ -47,6 +48,8 @@ class ScenarioWorld:
         2D map of it, where there is one.
     places : mapping of str to Pose
         Places with a name.
+    actors : list of Actor
+        What moves by itself; a scenario adds them.
     """
 
     bullet: BulletWorld
@@ -56,6 +59,7 @@ class ScenarioWorld:
     walls: Surface | None = None
     grid: OccupancyGrid | None = None
     places: Mapping[str, Pose] = field(default_factory=dict)
+    actors: list[Actor] = field(default_factory=list)
 
     def open_surface(self) -> Surface:
         """Return what a robot may drive on: the ground, in a building only its free cells."""

@@ -29,6 +29,13 @@ def box_triangles(size: Sequence[float]) -> tuple[FloatArray, IntArray]:
     return BOX_CORNERS * np.asarray(size, dtype=float), BOX_FACES.copy()
 
 
+def joined(parts: Sequence[tuple[FloatArray, IntArray]]) -> tuple[FloatArray, IntArray]:
+    """All parts as one mesh."""
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
+    faces = [faces + np.int32(start) for (_, faces), start in zip(parts, starts, strict=True)]
+    return np.concatenate([vertices for vertices, _ in parts]), np.concatenate(faces)
+
+
 def cylinder_triangles(radius: float, height: float, sides: int = 24) -> tuple[FloatArray, IntArray]:
     """Upright cylinder as a prism of ``sides``: vertices (2 * sides + 2, 3), faces (4 * sides, 3)."""
     angle = 2.0 * np.pi * np.arange(sides) / sides

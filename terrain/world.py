@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from mbf_abstract.geometry import Pose
 from terrain.bullet import load_pybullet, quiet_native_output
 from terrain.heightfield import Heightfield
+from terrain.mishaps import Thing
 from terrain.solids import box_triangles, cylinder_triangles
 
 FloatArray = NDArray[np.float64]
@@ -66,6 +67,8 @@ class BulletWorld:
         Steps since the clock was started (see ``restart_clock``); ``time`` is derived from it and thus exact.
     ground_bodies : set of int
         Bodies that are there to be driven on; touching any other counts as a collision.
+    things : dict of int to Thing
+        What bodies are that are not simply fixed, to tell collisions apart.
     """
 
     def __init__(self, time_step: float = TIME_STEP) -> None:
@@ -75,6 +78,7 @@ class BulletWorld:
             self.client: int = self.bullet.connect(self.bullet.DIRECT)
         self.step_count = 0
         self.ground_bodies: set[int] = set()
+        self.things: dict[int, Thing] = {}
         self.has_moving_bodies = False
         self._static: list[tuple[FloatArray, IntArray]] = []
         self._folder = tempfile.TemporaryDirectory(prefix="mbf_world_")

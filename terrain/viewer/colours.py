@@ -21,6 +21,7 @@ FLOOR: Colour = (222, 220, 212)
 SCAN: Colour = (220, 30, 40)
 BODY: Colour = (245, 190, 40)
 WHEEL: Colour = (40, 40, 44)
+ACTORS: dict[str, Colour] = {"person": (150, 60, 190), "door": (120, 90, 60), "robot": (0, 140, 160)}
 
 SLOPE_STOPS = np.array([0.0, 10.0, 20.0, 30.0, 45.0])  # degrees
 SLOPE_COLOURS = np.array(

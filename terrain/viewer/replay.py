@@ -19,6 +19,7 @@ from terrain.recording import Recording
 from terrain.viewer.page_server import page_server
 from terrain.viewer.replay_panel import with_panel
 from terrain.viewer.scene import (
+    ActorModels,
     RobotModel,
     add_path,
     add_scan,
@@ -51,9 +52,10 @@ def replay_html(recording: Recording) -> str:
         look_at_route(server.initial_camera, recording)
         add_world(server.scene, recording)
         robot = RobotModel(server.scene, recording.robot, pin_height(recording))
+        actors = ActorModels(server.scene, recording.actors)
         serializer = server.get_scene_serializer()
         if len(recording.times):
-            _Player(server, serializer, recording, robot).play()
+            _Player(server, serializer, recording, robot, actors).play()
         page: str = serializer.as_html()
     return with_panel(page, recording.events)
 
@@ -61,11 +63,14 @@ def replay_html(recording: Recording) -> str:
 class _Player:
     """Plays a recording into a serializer, frame by frame."""
 
-    def __init__(self, server: Any, serializer: Any, recording: Recording, robot: RobotModel) -> None:
+    def __init__(
+        self, server: Any, serializer: Any, recording: Recording, robot: RobotModel, actors: ActorModels
+    ) -> None:
         self._scene = server.scene
         self._serializer = serializer
         self._recording = recording
         self._robot = robot
+        self._actors = actors
         self._frames = frame_indices(recording.times)
         self._scans = _thinned(recording.scans, MAX_SCANS)
         self._next_path = 0
@@ -79,6 +84,7 @@ class _Player:
         for number, (index, following) in enumerate(zip(frames, [*frames[1:], frames[-1]], strict=True)):
             now = float(recording.times[index])
             self._robot.place(recording.poses[index], angles[index], status_text(recording, int(index)))
+            self._actors.place(int(index))
             self._show_new_plans(now)
             self._show_newest_scan(now)
             if number % piece == 0 or index == frames[-1]:

@@ -6,14 +6,17 @@ cut low, as in a doll's house, so that one can look into rooms.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
+from terrain.actor_track import ActorTrack
 from terrain.recording import Recording, RobotShape, Surface
 from terrain.viewer.colours import (
+    ACTORS,
     BODY,
     DRIVEN,
     GOAL,
@@ -183,6 +186,29 @@ class RobotModel:
             wheel.wxyz = (np.cos(angle / 2.0), 0.0, np.sin(angle / 2.0), 0.0)
         if self._label.text != text:
             self._label.text = text
+
+
+class ActorModels:
+    """People, doors and other robots of a recording in the scene, placed together.
+
+    Parameters
+    ----------
+    scene : viser.SceneApi
+    tracks : sequence of ActorTrack
+    """
+
+    def __init__(self, scene: Scene, tracks: Sequence[ActorTrack]) -> None:
+        self._tracks = tracks
+        self._frames = [scene.add_frame(f"/actor_{k}", show_axes=False) for k in range(len(tracks))]
+        for number, track in enumerate(tracks):
+            colour = ACTORS.get(track.thing, OBSTACLE)
+            _add_solid(scene, f"/actor_{number}/{track.thing}", Surface(track.vertices, track.faces), colour)
+
+    def place(self, index: int) -> None:
+        """Move all to where they were at a sample of the recording."""
+        for frame, track in zip(self._frames, self._tracks, strict=True):
+            x, y, z, qx, qy, qz, qw = track.poses[index].tolist()
+            frame.position, frame.wxyz = (x, y, z), (qw, qx, qy, qz)
 
 
 def wheel_angles(shape: RobotShape, times: FloatArray, twists: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from terrain.ego_sensors import Localization
 from terrain.kinematic_robot import KinematicRobot, KinematicWorld
 from terrain.mishaps import MishapKind
 from terrain.robot_models import TURTLEBOT
-from terrain.scenario_actors import Crowd, Door, Walker, add_actors
+from terrain.scenario_actors import Crowd, Door, OtherRobot, Walker, add_actors
 from terrain.scenario_faults import FaultSchedule, LocalizationJump, SensorFault, seen_from
 from terrain.scenario_limits import Limits, broken_limits
 from terrain.scenario_settings import apply_settings
@@ -99,6 +99,7 @@ def test_actors_move_in_the_world_and_the_seed_draws_the_crowd(tmp_path):
     actors = (
         Walker(type="walker", route=((4.0, 9.7), (6.0, 9.7)), speed=1.0),
         Door(type="door", opened={"x": 9.0, "y": 11.0}, closed={"x": 7.5, "y": 11.0}, closes_at=0.0),
+        OtherRobot(type="robot", model="turtlebot", route=((3.0, 9.7), (3.0, 10.7)), speed=0.5),
         Crowd(type="crowd", count=2, x_range=(1.0, 10.0), y_range=(8.6, 10.9)),
     )
     places = []
@@ -108,13 +109,15 @@ def test_actors_move_in_the_world_and_the_seed_draws_the_crowd(tmp_path):
         add_actors(world, actors, np.random.default_rng(seed))
         for _ in range(240):
             world.bullet.step()
-        bodies = range(before, before + 4)
+        bodies = range(before, before + 5)
         places.append([world.bullet.bullet.getBasePositionAndOrientation(b, world.bullet.client)[0] for b in bodies])
         world.bullet.close()
     assert places[0][0] == pytest.approx((5.0, 9.7, 0.85), abs=0.02)
     assert places[0][1] == pytest.approx((8.25, 11.0, 1.0), abs=0.02)
+    assert places[0][2] == pytest.approx((3.0, 10.2, 0.205), abs=0.02)
     assert places[0] == places[1]
-    assert places[0][2:] != places[2][2:]
+    assert places[0][3:] != places[2][3:]
+    assert [actor.thing.value for actor in world.actors] == ["person", "door", "robot", "person", "person"]
 
 
 def test_each_broken_limit_is_named():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose, Twist
-from terrain.mishaps import MishapKind, MishapMonitor, MotionSample, roll_pitch, tilt_of
+from terrain.mishaps import MishapKind, MishapMonitor, MotionSample, Thing, roll_pitch, tilt_of
 
 
 def rolled(angle: float, stamp: float = 0.0, x: float = 0.0) -> Pose:
@@ -72,8 +72,17 @@ def test_turning_on_the_spot_and_slow_driving_are_not_stuck_but_twitching_is() -
     assert kinds(lambda t: Pose.planar(0.01 * math.sin(9.0 * t), 0.0), Twist.planar(0.5)) == [MishapKind.STUCK]
 
 
-def test_collision_counts_at_once() -> None:
-    assert feed(MishapMonitor(), 0.05, body_on_obstacle=True) == [MishapKind.COLLISION]
+@pytest.mark.parametrize("thing", Thing)
+def test_a_collision_counts_at_once_and_by_what_was_hit(thing: Thing) -> None:
+    kinds = feed(MishapMonitor(), 0.05, touched=frozenset({thing}))
+    assert [kind.value for kind in kinds] == ["collision", f"collision_with_{thing.value}"]
+
+
+def test_a_person_that_is_hit_while_a_wall_is_touched_counts_too() -> None:
+    monitor = MishapMonitor()
+    feed(monitor, 0.2, touched=frozenset({Thing.WALL}))
+    kinds = feed(monitor, 0.2, 0.2, touched=frozenset({Thing.WALL, Thing.PERSON}))
+    assert kinds == [MishapKind.COLLISION_WITH_PERSON]
 
 
 def test_distance_slip_and_energy_add_up() -> None:

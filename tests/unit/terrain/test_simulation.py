@@ -7,16 +7,17 @@ import pytest
 
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.sensing import RangeScan
-from terrain.actors import RouteWalker, SlidingDoor, random_route
+from terrain.actors import RouteWalker, SlidingDoor, other_robot, random_route
 from terrain.ego_sensors import Imu, WheelOdometry
 from terrain.floor_plan import OFFICE_MAP
 from terrain.heightfield import Heightfield
 from terrain.indoor import add_building
 from terrain.kinematic_robot import KinematicRobot, KinematicWorld
-from terrain.mishaps import MishapKind
+from terrain.mishaps import MishapKind, Thing
 from terrain.occupancy import read_occupancy
 from terrain.rays import MovingRays, StaticRays
-from terrain.robot_models import CAR, HUSKY, TURTLEBOT
+from terrain.recording import RobotShape
+from terrain.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
 from terrain.robots import WheeledRobot
 from terrain.sensors import Lidar, planar_directions
 from terrain.simulation import Simulation
@@ -134,7 +135,38 @@ def test_a_door_closes_at_its_time_and_stops_the_robot() -> None:
         assert door.pose().y == 1.5
         simulation.advance_to(6.0)
         assert door.pose().y == 0.0 and robot.pose().x < 0.85
-    assert next(mishap.kind for mishap in simulation.mishaps) is MishapKind.COLLISION
+    kinds = {mishap.kind for mishap in simulation.mishaps}
+    assert {MishapKind.COLLISION, MishapKind.COLLISION_WITH_DOOR} <= kinds
+    assert MishapKind.COLLISION_WITH_WALL not in kinds
+
+
+@pytest.mark.parametrize("thing", [Thing.PERSON, Thing.ROBOT])
+def test_whom_the_robot_hits_is_told(thing: Thing) -> None:
+    route = np.array([[1.0, 0.0], [1.0, 0.01]])
+    with BulletWorld() as world:
+        world.add_ground_plane(-5.0, 5.0, -5.0, 5.0)
+        if thing is Thing.ROBOT:
+            other_robot(world, TURTLEBOT, route, 0.0)
+        else:
+            RouteWalker(world, route, 0.0)
+        robot = WheeledRobot(world, TURTLEBOT, Pose.planar(0.0, 0.0), command_timeout=math.inf)
+        robot.settle()
+        simulation = Simulation(world, robot)
+        robot.send_command(Twist.planar(0.4))
+        simulation.advance_to(3.0)
+    kinds = {mishap.kind.value for mishap in simulation.mishaps}
+    assert {kind for kind in kinds if kind.startswith("collision_")} == {f"collision_with_{thing.value}"}
+
+
+@pytest.mark.parametrize("spec", ROBOTS.values(), ids=lambda spec: spec.name)
+def test_another_robot_looks_like_its_model_and_fills_its_box(spec: RobotSpec) -> None:
+    with BulletWorld() as world:
+        robot = other_robot(world, spec, np.array([[0.0, 0.0], [2.0, 0.0]]), 1.0)
+        assert robot.pose().z == pytest.approx(0.5 * spec.height)
+        vertices, faces = robot.looks
+        assert len(faces) > 12 + 90 * len(RobotShape.of(spec).wheels)
+        assert np.ptp(vertices[:, 2]) == pytest.approx(spec.height)
+        assert (np.ptp(vertices[:, :2], axis=0) <= np.ptp(spec.footprint_array(), axis=0) + 0.05).all()
 
 
 def test_random_routes_keep_clear_of_walls() -> None:

@@ -7,9 +7,11 @@ import pytest
 
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.map_view import GridView, MeshView
+from terrain.mishaps import Thing
 from terrain.recorder import GRID_PERIOD, MAX_GRID_CELLS, Recorder
 from terrain.recording import Recording, RecordingError, RobotShape
 from terrain.robot_models import CAR, HUSKY, TURTLEBOT
+from terrain.solids import cylinder_triangles
 
 
 @pytest.mark.parametrize("name", ["hill_recording", "office_recording"])
@@ -107,3 +109,31 @@ def test_only_grids_of_a_sensible_size_are_recorded():
         recorder.map(0.0, lambda view=view: view)
 
     assert recorder.grids == []
+
+
+class Pacer:
+    """An actor that takes a step with every look at it."""
+
+    thing = Thing.PERSON
+    looks = cylinder_triangles(0.25, 1.7)
+
+    def __init__(self) -> None:
+        self.steps = 0
+
+    def pose(self) -> Pose:
+        self.steps += 1
+        return Pose.planar(0.5 * self.steps, 2.0, z=0.85)
+
+
+def test_what_moves_by_itself_is_recorded_with_every_sample_and_comes_back(tmp_path):
+    recorder = Recorder("paced", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), [], actors=[Pacer()])
+    for index in range(3):
+        recorder.sample(0.1 * index, Pose.planar(0, 0), Twist(), Twist())
+    recorder.finish(True, "SUCCESS", "").save(tmp_path / "recording.npz")
+
+    (track,) = Recording.load(tmp_path / "recording.npz").actors
+
+    assert track.thing == "person"
+    np.testing.assert_array_equal(track.poses[:, :3], [[0.5, 2.0, 0.85], [1.0, 2.0, 0.85], [1.5, 2.0, 0.85]])
+    np.testing.assert_array_equal(track.vertices, Pacer.looks[0])
+    np.testing.assert_array_equal(track.faces, Pacer.looks[1])

@@ -1,15 +1,20 @@
 """What goes into a replay: frames, texts and turning wheels; the page itself is opened in tests/browser."""
 
+import base64
 import math
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
+import zstandard
 
 from mbf_abstract.geometry import Pose
+from terrain.actor_track import ActorTrack
 from terrain.recorder import Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import HUSKY
+from terrain.solids import cylinder_triangles
 from terrain.viewer.replay import FRAME_RATE, MAX_FRAMES, frame_indices, replay_html, status_text, write_replay
 from terrain.viewer.scene import wheel_angles
 
@@ -63,3 +68,27 @@ def test_a_run_that_never_began_has_a_replay_too():
     run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(False, "FAILURE", "no robot")
 
     assert "__VISER_EMBED_DATA__" in replay_html(replace(run, goals=()))
+
+
+def test_people_doors_and_other_robots_move_through_the_replay(hill_recording):
+    count = len(hill_recording.times)
+    poses = np.tile([0.0, 5.0, 0.85, 0.0, 0.0, 0.0, 1.0], (count, 1))
+    poses[:, 0] = np.linspace(1.0, 9.0, count)
+    person = ActorTrack("person", *cylinder_triangles(0.25, 1.7), poses)
+
+    messages = messages_of(replay_html(replace(hill_recording, actors=[person])))
+
+    places = [
+        message["position"] for message in messages if message.get("name") == "/actor_0" and "position" in message
+    ]
+    assert any(message.get("name") == "/actor_0/person" for message in messages)
+    assert len(places) >= len(frame_indices(hill_recording.times)) - 2
+    assert places[0][0] == pytest.approx(1.0, abs=0.1) and places[-1][0] == pytest.approx(9.0, abs=0.1)
+
+
+def messages_of(page):
+    """What viser packed into a page: its length, then messages and buffers compressed together."""
+    packed = base64.b64decode(page.split('__VISER_EMBED_DATA__="')[1].split('"')[0])
+    content = zstandard.ZstdDecompressor().decompressobj().decompress(packed[8:])
+    length = int.from_bytes(content[:8], "little")
+    return [message for _, message in msgspec.msgpack.decode(content[8 : 8 + length])["messages"]]
