@@ -27,6 +27,7 @@ from mbf_costmap_nav.grid_planning import traversal_table
 from mbf_costmap_nav.kernels.grid_line import line_cost, pull_string
 from mbf_costmap_nav.kernels.grid_path import trace_cells
 from mbf_costmap_nav.kernels.grid_search import FOUND, pad_cells, search
+from mbf_costmap_nav.kernels.short_lines import trace_lines
 from mbf_costmap_nav.kernels.theta_star import theta_search
 
 FINE = 16
@@ -95,11 +96,8 @@ def fine_corner(cells: np.ndarray, x: int, y: int) -> int:
 def theta_length(grid: tuple[np.ndarray, int], start: int, goal: int) -> float:
     """Length [small cells] of the any-angle path between two small cells."""
     cells, stride = grid
-    _, _, parent = theta_search(cells, stride, TABLE, start, goal, NO_CANCEL)
-    chain = [goal]
-    while chain[-1] != start:
-        chain.append(int(parent[chain[-1]]))
-    corners = pull_string(cells, stride, TABLE, np.array(chain, dtype=np.int32))
+    _, _, origin = theta_search(cells, stride, TABLE, start, goal, NO_CANCEL)
+    corners = pull_string(cells, stride, TABLE, trace_lines(origin, stride, start, goal))
     return sum(float(line_cost(cells, stride, TABLE, int(a), int(b))) for a, b in pairwise(corners))
 
 

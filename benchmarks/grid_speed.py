@@ -25,7 +25,6 @@ from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.costmap import CellBox
 from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.grid_planning import traversal_table
-from mbf_costmap_nav.kernels.grid_field import distance_field
 from mbf_costmap_nav.kernels.grid_search import pad_cells, search
 from mbf_costmap_nav.kernels.inflation import inflate
 from mbf_costmap_nav.kernels.theta_star import theta_search
@@ -105,7 +104,7 @@ class Suite:
         self.table = traversal_table(2.0, 253, False)
         self.padded, self.stride = pad_cells(self.cells, 254), size + 2
         self.start = (20 + 1) * self.stride + 20 + 1
-        field = distance_field(self.padded, self.stride, self.table, self.start, -1, False, NO_CANCEL)[1]
+        field = self.field()[1]
         self.goal = int(np.flatnonzero(np.isfinite(field))[-1])  # the reached cell nearest to the far corner
         self.weights = np.ascontiguousarray(self.table[self.cells])
         self.goal_cell = (self.goal // self.stride - 1, self.goal % self.stride - 1)
@@ -123,9 +122,9 @@ class Suite:
         """Run our A*."""
         return search(self.padded, self.stride, self.table, self.start, self.goal, 1.0, False, NO_CANCEL)
 
-    def field(self) -> object:
+    def field(self) -> tuple[int, np.ndarray]:
         """Run our full field."""
-        return distance_field(self.padded, self.stride, self.table, self.start, -1, False, NO_CANCEL)
+        return search(self.padded, self.stride, self.table, self.start, -1, 0.0, False, NO_CANCEL)
 
     def theta(self) -> object:
         """Run our Theta*."""

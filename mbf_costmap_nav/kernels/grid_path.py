@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
-from mbf_costmap_nav.kernels.grid_search import SQRT2
+from mbf_costmap_nav.kernels.open_list import SQRT2
 
 GRADIENT_STEP = 0.5
 """Length of a step down the gradient [cells]."""

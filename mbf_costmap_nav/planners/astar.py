@@ -4,7 +4,7 @@ When to use: the default. It settles only the cells that could lie on a better p
 ``costmap.dijkstra``. When not: the path turns in steps of 45 degrees (``theta_star`` or a smoother give straight
 lines), and it does not know the robot's turning circle (``hybrid_astar``).
 
-Cost: 30 to 60 ns per settled cell; 1000 x 1000 cells in some 30 ms.
+Cost: about 20 ns per settled cell; across 1000 x 1000 cells in some 7 ms.
 
 Formula: Hart, Nilsson, Raphael 1968 with the octile distance as heuristic; the open list is a ring of buckets, see
 ``kernels.grid_search``.

@@ -26,8 +26,7 @@ from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.costmap import Costmap
 from mbf_costmap_nav.footprint_check import FootprintCheck
 from mbf_costmap_nav.grid_planning import GridPlannerParameters, SearchGrid
-from mbf_costmap_nav.kernels.grid_field import distance_field
-from mbf_costmap_nav.kernels.grid_search import CANCELED
+from mbf_costmap_nav.kernels.grid_search import CANCELED, search
 from mbf_costmap_nav.kernels.hybrid_astar import hybrid_search, pose_cost
 from mbf_costmap_nav.plugins import CostmapPlanner
 
@@ -84,7 +83,7 @@ class HybridAStarPlanner(CostmapPlanner):
         p, flag = self.parameters, request.cancel_token.flag
         grid = SearchGrid.build(costmap, GridPlannerParameters(cost_factor=0.0, allow_unknown=False))
         goal_cell = grid.index(costmap.world_to_cell_clamped(goal.x, goal.y))
-        status, g = distance_field(grid.cells, grid.stride, grid.table, goal_cell, -1, True, flag)
+        status, g = search(grid.cells, grid.stride, grid.table, goal_cell, -1, 0.0, True, flag)
         if status == CANCELED:
             return CANCELED, np.zeros((0, 3)), 0.0, 0
         field = np.ascontiguousarray(g.reshape(-1, grid.stride)[1:-1, 1:-1])

@@ -2,9 +2,10 @@
 
 When to use: long straight runs matter (fast robots, smooth heading) and a car's turning circle does not. When not: the
 exact optimum is asked for (``costmap.astar`` on the eight directions; Theta* is a heuristic, typically within 1 % of
-the any-angle optimum), or smooth corners are needed (put ``costmap.smoother`` behind it).
+the any-angle optimum and never longer than the octile one), or smooth corners are needed (put ``costmap.smoother``
+behind it).
 
-Cost: three to four times ``costmap.astar``.
+Cost: twice ``costmap.astar``.
 
 Formula: Lazy Theta* (Nash, Koenig, Tovey 2010), see ``kernels.theta_star``; lines end after a few cells during the
 search and are joined afterwards (``kernels.grid_line.pull_string``). ``spacing`` fills the pieces with poses, as
@@ -32,6 +33,7 @@ from mbf_costmap_nav.grid_planning import (
 )
 from mbf_costmap_nav.kernels.grid_line import line_cost, pull_string
 from mbf_costmap_nav.kernels.grid_search import CANCELED, FOUND
+from mbf_costmap_nav.kernels.short_lines import trace_lines
 from mbf_costmap_nav.kernels.theta_star import theta_search
 
 
@@ -56,22 +58,15 @@ class ThetaStarPlanner(GridPlanner):
         """Search and pull the string."""
         goal_cell = grid.costmap.world_to_cell_clamped(goal.x, goal.y)
         source = grid.index(start)
-        status, g, parent = theta_search(grid.cells, grid.stride, grid.table, source, grid.index(goal_cell), token.flag)
+        status, g, origin = theta_search(grid.cells, grid.stride, grid.table, source, grid.index(goal_cell), token.flag)
         if status == CANCELED:
             return CANCELED_LEG
         end = goal_cell if status == FOUND else grid.nearest_reached(g, goal, tolerance)
         if end is None:
             return NO_LEG
-        corners = pull_string(grid.cells, grid.stride, grid.table, _ancestors(parent, grid.index(end), source))
+        lines = trace_lines(origin, grid.stride, source, grid.index(end))
+        corners = pull_string(grid.cells, grid.stride, grid.table, lines)
         return Leg(grid.points(corners), path_cost(grid, corners), end == goal_cell)
-
-
-def _ancestors(parent: NDArray[np.int32], end: int, source: int) -> NDArray[np.int32]:
-    """Cells from the source to ``end`` along the parents."""
-    chain = [end]
-    while chain[-1] != source:
-        chain.append(int(parent[chain[-1]]))
-    return np.array(chain[::-1], dtype=np.int32)
 
 
 def path_cost(grid: SearchGrid, corners: NDArray[np.int32]) -> float:

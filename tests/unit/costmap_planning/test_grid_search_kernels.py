@@ -1,7 +1,8 @@
-"""The bucketed search and the near/far field against a heapq twin, and the paths traced out of its field."""
+"""The bucketed search and its field against a heapq twin, and the paths traced out of the field."""
 
 import heapq
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,10 +11,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from mbf_costmap_nav.grid_planning import traversal_table
-from mbf_costmap_nav.kernels.grid_field import distance_field
 from mbf_costmap_nav.kernels.grid_line import line_cost
 from mbf_costmap_nav.kernels.grid_path import trace_cells, trace_gradient
 from mbf_costmap_nav.kernels.grid_search import CANCELED, EXHAUSTED, FOUND, pad_cells, search
+from mbf_costmap_nav.kernels.short_lines import TOUCHED, crossed_cells, trace_lines
+from mbf_costmap_nav.kernels.theta_star import theta_search
 
 NO_CANCEL = np.zeros(1, dtype=np.uint8)
 small_maps = hnp.arrays(
@@ -53,7 +55,7 @@ def run(cells, start, goal, *, cost_factor=3.0, allow_unknown=False, cut_corners
         return (cell[0] + 1) * stride + cell[1] + 1
 
     if goal is None:
-        status, g = distance_field(padded, stride, table, index(start), -1, cut_corners, flag)
+        status, g = search(padded, stride, table, index(start), -1, 0.0, cut_corners, flag)
     else:
         status, g = search(padded, stride, table, index(start), index(goal), 1.0, cut_corners, flag)
     return status, g.reshape(-1, stride)[1:-1, 1:-1], (padded, stride, table, g), index
@@ -73,7 +75,7 @@ def test_field_equals_the_naive_dijkstra(cells, cut_corners, allow_unknown):
 def test_a_field_may_end_at_a_cell_that_has_its_final_value():
     cells = np.zeros((80, 80), dtype=np.uint8)
     _, _, (padded, stride, table, whole), index = run(cells, (5, 5), None)
-    status, g = distance_field(padded, stride, table, index((5, 5)), index((9, 12)), False, NO_CANCEL)
+    status, g = search(padded, stride, table, index((5, 5)), index((9, 12)), 0.0, False, NO_CANCEL)
     assert status == FOUND and g[index((9, 12))] == whole[index((9, 12))]
     assert np.isinf(g[index((79, 79))])
 
@@ -183,3 +185,41 @@ def test_line_of_sight_past_the_block(end, free):
     cells[7:15, 7:15] = 253
     index = [(y + 1) * 52 + x + 1 for y, x in ((2, 2), end)]
     assert np.isfinite(line_cost(pad_cells(cells, 254), 52, traversal_table(0.0, 253, False), *index)) == free
+
+
+@pytest.mark.parametrize("dx", range(-2, 3))
+@pytest.mark.parametrize("dy", range(-2, 3))
+def test_tabulated_lines_have_the_length_that_dense_samples_find_in_each_cell(dx, dy):
+    t = (np.arange(20000) + 0.5) / 20000
+    cells = np.floor(np.column_stack([t * dx, t * dy]) + 0.5).astype(int)
+    found, counts = np.unique(cells, axis=0, return_counts=True)
+    lengths = counts / len(t) * math.hypot(dx, dy)
+    crossed = crossed_cells(dx, dy)
+    assert {cell for cell, length in crossed.items() if length != TOUCHED} == {(int(x), int(y)) for x, y in found}
+    assert [crossed[int(x), int(y)] for x, y in found] == pytest.approx(lengths.tolist(), abs=1e-3)
+
+
+@settings(max_examples=100, deadline=None)
+@given(cells=small_maps, cost_factor=st.floats(0.0, 20.0))
+def test_theta_star_is_nowhere_dearer_than_the_naive_dijkstra_and_its_lines_are_free(cells, cost_factor):
+    cells[0, 0] = 0
+    table, stride = traversal_table(cost_factor, 253, False), cells.shape[1] + 2
+    padded, start = pad_cells(cells, 254), stride + 1
+    for (y, x), octile in list(naive_field(cells, table, (0, 0), False).items())[::7]:
+        goal = (y + 1) * stride + x + 1
+        status, g, origin = theta_search(padded, stride, table, start, goal, NO_CANCEL)
+        lines = [line_cost(padded, stride, table, a, b) for a, b in pairwise(trace_lines(origin, stride, start, goal))]
+        assert status == FOUND and g[goal] <= octile * (1.0 + 1e-5)
+        assert sum(lines) <= g[goal] * (1.0 + 1e-5)
+
+
+@settings(max_examples=50, deadline=None)
+@given(cells=small_maps)
+def test_theta_star_without_a_way_settles_exactly_what_can_be_reached(cells):
+    cells[0, 0], cells[-1, -1] = 0, 254
+    table, stride = traversal_table(3.0, 253, False), cells.shape[1] + 2
+    status, g, _ = theta_search(
+        pad_cells(cells, 254), stride, table, stride + 1, stride * (len(cells) + 1) - 2, NO_CANCEL
+    )
+    reached = {(int(y), int(x)) for y, x in np.argwhere(np.isfinite(g.reshape(-1, stride)[1:-1, 1:-1]))}
+    assert cells.size == 1 or (status == EXHAUSTED and reached == set(naive_field(cells, table, (0, 0), False)))
