@@ -6,8 +6,8 @@ A zones file is a YAML mapping with one list::
       - {name: stairs, polygon: [[1.0, 2.0], [3.0, 2.0], [3.0, 4.0]]}
       - {name: ramp, polygon: [[5.0, 0.0], [7.0, 0.0], [7.0, 2.0], [5.0, 2.0]], speed_limit: 0.3}
 
-Coordinates are metres in the costmap's frame. A mask image is a map_server map; it may have another grid than the
-costmap, each cell takes the value at its centre.
+Coordinates are metres in the costmap's frame, unless the layer is told another (``map_frame``). A mask image is a
+map_server map; it may have another grid than the costmap, each cell takes the value at its centre.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.transform import Transform
 from mbf_costmap_nav.costmap import LETHAL, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.map_description import MapError
+from mbf_costmap_nav.placement import mapped
 
 
 class Zone(ParameterModel):
@@ -118,17 +119,12 @@ def _sample_transformed(
     lower = np.array([geometry.origin_x, geometry.origin_y]) + np.array([box.x0, box.y0]) * geometry.resolution
     rows, columns = (axis.ravel() for axis in np.indices(values.shape))
     centres = lower + (np.column_stack([columns, rows]) + 0.5) * geometry.resolution
-    cells, inside = source.world_to_cells(_mapped(T_source_grid, centres))
+    cells, inside = source.world_to_cells(mapped(T_source_grid, centres))
     values[rows[inside], columns[inside]] = source.cells[cells[inside, 1], cells[inside, 0]]
 
     lethal = np.argwhere(source.cells == LETHAL)[:, ::-1]
-    points = _mapped(T_source_grid.inverse(), source.cells_to_world(lethal))
+    points = mapped(T_source_grid.inverse(), source.cells_to_world(lethal))
     x, y = np.floor((points - lower) / geometry.resolution).astype(np.int64).T
     seen = (x >= 0) & (x < values.shape[1]) & (y >= 0) & (y < values.shape[0])
     values[y[seen], x[seen]] = LETHAL
     return values
-
-
-def _mapped(transform: Transform, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points (n, 2) [m] of a flat world in the transform's parent frame."""
-    return transform.apply(np.pad(points, ((0, 0), (0, 1))))[:, :2]

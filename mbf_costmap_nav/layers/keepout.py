@@ -19,6 +19,7 @@ from mbf_costmap_nav.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray,
 from mbf_costmap_nav.kernels.cover import fill_polygon
 from mbf_costmap_nav.layer import CombinationMethod, CostmapLayer, LayerContext, LayerParameters, combine
 from mbf_costmap_nav.map_io import load_costmap
+from mbf_costmap_nav.placement import Placement
 from mbf_costmap_nav.zones import Zone, load_zones, sample_costmap
 
 
@@ -28,6 +29,7 @@ class KeepoutLayerParameters(LayerParameters):
     zones: tuple[Zone, ...] = parameter((), "Polygons written in place.", dynamic=False)
     zones_file: str = parameter("", "YAML file with more polygons.", dynamic=False)
     mask_file: str = parameter("", "map_server YAML file of a mask image.", dynamic=False)
+    map_frame: str = parameter("", "Frame of zones and mask; empty = the costmap's.", dynamic=False)
 
 
 class KeepoutLayer(CostmapLayer):
@@ -44,6 +46,7 @@ class KeepoutLayer(CostmapLayer):
         if files.mask_file:
             mask_file = context.base_folder / files.mask_file
             self._mask = load_costmap(mask_file, context.frame_id, confined=context.confine_images)
+        self._placement = Placement(files.map_frame, context)
         self._changed = EMPTY_BOX
 
     def match_geometry(self, geometry: GridGeometry) -> None:
@@ -59,18 +62,26 @@ class KeepoutLayer(CostmapLayer):
     def _paint(self) -> None:
         grid = self.geometry
         self.cells: CellArray = np.full((grid.height, grid.width), UNKNOWN, dtype=np.uint8)
+        if not self._placement.known:
+            return
         if self._mask is not None:
-            self.cells[:] = sample_costmap(self._mask, grid, grid.box, UNKNOWN)
+            self.cells[:] = sample_costmap(self._mask, grid, grid.box, UNKNOWN, self._placement.T_data_costmap)
             self.cells[self.cells == FREE] = UNKNOWN
         for zone in self._zones:
-            corners = (zone.corners - np.array([grid.origin_x, grid.origin_y])) / grid.resolution
-            fill_polygon(self.cells, corners, LETHAL)
+            corners = self._placement.to_costmap(zone.corners) - (grid.origin_x, grid.origin_y)
+            fill_polygon(self.cells, corners / grid.resolution, LETHAL)
         self._changed = grid.box
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Report everything once after painting."""
+        if self._placement.refresh():
+            self._paint()
         changed, self._changed = self._changed, EMPTY_BOX
         return box.union(changed)
+
+    def currency_problem(self, now: float) -> str:
+        """Say that the frame of the areas is unknown."""
+        return f"layer {self.name!r}: {self._placement.problem}" if self._placement.problem else ""
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
         """Raise costs to those of the areas."""

@@ -13,11 +13,15 @@ from __future__ import annotations
 
 from typing import Literal
 
+import numpy as np
+
+from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.costmap import FREE, CellArray, CellBox, Costmap
 from mbf_costmap_nav.layer import CostmapLayer, LayerContext, LayerParameters
 from mbf_costmap_nav.map_description import UNKNOWN_OCCUPANCY
 from mbf_costmap_nav.map_io import load_map
+from mbf_costmap_nav.placement import Placement
 from mbf_costmap_nav.zones import Zone, load_zones
 
 
@@ -27,6 +31,7 @@ class SpeedLimitLayerParameters(LayerParameters):
     zones: tuple[Zone, ...] = parameter((), "Polygons written in place.", dynamic=False)
     zones_file: str = parameter("", "YAML file with more polygons.", dynamic=False)
     mask_file: str = parameter("", "map_server YAML file of a mask image.", dynamic=False)
+    map_frame: str = parameter("", "Frame of zones and mask; empty = the costmap's.", dynamic=False)
     limit_type: Literal["absolute", "percent"] = parameter("absolute", "Whether limits are m/s or % of full speed.")
     base: float = parameter(100.0, "Limit of a mask cell of occupancy 0, in the unit of limit_type.")
     multiplier: float = parameter(-1.0, "Change of the limit per point of occupancy.")
@@ -46,12 +51,23 @@ class SpeedLimitLayer(CostmapLayer):
         if files.mask_file:
             mask = load_map(context.base_folder / files.mask_file, confined=context.confine_images).upright()
             self._mask = Costmap(mask.occupancy, mask.resolution, mask.origin[0], mask.origin[1], context.frame_id)
+        self._placement = Placement(files.map_frame, context)
+
+    def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
+        """Look up where the areas lie; they change no cell."""
+        self._placement.refresh()
+        return box
+
+    def currency_problem(self, now: float) -> str:
+        """Say that the frame of the areas is unknown."""
+        return f"layer {self.name!r}: {self._placement.problem}" if self._placement.problem else ""
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
         """Write nothing: a limit is no cost."""
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Allowed speed [m/s] at the point (x, y) [m], at most ``full_speed``."""
+        x, y = self._placement.to_data(np.array([[x, y]]))[0].tolist()
         limits = [zone.speed_limit for zone in self._zones if zone.speed_limit is not None and zone.contains(x, y)]
         occupancy = self._mask.cost_at(x, y) if self._mask is not None else None
         if occupancy is not None and occupancy not in (FREE, UNKNOWN_OCCUPANCY):

@@ -17,10 +17,10 @@ from pathlib import Path
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
-from mbf_abstract.transform import Transform, TransformError
 from mbf_costmap_nav.costmap import EMPTY_BOX, UNKNOWN, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.layer import CombinationMethod, GridLayer, LayerContext, LayerParameters, combine
 from mbf_costmap_nav.map_io import load_costmap
+from mbf_costmap_nav.placement import Placement
 from mbf_costmap_nav.zones import sample_costmap
 
 
@@ -54,14 +54,7 @@ class StaticLayer(GridLayer):
         else:
             raise ValueError(f"static layer {context.name!r} needs map_file, or a map handed over by the program")
         self._changed = EMPTY_BOX
-        self._frame_id = context.frame_id
-        self._transforms = context.transforms
-        self._T_map_costmap: Transform | None = None
-        self._misplaced = "" if self._in_costmap_frame else "its map has not been placed yet"
-
-    @property
-    def _in_costmap_frame(self) -> bool:
-        return self._map.frame_id == self._frame_id
+        self._placement = Placement(self._map.frame_id, context)
 
     @property
     def default_value(self) -> int:
@@ -70,7 +63,7 @@ class StaticLayer(GridLayer):
 
     def preferred_geometry(self) -> GridGeometry | None:
         """Grid of the map, unless it is in another frame."""
-        return self._map.geometry if self._in_costmap_frame else None
+        return self._map.geometry if self._placement.in_costmap_frame else None
 
     def match_geometry(self, geometry: GridGeometry) -> None:
         """Sample the map at the costmap's cells."""
@@ -88,27 +81,14 @@ class StaticLayer(GridLayer):
     def _sample(self, box: CellBox) -> None:
         """Take each cell's value from the map cell at its centre; nothing while the map has no place."""
         box = box.clipped(self.geometry.box)
-        if self._in_costmap_frame or self._T_map_costmap is not None:
+        if self._placement.known:
             self.cells[box.slices] = sample_costmap(
-                self._map, self.geometry, box, self.default_value, self._T_map_costmap
+                self._map, self.geometry, box, self.default_value, self._placement.T_data_costmap
             )
-
-    def _place(self) -> None:
-        """Look up where the map lies; sample it anew if it has moved."""
-        try:
-            if self._transforms is None:
-                raise TransformError(f"no transforms to place a map in {self._map.frame_id!r}")
-            found = self._transforms.lookup(self._map.frame_id, self._frame_id)
-        except TransformError as error:
-            self._misplaced = str(error)
-            return
-        last, self._T_map_costmap, self._misplaced = self._T_map_costmap, found, ""
-        if last is None or (last.translation, last.rotation) != (found.translation, found.rotation):
-            self.match_geometry(self.geometry)
 
     def currency_problem(self, now: float) -> str:
         """Say that the map's frame is unknown."""
-        return f"layer {self.name!r}: {self._misplaced}" if self._misplaced else ""
+        return f"layer {self.name!r}: {self._placement.problem}" if self._placement.problem else ""
 
     def reset(self) -> None:
         """Return to the map as loaded, undoing cleared areas."""
@@ -116,8 +96,8 @@ class StaticLayer(GridLayer):
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Report the whole map once after sampling it."""
-        if not self._in_costmap_frame:
-            self._place()
+        if self._placement.refresh():
+            self.match_geometry(self.geometry)
         changed, self._changed = self._changed, EMPTY_BOX
         return box.union(changed)
 

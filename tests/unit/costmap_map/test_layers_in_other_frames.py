@@ -1,4 +1,4 @@
-"""A static map in another frame than its costmap's: every cell where it belongs, wherever the frame goes."""
+"""Static maps, zones and masks in another frame than their costmap's: every cell where it belongs."""
 
 import math
 
@@ -125,3 +125,60 @@ def test_a_map_file_has_the_frame_it_is_told(frame, tmp_path):
     )
     costmap.update(None, 0.0)
     assert costmap.is_current(0.0) == (frame == "")
+
+
+# ------------------------------------------------------------------------------------------- zones and masks
+ROOM = [[1.0, 1.0], [3.0, 1.0], [3.0, 2.0], [1.0, 2.0]]
+INSIDE, OUTSIDE = Pose.planar(2.9, 1.1), Pose.planar(1.1, 2.9)
+
+
+def filters(tmp_path, odom=None):
+    """Keep-out and speed-limit layers whose zone and mask are given in map, on a costmap in odom."""
+    painted = np.zeros((4, 4), dtype=np.uint8)
+    painted[0, 3] = 100  # the cell from (3, 0) to (4, 1)
+    save_map(tmp_path / "mask.yaml", OccupancyMap(painted, 1.0))
+    zone = {"name": "room", "polygon": ROOM, "speed_limit": 0.2}
+    block = {"zones": [zone], "mask_file": "mask.yaml", "map_frame": "map"}
+    layers = [{"name": "keepout", "type": "keepout"}, {"name": "slow", "type": "speed_limit"}]
+    transforms = TransformBuffer()
+    if odom is not None:
+        transforms.set(odom)
+    parameters = CostmapParameters.model_validate(WALLS | {"layers": layers, "origin_x": -4.5, "origin_y": -3.5})
+    blocks = {"keepout": block, "slow": block | {"limit_type": "percent"}}
+    return build_layered_costmap(parameters, blocks, base_folder=tmp_path, transforms=transforms), transforms
+
+
+def on(odom, pose):
+    there = odom.inverse().apply_to_pose(pose)
+    return there.x, there.y
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.6, -2.0])
+def test_keep_out_zones_and_masks_lie_where_their_frame_does(tmp_path, yaw):
+    odom = odom_at(1.5, 0.5, yaw)
+    costmap, _ = filters(tmp_path, odom)
+    costmap.update(None, 0.0)
+    forbidden, in_mask = Pose.planar(2.0, 1.5), Pose.planar(3.5, 0.5)
+    assert [costmap.snapshot().cost_at(*on(odom, pose)) for pose in (forbidden, in_mask)] == [LETHAL, LETHAL]
+    assert costmap.snapshot().cost_at(*on(odom, Pose.planar(1.5, 2.6))) == UNKNOWN
+
+
+def test_a_speed_limit_holds_where_its_zone_lies(tmp_path):
+    odom = odom_at(1.5, 0.5, 0.6)
+    costmap, _ = filters(tmp_path, odom)
+    costmap.update(None, 0.0)
+    limits = [costmap.speed_limit(*on(odom, pose), 1.0) for pose in (INSIDE, OUTSIDE, Pose.planar(3.5, 0.5))]
+    assert limits == pytest.approx([0.002, 1.0, 0.0])
+
+
+def test_filters_follow_their_frame_and_without_it_the_map_is_not_current(tmp_path):
+    costmap, transforms = filters(tmp_path)
+    costmap.update(None, 0.0)
+    assert "'keepout'" in costmap.currency_problem(0.0) and (costmap.snapshot().cells == UNKNOWN).all()
+    for stamp, x in ((1.0, 0.0), (2.0, 1.0)):
+        odom = Transform((x, 0.5, 0.0), quaternion_from_yaw(0.6), "map", "odom", stamp)
+        transforms.set(odom)
+        costmap.update(None, stamp)
+        assert costmap.is_current(stamp)
+        assert costmap.snapshot().cost_at(*on(odom, INSIDE)) == LETHAL
+        assert costmap.snapshot().cost_at(*on(odom, OUTSIDE)) == UNKNOWN
