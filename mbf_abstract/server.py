@@ -289,15 +289,17 @@ class AbstractNavigationServer(ABC):
         start, goal : Pose
             In the global frame; a plan between them is made with every planner.
         on_step : callable
-            Told the name of each plugin before its turn.
+            Told the name of each plugin before its turn, and which of how many it is.
         """
         path = Path.from_poses([start, goal])
-        for planner in self.plugins.all_of(PluginKind.PLANNER):
-            on_step(f"warming up planner {planner.name}")
+        planners, controllers = self.plugins.all_of(PluginKind.PLANNER), self.plugins.all_of(PluginKind.CONTROLLER)
+        count = len(planners) + len(controllers)
+        for number, planner in enumerate(planners, start=1):
+            on_step(f"warming up planner {planner.name} ({number} of {count})")
             result = planner.instance.make_plan(PlanRequest(start, goal))
             path = result.path if result.success and result.path is not None else path
-        for controller in self.plugins.all_of(PluginKind.CONTROLLER):
-            on_step(f"warming up controller {controller.name}")
+        for number, controller in enumerate(controllers, start=len(planners) + 1):
+            on_step(f"warming up controller {controller.name} ({number} of {count})")
             controller.instance.set_plan(path)
             controller.instance.compute_velocity_commands(ControlRequest(start, Twist()))
             controller.instance.is_goal_reached(start, self.runtime.parameters.dist_tolerance, 0.1)

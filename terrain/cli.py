@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
+from mbf_abstract.commands.waiting import waiting
 
 if TYPE_CHECKING:
     from terrain.runner import RunResult
@@ -69,6 +70,7 @@ def run(
                 wall_clock=wall_clock,
                 on_progress=live.progress,
                 on_step=live.step,
+                on_note=live.note,
                 executive=executive,
                 on_page=lambda address: live.note(f"live view at {address}"),
                 view=ViewOptions(view_host, view_port, view_speed, stay) if view else None,
@@ -130,7 +132,8 @@ def compare(
         for row in compare_metrics(runs[0][1], runs[1][1]):
             table.add_row(*map(escape, row))
         Console().print(table)
-        write_comparison(out, names, *runs)
+        with waiting("writing the page"):
+            write_comparison(out, names, *runs)
     typer.echo(out.resolve())
 
 

@@ -1,15 +1,21 @@
-"""The line that lives in the terminal while a run goes on; plain lines, and few of them, where there is no terminal."""
+"""The line that lives in the terminal while a run goes on: what is done, a bar, and the time.
+
+Where there is no terminal, and with ``mbf run --json`` and ``--quiet``, only notes are printed, which must be read.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.status import Status
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 if TYPE_CHECKING:
-    from terrain.runner import Progress
+    from terrain.runner import Progress as RunProgress
+
+COUNTED = re.compile(r"\((\d+) of (\d+)\)$")
 
 
 class LiveLine:
@@ -18,44 +24,47 @@ class LiveLine:
     Parameters
     ----------
     show : bool
-        False shows nothing at all.
+        False shows notes only.
     console : rich.console.Console, optional
         Another place than stderr, for tests.
     """
 
     def __init__(self, show: bool = True, console: Console | None = None) -> None:
-        self._show = show
         self._console = console or Console(stderr=True, highlight=False)
-        self._status: Status | None = None
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
+        hidden = not (show and self._console.is_terminal)
+        self._bar = Progress(*columns, console=self._console, transient=True, disable=hidden)
+        self._task = self._bar.add_task("starting", total=None)
+        self._way: float | None = None
 
     def __enter__(self) -> LiveLine:
-        if self._show and self._console.is_terminal:
-            self._status = self._console.status("starting", spinner="dots")
-            self._status.start()
+        self._bar.start()
         return self
 
     def __exit__(self, *exc: object) -> None:
-        if self._status is not None:
-            self._status.stop()
+        self._bar.stop()
 
     def step(self, text: str) -> None:
-        """Tell of a preparation that may take a while."""
-        if self._status is not None:
-            self._status.update(text)
-        elif self._show:
-            self._console.print(text)
+        """Tell of a preparation that may take a while; a text that ends in ``(2 of 5)`` fills the bar so far."""
+        counted = COUNTED.search(text)
+        done, total = map(int, counted.groups()) if counted else (0, None)
+        self._bar.remove_task(self._task)
+        self._task = self._bar.add_task(text, completed=done, total=total)
 
     def note(self, text: str) -> None:
         """Leave a line in the terminal that stays, also where nothing else is shown."""
         self._console.print(text)
 
-    def progress(self, progress: Progress) -> None:
-        """Tell how the drive goes; without a terminal this is left out."""
-        if self._status is not None:
-            self._status.update(progress_text(progress))
+    def progress(self, progress: RunProgress) -> None:
+        """Tell how the drive goes; the bar shows how much of the longest way to the goal is done."""
+        left = progress.distance_left
+        if math.isfinite(left):
+            self._way = max(left, self._way or 0.0)
+        done = self._way - left if self._way is not None and math.isfinite(left) else None
+        self._bar.update(self._task, description=progress_text(progress), completed=done, total=self._way)
 
 
-def progress_text(progress: Progress) -> str:
+def progress_text(progress: RunProgress) -> str:
     """One line: time and its factor, action state, distance left, speed, tilt."""
     factor = progress.time / progress.wall_time if progress.wall_time > 0.0 else 0.0
     left = "  --  m" if math.isnan(progress.distance_left) else f"{progress.distance_left:6.1f} m"

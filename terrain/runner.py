@@ -84,6 +84,8 @@ class RunOptions:
         Serve a page on which the run can be watched and controlled.
     on_page : callable
         Told the address of that page.
+    on_note : callable
+        Told what the user must know: which package is missing to draw.
     """
 
     folder: Path
@@ -98,6 +100,7 @@ class RunOptions:
     executive: str = "move_base"
     view: ViewOptions | None = None
     on_page: Callable[[str], None] = lambda address: None
+    on_note: Callable[[str], None] = lambda text: None
 
 
 def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
@@ -218,4 +221,4 @@ def _draw(recording: Recording, metrics: dict[str, Any], options: RunOptions) ->
     try:
         write_results(options.folder, recording, metrics, options.on_step)
     except ViewerMissing as missing:
-        options.on_step(str(missing))
+        options.on_note(str(missing))

@@ -46,7 +46,9 @@ def sweep(
             console.print(f"{len(planned)} runs, {len(planned) - len(left)} of them done before")
             jobs = [(loaded, run) for run in left]
             finished = run_all(jobs, workers) if scheduler is None else run_on_cluster(jobs, scheduler)
-            for (_, run), metrics in track(finished, loaded.name, total=len(left), console=console):
+            for (_, run), metrics in track(
+                finished, loaded.name, len(left), console=console, disable=not console.is_terminal
+            ):
                 log.append(run.key(hashed), {**metrics, "seed": run.seed, "variant": run.variant})
                 console.print(f"seed {run.seed} {run.variant}: {metrics['outcome']}", markup=False, highlight=False)
             rows = [log.rows[run.key(hashed)] for run in planned]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import typer
 
 from mbf_abstract.commands.coordinates import CoordinateCommand, Place, parse_place
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
+from mbf_abstract.commands.waiting import waiting
 
 if TYPE_CHECKING:
     from mbf_abstract.actions.goals import GetPathResult
@@ -41,14 +43,19 @@ def plan(
         from mbf_abstract.navigator import Navigator
 
         cls, checked = read_config_or_map(config)
-        with standing_server(cls, checked) as server:
+        with ExitStack() as open_server:
+            with waiting("building the map and its layers"):
+                server = open_server.enter_context(standing_server(cls, checked))
             start_pose, goal_pose = _pose(from_place, server), _pose(to_place, server)
             place_robot(server, start_pose)
             began = wall_seconds()
-            result = Navigator(server).send(GetPathGoal(goal_pose, planner=planner, dist_tolerance=tolerance)).wait()
+            with waiting("planning"):
+                goal_to_plan = GetPathGoal(goal_pose, planner=planner, dist_tolerance=tolerance)
+                result = Navigator(server).send(goal_to_plan).wait()
             seconds = wall_seconds() - began
             if png is not None:
-                draw_plan(png, server, start_pose, goal_pose, result)
+                with waiting("drawing the picture"):
+                    draw_plan(png, server, start_pose, goal_pose, result)
     _tell(result, seconds, as_json)
     if not result.success:
         raise typer.Exit(FAILURE)

@@ -91,6 +91,7 @@ def test_a_killed_sweep_is_resumed_without_losing_or_doubling_a_run(arguments, t
     assert len(after) == len({row["key"] for row in after}) == 4
     assert all(row["success"] for row in after)
     assert f"{len(before)} of them done before" in finished.stdout
+    assert "%" not in finished.stdout, "a bar is for terminals"
     with (tmp_path / "out" / "sweep.csv").open() as file:
         table = list(csv.DictReader(file))
     assert all(0.97 <= float(row["path_over_geodesic"]) < 1.2 for row in table)  # straight ahead on open ground

@@ -2,10 +2,13 @@
 
 import io
 import math
+from dataclasses import replace
 from datetime import datetime
 
+import pytest
 from rich.console import Console
 
+from mbf_abstract.commands.waiting import waiting
 from terrain.cli import new_run_folder
 from terrain.live_line import LiveLine, progress_text
 from terrain.runner import Progress
@@ -26,30 +29,56 @@ def test_an_unknown_distance_is_shown_as_dashes():
     assert "nan" not in progress_text(waiting)
 
 
-def test_without_a_terminal_only_the_steps_are_told():
+def shown(show=True, terminal=True, **calls):
+    """What a live line leaves in the terminal's stream; ``calls`` are its methods with their argument."""
     text = io.StringIO()
-    with LiveLine(console=Console(file=text, force_terminal=False)) as live:
-        live.step("building the world")
-        live.progress(DRIVING)
+    with LiveLine(show, Console(file=text, force_terminal=terminal, width=140)) as live:
+        for method, argument in calls.items():
+            getattr(live, method)(argument)
+    return text.getvalue()
 
-    assert text.getvalue() == "building the world\n"
+
+def test_on_a_terminal_steps_and_the_drive_are_shown():
+    assert "building the world" in shown(step="building the world")
+    assert "34.6 m left" in shown(step="building the world", progress=DRIVING)
 
 
-def test_a_quiet_run_prints_nothing():
+@pytest.mark.parametrize(("show", "terminal"), [(True, False), (False, True)])
+def test_without_a_terminal_and_when_told_to_be_quiet_only_notes_are_printed(show, terminal):
+    text = shown(show, terminal, step="building the world", progress=DRIVING, note="matplotlib is missing")
+
+    assert text == "matplotlib is missing\n"
+
+
+@pytest.mark.parametrize(
+    ("step", "finished", "total"),
+    [("warming up planner cvp (2 of 5)", 2, 5), ("building the world", 0, None)],
+)
+def test_a_step_that_tells_how_many_there_are_fills_the_bar(step, finished, total):
+    live = LiveLine(console=Console(file=io.StringIO()))
+    for text in ("warming up planner astar (1 of 7)", step):
+        live.step(text)
+
+    (task,) = live._bar.tasks
+    assert (task.completed, task.total) == (finished, total)
+
+
+def test_the_bar_of_a_drive_is_the_part_of_the_way_that_is_done():
+    live = LiveLine(console=Console(file=io.StringIO()))
+    for left in (math.nan, 40.0, 50.0, 20.0):
+        live.progress(replace(DRIVING, distance_left=left))
+
+    (task,) = live._bar.tasks
+    assert (task.completed, task.total) == (30.0, 50.0)
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_waiting_is_shown_on_terminals_only(terminal):
     text = io.StringIO()
-    with LiveLine(show=False, console=Console(file=text, force_terminal=True)) as live:
-        live.step("building the world")
-        live.progress(DRIVING)
+    with waiting("planning", Console(file=text, force_terminal=terminal)):
+        pass
 
-    assert text.getvalue() == ""
-
-
-def test_on_a_terminal_the_line_is_shown():
-    text = io.StringIO()
-    with LiveLine(console=Console(file=text, force_terminal=True, width=120)) as live:
-        live.progress(DRIVING)
-
-    assert "34.6 m left" in text.getvalue()
+    assert ("planning" in text.getvalue()) is terminal
 
 
 def test_run_folders_of_the_same_second_get_different_names(tmp_path):
