@@ -1,4 +1,4 @@
-"""Makes the pictures of the README from real runs: ``python docs/make_pictures.py``."""
+"""Makes the pictures and animations of the README from real runs: ``python docs/make_pictures.py``."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ from pathlib import Path
 
 from PIL import Image
 
+from terrain.recording import Recording
 from terrain.runner import RunOptions, run_scenario
 from terrain.scenario import load_scenario
+from terrain.viewer.animation import write_animation
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
 WIDTH = 900  # pixels
 
 
 def make(name: str) -> None:
-    """Run a shipped scenario and keep its picture, small."""
+    """Run a shipped scenario and keep its picture, small, and its animation."""
     with tempfile.TemporaryDirectory() as folder:
         result = run_scenario(load_scenario(name), RunOptions(Path(folder)))
         if not result.success:
@@ -23,6 +25,7 @@ def make(name: str) -> None:
         image = Image.open(Path(folder) / "picture.png").convert("RGB")
         image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
         image.quantize(128).save(PICTURES / f"{name}.png", optimize=True)
+        write_animation(PICTURES / f"{name}.gif", Recording.load(Path(folder) / "recording.npz"))
 
 
 if __name__ == "__main__":

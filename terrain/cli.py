@@ -95,17 +95,25 @@ def replay(
     folder: Path = typer.Argument(..., help="Folder of a run, e.g. runs/2030-01-02_03-04-05."),
     show: bool = typer.Option(True, "--open/--no-open", help="Open the page in the browser."),
     rrd: bool = typer.Option(False, "--rrd", help="Write run.rrd for Rerun too; needs the extra rerun."),
+    gif: bool = typer.Option(False, "--gif", help="Write animation.gif too, for where no script may run."),
 ) -> None:
     """Write picture, report, replay and MCAP log of a run again from its recording, and open the replay."""
     with readable_errors():
+        from terrain.live_line import LiveLine
         from terrain.run_folder import read_run
+        from terrain.viewer.animation import write_animation
         from terrain.viewer.rerun_log import write_rrd
         from terrain.viewer.results import write_results
 
         recording, metrics = read_run(folder)
-        write_results(folder, recording, metrics)
-        if rrd:
-            write_rrd(folder / "run.rrd", recording)
+        with LiveLine() as live:
+            write_results(folder, recording, metrics, live.step)
+            if rrd:
+                live.step("writing the recording for Rerun")
+                write_rrd(folder / "run.rrd", recording)
+            if gif:
+                live.step("writing the animation")
+                write_animation(folder / "animation.gif", recording)
     page = (folder / "replay.html").resolve()
     typer.echo(page)
     if show:

@@ -39,10 +39,11 @@ def test_world_plans_scans_and_events_are_there(columns, office_recording):
     assert len(columns["/events", "TextLog:text"]) == len(office_recording.events)
 
 
-def test_the_command_writes_it_on_request(hill_recording, tmp_path):
+def test_the_command_writes_it_and_an_animation_on_request(hill_recording, tmp_path):
     hill_recording.save(tmp_path / "recording.npz")
 
-    asked = CliRunner().invoke(make_app(), ["replay", str(tmp_path), "--no-open", "--rrd"])
+    asked = CliRunner().invoke(make_app(), ["replay", str(tmp_path), "--no-open", "--rrd", "--gif"])
 
     assert asked.exit_code == 0, asked.output
     assert (tmp_path / "run.rrd").stat().st_size > 10_000
+    assert (tmp_path / "animation.gif").stat().st_size > 10_000
