@@ -62,7 +62,7 @@ def _corner_at_goal(path: Path) -> float:
 
 
 def _curve_to_goal(path: Path, progress: PathProgress, leaves_at: float, radius: float) -> NDArray[np.float64]:
-    """Points (n, 3) in the goal's tangent plane, from ``leaves_at`` [m] of the path to the straight piece at its end."""
+    """Points (n, 3) in the goal's tangent plane from ``leaves_at`` [m] of the path to the straight piece at the end."""
     goal = path[-1]
     start, ahead = progress.points_at(np.array([leaves_at, leaves_at + 0.5 * _SPACING])) @ goal.rotation
     end = path.positions[-1] - _STRAIGHT * goal.rotation[:, 0]
