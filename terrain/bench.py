@@ -15,6 +15,7 @@ import os
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from mbf_abstract.actions.handle import AnyGoalHandle
 from mbf_abstract.clock import Clock, WallClock
@@ -22,6 +23,7 @@ from mbf_abstract.events import EventBus, EventSink, MemorySink
 from mbf_abstract.findings import ConfigError, Finding
 from mbf_abstract.geometry import Pose
 from mbf_abstract.navigator import Navigator
+from mbf_abstract.robot import Odometry
 from mbf_abstract.server_factory import read_config
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.transforms import TransformBuffer
@@ -31,11 +33,12 @@ from terrain.recording import RobotShape
 from terrain.robot_models import ROBOTS
 from terrain.robots import WheeledRobot
 from terrain.scenario import Scenario, load_scenario
-from terrain.scenario_faults import FaultSchedule
-from terrain.scenario_sensors import make_localization, make_sensors
+from terrain.scenario_faults import ODOMETRY, FaultSchedule
+from terrain.scenario_sensors import make_ego_sensors, make_localization, make_sensors
 from terrain.scenario_settings import apply_settings
 from terrain.scenario_stage import set_stage
 from terrain.scenario_world import ScenarioWorld
+from terrain.sensors import Sensor
 from terrain.simulation import Simulation
 
 SENSE_FIRST = 0.5  # s; every sensor has spoken and every map has been updated when a script gets its turn
@@ -106,7 +109,7 @@ class Bench:
         self.clock: Clock = WallClock() if wall_clock else SimClock()
         self.memory = MemorySink(maxlen=MAX_EVENTS)
         self.events = EventBus(self.clock.now, [self.memory, *sinks])
-        clocked = ClockedRobot(self.robot)
+        clocked = ClockedRobot(self.robot, self._odometry)
         on_step("building the map")
         server = server_class(config, clocked, self.clock, TransformBuffer(), self.events, self.seed)
         server.get_path.listeners.append(self._record_plan)
@@ -145,7 +148,10 @@ class Bench:
         pose = self.world.pose_of(self.scenario.start)
         robot = WheeledRobot(self.world.bullet, ROBOTS[self.scenario.robot], pose)
         robot.settle()
-        sensors = make_sensors(self.scenario.sensors, robot, self.world, self.seed)
+        sensors: dict[str, Sensor[Any]] = {
+            **make_sensors(self.scenario.sensors, robot, self.world, self.seed),
+            **make_ego_sensors(self.scenario, robot, self.seed),
+        }
         self.localization = make_localization(robot, self.seed)
         self.faults = FaultSchedule(self.world.bullet, sensors, self.localization, self.scenario.faults)
         return robot, Simulation(self.world.bullet, robot, sensors)
@@ -156,6 +162,11 @@ class Bench:
         recorder.ground, recorder.walls = self.world.ground, self.world.walls
         recorder.obstacles, recorder.actors = self._obstacles, self.world.actors
         return recorder
+
+    def _odometry(self) -> Odometry:
+        """What the wheels say, if the scenario wants that, else the truth."""
+        reading = self.simulation.latest.get(ODOMETRY)
+        return self.robot.odometry() if reading is None else reading.odometry
 
     def _record_plan(self, handle: AnyGoalHandle) -> None:
         path = handle.result.path if handle.result is not None else None

@@ -13,10 +13,10 @@ from mbf_abstract.robot import Odometry
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.server import AbstractNavigationServer
 from mbf_abstract.transform import Transform
-from terrain.ego_sensors import Localization
+from terrain.ego_sensors import Localization, WheelOdometryReading
 from terrain.recorder import Recorder
 from terrain.robots import WheeledRobot
-from terrain.scenario_faults import seen_from
+from terrain.scenario_faults import ODOMETRY, seen_from
 from terrain.simulation import Simulation
 
 PERIOD = 1.0 / 60.0  # s between two publications of the robot's pose
@@ -27,10 +27,18 @@ Report = Callable[[float, Pose, float], None]
 
 
 class ClockedRobot:
-    """The simulated robot as the server sees it: its odometry is stamped with the server's clock."""
+    """The simulated robot as the server sees it: its odometry is stamped with the server's clock.
 
-    def __init__(self, robot: WheeledRobot) -> None:
+    Parameters
+    ----------
+    robot : WheeledRobot
+    measure : callable
+        Returns its odometry, stamped with the world's time.
+    """
+
+    def __init__(self, robot: WheeledRobot, measure: Callable[[], Odometry]) -> None:
         self._robot = robot
+        self._measure = measure
         self.time_offset = 0.0
 
     def send_command(self, command: Command) -> None:
@@ -39,7 +47,7 @@ class ClockedRobot:
 
     def odometry(self) -> Odometry:
         """Measured velocity; the stamp is the clock's time, not the simulation's."""
-        measured = self._robot.odometry()
+        measured = self._measure()
         return Odometry(measured.velocity, measured.stamp + self.time_offset)
 
 
@@ -78,6 +86,7 @@ class DriveLoop:
         self._recorder = recorder
         self._runtime = server.runtime
         self._scans = 0
+        self._odom_stamp: float | None = None
         self._stopped = False
         self._origin = self._runtime.clock.now()
         self.on_tick: list[Callable[[float], None]] = []
@@ -94,12 +103,30 @@ class DriveLoop:
         self._stopped = True
 
     def publish(self) -> None:
-        """Publish the pose that the robot's localisation gives, if it gives one."""
+        """Publish the pose that the robot's localisation gives, if it gives one; over odom where there is odometry."""
+        if ODOMETRY in self._simulation.sensors:
+            self._publish_over_odom(self._simulation.latest.get(ODOMETRY))
+            return
         pose, robot = self._localization.measure(self._runtime.clock.now()), self._runtime.robot
         if pose is not None:
             self._runtime.transforms.set(
                 Transform(pose.position, pose.orientation, robot.global_frame, robot.robot_frame, pose.stamp)
             )
+
+    def _publish_over_odom(self, reading: WheelOdometryReading | None) -> None:
+        """REP-105: odometry moves base_link in odom, and the localisation moves odom so that base_link is right."""
+        if reading is None or reading.pose.stamp == self._odom_stamp:
+            return
+        self._odom_stamp = reading.pose.stamp
+        stamp, robot = self._origin + reading.pose.stamp, self._runtime.robot
+        T_odom_base = Transform.from_pose(reading.pose.stamped(stamp), robot.robot_frame)
+        self._runtime.transforms.set(T_odom_base)
+        believed = self._localization.measure(stamp)
+        if believed is not None:
+            T_map_base = Transform(
+                believed.position, believed.orientation, robot.global_frame, robot.robot_frame, stamp
+            )
+            self._runtime.transforms.set(T_map_base @ T_odom_base.inverse())
 
     def _loop(self) -> None:
         clock, tick = self._runtime.clock, 0
@@ -120,6 +147,8 @@ class DriveLoop:
         self._report(time, pose, velocity.speed)
 
     def _take_measurement(self, name: str, measurement: Any) -> None:
+        if isinstance(measurement, WheelOdometryReading):
+            self._publish_over_odom(measurement)
         if not isinstance(measurement, RangeScan):
             return
         scan = replace(measurement, stamp=self._origin + measurement.stamp)

@@ -16,7 +16,7 @@ from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.validation import validate
 from mbf_abstract.yaml_source import YamlDocument, load_yaml
 from terrain.scenario_actors import Actor
-from terrain.scenario_faults import LOCALIZATION, Fault, SensorFault
+from terrain.scenario_faults import IMU, LOCALIZATION, ODOMETRY, Fault, SensorFault
 from terrain.scenario_limits import Limits
 from terrain.scenario_obstacles import Forest, Obstacle
 from terrain.scenario_places import Place, PlanarPose
@@ -28,12 +28,14 @@ SHIPPED = Path(__file__).parent / "scenarios"
 
 
 class Sensor(ParameterModel):
-    """A lidar on the robot."""
+    """A lidar or depth camera on the robot."""
 
     name: str = parameter("lidar", "Name of the source, as the map layers call it.")
-    type: Literal["planar", "rings"] = parameter("planar", "One horizontal ring, or 16 rings.")
+    type: Literal["planar", "rings", "depth"] = parameter(
+        "planar", "One horizontal ring, 16 rings, or a depth camera of 70 degrees that looks ahead."
+    )
     rate: float = parameter(10.0, "Scans a second.", unit="Hz", gt=0.0, le=60.0)
-    rays: int = parameter(360, "Rays of a ring.", ge=3, le=10_000)
+    rays: int = parameter(360, "Rays of a ring; columns of a camera, which has 3/4 as many rows.", ge=3, le=10_000)
     max_range: float = parameter(10.0, "Range.", unit="m", gt=0.0)
     noise: float = parameter(0.01, "Standard deviation of a range.", unit="m", ge=0.0)
     drop_out: float = parameter(0.0, "Share of rays without an answer.", ge=0.0, lt=1.0)
@@ -50,7 +52,11 @@ class Scenario(ParameterModel):
     robot: Literal["husky", "turtlebot"] = parameter(..., "Model of the robot.")
     start: Place = parameter(..., "Where the robot starts: x, y, yaw, or the name of a place of the world.")
     goals: tuple[Place, ...] = parameter(..., "Where it shall go, in order.")
-    sensors: tuple[Sensor, ...] = parameter((), "Its lidars.")
+    sensors: tuple[Sensor, ...] = parameter((), "Its lidars and cameras.")
+    odometry: Literal["exact", "wheels"] = parameter(
+        "exact", "Velocity as it is, or as turning wheels tell; then odom drifts and map -> odom corrects it."
+    )
+    imu: bool = parameter(False, "Whether it has an IMU, for scripts: simulation.latest['imu'] is the tilt.")
     obstacles: tuple[Obstacle, ...] = parameter((), "Things that are on no map.")
     forests: tuple[Forest, ...] = parameter((), "Posts that are on no map, drawn from the seed.")
     actors: tuple[Actor, ...] = parameter((), "What moves by itself.")
@@ -109,12 +115,17 @@ def _find_contradictions(scenario: Scenario, document: YamlDocument) -> list[Fin
     for backend, file in scenario.navigation.items():
         if not file.is_file():
             findings.append(document.finding(("navigation", backend), "a configuration file", f"no file {file}"))
-    sensors = [*(sensor.name for sensor in scenario.sensors), LOCALIZATION]
+    sensors = [*(sensor.name for sensor in scenario.sensors), *ego_sensors(scenario), LOCALIZATION]
     for index, fault in enumerate(scenario.faults):
         if isinstance(fault, SensorFault) and fault.sensor not in sensors:
             expected = "one of " + ", ".join(sensors)
             findings.append(document.finding(("faults", index, "sensor"), expected, repr(fault.sensor)))
     return findings
+
+
+def ego_sensors(scenario: Scenario) -> list[str]:
+    """Names of the sensors that look at the robot itself."""
+    return [ODOMETRY] * (scenario.odometry == "wheels") + [IMU] * scenario.imu
 
 
 def shipped_scenarios() -> dict[str, Path]:

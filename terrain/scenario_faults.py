@@ -16,8 +16,8 @@ from terrain.ego_sensors import Localization
 from terrain.sensors import Sensor
 from terrain.world import BulletWorld
 
-LOCALIZATION = "localization"
-"""Name of the localisation among the sensors of a fault."""
+LOCALIZATION, ODOMETRY, IMU = "localization", "odometry", "imu"
+"""Names among the sensors of a fault, of those that look at the robot itself."""
 
 
 class TimedFault(ParameterModel):
@@ -35,7 +35,7 @@ class SensorFault(TimedFault):
     """A sensor says nothing, its last measurement again and again, or something untrue."""
 
     type: Literal["silent", "stale", "wrong"]
-    sensor: str = parameter(..., "Name of the sensor, or localization.")
+    sensor: str = parameter(..., "Name of the sensor, or localization, odometry or imu.")
 
 
 class LocalizationJump(TimedFault):

@@ -1,18 +1,19 @@
-"""The sensors of a scenario: lidars that see the world and what stands or moves in it."""
+"""The sensors of a scenario: lidars and cameras that see the world, and those that look at the robot itself."""
 
 from __future__ import annotations
 
 import zlib
+from typing import Any
 
 import numpy as np
 
 from terrain import scenario as model
-from terrain.ego_sensors import Localization
+from terrain.ego_sensors import Imu, Localization, WheelOdometry
 from terrain.rays import MovingRays, StaticRays
 from terrain.robots import WheeledRobot
-from terrain.scenario_faults import LOCALIZATION
+from terrain.scenario_faults import IMU, LOCALIZATION, ODOMETRY
 from terrain.scenario_world import ScenarioWorld
-from terrain.sensors import Lidar, planar_directions, ring_directions
+from terrain.sensors import Lidar, Sensor, camera_directions, planar_directions, ring_directions
 
 
 def make_sensors(
@@ -25,13 +26,27 @@ def make_sensors(
     return {sensor.name: _lidar(sensor, robot, casters, seed) for sensor in sensors}
 
 
+def make_ego_sensors(scenario: model.Scenario, robot: WheeledRobot, seed: int) -> dict[str, Sensor[Any]]:
+    """Make the sensors of a scenario that look at the robot itself, by name."""
+    makers = {ODOMETRY: WheelOdometry, IMU: Imu}
+    return {name: makers[name](robot, _generator(seed, name)) for name in model.ego_sensors(scenario)}
+
+
 def make_localization(robot: WheeledRobot, seed: int) -> Localization:
     """Make the localisation of a robot: exact until a fault of the scenario says otherwise."""
-    return Localization(robot, np.random.default_rng([seed, zlib.crc32(LOCALIZATION.encode())]))
+    return Localization(robot, _generator(seed, LOCALIZATION))
+
+
+def _generator(seed: int, name: str) -> np.random.Generator:
+    """A generator of a sensor's own, so that sensors do not shift each other's noise."""
+    return np.random.default_rng([seed, zlib.crc32(name.encode())])
 
 
 def _lidar(sensor: model.Sensor, robot: WheeledRobot, casters: list[StaticRays | MovingRays], seed: int) -> Lidar:
-    directions = planar_directions(sensor.rays) if sensor.type == "planar" else ring_directions(rays=sensor.rays)
+    if sensor.type == "depth":
+        directions = camera_directions(sensor.rays, 3 * sensor.rays // 4)
+    else:
+        directions = planar_directions(sensor.rays) if sensor.type == "planar" else ring_directions(rays=sensor.rays)
     return Lidar(
         robot,
         sensor.name,
@@ -39,7 +54,7 @@ def _lidar(sensor: model.Sensor, robot: WheeledRobot, casters: list[StaticRays |
         robot.spec.lidar_position,
         directions,
         sensor.rate,
-        np.random.default_rng([seed, zlib.crc32(sensor.name.encode())]),
+        _generator(seed, sensor.name),
         max_range=sensor.max_range,
         noise=sensor.noise,
         drop_out=sensor.drop_out,
