@@ -35,7 +35,7 @@ from terrain.robots import WheeledRobot
 from terrain.scenario import Scenario, load_scenario
 from terrain.scenario_faults import ODOMETRY, FaultSchedule
 from terrain.scenario_sensors import make_ego_sensors, make_localization, make_sensors
-from terrain.scenario_settings import apply_settings
+from terrain.scenario_settings import apply_settings, apply_world_settings
 from terrain.scenario_stage import set_stage
 from terrain.scenario_world import ScenarioWorld
 from terrain.sensors import Sensor
@@ -65,7 +65,7 @@ class Bench:
     on_step : callable
         Told the name of each preparation that may take a while.
     settings : mapping of str to str
-        Changes of the navigation configuration, see ``terrain.scenario_settings``.
+        Changes of the scenario's world and navigation, see ``terrain.scenario_settings``.
 
     Raises
     ------
@@ -84,7 +84,8 @@ class Bench:
         on_step: Callable[[str], None] = lambda text: None,
         settings: Mapping[str, str] | None = None,
     ) -> None:
-        self.scenario = load_scenario(scenario) if isinstance(scenario, str) else scenario
+        loaded = load_scenario(scenario) if isinstance(scenario, str) else scenario
+        self.scenario, self._settings = apply_world_settings(loaded, settings or {})
         self.backend = backend or self.scenario.backend
         self.seed = self.scenario.seed if seed is None else seed
         self._temporary = tempfile.TemporaryDirectory(prefix="mbf_bench_")  # removed with the bench, used or not
@@ -93,7 +94,6 @@ class Bench:
         on_step("building the world")
         self.world, self._obstacles = set_stage(self.scenario, self.folder, self.seed)
         try:
-            self._settings = settings or {}
             self._start(wall_clock, sinks, on_step)
         except BaseException:
             self.world.bullet.close()

@@ -13,28 +13,41 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RectBivariateSpline
+from scipy.ndimage import gaussian_filter
 
 from mbf_abstract.geometry import Pose, quaternion_from_yaw, quaternion_multiply
 
 FloatArray = NDArray[np.float64]
 
+SMOOTHING_WIDTH = 0.5  # m; four sigma of the Gaussian that parts hills from bumps, about a wheelbase
 EDGE_TOLERANCE = 1e-9  # cells; a query on the far border must not fall off by a rounding error
 
 
 @dataclass(frozen=True)
 class SlopeReport:
-    """Slopes of the triangles of a terrain [degrees], weighted by their area on the map, and its relief [m]."""
+    """How steep and rough a terrain is.
+
+    Attributes
+    ----------
+    median, p90, p99, maximum : float
+        Slopes of the triangles [degrees], weighted by their area on the map.
+    relief : float
+        From the lowest to the highest sample [m].
+    roughness : float
+        Root mean square [m] of what is left of the heights when they are smoothed over half a metre: what wheels feel.
+    """
 
     median: float
     p90: float
     p99: float
     maximum: float
     relief: float
+    roughness: float
 
     def __str__(self) -> str:
         return (
             f"slope median {self.median:.1f}, p90 {self.p90:.1f}, p99 {self.p99:.1f}, max {self.maximum:.1f} deg; "
-            f"relief {self.relief:.2f} m"
+            f"relief {self.relief:.2f} m; roughness {1000.0 * self.roughness:.0f} mm"
         )
 
 
@@ -248,6 +261,9 @@ class Heightfield:
         return np.asarray(np.degrees(np.arctan(np.stack([lower, upper], axis=2).ravel())))
 
     def slope_report(self) -> SlopeReport:
-        """Summarise how steep the terrain is."""
+        """Summarise how steep and how rough the terrain is."""
         median, p90, p99, maximum = np.percentile(self.slopes(), [50, 90, 99, 100]).tolist()
-        return SlopeReport(median, p90, p99, maximum, float(np.ptp(self.heights)))
+        heights = self.heights.astype(np.float64)
+        sigma = 0.25 * SMOOTHING_WIDTH
+        bumps = heights - gaussian_filter(heights, (sigma / self.dy, sigma / self.dx), mode="nearest")
+        return SlopeReport(median, p90, p99, maximum, float(np.ptp(heights)), float(np.sqrt(np.mean(bumps**2))))

@@ -49,7 +49,7 @@ class Scenario(ParameterModel):
     backend: str = parameter(..., "Map backend to use where the command line names none.")
     navigation: dict[str, Path] = parameter(..., "Configuration file of each backend.")
     world: World = parameter(..., "What it takes place in.")
-    robot: Literal["husky", "turtlebot"] = parameter(..., "Model of the robot.")
+    robot: Literal["husky", "turtlebot", "car"] = parameter(..., "Model of the robot.")
     start: Place = parameter(..., "Where the robot starts: x, y, yaw, or the name of a place of the world.")
     goals: tuple[Place, ...] = parameter(..., "Where it shall go, in order.")
     sensors: tuple[Sensor, ...] = parameter((), "Its lidars and cameras.")

@@ -1,7 +1,8 @@
-"""Settings that a run or a sweep makes on top of a navigation configuration, such as ``planner=cvp``.
+"""Settings that a run or a sweep makes on top of a scenario, such as ``planner=cvp`` or ``world.median_slope=12``.
 
-``planner`` and ``controller`` choose the default plugin by its name in the configuration or by its type; any other
-key is a dotted path, e.g. ``mesh_map.edge_cost_factor``.
+``planner`` and ``controller`` choose the default plugin by its name in the navigation configuration or by its type;
+``world.`` and a key change the scenario's world; any other key is a dotted path of the configuration, e.g.
+``mesh_map.edge_cost_factor``.
 """
 
 from __future__ import annotations
@@ -10,10 +11,37 @@ from collections.abc import Mapping
 from typing import Any
 
 import yaml
+from pydantic import ValidationError
 
 from mbf_abstract.findings import ConfigError, Finding
+from terrain.scenario import Scenario
 
+WORLD = "world."
 PLUGIN_LISTS = {"planner": "planners", "controller": "controllers"}
+
+
+def apply_world_settings(scenario: Scenario, settings: Mapping[str, str]) -> tuple[Scenario, dict[str, str]]:
+    """Return the scenario with the settings of its world made, and the other settings.
+
+    Raises
+    ------
+    ConfigError
+        The world has no such key, or refuses a value; all findings.
+    """
+    of_world = {key: yaml.safe_load(value) for key, value in settings.items() if key.startswith(WORLD)}
+    if not of_world:
+        return scenario, dict(settings)
+    kept = scenario.world.model_dump(exclude_unset=True)
+    changed = kept | {key.removeprefix(WORLD): value for key, value in of_world.items()}
+    try:
+        world = type(scenario.world).model_validate(changed)
+    except ValidationError as error:
+        wrong = [(".".join(map(str, detail["loc"])), detail["msg"]) for detail in error.errors()]
+        raise ConfigError(
+            [Finding("settings", 1, f"{WORLD}{key}", text, repr(changed.get(key))) for key, text in wrong]
+        ) from error
+    rest = {key: value for key, value in settings.items() if key not in of_world}
+    return scenario.model_copy(update={"world": world}), rest
 
 
 def apply_settings(text: str, settings: Mapping[str, str]) -> str:

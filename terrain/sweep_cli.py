@@ -18,7 +18,7 @@ def sweep(
     scenario: str = typer.Argument(..., help="Name of a shipped scenario (see mbf scenarios), or a YAML file."),
     seeds: str = typer.Option("0:10", "--seeds", help="First and one past the last seed, 0:20, or a list, 1,5,9."),
     settings: list[str] = typer.Option(
-        [], "--set", help="KEY=VALUE,VALUE: planner, controller, backend, or a dotted path of the configuration."
+        [], "--set", help="KEY=VALUE,VALUE: planner, controller, backend, world.KEY, or a path of the configuration."
     ),
     workers: int = typer.Option(1, "--workers", min=1, help="Worker processes."),
     scheduler: str | None = typer.Option(

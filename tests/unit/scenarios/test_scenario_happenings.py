@@ -13,10 +13,11 @@ from terrain.ego_sensors import Localization
 from terrain.kinematic_robot import KinematicRobot, KinematicWorld
 from terrain.mishaps import MishapKind
 from terrain.robot_models import TURTLEBOT
+from terrain.scenario import load_scenario
 from terrain.scenario_actors import Crowd, Door, OtherRobot, Walker, add_actors
 from terrain.scenario_faults import FaultSchedule, LocalizationJump, SensorFault, seen_from
 from terrain.scenario_limits import Limits, broken_limits
-from terrain.scenario_settings import apply_settings
+from terrain.scenario_settings import apply_settings, apply_world_settings
 from terrain.scenario_world import build_world
 from terrain.scenario_world_types import OfficeWorld
 
@@ -160,6 +161,18 @@ def test_a_dotted_setting_changes_one_value_with_its_type():
 def test_a_dotted_setting_through_a_value_is_refused():
     with pytest.raises(ConfigError, match="block of keys"):
         apply_settings(CONFIG, {"mesh_map.edge_cost_factor.x": "2"})
+
+
+def test_a_setting_of_the_world_changes_the_ground_and_is_no_setting_of_the_navigation():
+    scenario, rest = apply_world_settings(load_scenario("outdoor"), {"world.size": "40.0", "planner": "cvp"})
+    assert (scenario.world.size, rest) == (40.0, {"planner": "cvp"})
+    assert apply_world_settings(scenario, rest) == (scenario, rest)
+
+
+@pytest.mark.parametrize(("key", "value"), [("world.size", "-3.0"), ("world.colour", "red")])
+def test_a_wrong_setting_of_the_world_is_refused_by_name(key, value):
+    with pytest.raises(ConfigError, match=key):
+        apply_world_settings(load_scenario("outdoor"), {key: value})
 
 
 def test_no_settings_leave_the_text_as_it_is():

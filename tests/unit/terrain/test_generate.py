@@ -28,6 +28,16 @@ def test_roughness_is_the_root_mean_square_of_the_bumps() -> None:
     assert np.std(generate.add_roughness(flat, rng(), 0.03).heights) == pytest.approx(0.03, rel=1e-3)
 
 
+def test_the_report_tells_steep_ground_from_rough_ground() -> None:
+    reports = {}
+    for slope, roughness in ((5.0, 0.0), (15.0, 0.0), (5.0, 0.03)):
+        rng = np.random.default_rng(3)
+        reports[slope, roughness] = fractal_terrain(20.0, 20.0, 0.1, rng, slope, roughness).slope_report()
+    assert reports[15.0, 0.0].median > reports[5.0, 0.03].median > reports[5.0, 0.0].median
+    assert reports[5.0, 0.03].roughness > 1.5 * reports[15.0, 0.0].roughness > 3.0 * reports[5.0, 0.0].roughness
+    assert "roughness" in str(reports[5.0, 0.03])
+
+
 def test_ridge_crest_and_crater_bottom_have_their_heights() -> None:
     flat = flat_terrain(20.0, 20.0, 0.1)
     ridge = generate.add_ridge(flat, np.array([[10.0, 0.0], [10.0, 20.0]]), 2.0, 4.0)
