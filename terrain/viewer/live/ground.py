@@ -26,7 +26,6 @@ OWN_LOOK = "the ground itself"
 LETHAL = (200, 20, 40)
 LIFT = 0.03  # m from one layer of things that lie on the ground to the next
 REFRESH = 10  # frames of the page between two looks at the map
-LOCAL_REFRESH = 5
 
 
 class Ground:
@@ -64,7 +63,6 @@ class Ground:
         if self._frame % REFRESH == 0 or self._drawn is None or chosen != self._drawn[0]:
             self._show_base(chosen)
             self._show_lethal()
-        if self._local is not None and self._frame % LOCAL_REFRESH == 0:
             self._show_local()
         self._frame += 1
 
@@ -98,12 +96,17 @@ class Ground:
         if not self._is_level:
             return self._drape(view, name, lift)
         x_min, x_max, y_min, y_max = view.extent
-        pixels = cost_colours(view.costs)
+        pixels = cost_colours(view.costs)[::-1].astype(np.uint8)
         centre = (0.5 * (x_min + x_max), 0.5 * (y_min + y_max), float(self._world.vertices[0, 2]) + lift)
-        return self._scene.add_image(
-            name, pixels[::-1].astype(np.uint8), x_max - x_min, y_max - y_min, format="png", position=centre,
-            wxyz=(0.0, 1.0, 0.0, 0.0), cast_shadow=False, receive_shadow=False,
+        frame = self._scene.get_handle_by_name(name)
+        if frame is None:
+            frame = self._scene.add_frame(name, show_axes=False, wxyz=(0.0, 1.0, 0.0, 0.0))
+        frame.position = centre
+        self._scene.add_image(
+            f"{name}/image", pixels, x_max - x_min, y_max - y_min, format="png",
+            cast_shadow=False, receive_shadow=False,
         )  # fmt: skip
+        return frame
 
     def _drape(self, view: GridView, name: str, lift: float) -> Any:
         vertices, faces = self._world.vertices, self._world.faces
@@ -115,7 +118,8 @@ class Ground:
         return add_ground(self._scene, Surface(vertices, faces, colours), name) if len(faces) else None
 
     def _show_local(self) -> None:
-        assert self._local is not None
+        if self._local is None:
+            return
         view = self._navigation.map_view(self._navigation.map_views[1])
         if isinstance(view, GridView):
             key = (view.extent, hash(view.costs.tobytes()))

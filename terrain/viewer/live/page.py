@@ -74,7 +74,7 @@ class LivePage:
             self._camera.show(np.array(self._bench.simulation.robot.pose().position))
             self._ground.show()
             self._drive.show()
-            self._show_words()
+            self._show_words(time)
             if self._frame % PLOT_EVERY == 0:
                 self._plots.show(history)
         self._frame += 1
@@ -95,11 +95,11 @@ class LivePage:
         panel.dock_left()
         panel.set_width(PANEL_WIDTH)
 
-    def _show_words(self) -> None:
+    def _show_words(self, time: float) -> None:
         snapshot = self._log.snapshot()
         tree = tree_html(snapshot.nodes) if snapshot.nodes else NO_TREE
         for element, content in (
-            (self._headline, headline_html(self._tour)),
+            (self._headline, headline_html(time, self._tour)),
             (self._actions, actions_html(self._bench.navigator.server, snapshot)),
             (self._tree, f'<div style="{SMALL}">{tree}</div>'),
             (self._lines, lines_html(snapshot.lines)),

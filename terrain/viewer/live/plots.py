@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from terrain.viewer.colours import DRIVEN, PLANNED, SLOPE_COLOURS, Colour
 
 PERIOD = 0.2  # s of simulated time between two samples
+UNWATCHED_PERIOD = 1.0  # s, while nobody looks
 LENGTH = 600  # samples: two minutes
 HEIGHT = 110  # pixels
 
@@ -21,9 +22,9 @@ class History:
     def __init__(self) -> None:
         self._samples: deque[tuple[float, float, float, float]] = deque(maxlen=LENGTH)
 
-    def is_due(self, time: float) -> bool:
-        """Whether the last sample is long enough ago."""
-        return not self._samples or time >= self._samples[-1][0] + PERIOD - 1e-9
+    def is_due(self, time: float, period: float = PERIOD) -> bool:
+        """Whether the last sample is ``period`` s ago."""
+        return not self._samples or time >= self._samples[-1][0] + period - 1e-9
 
     def add(self, time: float, speed: float, tilt: float, cost: float) -> None:
         """Keep a sample."""

@@ -21,7 +21,7 @@ from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.pace import Pace
 from terrain.viewer.live.page import LivePage, tilt_of
-from terrain.viewer.live.plots import History
+from terrain.viewer.live.plots import PERIOD, UNWATCHED_PERIOD, History
 from terrain.viewer.page_server import page_server
 
 FRAME_PERIOD = 0.1  # s of wall time between two drawings
@@ -94,7 +94,7 @@ class LiveSession:
         if self._page is None:
             return
         try:
-            self._sample(time)
+            self._sample(time, PERIOD if self._page.is_watched else UNWATCHED_PERIOD)
             self._show(self._page, time)
         except Exception as error:  # whatever the page's library may raise, the run does not depend on it
             self._page = None
@@ -106,8 +106,8 @@ class LiveSession:
             return 0.0
         return self._options.speed or (1.0 if self._tour.is_waiting else 0.0)
 
-    def _sample(self, time: float) -> None:
-        if self._history.is_due(time):
+    def _sample(self, time: float, period: float) -> None:
+        if self._history.is_due(time, period):
             robot, queries = self._bench.simulation.robot, self._bench.navigator.server.queries
             pose = robot.pose()
             self._history.add(time, robot.velocity().speed, tilt_of(pose), queries.check_point(pose).cost)

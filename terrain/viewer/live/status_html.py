@@ -32,8 +32,8 @@ def actions_html(server: AbstractNavigationServer, snapshot: Snapshot) -> str:
     return f'<table style="{SMALL}">{"".join(rows)}</table>'
 
 
-def headline_html(tour: GoalTour) -> str:
-    """Where the run stands: the goal the robot goes to, or how the last one has ended."""
+def headline_html(time: float, tour: GoalTour) -> str:
+    """Simulated time [s], and the goal the robot goes to, or how the last one has ended."""
     if tour.target is not None:
         x, y, z = tour.target.position
         text = _coloured(f"going to {x:.1f}, {y:.1f}, {z:.1f}", BUSY)
@@ -42,7 +42,7 @@ def headline_html(tour: GoalTour) -> str:
         text = _coloured(f"{result.outcome_name}: {result.message}", GOOD if result.success else BAD)
     else:
         text = _coloured("not started yet", NEITHER)
-    return f'<div style="{SMALL};font-weight:600">{text}</div>'
+    return f'<div style="{SMALL};font-weight:600">{time:.0f} s · {text}</div>'
 
 
 def lines_html(lines: Sequence[Line]) -> str:
