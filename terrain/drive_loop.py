@@ -92,6 +92,11 @@ class DriveLoop:
         self.on_tick: list[Callable[[float], None]] = []
         simulation.on_measurement(self._take_measurement)
 
+    @property
+    def origin(self) -> float:
+        """Time [s] of the clock at which the simulation's time was 0."""
+        return self._origin
+
     def start(self, report: Report) -> None:
         """Start the thread; ``report(time, pose, speed)`` is called ten times a second."""
         self._report = report

@@ -7,7 +7,7 @@ Use one per run, on one thread: the runner's, which steps the simulator. Give it
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -77,8 +77,10 @@ class Recorder:
         if isinstance(view, GridView) and view.costs.size <= MAX_GRID_CELLS:
             self.grids.append(RecordedGrid.of(time, view))
 
-    def finish(self, success: bool, outcome: str, message: str, events: Sequence[Event] = ()) -> Recording:
-        """Return what was recorded."""
+    def finish(
+        self, success: bool, outcome: str, message: str, events: Sequence[Event] = (), began: float = 0.0
+    ) -> Recording:
+        """Return what was recorded; ``began`` [s] is the events' time at which the samples' time was 0."""
         rows = np.array(self._samples, dtype=np.float64).reshape(-1, 14)
         return Recording(
             scenario=self.scenario,
@@ -95,7 +97,7 @@ class Recorder:
             commands=rows[:, 11:14].copy(),
             paths=list(self.paths),
             scans=list(self.scans),
-            events=tuple(events),
+            events=tuple(replace(event, time=max(0.0, round(event.time - began, 9))) for event in events),
             success=success,
             outcome=outcome,
             message=message,

@@ -127,7 +127,9 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
         result, wall_time = _drive(bench, options)
     finally:
         bench.close()
-    recording = bench.recorder.finish(result.success, result.outcome_name, result.message, list(bench.memory.events))
+    recording = bench.recorder.finish(
+        result.success, result.outcome_name, result.message, bench.memory.events, began=bench.loop.origin
+    )
     metrics = _write_numbers(recording, bench, wall_time, options)
     if options.draw:
         _draw(recording, metrics, options)

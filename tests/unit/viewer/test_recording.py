@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.map_view import GridView, MeshView
 from terrain.mishaps import Thing
@@ -137,3 +138,13 @@ def test_what_moves_by_itself_is_recorded_with_every_sample_and_comes_back(tmp_p
     np.testing.assert_array_equal(track.poses[:, :3], [[0.5, 2.0, 0.85], [1.0, 2.0, 0.85], [1.5, 2.0, 0.85]])
     np.testing.assert_array_equal(track.vertices, Pacer.looks[0])
     np.testing.assert_array_equal(track.faces, Pacer.looks[1])
+
+
+def test_events_of_a_real_clock_are_brought_to_the_time_of_the_samples():
+    recorder = Recorder("late", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), [])
+    events = [Event(time, EventKind.CUSTOM, "test", {"number": number}) for number, time in enumerate((3.0, 4.5, 9.0))]
+
+    recording = recorder.finish(True, "SUCCESS", "", events, began=4.25)
+
+    assert [event.time for event in recording.events] == [0.0, 0.25, 4.75]
+    assert [event.data["number"] for event in recording.events] == [0, 1, 2]
