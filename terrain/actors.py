@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from mbf_abstract.geometry import Pose
+from terrain.kinematic_robot import KinematicWorld
 from terrain.mishaps import Thing
 from terrain.occupancy import OccupancyGrid
 from terrain.recording import RobotShape
@@ -25,6 +26,7 @@ from terrain.world import BulletWorld
 
 FloatArray = NDArray[np.float64]
 
+AnyWorld = BulletWorld | KinematicWorld
 Triangles = tuple[FloatArray, NDArray[np.int32]]
 
 PERSON_RADIUS, PERSON_HEIGHT = 0.25, 1.7
@@ -54,7 +56,7 @@ class RouteWalker:
 
     Parameters
     ----------
-    world : BulletWorld
+    world : AnyWorld
     route : (n, 2) or (n, 3) float
         Corners [m]; after the last it goes back to the first. With three columns the third is the ground's height.
     speed : float
@@ -70,7 +72,7 @@ class RouteWalker:
 
     def __init__(
         self,
-        world: BulletWorld,
+        world: AnyWorld,
         route: FloatArray,
         speed: float,
         start: float = 0.0,
@@ -126,7 +128,7 @@ class SlidingDoor:
 
     def __init__(
         self,
-        world: BulletWorld,
+        world: AnyWorld,
         opened: Pose,
         closed: Pose,
         size: Sequence[float],
@@ -153,9 +155,7 @@ class SlidingDoor:
         self._world.place_body(self.body, self.pose())
 
 
-def other_robot(
-    world: BulletWorld, spec: RobotSpec, route: FloatArray, speed: float, start: float = 0.0
-) -> RouteWalker:
+def other_robot(world: AnyWorld, spec: RobotSpec, route: FloatArray, speed: float, start: float = 0.0) -> RouteWalker:
     """Put in another robot that follows a route: a box as large as the model, with its body and wheels to look at."""
     length, width = np.ptp(spec.footprint_array(), axis=0).tolist()
     size = (length, width, spec.height)

@@ -28,13 +28,14 @@ from mbf_abstract.server_factory import read_config
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.transforms import TransformBuffer
 from terrain.drive_loop import ClockedRobot, DriveLoop, Report
+from terrain.kinematic_robot import KinematicRobot, KinematicWorld
 from terrain.recorder import Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import ROBOTS
 from terrain.robots import WheeledRobot
 from terrain.scenario import Scenario, load_scenario
 from terrain.scenario_faults import ODOMETRY, FaultSchedule
-from terrain.scenario_sensors import make_ego_sensors, make_localization, make_sensors
+from terrain.scenario_sensors import AnyRobot, make_ego_sensors, make_localization, make_sensors
 from terrain.scenario_settings import apply_settings, apply_world_settings
 from terrain.scenario_stage import set_stage
 from terrain.scenario_world import ScenarioWorld
@@ -96,7 +97,7 @@ class Bench:
         try:
             self._start(wall_clock, sinks, on_step)
         except BaseException:
-            self.world.bullet.close()
+            self.world.physics.close()
             self._temporary.cleanup()
             raise
 
@@ -134,7 +135,7 @@ class Bench:
         self.loop.stop()
         self.navigator.close()
         self.events.close()
-        self.world.bullet.close()
+        self.world.physics.close()
         self._temporary.cleanup()
 
     def __enter__(self) -> Bench:
@@ -144,17 +145,21 @@ class Bench:
     def __exit__(self, *exc: object) -> None:
         self.close()
 
-    def _make_simulation(self) -> tuple[WheeledRobot, Simulation]:
-        pose = self.world.pose_of(self.scenario.start)
-        robot = WheeledRobot(self.world.bullet, ROBOTS[self.scenario.robot], pose)
+    def _make_simulation(self) -> tuple[AnyRobot, Simulation]:
+        pose, spec, physics = self.world.pose_of(self.scenario.start), ROBOTS[self.scenario.robot], self.world.physics
+        robot: AnyRobot
+        if isinstance(physics, KinematicWorld):
+            robot = KinematicRobot(physics, spec, pose)
+        else:
+            robot = WheeledRobot(physics, spec, pose)
         robot.settle()
         sensors: dict[str, Sensor[Any]] = {
             **make_sensors(self.scenario.sensors, robot, self.world, self.seed),
             **make_ego_sensors(self.scenario, robot, self.seed),
         }
         self.localization = make_localization(robot, self.seed)
-        self.faults = FaultSchedule(self.world.bullet, sensors, self.localization, self.scenario.faults)
-        return robot, Simulation(self.world.bullet, robot, sensors)
+        self.faults = FaultSchedule(self.world.physics, sensors, self.localization, self.scenario.faults)
+        return robot, Simulation(self.world.physics, robot, sensors)
 
     def _make_recorder(self) -> Recorder:
         shape = RobotShape.of(self.robot.spec)

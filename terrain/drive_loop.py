@@ -15,9 +15,8 @@ from mbf_abstract.server import AbstractNavigationServer
 from mbf_abstract.transform import Transform
 from terrain.ego_sensors import Localization, WheelOdometryReading
 from terrain.recorder import Recorder
-from terrain.robots import WheeledRobot
 from terrain.scenario_faults import ODOMETRY, seen_from
-from terrain.simulation import Simulation
+from terrain.simulation import SimulatedRobot, Simulation
 
 PERIOD = 1.0 / 60.0  # s between two publications of the robot's pose
 TICKS_PER_SAMPLE = 6  # 10 samples a second are recorded and reported
@@ -31,12 +30,12 @@ class ClockedRobot:
 
     Parameters
     ----------
-    robot : WheeledRobot
+    robot : SimulatedRobot
     measure : callable
         Returns its odometry, stamped with the world's time.
     """
 
-    def __init__(self, robot: WheeledRobot, measure: Callable[[], Odometry]) -> None:
+    def __init__(self, robot: SimulatedRobot, measure: Callable[[], Odometry]) -> None:
         self._robot = robot
         self._measure = measure
         self.time_offset = 0.0

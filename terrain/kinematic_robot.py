@@ -1,13 +1,14 @@
 """A robot without physics: it does what it is told, within its limits, on flat ground or on a heightfield.
 
 Use it for sweeps of hundreds of runs and for tests of planners and controllers: it steps some thirty times faster
-than Bullet. It never slips or tips over, so do not judge routes over rough ground with it. Walls of an occupancy grid
-stop it, which counts as a collision.
+than Bullet. It never slips or tips over, so do not judge routes over rough ground with it. Walls of an occupancy grid,
+obstacles and actors stop it, which counts as a collision; they do not push it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +21,13 @@ from terrain.heightfield import Heightfield
 from terrain.mishaps import MotionSample, Thing
 from terrain.occupancy import OccupancyGrid, wall_triangles
 from terrain.robot_models import RobotSpec
+from terrain.solids import joined
+from terrain.upright_solids import UprightSolid
 
 FloatArray = NDArray[np.float64]
 
 TIME_STEP = 1.0 / 60.0
+BLOCKED_GAP = 0.1  # m; what stopped a robot is nearer than its radius and this, more than it drives in a step
 FLOOR = 1000.0  # m; half the size of the floor that sensors see in a world without a map
 
 
@@ -44,7 +48,10 @@ class KinematicWorld:
         self.terrain = terrain
         self.building = building
         self.robots: list[KinematicRobot] = []
+        self.solids: list[UprightSolid] = []
+        self.things: dict[int, Thing] = {}
         self.step_count = 0
+        self._before_step: list[Callable[[], None]] = []
         self._clearance: FloatArray | None = None
         if building is not None:
             distance = ndimage.distance_transform_edt(~building.occupied)
@@ -57,12 +64,42 @@ class KinematicWorld:
 
     def step(self) -> None:
         """Advance by one time step."""
+        for callback in self._before_step:
+            callback()
         self.step_count += 1
         for robot in self.robots:
             robot.advance(TIME_STEP)
 
+    def before_step(self, callback: Callable[[], None]) -> None:
+        """Call ``callback`` before each step: moving actors, faults."""
+        self._before_step.append(callback)
+
     def close(self) -> None:
         """Do nothing; there is nothing to free."""
+
+    def __enter__(self) -> KinematicWorld:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def add_box(self, pose: Pose, size: Sequence[float], moving: bool = False) -> int:
+        """Stand a box of ``size`` (3,) [m] with its middle at ``pose``; ``moving`` if it will be put elsewhere."""
+        self.solids.append(UprightSolid(pose, size, moving))
+        return len(self.solids) - 1
+
+    def add_cylinder(self, pose: Pose, radius: float, height: float, moving: bool = False) -> int:
+        """Stand a cylinder; as ``add_box``."""
+        return self.add_box(pose, (radius, height), moving)
+
+    def place_body(self, body: int, pose: Pose) -> None:
+        """Put a box or cylinder at ``pose`` at once."""
+        self.solids[body].pose = pose
+
+    @property
+    def has_moving_bodies(self) -> bool:
+        """Whether anything may move besides the robots."""
+        return any(solid.moving for solid in self.solids)
 
     def contains(self, x: float, y: float) -> bool:
         """Whether there is ground at (x, y) [m]."""
@@ -70,7 +107,18 @@ class KinematicWorld:
         return terrain is None or (terrain.x0 <= x <= terrain.x_max and terrain.y0 <= y <= terrain.y_max)
 
     def clearance_at(self, x: float, y: float) -> float:
-        """Distance [m] from (x, y) to the nearest wall, inf without walls or off the map."""
+        """Distance [m] from (x, y) to the nearest wall, obstacle or actor; inf without any."""
+        solid = min((solid.distance(x, y) for solid in self.solids), default=math.inf)
+        return min(solid, self._wall_clearance(x, y))
+
+    def touched_at(self, x: float, y: float, radius: float) -> frozenset[Thing]:
+        """What a disc of ``radius`` [m] at (x, y) touches."""
+        touched = {
+            self.things.get(body, Thing.WALL) for body, solid in enumerate(self.solids) if solid.distance(x, y) < radius
+        }
+        return frozenset(touched | ({Thing.WALL} if self._wall_clearance(x, y) < radius else set()))
+
+    def _wall_clearance(self, x: float, y: float) -> float:
         if self.building is None or self._clearance is None:
             return math.inf
         ix = math.floor((x - self.building.origin_x) / self.building.resolution)
@@ -84,6 +132,10 @@ class KinematicWorld:
 
     def static_triangles(self) -> tuple[FloatArray, NDArray[np.int32]]:
         """All that sensors can see as one mesh: vertices (n, 3) float64 [m], faces (m, 3) int32."""
+        return joined([self._ground_triangles(), *(solid.triangles() for solid in self.solids if not solid.moving)])
+
+    def _ground_triangles(self) -> tuple[FloatArray, NDArray[np.int32]]:
+        """The ground with the walls of the building."""
         if self.terrain is not None:
             return self.terrain.triangles()
         floor = FLOOR * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)
@@ -184,7 +236,10 @@ class KinematicRobot:
         """Collect what ``MishapMonitor`` looks at."""
         commanded = commanded_twist(self.spec, self._command)
         velocity = self.velocity()
-        touched = frozenset({Thing.WALL}) if self._blocked else frozenset()
+        reach = self.spec.inscribed_radius + (BLOCKED_GAP if self._blocked else 0.0)
+        touched = self.world.touched_at(self._x, self._y, reach)
+        if self._blocked and not touched:  # the ground ends here
+            touched = frozenset({Thing.WALL})
         return MotionSample(self.pose(), velocity, commanded, velocity, touched=touched)
 
 

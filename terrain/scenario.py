@@ -20,7 +20,7 @@ from terrain.scenario_faults import IMU, LOCALIZATION, ODOMETRY, Fault, SensorFa
 from terrain.scenario_limits import Limits
 from terrain.scenario_obstacles import Forest, Obstacle
 from terrain.scenario_places import Place, PlanarPose
-from terrain.scenario_world_types import MapWorld, World
+from terrain.scenario_world_types import LevelsWorld, MapWorld, World
 
 __all__ = ["MapWorld", "Obstacle", "PlanarPose", "Scenario", "Sensor", "load_scenario", "shipped_scenarios"]
 
@@ -62,6 +62,9 @@ class Scenario(ParameterModel):
     actors: tuple[Actor, ...] = parameter((), "What moves by itself.")
     faults: tuple[Fault, ...] = parameter((), "What goes wrong with sensors and localisation, and when.")
     limits: Limits = parameter(Limits(), "What must not happen.")
+    physics: Literal["bullet", "kinematic"] = parameter(
+        "bullet", "Real physics, or robots that follow commands exactly: for sweeps on flat ground, much faster."
+    )
     physics_rate: float = parameter(
         240.0,
         "Steps of the physics a second; 120 takes half as long and moves a robot almost alike.",
@@ -115,6 +118,8 @@ def _find_contradictions(scenario: Scenario, document: YamlDocument) -> list[Fin
     for backend, file in scenario.navigation.items():
         if not file.is_file():
             findings.append(document.finding(("navigation", backend), "a configuration file", f"no file {file}"))
+    if scenario.physics == "kinematic" and isinstance(scenario.world, LevelsWorld):
+        findings.append(document.finding(("physics",), "bullet, for a world with several levels", scenario.physics))
     sensors = [*(sensor.name for sensor in scenario.sensors), *ego_sensors(scenario), LOCALIZATION]
     for index, fault in enumerate(scenario.faults):
         if isinstance(fault, SensorFault) and fault.sensor not in sensors:

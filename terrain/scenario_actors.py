@@ -71,7 +71,7 @@ def add_actors(
             world.actors.extend(_crowd(world, actor, rng))
         elif isinstance(actor, Door):
             opened, closed = (_leaf_pose(world, place, actor.size[2]) for place in (actor.opened, actor.closed))
-            world.actors.append(SlidingDoor(world.bullet, opened, closed, actor.size, actor.closes_at, actor.duration))
+            world.actors.append(SlidingDoor(world.physics, opened, closed, actor.size, actor.closes_at, actor.duration))
         else:
             route = np.array([(x, y, world.height_at(x, y)) for x, y in actor.route])
             world.actors.append(_on_route(world, actor, route))
@@ -79,8 +79,8 @@ def add_actors(
 
 def _on_route(world: ScenarioWorld, actor: Walker | OtherRobot, route: FloatArray) -> RouteWalker:
     if isinstance(actor, OtherRobot):
-        return other_robot(world.bullet, ROBOTS[actor.model], route, actor.speed, actor.start)
-    return RouteWalker(world.bullet, route, actor.speed, actor.start, (actor.radius, actor.height))
+        return other_robot(world.physics, ROBOTS[actor.model], route, actor.speed, actor.start)
+    return RouteWalker(world.physics, route, actor.speed, actor.start, (actor.radius, actor.height))
 
 
 def _crowd(world: ScenarioWorld, crowd: Crowd, rng: np.random.Generator) -> list[RouteWalker]:
@@ -88,7 +88,7 @@ def _crowd(world: ScenarioWorld, crowd: Crowd, rng: np.random.Generator) -> list
         raise ValueError("a crowd needs a world with a 2D map to draw its routes on")
     grid = _part_of(world.grid, crowd)
     return [
-        RouteWalker(world.bullet, random_route(grid, rng), crowd.speed, float(rng.uniform(0.0, 20.0)))
+        RouteWalker(world.physics, random_route(grid, rng), crowd.speed, float(rng.uniform(0.0, 20.0)))
         for _ in range(crowd.count)
     ]
 

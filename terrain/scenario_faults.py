@@ -12,9 +12,9 @@ from pydantic import Field
 from mbf_abstract.geometry import Pose, rotation_matrix
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.sensing import RangeScan
+from terrain.actors import AnyWorld
 from terrain.ego_sensors import Localization
 from terrain.sensors import Sensor
-from terrain.world import BulletWorld
 
 LOCALIZATION, ODOMETRY, IMU = "localization", "odometry", "imu"
 """Names among the sensors of a fault, of those that look at the robot itself."""
@@ -55,7 +55,7 @@ class FaultSchedule:
 
     Parameters
     ----------
-    world : BulletWorld
+    world : AnyWorld
     sensors : mapping of str to Sensor
     localization : Localization
     faults : sequence of Fault
@@ -63,7 +63,7 @@ class FaultSchedule:
 
     def __init__(
         self,
-        world: BulletWorld,
+        world: AnyWorld,
         sensors: Mapping[str, Sensor[Any]],
         localization: Localization,
         faults: Sequence[SensorFault | LocalizationJump],

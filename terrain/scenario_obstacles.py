@@ -10,9 +10,9 @@ import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
+from terrain.actors import AnyWorld
 from terrain.recording import Surface
 from terrain.solids import box_triangles, cylinder_triangles, joined
-from terrain.world import BulletWorld
 
 DRAWS_PER_POST = 100
 
@@ -52,7 +52,7 @@ class Forest(ParameterModel):
 
 
 def add_obstacles(
-    bullet: BulletWorld, obstacles: Iterable[Obstacle], height_at: Callable[[float, float], float]
+    world: AnyWorld, obstacles: Iterable[Obstacle], height_at: Callable[[float, float], float]
 ) -> Surface | None:
     """Stand the obstacles on the ground; return them as one surface to look at."""
     parts = []
@@ -60,10 +60,10 @@ def add_obstacles(
         length, _, height = obstacle.size
         pose = Pose.planar(obstacle.x, obstacle.y, obstacle.yaw, height_at(obstacle.x, obstacle.y) + 0.5 * height)
         if obstacle.shape == "box":
-            bullet.add_box(pose, obstacle.size)
+            world.add_box(pose, obstacle.size)
             corners, triangles = box_triangles(obstacle.size)
         else:
-            bullet.add_cylinder(pose, 0.5 * length, height)
+            world.add_cylinder(pose, 0.5 * length, height)
             corners, triangles = cylinder_triangles(0.5 * length, height)
         parts.append((corners @ pose.rotation.T + np.array(pose.position), triangles))
     return Surface(*joined(parts)) if parts else None

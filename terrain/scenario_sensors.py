@@ -9,30 +9,36 @@ import numpy as np
 
 from terrain import scenario as model
 from terrain.ego_sensors import Imu, Localization, WheelOdometry
-from terrain.rays import MovingRays, StaticRays
+from terrain.kinematic_robot import KinematicRobot
+from terrain.rays import MovingRays, RayCaster, StaticRays
 from terrain.robots import WheeledRobot
 from terrain.scenario_faults import IMU, LOCALIZATION, ODOMETRY
 from terrain.scenario_world import ScenarioWorld
 from terrain.sensors import Lidar, Sensor, camera_directions, planar_directions, ring_directions
+from terrain.upright_solids import SolidRays
+from terrain.world import BulletWorld
+
+AnyRobot = WheeledRobot | KinematicRobot
 
 
 def make_sensors(
-    sensors: tuple[model.Sensor, ...], robot: WheeledRobot, world: ScenarioWorld, seed: int
+    sensors: tuple[model.Sensor, ...], robot: AnyRobot, world: ScenarioWorld, seed: int
 ) -> dict[str, Lidar]:
     """Make the lidars of a scenario, by name; each draws its noise from a generator of its own."""
-    casters: list[StaticRays | MovingRays] = [StaticRays(*world.bullet.static_triangles())]
-    if world.bullet.has_moving_bodies:
-        casters.append(MovingRays(world.bullet))
+    physics = world.physics
+    casters: list[RayCaster] = [StaticRays(*physics.static_triangles())]
+    if physics.has_moving_bodies:
+        casters.append(MovingRays(physics) if isinstance(physics, BulletWorld) else SolidRays(physics.solids))
     return {sensor.name: _lidar(sensor, robot, casters, seed) for sensor in sensors}
 
 
-def make_ego_sensors(scenario: model.Scenario, robot: WheeledRobot, seed: int) -> dict[str, Sensor[Any]]:
+def make_ego_sensors(scenario: model.Scenario, robot: AnyRobot, seed: int) -> dict[str, Sensor[Any]]:
     """Make the sensors of a scenario that look at the robot itself, by name."""
     makers = {ODOMETRY: WheelOdometry, IMU: Imu}
     return {name: makers[name](robot, _generator(seed, name)) for name in model.ego_sensors(scenario)}
 
 
-def make_localization(robot: WheeledRobot, seed: int) -> Localization:
+def make_localization(robot: AnyRobot, seed: int) -> Localization:
     """Make the localisation of a robot: exact until a fault of the scenario says otherwise."""
     return Localization(robot, _generator(seed, LOCALIZATION))
 
@@ -42,7 +48,7 @@ def _generator(seed: int, name: str) -> np.random.Generator:
     return np.random.default_rng([seed, zlib.crc32(name.encode())])
 
 
-def _lidar(sensor: model.Sensor, robot: WheeledRobot, casters: list[StaticRays | MovingRays], seed: int) -> Lidar:
+def _lidar(sensor: model.Sensor, robot: AnyRobot, casters: list[RayCaster], seed: int) -> Lidar:
     if sensor.type == "depth":
         directions = camera_directions(sensor.rays, 3 * sensor.rays // 4)
     else:

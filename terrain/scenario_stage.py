@@ -26,14 +26,14 @@ def set_stage(scenario: Scenario, folder: Path, seed: int) -> tuple[ScenarioWorl
         What stands in the world and is on no map, to look at.
     """
     keep_clear = coordinates((scenario.start, *scenario.goals))
-    rng, time_step = np.random.default_rng([seed, WORLD_STREAM]), 1.0 / scenario.physics_rate
-    world = build_world(scenario.world, folder, rng, keep_clear, time_step)
+    rng, is_kinematic = np.random.default_rng([seed, WORLD_STREAM]), scenario.physics == "kinematic"
+    world = build_world(scenario.world, folder, rng, keep_clear, 1.0 / scenario.physics_rate, is_kinematic)
     try:
         rng = np.random.default_rng([seed, FOREST_STREAM])
         posts = [post for forest in scenario.forests for post in forest.posts(rng, keep_clear)]
-        obstacles = add_obstacles(world.bullet, [*scenario.obstacles, *posts], world.height_at)
+        obstacles = add_obstacles(world.physics, [*scenario.obstacles, *posts], world.height_at)
         add_actors(world, scenario.actors, np.random.default_rng([seed, ACTOR_STREAM]))
     except BaseException:
-        world.bullet.close()
+        world.physics.close()
         raise
     return world, obstacles

@@ -9,17 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray, Pose
-from terrain.actors import Actor
+from terrain.actors import Actor, AnyWorld
 from terrain.floor_plan import write_map
 from terrain.heightfield import Heightfield
 from terrain.indoor import add_building
+from terrain.kinematic_robot import KinematicWorld
 from terrain.occupancy import OccupancyGrid, wall_triangles
 from terrain.recording import Surface
 from terrain.scenario_places import Place
@@ -31,6 +34,7 @@ from terrain.world import TIME_STEP, BulletWorld
 STOREY = 1.0  # m; height of the walls in the mesh of a building
 MESH_CELL = 0.1  # m; edge length of that mesh
 
+Physics = TypeVar("Physics", BulletWorld, AnyWorld)
 HeightAt = Callable[[float, float], float]
 
 
@@ -40,6 +44,8 @@ class ScenarioWorld:
 
     Attributes
     ----------
+    physics : BulletWorld or KinematicWorld
+        What steps it.
     files : dict of str to Path
         Placeholder of a navigation configuration -> the file that stands for it.
     height_at : callable
@@ -52,7 +58,7 @@ class ScenarioWorld:
         What moves by itself; a scenario adds them.
     """
 
-    bullet: BulletWorld
+    physics: AnyWorld
     files: dict[str, Path]
     height_at: HeightAt
     ground: Surface
@@ -82,8 +88,9 @@ def build_world(
     rng: np.random.Generator,
     keep_clear: FloatArray,
     time_step: float = TIME_STEP,
+    kinematic: bool = False,
 ) -> ScenarioWorld:
-    """Put a world into Bullet and write its map files into ``folder``.
+    """Put a world into Bullet, or into its stand-in without physics, and write its map files into ``folder``.
 
     Parameters
     ----------
@@ -91,48 +98,64 @@ def build_world(
         Places [m] on which nothing that is drawn may stand.
     time_step : float
         Of the physics [s].
+    kinematic : bool
+        Whether robots follow commands exactly; impossible on several levels.
     """
-    bullet = BulletWorld(time_step)
+    build: Callable[[AnyWorld], ScenarioWorld]
+    if isinstance(world, TerrainWorld):
+        terrain = world.heightfield(rng, keep_clear)
+        stand_in = KinematicWorld(terrain)
+        build = partial(_build_terrain, terrain, world.lethal_slope, folder)
+    elif isinstance(world, BuildingWorld):
+        grid = world.grid()
+        stand_in = KinematicWorld(building=grid)
+        build = partial(_build_building, world, grid, folder)
+    elif kinematic:
+        raise ValueError("a robot without physics needs a world with one level")
+    else:
+        return _built(BulletWorld(time_step), partial(_build_levels, world, folder))
+    return _built(stand_in if kinematic else BulletWorld(time_step), build)
+
+
+def _built(physics: Physics, build: Callable[[Physics], ScenarioWorld]) -> ScenarioWorld:
+    """Build into ``physics``, which is closed if that fails."""
     try:
-        if isinstance(world, TerrainWorld):
-            return _build_terrain(world.heightfield(rng, keep_clear), world.lethal_slope, bullet, folder)
-        if isinstance(world, BuildingWorld):
-            return _build_building(world, bullet, folder)
-        return _build_levels(world, bullet, folder)
+        return build(physics)
     except BaseException:
-        bullet.close()
+        physics.close()
         raise
 
 
-def _build_terrain(terrain: Heightfield, lethal_slope: float, bullet: BulletWorld, folder: Path) -> ScenarioWorld:
-    bullet.add_heightfield(terrain)
+def _build_terrain(terrain: Heightfield, lethal_slope: float, folder: Path, physics: AnyWorld) -> ScenarioWorld:
+    if isinstance(physics, BulletWorld):
+        physics.add_heightfield(terrain)
     ground, resolution = Surface(*terrain.triangles()), min(terrain.dx, terrain.dy)
     files = _write_files(ground, folder)
     files["$WORLD_MAP"] = write_slope_map(terrain, folder, "world", resolution, lethal_slope)
     grid = slope_grid(terrain, resolution, lethal_slope)
-    return ScenarioWorld(bullet, files, lambda x, y: float(terrain.height_at(x, y)), ground, None, grid)
+    return ScenarioWorld(physics, files, lambda x, y: float(terrain.height_at(x, y)), ground, None, grid)
 
 
-def _build_building(world: BuildingWorld, bullet: BulletWorld, folder: Path) -> ScenarioWorld:
-    grid = world.grid()
-    add_building(bullet, grid)
+def _build_building(world: BuildingWorld, grid: OccupancyGrid, folder: Path, physics: AnyWorld) -> ScenarioWorld:
+    if isinstance(physics, BulletWorld):
+        add_building(physics, grid)
     files = _write_files(Surface(*storey_heights(grid).triangles()), folder, grid)
     walls = Surface(*wall_triangles(grid))
-    return ScenarioWorld(bullet, files, lambda x, y: 0.0, _floor_surface(grid), walls, grid, world.places())
+    return ScenarioWorld(physics, files, lambda x, y: 0.0, _floor_surface(grid), walls, grid, world.places())
 
 
-def _build_levels(world: LevelsWorld, bullet: BulletWorld, folder: Path) -> ScenarioWorld:
+def _build_levels(world: LevelsWorld, folder: Path, physics: BulletWorld) -> ScenarioWorld:
     levels = world.levels()
-    bullet.add_mesh(levels.ground.vertices, levels.ground.faces)
+    physics.add_mesh(levels.ground.vertices, levels.ground.faces)
     ground, walls = Surface(levels.ground.vertices, levels.ground.faces), None
     if len(levels.walls.faces):
-        bullet.add_mesh(levels.walls.vertices, levels.walls.faces, ground=False)
+        physics.add_mesh(levels.walls.vertices, levels.walls.faces, ground=False)
         walls = Surface(levels.walls.vertices, levels.walls.faces)
 
     def height_at(x: float, y: float) -> float:
-        return float(bullet.vertical_rays([(x, y)])[0])
+        return float(physics.vertical_rays([(x, y)])[0])
 
-    return ScenarioWorld(bullet, _write_files(ground, folder), height_at, ground, walls, places=levels.places)
+    return ScenarioWorld(physics, _write_files(ground, folder), height_at, ground, walls, places=levels.places)
 
 
 def _write_files(ground: Surface, folder: Path, grid: OccupancyGrid | None = None) -> dict[str, Path]:

@@ -65,7 +65,7 @@ def test_the_name_of_a_place_stands_for_its_pose(tmp_path):
     assert world.pose_of("kitchen").position == (4.2, 13.0, 0.0)
     with pytest.raises(ConfigError, match="kitchen"):
         world.pose_of("cellar")
-    world.bullet.close()
+    world.physics.close()
 
 
 def test_each_seed_draws_its_own_ground_and_the_same_one_again(tmp_path):
@@ -101,7 +101,7 @@ def test_a_world_of_levels_has_places_above_each_other_and_no_flat_map(tmp_path)
         assert world.pose_of(low).position[:2] == world.pose_of(high).position[:2]
         assert world.pose_of(high).z > world.pose_of(low).z + 2.0
         assert set(world.files) == {"$WORLD_MESH"}
-        world.bullet.close()
+        world.physics.close()
 
 
 def test_a_mesh_file_and_an_elevation_file_become_worlds(tmp_path):
@@ -113,7 +113,7 @@ def test_a_mesh_file_and_an_elevation_file_become_worlds(tmp_path):
     hill = built(HeightfieldWorld(type="heightfield", file=tmp_path / "hill.asc", size=10.0), tmp_path)
     assert hill.ground.vertices[:, 2].max() == pytest.approx(3.0)
     for world in (garage, again, hill):
-        world.bullet.close()
+        world.physics.close()
 
 
 def test_a_forest_is_the_same_for_the_same_seed_and_leaves_room(tmp_path):
@@ -122,7 +122,7 @@ def test_a_forest_is_the_same_for_the_same_seed_and_leaves_room(tmp_path):
     surfaces = []
     for seed in (1, 1, 2):
         world, posts = set_stage(scenario, tmp_path, seed)
-        world.bullet.close()
+        world.physics.close()
         surfaces.append(posts.vertices)
     assert np.array_equal(surfaces[0], surfaces[1])
     assert surfaces[0].shape != surfaces[2].shape or not np.array_equal(surfaces[0], surfaces[2])
@@ -137,7 +137,7 @@ def test_the_2d_map_of_a_terrain_has_every_shade_of_slope_up_to_the_lethal_one(t
         world = GeneratedWorld(
             type="generated", size=(12.0, 10.0), spacing=0.5, features=(hill,), lethal_slope=lethal_slope
         )
-        with built(world, tmp_path).bullet:
+        with built(world, tmp_path).physics:
             shades[lethal_slope] = np.asarray(Image.open(tmp_path / "world.png"))[5:-5, 5:-5]
     assert shades[20.0].max() == 100 and shades[60.0].max() < 100
     assert len(np.unique(shades[60.0])) > 3
@@ -146,5 +146,11 @@ def test_the_2d_map_of_a_terrain_has_every_shade_of_slope_up_to_the_lethal_one(t
 def test_the_steps_of_the_physics_are_as_long_as_the_scenario_says(tmp_path):
     text = PLAIN + "physics_rate: 120.0\n"
     world, _ = set_stage(load_scenario(scenario_file(tmp_path, text)), tmp_path, 0)
-    with world.bullet:
-        assert world.bullet.time_step == pytest.approx(1.0 / 120.0)
+    with world.physics:
+        assert world.physics.time_step == pytest.approx(1.0 / 120.0)
+
+
+def test_several_levels_without_physics_are_refused(tmp_path):
+    text = PLAIN.replace("{type: generated, size: [12.0, 10.0], spacing: 0.5}", "{type: bridge}")
+    with pytest.raises(ConfigError, match="several levels"):
+        load_scenario(scenario_file(tmp_path, text + "physics: kinematic\n"))

@@ -106,13 +106,13 @@ def test_actors_move_in_the_world_and_the_seed_draws_the_crowd(tmp_path):
     places = []
     for seed in (1, 1, 2):
         world = build_world(OfficeWorld(type="office"), tmp_path, np.random.default_rng(0), np.zeros((0, 2)))
-        before = world.bullet.bullet.getNumBodies(physicsClientId=world.bullet.client)
+        before = world.physics.bullet.getNumBodies(physicsClientId=world.physics.client)
         add_actors(world, actors, np.random.default_rng(seed))
         for _ in range(240):
-            world.bullet.step()
+            world.physics.step()
         bodies = range(before, before + 5)
-        places.append([world.bullet.bullet.getBasePositionAndOrientation(b, world.bullet.client)[0] for b in bodies])
-        world.bullet.close()
+        places.append([world.physics.bullet.getBasePositionAndOrientation(b, world.physics.client)[0] for b in bodies])
+        world.physics.close()
     assert places[0][0] == pytest.approx((5.0, 9.7, 0.85), abs=0.02)
     assert places[0][1] == pytest.approx((8.25, 11.0, 1.0), abs=0.02)
     assert places[0][2] == pytest.approx((3.0, 10.2, 0.205), abs=0.02)

@@ -1,0 +1,46 @@
+"""The kinematic stand-in drives scenarios on flat ground: same files, same sensors, same actors, no Bullet."""
+
+import sys
+
+import pytest
+
+from mbf_abstract.geometry import Twist
+from terrain.bench import Bench
+from terrain.runner import RunOptions, run_scenario
+from terrain.scenario import PlanarPose, load_scenario
+from terrain.scenario_actors import Walker
+
+
+@pytest.fixture
+def corridor(monkeypatch):
+    """The shipped corridor full of people, ten metres of it, without physics, on a machine that has none."""
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    scenario = load_scenario("crowded_corridor")
+    return scenario.model_copy(update={"physics": "kinematic", "goals": (PlanarPose(x=10.0, y=9.7),)})
+
+
+def test_the_crowded_corridor_is_driven_with_lidar_and_people_and_repeats(corridor, tmp_path):
+    runs = [run_scenario(corridor, RunOptions(tmp_path / name, draw=False)) for name in ("first", "second")]
+    assert runs[0].success, runs[0].message
+    assert runs[0].metrics["real_time_factor"] > 1.0
+    logs = [(tmp_path / name / "events.jsonl").read_bytes() for name in ("first", "second")]
+    assert logs[0] == logs[1]
+
+
+def test_a_person_in_the_way_is_seen_by_the_lidar_and_stops_the_robot(corridor, tmp_path):
+    standing = Walker(type="walker", route=((4.0, 9.7), (4.0, 9.71)), speed=0.0)
+    scenario = corridor.model_copy(update={"actors": (standing,), "start": PlanarPose(x=2.0, y=9.7)})
+    with Bench(scenario, folder=tmp_path) as bench:
+        ends, hits = bench.simulation.latest["lidar"].ends, bench.simulation.latest["lidar"].hits
+        ahead = ends[hits & (abs(ends[:, 1] - 9.7) < 0.1) & (ends[:, 0] > 2.0)]
+        assert ahead[:, 0].min() == pytest.approx(3.75, abs=0.05)
+        drive_ahead(bench, 8.0)
+        assert 3.2 < bench.robot.pose().x < 3.75
+        assert {mishap.kind.value for mishap in bench.simulation.mishaps} >= {"collision", "collision_with_person"}
+
+
+def drive_ahead(bench, seconds):
+    end = bench.clock.now() + seconds
+    while bench.clock.now() < end:
+        bench.robot.send_command(Twist.planar(0.4))
+        bench.clock.sleep(0.1)
