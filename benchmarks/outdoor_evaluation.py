@@ -1,7 +1,7 @@
 """Who arrives on rough ground: planners on the mesh against a flat map of slopes and against the straight line.
 
     python benchmarks/outdoor_evaluation.py [--quick] [--json] [--workers 2] [--data ../shared/data]
-        [--results FILE] [--replays DIR] [--figure FILE]
+        [--results FILE] [--replays DIR] [--report DIR]
 
 Seeded terrains of rising difficulty and crops of real surveys (``outdoor_terrains.py``). On each, a simulated Husky
 drives from one corner to the other, once per method, with the shipped outdoor configurations. Finished runs stand in
@@ -15,6 +15,7 @@ the controller (the rest), or an error before the start; ``--replays`` drives on
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import tempfile
 from collections import Counter
@@ -57,6 +58,7 @@ METHODS = {
     "mesh any-angle": {"planner": "any_angle"},
 }
 PLANNER_OUTCOMES = set(GetPathOutcome.__members__) - set(ExePathOutcome.__members__)
+FAILURES = ("planner", "controller", "physics", "error")
 PHYSICS = {"tipped_over", "stuck", "high_centred"}
 
 Row = dict[str, Any]
@@ -139,24 +141,39 @@ def keep_replays(chosen: list[tuple[Scenario, int]], rows: list[Row], folder: Fi
         run_scenario(scenario, RunOptions(target, settings.pop("backend", None), run.seed, settings=settings))
 
 
-def draw(rows: list[Row], file: FilePath) -> None:
-    """Success over difficulty, one line per method, terrains with a route only."""
+def by_place(rows: list[Row]) -> list[Row]:
+    """Count for every method and level or survey: terrains with a route, arrivals, tip-overs, failures by class."""
+    places = [f"level {level}" for level in range(LEVELS)] + [FilePath(name).stem for name in SURVEYS]
+    table = []
+    for method in dict.fromkeys(row["method"] for row in rows):
+        for place in places:
+            here = [row for row in rows if (row["method"], row["terrain"]) == (method, place) and row["route"]]
+            failures = Counter(row["failure"] for row in here)
+            line = {"method": method, "terrain": place, "with_route": len(here), "arrived": failures.pop("", 0)}
+            line["tipped_over"] = sum("tipped_over" in row.get("mishaps", ()) for row in here)
+            table.append({**line, **{name: failures[name] for name in FAILURES}})
+    return table
+
+
+def report(rows: list[Row], folder: FilePath) -> None:
+    """Write the counts as a table, and success over difficulty as a picture with one line per method."""
     from matplotlib.figure import Figure
 
-    places = [f"level {level}" for level in range(LEVELS)] + [FilePath(name).stem for name in SURVEYS]
-    routed = [row for row in rows if row["route"]]
+    table = by_place(rows)
+    with (folder / "outdoor_evaluation.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, table[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table)
     figure = Figure(figsize=(9.0, 4.5), layout="constrained")
     axes = figure.subplots()
-    for method in dict.fromkeys(row["method"] for row in rows):
-        share = []
-        for place in places:
-            here = [row["success"] for row in routed if (row["method"], row["terrain"]) == (method, place)]
-            share.append(100.0 * np.mean(here) if here else np.nan)
-        axes.plot(places, share, marker="o", label=method)
+    for method in dict.fromkeys(line["method"] for line in table):
+        lines = [line for line in table if line["method"] == method and line["with_route"]]
+        share = [100.0 * line["arrived"] / line["with_route"] for line in lines]
+        axes.plot([line["terrain"] for line in lines], share, marker="o", label=method)
     axes.set(ylabel="arrived [%], where a route exists", ylim=(-3, 103))
     axes.tick_params(axis="x", rotation=60)
     axes.legend()
-    figure.savefig(file, dpi=110)
+    figure.savefig(folder / "outdoor_evaluation.png", dpi=90)
 
 
 def main() -> None:
@@ -169,7 +186,7 @@ def main() -> None:
     parser.add_argument("--data", type=FilePath, default=FilePath("../shared/data"))
     parser.add_argument("--results", type=FilePath, help="file of finished runs, added to")
     parser.add_argument("--replays", type=FilePath, help="folder for one replay of each class of failure")
-    parser.add_argument("--figure", type=FilePath, help="picture of success over difficulty")
+    parser.add_argument("--report", type=FilePath, help="folder for a table and a picture of success over difficulty")
     arguments = parser.parse_args()
     methods = arguments.methods.split(",")
     chosen = terrains(arguments.data, arguments.first_seed, *((1, 0) if arguments.quick else (16, 10)))
@@ -181,8 +198,8 @@ def main() -> None:
         print(f"{name:26} {line}")
     if arguments.replays:
         keep_replays(chosen, rows, arguments.replays)
-    if arguments.figure:
-        draw(rows, arguments.figure)
+    if arguments.report:
+        report(rows, arguments.report)
     if arguments.json:
         print(json.dumps({"figures": figures}))
 
