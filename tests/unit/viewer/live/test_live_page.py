@@ -1,0 +1,106 @@
+"""What stands in the scene and in the panels of the page while a robot drives, on both maps; no browser needed."""
+
+import numpy as np
+import pytest
+
+from mbf_abstract.map_view import GridView, MeshView
+from terrain.bench import Bench
+from terrain.goal_drivers import make_goal_driver
+from terrain.goal_tour import GoalTour
+from terrain.scenario import PlanarPose, load_scenario
+from terrain.viewer.live.controls import LiveControls
+from terrain.viewer.live.log import LiveLog
+from terrain.viewer.live.page import LivePage
+from terrain.viewer.live.plots import History
+from terrain.viewer.page_server import page_server
+
+NODES = ("ground", "map", "local_map", "lethal", "robot", "plan", "track", "ahead", "field", "scan", "goal_asked_for")
+
+
+def look_once(bench, controls, tour, time, port):
+    """Drive until ``time``, draw the page once, end the run; returns the names of the nodes and the panels' words."""
+    seen = {}
+    log, history = LiveLog(), History()
+    bench.events.add_sink(log)
+    with page_server(port) as server:
+        page = LivePage(server, bench, tour, controls, log)
+        tour.on_goal.append(page.things.show_goal)
+
+        def look(now):
+            if now >= time and not seen:
+                page.show(now, history)
+                seen["nodes"] = {name for name in NODES if server.scene.get_handle_by_name(f"/{name}") is not None}
+                seen["words"] = page._headline.content + page._actions.content + page._tree.content
+                tour.end("seen")
+
+        bench.loop.on_tick.append(look)
+        bench.run()
+        tour.visit_goals()
+        assert not page.is_watched
+    return seen["nodes"], seen["words"]
+
+
+def test_on_a_mesh_the_page_shows_layers_plan_field_and_what_is_forbidden(steered):
+    run = steered("navigation")
+    run.at(
+        0.6, lambda: run.controls.choose("cvp", "follower"), lambda: run.controls.go_to((9.0, 7.0, 50.0), (0, 0, -1))
+    )
+
+    nodes, words = look_once(run.bench, run.controls, run.tour, 3.0, 18220)
+
+    assert nodes == set(NODES) - {"map", "local_map"}
+    assert "going to 9.0, 7.0" in words and "follow path" in words and "plan found" in words
+
+
+def test_on_costmaps_the_page_shows_both_maps():
+    scenario = load_scenario("indoor")
+    goal = PlanarPose(x=scenario.start.x + 2.0, y=scenario.start.y + 3.0, yaw=1.0)
+    with_goal = scenario.model_copy(update={"goals": (goal,)})
+    bench = Bench(with_goal, "costmap")
+    try:
+        tour = GoalTour(bench, make_goal_driver("move_base", bench.navigator), stay=True)
+        nodes, words = look_once(bench, LiveControls(bench, tour), tour, 3.0, 18230)
+    finally:
+        bench.close()
+
+    assert nodes == {"map", "local_map", "robot", "plan", "track", "ahead", "scan"}
+    assert "No behaviour tree runs" in words
+
+
+def test_a_mesh_server_shows_each_layer_by_name_the_default_one_first(meadow):
+    with Bench(meadow) as bench:
+        server = bench.navigator.server
+        default, *others = server.map_views
+        views = {name: server.map_view(name) for name in server.map_views}
+
+        assert default == server.mesh_map.default_layer and {default, *others} == set(server.mesh_map.layers)
+        assert all(isinstance(view, MeshView) for view in views.values())
+        np.testing.assert_array_equal(views[default].costs, server.map_view().costs)
+        for name, view in views.items():
+            layer = server.mesh_map.layers[name]
+            assert (np.isinf(view.costs) == (layer.lethal | np.isinf(layer.costs))).all()
+        with pytest.raises(KeyError):
+            server.map_view("no such layer")
+
+
+def test_only_a_planner_with_a_field_has_one_to_show_and_it_leads_to_the_goal(meadow):
+    with Bench(meadow) as bench:
+        server, goal = bench.navigator.server, bench.goals[0]
+        straight = bench.navigator.get_path(goal, planner="any_angle").path
+        field = server.field_view(bench.navigator.get_path(goal, planner="cvp").path)
+
+        assert server.field_view(straight) is None
+        np.testing.assert_allclose(np.linalg.norm(field.directions, axis=1), 1.0, atol=1e-3)
+        near = np.linalg.norm(field.points - goal.position, axis=1)
+        towards = ((goal.position - field.points) * field.directions).sum(axis=1) / np.maximum(near, 1e-9)
+        assert np.median(towards[(near > 0.5) & (near < 3.0)]) > 0.8
+
+
+def test_a_costmap_server_shows_both_maps_where_they_are():
+    with Bench("indoor", "costmap") as bench:
+        server, robot = bench.navigator.server, bench.simulation.robot.pose()
+        whole, local = (server.map_view(name) for name in server.map_views)
+
+        assert isinstance(whole, GridView) and server.map_view().extent == whole.extent
+        assert local.extent[1] - local.extent[0] == pytest.approx(5.0)
+        assert local.extent[0] < robot.x < local.extent[1] and local.extent[2] < robot.y < local.extent[3]
