@@ -138,7 +138,8 @@ def _location_in_data(block: object, error: ErrorDetails) -> KeyPath:
     """Return the part of pydantic's location that exists in the data; the rest names alternatives of a union."""
     loc: KeyPath = ()
     for part in error["loc"]:
-        inside = (isinstance(block, dict) and part in block) or (isinstance(block, list) and isinstance(part, int))
+        known = range(len(block)) if isinstance(block, list) else block if isinstance(block, dict) else ()
+        inside = part in known
         if not inside:
             return (*loc, part) if error["type"] == "missing" else loc
         loc = (*loc, part)

@@ -6,6 +6,7 @@ it early. Results go to the mission: paths to follow, and failures whose code pi
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from typing import Any
 
@@ -125,12 +126,26 @@ class GetPath(ActionLeaf):
 
 
 class UpdatePath(GetPath):
-    """Plan beside a driving robot. Its failure does not become the mission's: the robot has a path."""
+    """Plan beside a driving robot. Its failure does not become the mission's: the robot has a path.
+
+    Parameters
+    ----------
+    longest : float
+        A path that is longer than this many times the rest of the present one is not taken; waiting is better then.
+    """
+
+    def __init__(self, name: str = "update path", planner: str = "", slot: int = 0, longest: float = math.inf) -> None:
+        super().__init__(name, planner, slot=slot)
+        self.longest = longest
 
     def take_result(self, result: ActionResult) -> None:
         """Keep the path of a success only."""
-        if result.success:
-            super().take_result(result)
+        if result.success and isinstance(result, GetPathResult) and result.path is not None:
+            present = math.inf if self.mission.path is None else self.mission.path_to_follow().length
+            if result.path.length <= self.longest * present:
+                super().take_result(result)
+            else:
+                self.feedback_message = f"{result.path.length:.1f} m instead of {present:.1f} m: not taken"
 
 
 class ExePath(ActionLeaf):

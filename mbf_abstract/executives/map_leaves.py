@@ -1,4 +1,4 @@
-"""Leaves that ask the map or clear it: ``CheckPoint``, ``CheckPose``, ``CheckPath``, ``ClearMap``.
+"""Leaves that ask the map or clear it: ``CheckPoint``, ``CheckPose``, ``CheckPath``, ``PathBlocked``, ``ClearMap``.
 
 Each is done within one tick. A check succeeds where the place is no worse than ``worst``; its failure carries a code,
 so that guards can react. Use them before a long drive; they cost a look-up, not a plan.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
+import numpy as np
 from py_trees.common import Status
 
 from mbf_abstract.actions.goals import ActionResult
@@ -103,6 +104,29 @@ class CheckPath(MapCheck):
         first_bad = CellState(min(self.worst + 1, CellState.OUTSIDE))
         queries = self.mission.navigator.server.queries
         return queries.check_path(self.mission.path_to_follow(), self.query, first_bad, self.skip_poses)
+
+
+class PathBlocked(Leaf):
+    """Succeed if the next ``length`` [m] of the mission's path are blocked; it leaves no failure behind."""
+
+    def __init__(self, name: str, length: float) -> None:
+        super().__init__(name)
+        self.length = length
+
+    def update(self) -> Status:
+        """Look under the outline along the path; a robot that does not know where it is does not know this either."""
+        if self.mission.path is None:  # driven to its end in this very tick
+            return Status.FAILURE
+        path = self.mission.path_to_follow()
+        driven = path.length - path.remaining_lengths
+        ahead = path[: max(int(np.searchsorted(driven, self.length, side="right")), 1)]
+        try:
+            answer = self.mission.navigator.server.queries.check_path(ahead, PlaceQuery(), CellState.LETHAL)
+        except (TransformError, RobotStateError) as error:
+            self.feedback_message = str(error)
+            return Status.FAILURE
+        self.feedback_message = answer.state.name
+        return Status.SUCCESS if answer.state > CellState.INSCRIBED else Status.FAILURE
 
 
 class ClearMap(Leaf):

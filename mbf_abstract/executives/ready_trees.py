@@ -11,6 +11,7 @@ Use them as they are, or as a pattern: a tree is an expression of nodes. They ne
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -55,6 +56,8 @@ class TreeOptions:
         Pause of the second planner between two of its plans [s]; 0 = no second planner.
     second_planner_look_ahead : float
         The second planner plans only where the path is blocked within this length [m] ahead; 0 = in any case.
+    longest_update : float
+        The second planner's path is taken up to this many times the length of what is left of the present one.
     control_retries : int
         Recoveries of driving before the tree falls back to planning.
     replans : int
@@ -78,6 +81,7 @@ class TreeOptions:
     check_poses: bool = True
     second_planner_pause: float = 2.0
     second_planner_look_ahead: float = 0.0
+    longest_update: float = math.inf
     control_retries: int = 4
     replans: int = 3
     reuse_path: bool = True
@@ -144,7 +148,8 @@ def _drive(options: TreeOptions) -> Behaviour:
 
 
 def _second_planner(options: TreeOptions) -> Behaviour:
-    update = UpdatePath("update path", options.second_planner or options.planner, slot=SECOND_PLANNER_SLOT)
+    planner = options.second_planner or options.planner
+    update = UpdatePath("update path", planner, SECOND_PLANNER_SLOT, options.longest_update)
     if options.second_planner_look_ahead <= 0.0:
         return update
     blocked = PathBlocked("path blocked?", options.second_planner_look_ahead)

@@ -3,7 +3,8 @@
 import pytest
 from py_trees.common import Status
 
-from mbf_abstract.executives.map_leaves import CheckPath, CheckPoint, CheckPose, ClearMap
+from mbf_abstract.events import EventKind
+from mbf_abstract.executives.map_leaves import CheckPath, CheckPoint, CheckPose, ClearMap, PathBlocked
 from mbf_abstract.executives.ready_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
@@ -36,7 +37,8 @@ class Map:
     def check_pose(self, pose, query):
         return PlaceAnswer(self._state("pose", pose), 1.0)
 
-    def check_path(self, path, query, return_on, skip_poses):
+    def check_path(self, path, query, return_on, skip_poses=0):
+        self.path_length = path.length
         return PathAnswer(0, self._state("path", return_on), 1.0)
 
     def clear_map(self):
@@ -78,6 +80,30 @@ def test_a_path_is_checked_up_to_its_first_bad_pose(run, world, make_bench):
     path = make_bench().path_to(1.0)
     assert run(CheckPath("path free?"), path=path).mission.failure_code == ExePathOutcome.BLOCKED_PATH
     assert world.asked[-1] == ("path", CellState.LETHAL)
+
+
+@pytest.mark.parametrize(
+    ("state", "status"), [(CellState.LETHAL, Status.SUCCESS), (CellState.INSCRIBED, Status.FAILURE)]
+)
+def test_a_path_is_blocked_if_its_next_metres_are_and_that_is_no_failure(run, world, make_bench, state, status):
+    world.states = [state]
+    result = run(PathBlocked("blocked?", 0.5), path=make_bench().path_to(3.0))
+    assert (result.status, result.mission.failure) == (status, None)
+    assert 0.0 < world.path_length <= 0.5
+
+
+def test_without_a_path_nothing_is_blocked(run, world):
+    assert run(PathBlocked("blocked?", 0.5)).status == Status.FAILURE
+    assert world.asked == []
+
+
+def test_a_second_planner_of_blocked_paths_is_not_asked_on_a_free_one(make_bench, world):
+    for state, planned in ((CellState.FREE, 1), (CellState.LETHAL, 3)):
+        bench, world.states = make_bench(), [state]
+        options = TreeOptions(check_poses=False, second_planner_pause=0.5, second_planner_look_ahead=1.0)
+        assert TreeExecutive(navigation_tree(options), bench.navigator).run(Pose.planar(3.0, 0.0)).success
+        calls = [e for e in bench.events(EventKind.PLUGIN_CALL_STARTED) if e.data["method"] == "make_plan"]
+        assert len(calls) == planned if planned == 1 else len(calls) >= planned
 
 
 def test_an_unknown_frame_is_a_failure_not_a_crash(run, world):

@@ -1,5 +1,7 @@
 """The ready trees on a robot without walls: what they do when planning or driving fails."""
 
+from dataclasses import replace
+
 import pytest
 
 from mbf_abstract.events import EventKind
@@ -136,6 +138,19 @@ def test_the_second_planner_updates_the_path_and_the_robot_does_not_stop(make_be
     moving = [time for time, command in bench.robot.commands if not command.is_stopped()]
     stops = [t for t, command in bench.robot.commands if command.is_stopped() and moving[0] < t < moving[-1]]
     assert stops == []
+
+
+def test_an_update_that_is_a_detour_is_not_taken(make_bench):
+    bench = make_bench()
+
+    def detour(request):
+        return straight_plan(replace(request, goal=Pose.planar(9.0, 0.0)))
+
+    bench.planner.play(straight_plan, *[detour] * 9)
+    options = TreeOptions(check_poses=False, second_planner_pause=0.5, longest_update=1.5)
+    assert run(bench, navigation_tree(options), Pose.planar(2.0, 0.0)).success
+    assert plans(bench) > 1
+    assert len(bench.controller.paths) == 1
 
 
 def test_a_second_planner_that_fails_harms_nothing(make_bench, recoveries):
