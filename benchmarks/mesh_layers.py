@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import resource
 import time
 from collections.abc import Callable
+from pathlib import Path as FilePath
 
 import numpy as np
 import scipy.sparse
@@ -20,22 +22,25 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 from terrain_meshes import fractal_terrain
 
-from mbf_mesh_nav.layer import MeshLayer
+from mbf_mesh_nav.layer import LayerContext, MeshLayer
+from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.locate import SurfaceLocator
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.wave_search import WaveSearch
 
-ANALYSIS = ("border", "steepness", "roughness", "height_diff", "ridge", "clearance", "tilt")
+ANALYSIS = ("border", "steepness", "roughness", "height_diff", "ridge", "clearance")
 LIMIT_EIGHT_LAYERS = 40.0
 QUERIES = 100_000
 
 
 def seconds_of(task: Callable[[], object], rounds: int = 2) -> float:
+    """Shortest time [s] this thread computed for a task."""
     times = []
     for _ in range(rounds):
-        start = time.perf_counter()
+        start = time.thread_time()
         task()
-        times.append(time.perf_counter() - start)
+        times.append(time.thread_time() - start)
     return min(times)
 
 
@@ -44,7 +49,7 @@ def layered_map(side: int) -> MeshMap:
     terrain = fractal_terrain(side)
     layers = [{"name": name, "type": name} for name in ANALYSIS]
     layers += [
-        {"name": "lethal", "type": "max_combination", "inputs": ANALYSIS[:6]},
+        {"name": "lethal", "type": "max_combination", "inputs": ANALYSIS},
         {"name": "inflation", "type": "inflation", "inputs": ["lethal"]},
         {"name": "seen", "type": "obstacle"},
         {"name": "seen_inflation", "type": "inflation", "inputs": ["seen"]},
@@ -57,11 +62,13 @@ def layered_map(side: int) -> MeshMap:
 
 def report_layers(mesh_map: MeshMap, unit: float) -> dict[str, float]:
     total, figures = 0.0, {}
-    for name in (*ANALYSIS, "lethal", "inflation"):
-        layer: MeshLayer = mesh_map.layers[name]
+    settings = TiltLayer.Parameters()
+    tilt = TiltLayer(LayerContext("tilt", mesh_map.topology, mesh_map.locator, settings))
+    layers: dict[str, MeshLayer] = {name: mesh_map.layers[name] for name in (*ANALYSIS, "lethal", "inflation")}
+    for name, layer in {**layers, "tilt": tilt}.items():
         ratio = seconds_of(layer.recompute) / unit
         figures[f"{name}_over_scipy"] = ratio
-        total += ratio if name != "tilt" else 0.0
+        total += ratio if name in layers else 0.0
         print(f"  {name:12} {ratio:7.2f} x SciPy")
     print(f"  eight layers {total:7.2f} x SciPy, limit {LIMIT_EIGHT_LAYERS:g}  (tilt is not among them)")
     return {**figures, "eight_layers_over_scipy": total}
@@ -88,7 +95,37 @@ def report_queries(mesh_map: MeshMap) -> dict[str, float]:
     build = seconds_of(lambda: SurfaceLocator(mesh_map.topology)) / seconds_of(lambda: cKDTree(mesh_map.vertices), 1)
     query = seconds_of(lambda: mesh_map.locate(points, 0.5)) / seconds_of(lambda: tree.query(points), 1)
     print(f"  pose queries: build {build:.2f} x, {QUERIES} exact surface points {query:.2f} x cKDTree (vertices only)")
-    return {"locator_build_over_kdtree": build, "locate_over_kdtree": query}
+    figures = {"locator_build_over_kdtree": build, "locate_over_kdtree": query}
+    try:
+        import open3d
+    except ImportError:  # 400 MB, so it is not in the extra: pip install open3d
+        return figures
+    scene = open3d.t.geometry.RaycastingScene(nthreads=1)
+    scene.add_triangles(mesh_map.vertices.astype(np.float32), mesh_map.faces.astype(np.uint32))
+    queries = open3d.core.Tensor(points.astype(np.float32))
+    peer = seconds_of(lambda: scene.compute_closest_points(queries, nthreads=1))
+    figures["locate_over_open3d"] = seconds_of(lambda: mesh_map.locate(points, 0.5)) / peer
+    print(f"  {QUERIES} surface points {figures['locate_over_open3d']:.2f} x open3d on one thread, limit 2")
+    return figures
+
+
+def report_memory(mesh_map: MeshMap) -> dict[str, float]:
+    """Megabytes of the arrays of graph planners, what waves need besides, all layers, the process without waves."""
+    resident = int(FilePath("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 1e6
+    snapshot, topology = mesh_map.snapshot(), mesh_map.topology
+    names = ("vertices", "faces", "neighbour_offsets", "neighbours", "vertex_face_offsets", "vertex_faces")
+    graph = [getattr(topology, name) for name in names]
+    graph += [snapshot.costs, snapshot.lethal, snapshot.edge_weights]
+    wave = [array for array in vars(WaveSearch(mesh_map)).values() if isinstance(array, np.ndarray)]
+    layers = [array for layer in mesh_map.layers.values() for array in vars(layer).values()]
+    figures = {
+        "planning_mb": sum(array.nbytes for array in graph) / 1e6,
+        "wave_mb": sum(array.nbytes for array in wave) / 1e6,
+        "layers_mb": sum(array.nbytes for array in layers if isinstance(array, np.ndarray)) / 1e6,
+        "resident_mb": resident,
+    }
+    print("  memory: " + ", ".join(f"{name} {value:.0f}" for name, value in figures.items()))
+    return figures
 
 
 def main() -> None:
@@ -102,12 +139,13 @@ def main() -> None:
     start = time.perf_counter()
     mesh_map = layered_map(side)
     print(f"{side * side} vertices, {len(mesh_map.layers)} layers, built in {time.perf_counter() - start:.2f} s")
+    memory = report_memory(mesh_map)
     graph = scipy.sparse.csr_matrix(
         (mesh_map.neighbour_lengths.astype(float), mesh_map.neighbours, mesh_map.neighbour_offsets)
     )
     unit = seconds_of(lambda: dijkstra(graph, indices=0, return_predecessors=True))
     print(f"  SciPy's full Dijkstra {unit * 1e3:.1f} ms")
-    figures = {**report_layers(mesh_map, unit), **report_obstacles(mesh_map), **report_queries(mesh_map)}
+    figures = {**memory, **report_layers(mesh_map, unit), **report_obstacles(mesh_map), **report_queries(mesh_map)}
     if chosen.json:
         print(json.dumps({"vertices": side * side, **{key: round(value, 3) for key, value in figures.items()}}))
 

@@ -177,11 +177,11 @@ def build_mesh_map(
         mesh = densify(mesh, parameters.densify)
     topology = build_topology(mesh.vertices, mesh.faces, mesh.vertex_source, mesh.face_source, mesh.input_to_vertex)
     mesh_map = MeshMap(topology, frame_id, report, parameters.inscribed_radius)
-    _warn_if_coarse(mesh_map)
     if plan:
         graph = _compute_layers(mesh_map, plan, parameters.cache_dir)
         default = parameters.default_layer or parameters.layers[-1].name
         mesh_map.set_layers(graph, default, parameters.edge_cost_factor)
+    _warn_if_coarse(mesh_map)
     return mesh_map
 
 
@@ -255,12 +255,16 @@ def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer], cache_dir: 
 
 
 def _warn_if_coarse(mesh_map: MeshMap) -> None:
-    inscribed_radius = mesh_map.inscribed_radius
-    mean_edge = float(mesh_map.neighbour_lengths.mean())
-    if 0.0 < 0.5 * inscribed_radius < mean_edge:
-        text = (
-            f"edges are {mean_edge:.3g} m long on average, more than half the inscribed radius of "
-            f"{inscribed_radius:.3g} m; layers may miss obstacles, consider densify"
-        )
-        long = np.flatnonzero(np.diff(mesh_map.neighbour_offsets) > 0)
-        mesh_map.report.findings.append(Finding("coarse", text, long))
+    """Report a mesh whose edges are too long for the robot's radius or for the neighbourhood of a layer."""
+    mean_edge = mesh_map.topology.mean_edge_length
+    limits = {"half the inscribed radius": 0.5 * mesh_map.inscribed_radius}
+    for name, layer in mesh_map.layers.items():
+        limits[f"the radius of layer '{name}'"] = float(getattr(layer.parameters, "radius", 0.0))
+    for what, limit in limits.items():
+        if 0.0 < limit < mean_edge:
+            text = (
+                f"edges are {mean_edge:.3g} m long on average, more than {what} ({limit:.3g} m); "
+                "layers may miss obstacles, consider densify"
+            )
+            everywhere = np.flatnonzero(np.diff(mesh_map.neighbour_offsets) > 0)
+            mesh_map.report.findings.append(Finding("coarse", text, everywhere))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
@@ -21,7 +22,7 @@ from mbf_abstract.map_view import FieldView, MeshView
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.sensing import RangeScan
-from mbf_abstract.server import AbstractNavigationServer
+from mbf_abstract.server import AbstractNavigationServer, ServerError
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh_io import HDF5_FORMATS, TRIMESH_FORMATS
 from mbf_mesh_nav.mesh_map import MeshMap
@@ -68,18 +69,61 @@ class MeshNavigationServer(AbstractNavigationServer):
 
     def load_map(self, config: Config) -> None:
         """Read the mesh and compute its layers."""
+        self.mesh_map = self._build_map(config, mesh_file=None)
+        clock, events = self.runtime.clock, self.runtime.events
+        self._decay = Ticker(clock, events, lambda: self.mesh_map.update(clock.now()), DECAY_PERIOD, "mesh map decay")
+
+    def swap_mesh(self, mesh_file: Path | str) -> None:
+        """Drive on another mesh from now on, e.g. after the lift; its layers are those of the configuration.
+
+        Sensed obstacles and changes of layer parameters at run time are gone with the old map; plugins keep their
+        parameters.
+
+        Parameters
+        ----------
+        mesh_file : path
+            Absolute, or relative to the configuration.
+
+        Raises
+        ------
+        MeshError
+            The mesh cannot be read or has defects that may not be repaired; the old map stays.
+        ServerError
+            A goal is using a plugin, or a plugin does not take the new map; the old map stays.
+        """
+        old_map, new_map = self.mesh_map, self._build_map(self.config, mesh_file)
+        loaded = [(kind, plugin) for kind in PluginKind for plugin in self.plugins.all_of(kind)]
+        held = [plugin for _, plugin in loaded if plugin.acquire(self, lambda: True)]
+        try:
+            if busy := [plugin.name for _, plugin in loaded if plugin not in held]:
+                raise ServerError(f"the mesh cannot be swapped while {', '.join(busy)} is in use")
+            self.mesh_map = new_map
+            try:
+                specs = [(kind, replace(one.spec, parameters=one.instance.parameters)) for kind, one in loaded]
+                renewed = [(kind, self._construct(spec)) for kind, spec in specs]
+            except Exception as error:
+                self.mesh_map = old_map
+                raise ServerError(f"a plugin does not take {mesh_file}: {type(error).__name__}: {error}") from error
+            for kind, plugin in renewed:
+                self.plugins.replace(kind, plugin)
+        finally:
+            for plugin in held:
+                plugin.release(self)
+        for plugin in held:
+            plugin.retire()  # who waited for the old instance is told that it is gone
+
+    def _build_map(self, config: Config, mesh_file: Path | str | None) -> MeshMap:
+        """Read the mesh, the configured one without ``mesh_file``, and compute its layers."""
         section = config.sections["mesh_map"]
         parameters = cast(MeshMapParameters, section.parameters)
-        mesh_file = config.path.parent / parameters.mesh_file
+        file = config.path.parent / (mesh_file or parameters.mesh_file)
         layer_classes: dict[str, Any] = {layer.type_name: layer.layer_class for layer in section.layers}
-        self.mesh_map = build_mesh_map(
-            parameters.model_copy(update={"mesh_file": str(mesh_file)}),
+        return build_mesh_map(
+            parameters.model_copy(update={"mesh_file": str(file)}),
             {layer.name: cast(Any, layer.parameters) for layer in section.layers},
             frame_id=config.parameters.global_frame,
             load_layer=layer_classes.__getitem__,
         )
-        clock, events = self.runtime.clock, self.runtime.events
-        self._decay = Ticker(clock, events, lambda: self.mesh_map.update(clock.now()), DECAY_PERIOD, "mesh map decay")
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the mesh map."""

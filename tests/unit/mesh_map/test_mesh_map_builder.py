@@ -102,6 +102,15 @@ def test_damaged_cache_file_is_computed_anew(tmp_path):
     np.testing.assert_array_equal(again.layers["rough"].costs, first.layers["rough"].costs)
 
 
+def test_layers_whose_radius_is_shorter_than_the_edges_are_reported_by_name():
+    vertices, faces = heightfield_mesh(np.zeros((9, 9)), 0.5, 0.5)
+    layers = [{"name": "near", "type": "roughness"}, {"name": "far", "type": "roughness"}]
+    blocks = {"near": {"radius": 0.3}, "far": {"radius": 1.0}}
+    mesh_map = build_mesh_map(MeshMapParameters(layers=layers), blocks, vertices=vertices, faces=faces)
+    assert [finding.name for finding in mesh_map.report.findings] == ["coarse"]
+    assert "'near'" in mesh_map.report.findings[0].text
+
+
 def test_coarse_mesh_is_reported_and_densify_mends_it():
     vertices, faces = heightfield_mesh(np.zeros((3, 3)), 2.0, 2.0)
     coarse = MeshMapParameters(inscribed_radius=0.4)

@@ -1,0 +1,77 @@
+"""Another mesh at run time: the robot came out of the lift on another floor."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.navigator import Navigator
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PluginKind
+from mbf_abstract.server import ServerError
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.transforms import TransformBuffer
+from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.repair import MeshError
+
+CONFIG = """
+backend: mesh
+planner_max_retries: 0
+planners: [{name: astar, type: astar}, {name: cvp, type: cvp}]
+controllers: [{name: follow, type: path_follower}]
+mesh_map:
+  mesh_file: small.ply
+  layers: [{name: slopes, type: steepness}]
+  slopes: {threshold: 0.5}
+"""
+FAR = Pose.planar(6.5, 0.5)
+
+
+@pytest.fixture
+def navigator(tmp_path):
+    """A robot on a floor of 4 x 4 m; the next floor has 8 x 4 m."""
+    for name, columns in (("small", 21), ("large", 41)):
+        mesh = trimesh.Trimesh(*heightfield_mesh(np.zeros((21, columns)), 0.2, 0.2), process=False)
+        mesh.export(tmp_path / f"{name}.ply")
+    (tmp_path / "broken.ply").write_text("no mesh")
+    (tmp_path / "mesh.yaml").write_text(CONFIG)
+    clock, transforms = SimClock(), TransformBuffer()
+    robot = LoopbackRobot(clock, transforms, Pose.planar(0.45, 0.45))
+    with Navigator.from_file(tmp_path / "mesh.yaml", robot, clock, transforms) as made:
+        clock.sleep(0.1)
+        yield made
+    robot.close()
+
+
+@pytest.mark.parametrize("planner", ["astar", "cvp"])
+def test_goals_that_only_the_new_mesh_has_are_reached_after_the_swap(navigator, planner):
+    assert navigator.get_path(FAR, planner=planner).outcome == GetPathOutcome.OUT_OF_MAP
+    navigator.server.swap_mesh("large.ply")
+    assert navigator.get_path(FAR, planner=planner).success
+    assert set(navigator.server.mesh_map.layers) == {"slopes"}
+
+
+def test_plugins_keep_the_parameters_they_were_given_at_run_time(navigator):
+    navigator.server.set_plugin_parameters(PluginKind.PLANNER, "astar", cost_limit=0.7)
+    navigator.server.swap_mesh("large.ply")
+    assert navigator.server.plugins.get(PluginKind.PLANNER, "astar").instance.parameters.cost_limit == 0.7
+
+
+def test_a_mesh_that_cannot_be_read_leaves_everything_as_it_was(navigator):
+    before = navigator.server.mesh_map
+    with pytest.raises(MeshError):
+        navigator.server.swap_mesh("broken.ply")
+    assert navigator.server.mesh_map is before
+    assert navigator.get_path(Pose.planar(3.0, 3.0), planner="astar").success
+
+
+def test_while_a_goal_uses_a_plugin_the_mesh_stays(navigator):
+    server = navigator.server
+    before, busy = server.mesh_map, server.plugins.get(PluginKind.PLANNER, "cvp")
+    assert busy.acquire("a goal", lambda: True)
+    with pytest.raises(ServerError, match="cvp"):
+        server.swap_mesh("large.ply")
+    busy.release("a goal")
+    assert server.mesh_map is before
+    assert navigator.get_path(Pose.planar(3.0, 3.0), planner="astar").success
