@@ -22,7 +22,6 @@ class Snapshot:
 
     lines: tuple[Line, ...] = ()
     ends: dict[str, Line] = field(default_factory=dict)
-    tree: str = ""
     nodes: tuple[NodeState, ...] = ()
 
 
@@ -34,8 +33,6 @@ class LiveLog:
         self._lines: deque[Line] = deque(maxlen=MAX_LINES)
         self._ends: dict[str, Line] = {}
         self._tree = TreeState()
-        self.version = 0
-        """Grows whenever a snapshot would look different."""
 
     def write(self, event: Event) -> None:
         """Take one event."""
@@ -43,7 +40,6 @@ class LiveLog:
         if not (is_told or event.kind is EventKind.TREE):
             return
         with self._lock:
-            self.version += 1
             if is_told:
                 line = line_of(event)
                 self._lines.appendleft(line)
@@ -59,4 +55,4 @@ class LiveLog:
         """Return what is known now."""
         with self._lock:
             nodes = tuple(NodeState(**vars(node)) for node in self._tree.nodes)
-            return Snapshot(tuple(self._lines), dict(self._ends), self._tree.name, nodes)
+            return Snapshot(tuple(self._lines), dict(self._ends), nodes)
