@@ -47,7 +47,7 @@ def read_map(path: FilePath) -> np.ndarray:
 def octile_steps(grid: tuple[np.ndarray, int], start: int, goal: int) -> tuple[float, int]:
     """Straight and diagonal steps of our A* path; inf straight ones without a path."""
     cells, stride = grid
-    status, g = search(cells, stride, TABLE, start, goal, 1.0, False, NO_CANCEL)
+    status, g = search(cells, stride, TABLE, start, goal, 1.0, False, False, NO_CANCEL)
     if status != FOUND:
         return math.inf, 0
     path = trace_cells(cells, stride, TABLE, g, goal, False)

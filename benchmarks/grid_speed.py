@@ -3,7 +3,8 @@
     python benchmarks/grid_speed.py [--quick] [--json]
 
 Maps: rooms of 6 m with doors at 0.05 m, 1 % boxes, inflated (0.55 m, inscribed 0.22 m, scaling 3.0), corner to corner;
-384^2, 1000^2 and 4000^2 cells (``--quick``: the first two). Ours and the peer alternate; a line shows both medians [ms]
+384^2, 1000^2 and 4000^2 cells (``--quick``: the first two). Medians are of 7 pairs, of 3 with the peers that take 10 s
+and more at 4000^2. Ours and the peer alternate; a line shows both medians [ms]
 and the median of the ratios ours / peer. ``C++`` is what the ratio of that Python peer to a C++ peer, measured on a
 quiet machine (peers.md, section 4), makes of ours: how many times faster we are than that C++ planner.
 A peer that is not installed is skipped with a note. Times are CPU times of the one thread, so that other load on the
@@ -16,7 +17,8 @@ import argparse
 import importlib
 import json
 from collections.abc import Callable
-from time import thread_time
+from concurrent.futures import ThreadPoolExecutor
+from time import perf_counter, sleep, thread_time
 from types import ModuleType
 
 import numpy as np
@@ -25,7 +27,7 @@ from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.costmap import CellBox
 from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.grid_planning import traversal_table
-from mbf_costmap_nav.kernels.grid_search import pad_cells, search
+from mbf_costmap_nav.kernels.grid_search import CANCELED, FOUND, pad_cells, search
 from mbf_costmap_nav.kernels.inflation import inflate
 from mbf_costmap_nav.kernels.theta_star import theta_search
 from mbf_costmap_nav.layers.inflation import cost_table
@@ -99,6 +101,7 @@ class Suite:
 
     def __init__(self, size: int, repeats: int, results: dict[str, float]) -> None:
         self.size, self.repeats, self.results = size, repeats, results
+        self.slow_repeats = 3 if size > 1000 else repeats
         self.lethal = rooms(size)
         self.cells = inflated(self.lethal)
         self.table = traversal_table(2.0, 253, False)
@@ -110,23 +113,33 @@ class Suite:
         self.goal_cell = (self.goal // self.stride - 1, self.goal % self.stride - 1)
 
     def line(
-        self, name: str, ours: Callable[[], object], theirs: Callable[[], object], cpp: tuple[str, float] | None = None
+        self,
+        name: str,
+        ours: Callable[[], object],
+        theirs: Callable[[], object],
+        cpp: tuple[str, float] | None = None,
+        *,
+        slow: bool = False,
     ) -> None:
-        """Measure one pair and print it."""
-        mine, other, ratio = compare(ours, theirs, self.repeats)
+        """Measure one pair and print it; ``slow`` peers are asked less often on the largest map."""
+        mine, other, ratio = compare(ours, theirs, self.slow_repeats if slow else self.repeats)
         self.results[f"{name}_{self.size}"] = ratio
         text = f"{self.size:5d}^2 {name:28s} {mine:9.2f} ms, peer {other:9.2f} ms, ratio {ratio:6.3f}"
         print(text + (f"   = {cpp[1] / ratio:.1f} x {cpp[0]} (C++)" if cpp else ""), flush=True)
 
-    def astar(self) -> object:
+    def astar(self) -> tuple[int, np.ndarray]:
         """Run our A*."""
-        return search(self.padded, self.stride, self.table, self.start, self.goal, 1.0, False, NO_CANCEL)
+        return search(self.padded, self.stride, self.table, self.start, self.goal, 1.0, False, False, NO_CANCEL)
 
     def field(self) -> tuple[int, np.ndarray]:
         """Run our full field."""
-        return search(self.padded, self.stride, self.table, self.start, -1, 0.0, False, NO_CANCEL)
+        return search(self.padded, self.stride, self.table, self.start, -1, 0.0, False, False, NO_CANCEL)
 
-    def theta(self) -> object:
+    def interpolated(self) -> tuple[int, np.ndarray]:
+        """Run navfn's potential up to the goal."""
+        return search(self.padded, self.stride, self.table, self.start, self.goal, 0.0, False, True, NO_CANCEL)
+
+    def theta(self) -> tuple[int, np.ndarray, np.ndarray]:
         """Run our Theta*."""
         return theta_search(self.padded, self.stride, self.table, self.start, self.goal, NO_CANCEL)
 
@@ -150,17 +163,30 @@ class Suite:
             self.line("astar_over_pyastar2d", self.astar, theirs, cpp)
             self.line("theta_over_pyastar2d", self.theta, theirs, ("Nav2 Theta*", THETA_TO_PYASTAR[size]))
         self.line("theta_over_our_astar", self.theta, self.astar)
-        if size > 1000 and self.repeats < 7:
-            return
+        self.answers()
         integer = np.where(np.isfinite(self.weights), self.weights * 10.0, 0.0).astype(np.int32)
         if tcod:
-            self.line("field_over_tcod", self.field, lambda: tcod_field(tcod, integer), ("NavFn", NAVFN_TO_TCOD[size]))
-            self.line(
-                "astar_over_tcod", self.astar, lambda: tcod.path.AStar(integer, 1.41).get_path(20, 20, *self.goal_cell)
-            )
+            cpp = ("NavFn", NAVFN_TO_TCOD[size])
+            self.line("field_over_tcod", self.field, lambda: tcod_field(tcod, integer), cpp, slow=True)
+            theirs = lambda: tcod.path.AStar(integer, 1.41).get_path(20, 20, *self.goal_cell)  # noqa: E731
+            self.line("astar_over_tcod", self.astar, theirs, slow=True)
         if graph:
             costs = np.where(np.isfinite(self.weights), self.weights, -1.0)
-            self.line("field_over_skimage", self.field, lambda: graph.MCP_Geometric(costs).find_costs([(20, 20)]))
+            theirs = lambda: graph.MCP_Geometric(costs).find_costs([(20, 20)])  # noqa: E731
+            self.line("field_over_skimage", self.field, theirs, slow=True)
+
+    def answers(self) -> None:
+        """Which planners find the way (on 4000^2 NavFn's A* does not), and how long a cancel takes."""
+        found = {
+            "A*": self.astar()[0],
+            "navfn's potential": self.interpolated()[0],
+            "Theta*": self.theta()[0],
+        }
+        delay = max(cancel_delay(self, 0.05 * step) for step in range(1, 6))
+        self.results[f"ways_found_{self.size}"] = sum(status == FOUND for status in found.values())
+        self.results[f"cancel_ms_{self.size}"] = delay
+        names = ", ".join(name for name, status in found.items() if status == FOUND)
+        print(f"{self.size:5d}^2 a way is found by {names}; a cancelled search ends within {delay:.1f} ms", flush=True)
 
 
 def rolling_local_map(repeats: int) -> float:
@@ -187,6 +213,19 @@ def rolling_local_map(repeats: int) -> float:
         times.append((thread_time() - begin) * 1e3)
         assert box == costmap.geometry.box, "the window moves, so all of it must be made anew"
     return float(np.median(times[2:]))  # the first ones compile
+
+
+def cancel_delay(suite: Suite, after: float) -> float:
+    """Wall-clock time [ms] from a cancel, ``after`` seconds into a full field, to the search's return; 0 if done."""
+    flag = np.zeros(1, dtype=np.uint8)
+    with ThreadPoolExecutor(1) as pool:
+        arguments = (suite.padded, suite.stride, suite.table, suite.start, -1, 0.0, False, False, flag)
+        running = pool.submit(search, *arguments)
+        sleep(after)
+        begin = perf_counter()
+        flag[0] = 1
+        status, _ = running.result()
+        return (perf_counter() - begin) * 1e3 if status == CANCELED else 0.0
 
 
 def tcod_field(tcod: ModuleType, costs: np.ndarray) -> np.ndarray:

@@ -16,7 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
-from mbf_costmap_nav.kernels.open_list import IDLE, INF, RING, SQRT2, Integer, bucket_width, relax_bucket, with_room
+from mbf_costmap_nav.kernels.open_list import (
+    IDLE,
+    INF,
+    RING,
+    SQRT2,
+    Integer,
+    bucket_width,
+    relax_bucket,
+    relax_interpolated,
+    with_room,
+)
 
 FOUND, EXHAUSTED, CANCELED = 0, 1, 2
 """States of a finished search: goal settled; everything reachable settled; the cancel flag was seen."""
@@ -52,6 +62,7 @@ def search(
     goal: int,
     heuristic_scale: float,
     cut_corners: bool,
+    interpolated: bool,
     cancel_flag: NDArray[np.uint8],
 ) -> tuple[int, NDArray[np.float32]]:
     """Settle cells around ``start`` until ``goal`` is settled, or everything reachable if it cannot be reached.
@@ -70,6 +81,10 @@ def search(
         At most the least finite traversal; 0 is Dijkstra's order, and the only choice without a goal.
     cut_corners : bool
         Whether a diagonal step may pass a blocked cell at its side.
+    interpolated : bool
+        Fill ``g`` with navfn's interpolated potential instead of the cost of steps. It cuts no corners, as it spreads
+        along rows and columns, and needs a ``heuristic_scale`` of 0: a cell's value may come from two neighbours, of
+        which a heuristic settles one too late.
     cancel_flag : (1,) uint8
         Polled at every bucket.
 
@@ -114,7 +129,10 @@ def search(
         if fresh.size < 8 * counts[slot]:
             fresh = np.empty(16 * counts[slot], dtype=np.int32)
         in_bucket = buckets[slot, : counts[slot]]
-        improved = relax_bucket(cells, stride, halves, side_limit, in_bucket, slot, queued, g, fresh)
+        if interpolated:
+            improved = relax_interpolated(cells, stride, table, in_bucket, slot, queued, g, fresh)
+        else:
+            improved = relax_bucket(cells, stride, halves, side_limit, in_bucket, slot, queued, g, fresh)
         waiting -= counts[slot]
         counts[slot] = 0
 

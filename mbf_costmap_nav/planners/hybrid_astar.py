@@ -83,7 +83,7 @@ class HybridAStarPlanner(CostmapPlanner):
         p, flag = self.parameters, request.cancel_token.flag
         grid = SearchGrid.build(costmap, GridPlannerParameters(cost_factor=0.0, allow_unknown=False))
         goal_cell = grid.index(costmap.world_to_cell_clamped(goal.x, goal.y))
-        status, g = search(grid.cells, grid.stride, grid.table, goal_cell, -1, 0.0, True, flag)
+        status, g = search(grid.cells, grid.stride, grid.table, goal_cell, -1, 0.0, True, False, flag)
         if status == CANCELED:
             return CANCELED, np.zeros((0, 3)), 0.0, 0
         field = np.ascontiguousarray(g.reshape(-1, grid.stride)[1:-1, 1:-1])

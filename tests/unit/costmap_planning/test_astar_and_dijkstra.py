@@ -198,6 +198,25 @@ def test_theta_star_is_never_longer_than_the_octile_path(make_plugin, seed):
     assert not octile.success or theta.path.length <= octile.path.length + 1e-9
 
 
+@pytest.mark.parametrize("planner_class", [AStarPlanner, DijkstraPlanner])
+def test_the_interpolated_potential_bends_smoothly_around_the_block(make_plugin, planner_class):
+    planner = make_plugin(planner_class, block_map(), interpolated_potential=True)
+    result = plan(planner, (5.5, 5.5), (18.5, 18.5))
+    shortest = math.hypot(10, 1) + math.hypot(3, 12)
+    assert result.success and shortest - 1e-6 <= result.path.length <= 1.08 * shortest
+    assert result.cost == pytest.approx(shortest, rel=0.06)
+
+
+def test_the_interpolated_potential_honours_the_goal_tolerance(make_plugin):
+    planner = make_plugin(AStarPlanner, WALLED, interpolated_potential=True)
+    assert plan(planner, (1.5, 1.5), (5.6, 1.5), dist_tolerance=1.5).path[-1].x == 4.5
+
+
+def test_a_cell_path_down_the_interpolated_potential_is_refused():
+    with pytest.raises(ValueError, match="gradient_path"):
+        DijkstraPlanner.Parameters(interpolated_potential=True, gradient_path=False)
+
+
 def test_straight_line_is_straight_or_nothing(make_plugin):
     free = plan(make_plugin(StraightLinePlanner, np.zeros((10, 10))), (1.2, 1.7), (8.1, 6.6))
     assert free.path.length == pytest.approx(math.hypot(6.9, 4.9))

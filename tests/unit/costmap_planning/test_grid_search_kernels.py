@@ -55,9 +55,9 @@ def run(cells, start, goal, *, cost_factor=3.0, allow_unknown=False, cut_corners
         return (cell[0] + 1) * stride + cell[1] + 1
 
     if goal is None:
-        status, g = search(padded, stride, table, index(start), -1, 0.0, cut_corners, flag)
+        status, g = search(padded, stride, table, index(start), -1, 0.0, cut_corners, False, flag)
     else:
-        status, g = search(padded, stride, table, index(start), index(goal), 1.0, cut_corners, flag)
+        status, g = search(padded, stride, table, index(start), index(goal), 1.0, cut_corners, False, flag)
     return status, g.reshape(-1, stride)[1:-1, 1:-1], (padded, stride, table, g), index
 
 
@@ -75,7 +75,7 @@ def test_field_equals_the_naive_dijkstra(cells, cut_corners, allow_unknown):
 def test_a_field_may_end_at_a_cell_that_has_its_final_value():
     cells = np.zeros((80, 80), dtype=np.uint8)
     _, _, (padded, stride, table, whole), index = run(cells, (5, 5), None)
-    status, g = search(padded, stride, table, index((5, 5)), index((9, 12)), 0.0, False, NO_CANCEL)
+    status, g = search(padded, stride, table, index((5, 5)), index((9, 12)), 0.0, False, False, NO_CANCEL)
     assert status == FOUND and g[index((9, 12))] == whole[index((9, 12))]
     assert np.isinf(g[index((79, 79))])
 
@@ -223,3 +223,50 @@ def test_theta_star_without_a_way_settles_exactly_what_can_be_reached(cells):
     )
     reached = {(int(y), int(x)) for y, x in np.argwhere(np.isfinite(g.reshape(-1, stride)[1:-1, 1:-1]))}
     assert cells.size == 1 or (status == EXHAUSTED and reached == set(naive_field(cells, table, (0, 0), False)))
+
+
+def naive_potential(cells, table, start):
+    """navfn's update of all cells again and again until none changes."""
+    traversal = np.pad(table[cells].astype(float), 1, constant_values=np.inf)
+    potential = np.full(traversal.shape, np.inf)
+    before = None
+    while before is None or not np.array_equal(before, potential):
+        before = potential.copy()
+        for y, x in np.argwhere(np.isfinite(traversal)):
+            t = traversal[y, x]
+            a, b = sorted([min(before[y, x - 1], before[y, x + 1]), min(before[y - 1, x], before[y + 1, x])])
+            if math.isinf(a):
+                continue
+            if b - a < t:
+                d = (b - a) / t
+                potential[y, x] = min(potential[y, x], a + t * min(1.0, -0.2301 * d * d + 0.5307 * d + 0.7040))
+            else:
+                potential[y, x] = min(potential[y, x], a + t)
+        potential[start[0] + 1, start[1] + 1] = 0.0
+    return potential[1:-1, 1:-1]
+
+
+@settings(max_examples=40, deadline=None)
+@given(cells=small_maps, cost_factor=st.floats(0.0, 300.0))
+def test_the_interpolated_potential_equals_navfns_update_repeated_until_nothing_changes(cells, cost_factor):
+    cells[0, 0] = 0
+    table, stride = traversal_table(cost_factor, 253, False), cells.shape[1] + 2
+    padded, start = pad_cells(cells, 254), stride + 1
+    _, g = search(padded, stride, table, start, -1, 0.0, False, True, NO_CANCEL)
+    expected = naive_potential(cells, table, (0, 0))
+    np.testing.assert_allclose(g.reshape(-1, stride)[1:-1, 1:-1], expected, rtol=1e-5)
+    y, x = np.argwhere(np.isfinite(expected))[-1]
+    goal = (y + 1) * stride + x + 1
+    status, partial = search(padded, stride, table, start, goal, 0.0, False, True, NO_CANCEL)
+    assert status == FOUND and partial[goal] == pytest.approx(expected[y, x], rel=1e-5)
+
+
+def test_the_interpolated_potential_in_the_open_is_nearly_the_euclidean_distance():
+    table, stride = traversal_table(3.0, 253, False), 102
+    padded = pad_cells(np.zeros((100, 100), dtype=np.uint8), 254)
+    g = search(padded, stride, table, 11 * stride + 11, -1, 0.0, False, True, NO_CANCEL)[1].reshape(102, 102)[
+        1:-1, 1:-1
+    ]
+    y, x = np.mgrid[:100, :100] - 10
+    far = np.hypot(x, y) > 20
+    assert np.abs(g[far] / np.hypot(x, y)[far] - 1.0).max() < 0.05

@@ -161,12 +161,12 @@ def test_f127_a_circle_in_steps_of_one_degree():
 
 
 # -------------------------------------------------------------------------------------------------------- planning
-def navfn_plan(make_plugin, shared_data, start, lethal_cost):
+def navfn_plan(make_plugin, shared_data, start, lethal_cost, planner_class=AStarPlanner, **more):
     pixels = (shared_data / "maps" / "navfn" / "willow_costmap.pgm").read_bytes()
     cells = np.frombuffer(pixels[-1132 * 1217 :], dtype=np.uint8).reshape(1217, 1132)
     parameters = {"cost_factor": 0.0, "lethal_cost": lethal_cost, "allow_unknown": False}
     return plan(
-        make_plugin(AStarPlanner, cells.copy(), **parameters),
+        make_plugin(planner_class, cells.copy(), **parameters, **more),
         (start[0] + 0.5, start[1] + 0.5),
         (350.5, 450.5),
     )
@@ -181,6 +181,17 @@ def test_f157_a_way_through_willow_garage_over_inscribed_cells(make_plugin, shar
 def test_f158_a_straight_way_through_willow_garage(make_plugin, shared_data):
     result = navfn_plan(make_plugin, shared_data, (350, 400), lethal_cost=254)
     assert result.path.length == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize("planner_class", [AStarPlanner, DijkstraPlanner])
+@pytest.mark.parametrize(
+    ("start", "octile"), [pytest.param((428, 746), 328.3087, id="F157"), pytest.param((350, 400), 50.0, id="F158")]
+)
+def test_navfns_paths_through_willow_garage_down_its_own_potential(
+    make_plugin, shared_data, planner_class, start, octile
+):
+    result = navfn_plan(make_plugin, shared_data, start, 254, planner_class, interpolated_potential=True)
+    assert result.success and result.path.length <= octile + 1e-3
 
 
 @pytest.mark.parametrize("planner_class", PLANNERS)
