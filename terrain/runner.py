@@ -24,6 +24,7 @@ from terrain.bench import Bench
 from terrain.goal_drivers import make_goal_driver
 from terrain.goal_tour import GoalTour
 from terrain.metrics import measure
+from terrain.mishaps import MishapKind
 from terrain.recording import Recording
 from terrain.scenario import Scenario
 from terrain.scenario_limits import broken_limits
@@ -191,6 +192,8 @@ def _write_numbers(recording: Recording, bench: Bench, wall_time: float, options
     if options.geodesic and recording.success:
         metrics |= _compare_with_geodesic(recording, bench.world)
     metrics["mishaps"] = sorted({mishap.kind.value for mishap in bench.simulation.mishaps})
+    counts = bench.simulation.monitor.counts
+    metrics |= {"collisions": counts[MishapKind.COLLISION], "tip_overs": counts[MishapKind.TIPPED_OVER]}
     metrics["energy_j"] = round(bench.simulation.monitor.energy, 3)
     metrics["slipped_m"] = round(bench.simulation.monitor.slipped, 6)
     metrics["broken_limits"] = broken_limits(bench.scenario.limits, metrics)

@@ -72,7 +72,7 @@ def run_once(scenario: Scenario, run: SweepRun) -> dict[str, Any]:
             result = run_scenario(scenario, options)
         except Exception as error:  # one impossible variant must not end the sweep
             return {"success": False, "outcome": type(error).__name__, "message": str(error)}
-    return {**result.metrics, "message": result.message}
+    return {**result.metrics, "outcome_code": result.outcome, "message": result.message}
 
 
 def run_all(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, dict[str, Any]]]:

@@ -16,6 +16,7 @@ COLUMNS = (
     "seed",
     "success",
     "outcome",
+    "outcome_code",
     "time_s",
     "path_length_m",
     "planned_length_m",
@@ -25,6 +26,8 @@ COLUMNS = (
     "max_pitch_deg",
     "energy_j",
     "slipped_m",
+    "collisions",
+    "tip_overs",
     "mishaps",
     "recoveries",
     "wall_time_s",
@@ -68,7 +71,9 @@ def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
                 "median_time_s": round(median(row["time_s"] for row in arrived), 1) if arrived else "",
                 "median_length_m": round(median(row["path_length_m"] for row in arrived), 1) if arrived else "",
                 "median_path_over_geodesic": round(median(ratios), 3) if ratios else "",
-                "runs_with_mishaps": sum(bool(row["mishaps"]) for row in runs),
+                "collisions": sum(row.get("collisions") or 0 for row in runs),
+                "tip_overs": sum(row.get("tip_overs") or 0 for row in runs),
+                "runs_with_mishaps": sum(bool(row.get("mishaps")) for row in runs),
             }
         )
     return lines

@@ -94,6 +94,7 @@ def test_a_killed_sweep_is_resumed_without_losing_or_doubling_a_run(arguments, t
     assert "%" not in finished.stdout, "a bar is for terminals"
     with (tmp_path / "out" / "sweep.csv").open() as file:
         table = list(csv.DictReader(file))
+    assert {(row["outcome_code"], row["collisions"], row["tip_overs"]) for row in table} == {("0", "0", "0")}
     assert all(0.97 <= float(row["path_over_geodesic"]) < 1.2 for row in table)  # straight ahead on open ground
     assert {(row["seed"], row["variant"]) for row in table} == {
         (seed, variant) for seed in ("0", "1") for variant in ("planner=astar", "planner=dijkstra")

@@ -81,14 +81,21 @@ def test_a_run_that_could_not_begin_has_a_row_too(tmp_path):
     rows = [{"seed": 0, "variant": "planner=none", "success": False, "outcome": "ConfigError", "message": "unknown"}]
     write_tables("Trial", rows, tmp_path)
     assert "ConfigError" in (tmp_path / "sweep.csv").read_text()
+    assert summarise(rows)[0]["success_percent"] == 0.0
 
 
 def test_the_summary_counts_per_variant_and_takes_medians_of_successes():
-    rows = [row(0), row(1, path_over_geodesic=1.1), row(2, success=False), row(0, "planner=astar", success=False)]
+    rows = [
+        row(0),
+        row(1, path_over_geodesic=1.1, collisions=2),
+        row(2, success=False, tip_overs=1),
+        row(0, "planner=astar", success=False),
+    ]
     lines = {line["variant"]: line for line in summarise(rows)}
     assert lines["planner=cvp"]["success_percent"] == 66.7
     assert lines["planner=cvp"]["median_time_s"] == 10.5
     assert lines["planner=cvp"]["median_path_over_geodesic"] == 1.1
+    assert (lines["planner=cvp"]["collisions"], lines["planner=cvp"]["tip_overs"]) == (2, 1)
     assert lines["planner=cvp"]["runs_with_mishaps"] == 2
     assert lines["planner=astar"]["median_time_s"] == ""
 
