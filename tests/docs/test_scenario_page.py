@@ -1,0 +1,34 @@
+"""The scenario in the documentation is a scenario, and the sweep beside it can be planned."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from terrain.scenario import SHIPPED, load_scenario
+from terrain.scenario_settings import apply_world_settings
+from terrain.sweep_cli import parse_seeds, parse_settings
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "write_a_scenario.md"
+
+
+def test_the_scenario_of_the_page_is_read_without_a_finding(tmp_path):
+    (example,) = re.findall(r"```yml\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    (tmp_path / "config").symlink_to(SHIPPED / "config")
+    (tmp_path / "example.yaml").write_text(example)
+
+    scenario = load_scenario(tmp_path / "example.yaml")
+
+    assert (scenario.odometry, len(scenario.actors), len(scenario.faults)) == ("wheels", 1, 2)
+
+
+def test_every_setting_of_the_sweep_on_the_page_fits_its_scenario():
+    (line,) = re.findall(r"^mbf sweep .*$", PAGE.read_text(), re.MULTILINE)
+    words = shlex.split(line)
+    settings = parse_settings([words[i + 1] for i, word in enumerate(words) if word == "--set"])
+    assert len(parse_seeds(words[words.index("--seeds") + 1])) == 50
+    for key, values in settings.items():
+        for value in values:
+            scenario, _ = apply_world_settings(load_scenario(words[2]), {key: value})
+    assert scenario.world.spacing == pytest.approx(0.5)
