@@ -125,7 +125,9 @@ def cost_table(
     """
     distances = np.sqrt(np.arange(radius * radius + 1, dtype=np.float64)) * resolution
     beyond = np.maximum(distances - inscribed_radius, 0.0)
-    table = ((INSCRIBED - 1) * np.exp(-cost_scaling_factor * beyond)).astype(np.uint8)
+    # math.exp, because numpy's own can be one bit off, and the truncation makes a cost of that.
+    decay = np.array([math.exp(-cost_scaling_factor * distance) for distance in beyond.tolist()])
+    table = ((INSCRIBED - 1) * decay).astype(np.uint8)
     table[distances <= inscribed_radius] = INSCRIBED
     table[0] = LETHAL
     return table

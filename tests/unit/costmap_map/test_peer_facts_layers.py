@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose
@@ -35,6 +35,7 @@ def see(costmap, *points, sensor=(0.0, 0.0, 0.0), source="laser", now=0.0):
 
 
 @given(st.integers(0, 40), st.integers(0, 40), st.floats(0.1, 3.0), st.floats(0.0, 2.0))
+@example(dx=0, dy=37, inscribed_radius=1.625, weight=2.220446049250313e-16)
 @settings(deadline=None)
 def test_f001_the_cost_of_a_distance_follows_the_rule(dx, dy, inscribed_radius, weight):
     table = cost_table(57, 0.05, inscribed_radius, weight)
