@@ -19,7 +19,11 @@ from mbf_abstract.commands.reporting import FAILURE
 
 NEEDED = ("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "h5py")
 SIMULATION = ("pybullet", "embreex", "matplotlib", "viser", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf")
-DISTRIBUTIONS = {"yaml": "pyyaml", "mcap_protobuf": "mcap-protobuf-support"}  # where the names differ
+DISTRIBUTIONS = {
+    "yaml": "pyyaml",
+    "mcap_protobuf": "mcap-protobuf-support",
+    "rerun": "rerun-sdk",
+}  # where the names differ
 OLDEST_PYTHON = (3, 10)
 
 
@@ -60,6 +64,7 @@ def examine() -> Iterator[Finding]:
         yield _package(name, "pip install mbf-flex", optional=False)
     for name in SIMULATION:
         yield _package(name, "needed by mbf run and pictures: pip install 'mbf-flex[sim]'", optional=True)
+    yield _package("rerun", "only for mbf replay --rrd: pip install 'mbf-flex[rerun]'", optional=True)
     yield _check("plugins", _plugins, "mbf plugins tells which and why")
     yield _check("kernel cache", _kernel_cache, "set NUMBA_CACHE_DIR to a folder that can be written")
     yield _check("loopback port", _loopback_port, "a firewall or sandbox forbids sockets: no replay, no live view")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from foxglove_schemas_protobuf.CylinderPrimitive_pb2 import CylinderPrimitive
 from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
@@ -13,8 +15,9 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
+from terrain.actor_track import ActorTrack
 from terrain.recording import Recording, RobotShape, Surface
-from terrain.viewer.colours import BODY, DRIVEN, GOAL, OBSTACLE, START, WALL, WHEEL, Colour
+from terrain.viewer.colours import ACTORS, BODY, DRIVEN, GOAL, OBSTACLE, START, WALL, WHEEL, Colour
 from terrain.viewer.foxglove_messages import colour, points, pose, timestamp, triangles
 from terrain.viewer.shading import vertex_colours
 from terrain.viewer.shapes import cut_walls, prism
@@ -61,6 +64,23 @@ def robot(shape: RobotShape) -> SceneUpdate:
         entity.cylinders.append(drum)
         entities.append(entity)
     return SceneUpdate(entities=entities)
+
+
+def actors(tracks: Sequence[ActorTrack]) -> SceneUpdate:
+    """People, doors and other robots, each in a frame of its own."""
+    return SceneUpdate(
+        entities=[
+            _solid(
+                actor_frame(index), f"{track.thing} {index}", Surface(track.vertices, track.faces), ACTORS[track.thing]
+            )
+            for index, track in enumerate(tracks)
+        ]
+    )
+
+
+def actor_frame(index: int) -> str:
+    """Name of an actor's frame."""
+    return f"actor_{index}"
 
 
 def wheel_frame(index: int) -> str:

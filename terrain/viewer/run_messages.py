@@ -3,8 +3,8 @@
 ========== ================================ =====================================================
 topic      schema                           contents
 ========== ================================ =====================================================
-/tf        foxglove.FrameTransforms         true pose of ``base_link`` and of the wheels
-/scene     foxglove.SceneUpdate             ground, walls, obstacles, start, goals, robot, track
+/tf        foxglove.FrameTransforms         true pose of ``base_link``, of wheels and of actors
+/scene     foxglove.SceneUpdate             ground, walls, obstacles, marks, robot, actors, track
 /plan      foxglove.PosesInFrame            every plan the robot followed
 /scan      foxglove.PointCloud              what a range sensor hit
 /map       foxglove.Grid                    the map, where it is a grid
@@ -70,7 +70,7 @@ def messages_of(recording: Recording) -> list[Stamped]:
     """All messages of a run, in the order of time."""
     frame, height = recording.start.frame_id, recording.start.z + GRID_LIFT
     streams: list[Iterator[Stamped]] = [
-        iter([(0.0, "/scene", scene.world(recording)), (0.0, "/scene", scene.robot(recording.robot))]),
+        ((0.0, "/scene", update) for update in _stage(recording)),
         _transforms(recording),
         _track(recording),
         ((time, "/plan", message.poses_along(time, frame, line)) for time, line in recording.paths if len(line)),
@@ -82,6 +82,14 @@ def messages_of(recording: Recording) -> list[Stamped]:
         _motion(recording),
     ]
     return sorted(itertools.chain(*streams), key=lambda stamped: stamped[0])
+
+
+def _stage(recording: Recording) -> Iterator[Any]:
+    """What stands and what moves, as it looks; where the moving things are is told on ``/tf``."""
+    yield scene.world(recording)
+    yield scene.robot(recording.robot)
+    if recording.actors:
+        yield scene.actors(recording.actors)
 
 
 def action_states(events: tuple[Event, ...]) -> Iterator[Stamped]:
@@ -105,13 +113,17 @@ def action_states(events: tuple[Event, ...]) -> Iterator[Stamped]:
 def _transforms(recording: Recording) -> Iterator[Stamped]:
     shape, frame = recording.robot, recording.start.frame_id
     angles = wheel_angles(shape, recording.times, recording.twists)
-    for time, row, turned in zip(recording.times.tolist(), recording.poses, angles, strict=True):
+    for sample, (time, row) in enumerate(zip(recording.times.tolist(), recording.poses, strict=True)):
         body = message.transform(time, frame, "base_link", row[:3], row[3:])
         wheels = [
             message.transform(time, "base_link", scene.wheel_frame(index), centre, _about_y(angle))
-            for index, (centre, angle) in enumerate(zip(shape.wheels, turned.tolist(), strict=True))
+            for index, (centre, angle) in enumerate(zip(shape.wheels, angles[sample].tolist(), strict=True))
         ]
-        yield time, "/tf", FrameTransforms(transforms=[body, *wheels])
+        actors = [
+            message.transform(time, frame, scene.actor_frame(index), track.poses[sample, :3], track.poses[sample, 3:])
+            for index, track in enumerate(recording.actors)
+        ]
+        yield time, "/tf", FrameTransforms(transforms=[body, *wheels, *actors])
 
 
 def _about_y(angle: float) -> message.FloatArray:

@@ -2,6 +2,7 @@
 
 import json
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from mcap_protobuf.decoder import DecoderFactory as ProtobufDecoderFactory
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose
 from mbf_abstract.map_view import GridView
+from terrain.actor_track import ActorTrack
 from terrain.recorder import Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import HUSKY
@@ -183,3 +185,24 @@ def test_a_run_that_never_began_has_a_log_too(tmp_path):
     write_mcap(tmp_path / "run.mcap", run)
 
     assert Log(tmp_path / "run.mcap").metadata["run"]["message"] == "no robot"
+
+
+def test_the_same_recording_gives_the_same_bytes(office, tmp_path):
+    for name in ("first.mcap", "second.mcap"):
+        write_mcap(tmp_path / name, office)
+
+    assert (tmp_path / "first.mcap").read_bytes() == (tmp_path / "second.mcap").read_bytes()
+
+
+def test_people_and_doors_are_drawn_in_frames_that_move_as_recorded(office_recording, tmp_path):
+    poses = office_recording.poses + np.array([0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    person = ActorTrack("person", office_recording.obstacles.vertices, office_recording.obstacles.faces, poses)
+    write_mcap(tmp_path / "run.mcap", replace(office_recording, actors=[person]))
+
+    log = Log(tmp_path / "run.mcap")
+    moves = [
+        transform for message in log["/tf"] for transform in message.transforms if transform.child_frame_id == "actor_0"
+    ]
+    drawn = {entity.id: entity.frame_id for message in log["/scene"] for entity in message.entities}
+    assert drawn["person 0"] == "actor_0"
+    np.testing.assert_array_equal([[m.translation.x, m.translation.y, m.translation.z] for m in moves], poses[:, :3])
