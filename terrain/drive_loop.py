@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from mbf_abstract.clock import Priority
+from mbf_abstract.clock import ClockThread, Priority, WallClock
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Command, Pose
 from mbf_abstract.robot import Odometry
@@ -21,6 +21,7 @@ from terrain.simulation import SimulatedRobot, Simulation
 PERIOD = 1.0 / 60.0  # s between two publications of the robot's pose
 TICKS_PER_SAMPLE = 6  # 10 samples a second are recorded and reported
 SCANS_PER_RECORDED = 10
+STOP_TIMEOUT = 2.0  # s
 
 Report = Callable[[float, Pose, float], None]
 
@@ -87,6 +88,7 @@ class DriveLoop:
         self._scans = 0
         self._odom_stamp: float | None = None
         self._stopped = False
+        self._thread: ClockThread | None = None
         self._origin = self._runtime.clock.now()
         self.on_tick: list[Callable[[float], None]] = []
         simulation.on_measurement(self._take_measurement)
@@ -100,11 +102,13 @@ class DriveLoop:
         """Start the thread; ``report(time, pose, speed)`` is called ten times a second."""
         self._report = report
         self._origin = self._robot.time_offset = self._runtime.clock.now()
-        self._runtime.clock.spawn(self._loop, "simulator", Priority.SIMULATOR)
+        self._thread = self._runtime.clock.spawn(self._loop, "simulator", Priority.SIMULATOR)
 
     def stop(self) -> None:
-        """Step no more."""
+        """Step no more; in real time, wait until the present step is done, because the world may be closed next."""
         self._stopped = True
+        if self._thread is not None and isinstance(self._runtime.clock, WallClock):
+            self._thread.join(STOP_TIMEOUT)
 
     def publish(self) -> None:
         """Publish the pose that the robot's localisation gives, if it gives one; over odom where there is odometry."""

@@ -6,6 +6,7 @@ import urllib.request
 
 import pytest
 
+from mbf_abstract.clock import WallClock
 from mbf_abstract.events import EventKind, read_events
 from terrain.bench import Bench
 from terrain.goal_drivers import EXECUTIVES, make_goal_driver
@@ -85,3 +86,18 @@ def test_every_executive_drives_a_run_or_plans_it(meadow, tmp_path, executive):
     assert arrived == (executive != "planning")
     trees = [event for event in read_events(tmp_path / "events.jsonl") if event.kind is EventKind.TREE]
     assert bool(trees) == (executive not in ("move_base", "classic"))
+
+
+def test_in_real_time_the_world_is_closed_after_the_step_that_is_under_way(meadow):
+    bench, begun, done = Bench(meadow, wall_clock=True), [], []
+
+    def look_slowly(time):
+        begun.append(time)
+        WallClock().sleep(0.15)
+        done.append(bench.simulation.robot.pose())
+
+    bench.loop.on_tick.append(look_slowly)
+    bench.run()
+    bench.close()
+
+    assert begun and len(done) == len(begun)
