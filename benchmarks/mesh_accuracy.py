@@ -3,7 +3,7 @@
     python benchmarks/mesh_accuracy.py [--quick] [--json] [--data ../shared/data]
 
 Truth: ``terrain/geodesic_reference.csv`` of the data folder (342 pairs, exact MMP lengths), and pygeodesic's exact
-solver on the plane and the sphere in the same run (if installed). Per mesh: the potential of the continuous wave,
+solver on plane, sphere, bunny and parking garage in the same run. Per mesh: the potential of the continuous wave,
 the length of its traced path, the any-angle path and the path along edges, all over the exact length.
 Pairs nearer than five edges are left out, there any first-order method is as coarse as the mesh.
 """
@@ -37,6 +37,12 @@ REPAIRS = ("duplicate_vertices", "zero_area", "duplicate_faces", "non_manifold",
 PLANNERS = {"cvp_path": CVPPlanner, "any_angle_path": AnyAnglePlanner, "dijkstra_path": DijkstraPlanner}
 COARSE = {"terrain/recast/nav_test.obj", "movingai/anyangle/polyanya/recast_detail_tri.ply"}
 """Navigation meshes with triangles as long as rooms: shown, but not under the limits, which are for terrain."""
+WHOLE_FIELDS = (
+    "meshes/mesh_mppi/plane.ply",
+    "meshes/mesh_mppi/sphere.ply",
+    "terrain/surfaces/bunny_trimesh.ply",
+    "meshes/derived/parking_garage_1m.ply",
+)
 
 
 def load(path: FilePath) -> MeshMap:
@@ -145,8 +151,7 @@ def main() -> None:
         if name not in COARSE:
             for what, values in ratios.items():
                 pooled[what] += values
-    for shape in ("plane", "sphere"):
-        name = f"meshes/mesh_mppi/{shape}.ply"
+    for name in WHOLE_FIELDS[:2] if options.quick else WHOLE_FIELDS:
         results[name] = {"cvp_field": summary(compare_field(load(options.data / name)))}
         report(f"{name}, whole field against pygeodesic", results[name])
     results["all terrain"] = {what: summary(values) for what, values in pooled.items()}
