@@ -1,0 +1,121 @@
+"""One run of one arm: all waypoints in order, each with its time limit; a function of (arm, world, seed)."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.clock import wall_seconds
+from mbf_abstract.events import Event, EventKind
+from mbf_abstract.geometry import Pose
+from terrain.table1.arms import Arm, Conditions, Executive, make_executive
+from terrain.table1.counting import Tally, count
+from terrain.table1.outdoor_stage import OUTDOOR, OutdoorStage
+from terrain.table1.plugin_wrappers import SOURCE
+from terrain.table1.stage import Stage
+from terrain.table1.world import load_world
+
+LEG_TIME_LIMIT = 300.0  # s
+TRACK_SPACING = 10  # of the simulation's 20 poses a second every tenth is kept
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """What is kept of one run.
+
+    Attributes
+    ----------
+    tally : Tally
+    recovery_goals : int
+        Recovery goals that were started, counted apart from the calls of the behaviours.
+    log_hash : str
+        Of the whole event log; equal runs have equal hashes.
+    track : (n, 2) float64
+        Where the robot was [m], two points a second.
+    wall_time : float
+        [s]; the only number that differs between equal runs.
+    """
+
+    tally: Tally
+    recovery_goals: int
+    log_hash: str
+    track: NDArray[np.float64]
+    wall_time: float
+
+    def to_row(self) -> dict[str, object]:
+        """Return plain JSON values."""
+        track = np.round(self.track, 2).tolist()
+        return {
+            "tally": asdict(self.tally),
+            "recovery_goals": self.recovery_goals,
+            "log_hash": self.log_hash,
+            "track": track,
+            "wall_time": self.wall_time,
+        }
+
+
+class _Deadline:
+    """Cancels an executive when the time of its leg is over; lives on the simulator's thread."""
+
+    def __init__(self) -> None:
+        self.executive: Executive | None = None
+        self.stamp = float("inf")
+        self.passed = False
+
+    def __call__(self, now: float) -> None:
+        if self.executive is not None and not self.passed and now >= self.stamp:
+            self.passed = True
+            self.executive.cancel("time limit of the leg")
+
+
+def run_repetition(arm: Arm, world: Path, seed: int, legs: int | None = None) -> Repetition:
+    """Drive to the waypoints of a world (the first ``legs`` of them) and count what happened.
+
+    Parameters
+    ----------
+    world : Path
+        A world file, or ``outdoor_stage.OUTDOOR``.
+    """
+    started = wall_seconds()
+    with _open_stage(world, arm.conditions, seed) as stage:
+        executive = make_executive(arm, stage.navigator)
+        deadline = _Deadline()
+        deadline.executive = executive
+        stage.on_tick.append(deadline)
+        for number, goal in enumerate(stage.goals()[:legs]):
+            _drive_leg(stage, executive, deadline, number, goal)
+        events = stage.memory.events
+        track = np.array([(pose.x, pose.y) for pose in stage.simulation.track[::TRACK_SPACING]])
+    recovery_goals = sum(event.kind is EventKind.RECOVERY for event in events)
+    return Repetition(count(events), recovery_goals, hash_of_log(events), track, wall_seconds() - started)
+
+
+def _open_stage(world: Path, conditions: Conditions, seed: int) -> Stage | OutdoorStage:
+    if world == OUTDOOR:
+        return OutdoorStage(world, conditions, seed)
+    return Stage(load_world(world), conditions, seed)
+
+
+def _drive_leg(stage: Stage | OutdoorStage, executive: Executive, deadline: _Deadline, number: int, goal: Pose) -> None:
+    driven = stage.distance
+    deadline.stamp, deadline.passed = stage.clock.now() + LEG_TIME_LIMIT, False
+    stage.events.emit(EventKind.CUSTOM, SOURCE, what="leg_started", leg=number)
+    result = executive.run(goal)
+    deadline.stamp = float("inf")
+    end = "reached" if result.success else "timed_out" if deadline.passed else "aborted"
+    distance = stage.distance - driven
+    stage.events.emit(
+        EventKind.CUSTOM, SOURCE, what="leg_ended", leg=number, end=end, distance=distance, message=result.message
+    )
+
+
+def hash_of_log(events: tuple[Event, ...]) -> str:
+    """Return the SHA-256 of the log as JSON lines."""
+    digest = hashlib.sha256()
+    for event in events:
+        digest.update(event.to_json().encode() + b"\n")
+    return digest.hexdigest()

@@ -1,0 +1,105 @@
+"""The tables of the experiment, as text for a terminal and for the documentation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Group
+from rich.table import Table
+
+PAPER = {
+    "planner calls": (1195, 290),
+    "controller calls": (389, 232),
+    "recovery calls": (194, 180),
+    "clear_costmaps": (175, 93),
+    "out_of_collision": (6, 46),
+    "relax_controller": (4, 31),
+    "relax_planner": (7, 10),
+    "escape_distance": (2, 0),
+    "time": (4926, 4312),
+}
+"""Table I of the paper: move_base, and Move Base Flex with a tree; the time in seconds."""
+
+RECOVERY_ROWS = ("clear_costmaps", "out_of_collision", "relax_controller", "relax_planner", "escape_distance")
+
+
+def show(result: Mapping[str, Any]) -> Group:
+    """Everything a reader of the result wants to see first."""
+    verdict = f"\nverdict: {result['verdict']}   (parameters {result['parameters_hash']}, seeds {result['seeds']})"
+    return Group(table_1(result), arms_table(result), gates_table(result), criteria_table(result), verdict)
+
+
+def table_1(result: Mapping[str, Any], main: tuple[str, str] = ("S1", "B")) -> Table:
+    """Make the paper's table with ours beside it."""
+    a, b = (result["arms"][name] for name in main)
+    table = Table("", "move_base", "MBF + tree", "ratio", f"ours: {main[0]}", f"ours: {main[1]}", "ratio [95 %]")
+    for row in ("planner calls", "controller calls", "recovery calls", *RECOVERY_ROWS, "time"):
+        paper = PAPER[row]
+        ours = [arm["recoveries"].get(row, 0) if row in RECOVERY_ROWS else round(arm[row]) for arm in (a, b)]
+        ratio = _plain_ratio(*ours)
+        if row in result["ratios"]:
+            found = result["ratios"][row]
+            ratio = f"{found['value']:.2f} [{found['low']:.2f}, {found['high']:.2f}]"
+        table.add_row(
+            ("- " if row in RECOVERY_ROWS else "") + row, *map(str, paper), _plain_ratio(*paper), *map(str, ours), ratio
+        )
+    table.caption = f"times in s; Wilcoxon signed rank of the times p = {result['wilcoxon_p']:.4f}"
+    return table
+
+
+def arms_table(result: Mapping[str, Any]) -> Table:
+    """Make one row for every arm that was run."""
+    table = Table(
+        "arm",
+        "planner main / second (failed)",
+        "ctrl",
+        "rec (useless)",
+        "bit",
+        "time",
+        "plan / drive / recover / wait",
+        "dist",
+        "contacts rack / we / they",
+        "legs lost",
+    )
+    for name, arm in result["arms"].items():
+        planner, split, contacts = arm["planner"], arm["split"], arm["contacts"]
+        main = planner["main_ok"] + planner["main_failed"]
+        second = planner["second_ok"] + planner["second_failed"]
+        table.add_row(
+            f"{name}: {arm['text']}",
+            f"{main} ({planner['main_failed']}) / {second} ({planner['second_failed']})",
+            str(arm["controller calls"]),
+            f"{arm['recovery calls']} ({arm['useless recoveries']})",
+            f"{arm['entropy']:.2f}",
+            f"{arm['time']:.0f} s",
+            " / ".join(f"{split[key]:.0f}" for key in ("planning", "driving", "recovering", "waiting")),
+            f"{arm['distance']:.0f} m",
+            " / ".join(str(contacts[key]) for key in ("rack/we", "robot/we", "robot/they")),
+            f"{arm['legs']['aborted']} + {arm['legs']['timed_out']} of {sum(arm['legs'].values())}",
+        )
+    table.caption = "legs lost: aborted + timed out"
+    return table
+
+
+def gates_table(result: Mapping[str, Any]) -> Table:
+    """Make the table of the sanity gates."""
+    table = Table("sanity gate", "", "found")
+    for gate in result["gates"]:
+        table.add_row(gate["name"], "open" if gate["open"] else "CLOSED", gate["found"])
+    return table
+
+
+def criteria_table(result: Mapping[str, Any]) -> Table:
+    """Make the table of the six criteria."""
+    table = Table("claim", "found", "direction", "agreement")
+    for criterion in result["criteria"]:
+        holds, strong = criterion["holds"], criterion["strong"]
+        table.add_row(
+            criterion["claim"], criterion["found"], "holds" if holds else "FAILS", "strong" if holds and strong else "-"
+        )
+    return table
+
+
+def _plain_ratio(a: float, b: float) -> str:
+    return f"{a / b:.2f}" if b else "-"

@@ -1,0 +1,46 @@
+"""Short real runs of the experiment: one leg in the warehouse, both arms; and the same log twice."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from terrain.table1.arms import ARMS, without_traffic
+from terrain.table1.outdoor_stage import OUTDOOR
+from terrain.table1.repetition import run_repetition
+from terrain.table1.world import WAREHOUSE
+
+DEPOT = Path(__file__).with_name("table1_depot.yaml")
+
+
+@pytest.mark.parametrize("arm", ["S1", "B"])
+def test_an_empty_world_costs_one_plan_one_hand_over_and_no_recovery(arm):
+    run = run_repetition(without_traffic(ARMS[arm]), WAREHOUSE, seed=100, legs=1)
+    tally = run.tally
+    assert (tally.all_planner_calls, tally.controller_calls, tally.all_recoveries) == (1, 1, 0)
+    leg = tally.legs[0]
+    assert leg.end == "reached"
+    assert sum(leg.split.values()) == pytest.approx(leg.time)
+    assert leg.distance > 15.0
+    assert tally.control_cycles > 15.0 / 0.6 * 20.0
+
+
+def test_both_arms_meet_the_same_traffic_and_a_run_repeats_bit_for_bit():
+    crowded = replace(ARMS["B"], conditions=replace(ARMS["B"].conditions, robots=10))
+    first, again = (run_repetition(crowded, WAREHOUSE, seed=101, legs=1) for _ in range(2))
+    assert first.log_hash == again.log_hash
+    assert (first.track == again.track).all()
+    assert run_repetition(crowded, WAREHOUSE, seed=102, legs=1).log_hash != first.log_hash
+
+
+@pytest.mark.parametrize("arm", ["S1", "B"])
+def test_the_outdoor_stage_drives_a_leg_on_the_mesh(arm):
+    run = run_repetition(ARMS[arm], OUTDOOR, seed=100, legs=1)
+    assert run.tally.legs[0].end == "reached"
+    assert run.tally.planner_calls["main_ok"] >= 1
+
+
+def test_the_experiment_runs_in_another_building():
+    run = run_repetition(ARMS["B"], DEPOT, seed=100, legs=1)
+    assert run.tally.legs[0].end == "reached"
+    assert not run.tally.contacts
