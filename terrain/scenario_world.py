@@ -101,20 +101,19 @@ def build_world(
     kinematic : bool
         Whether robots follow commands exactly; impossible on several levels.
     """
-    build: Callable[[AnyWorld], ScenarioWorld]
+
+    def physics(terrain: Heightfield | None = None, building: OccupancyGrid | None = None) -> AnyWorld:
+        return KinematicWorld(terrain, building) if kinematic else BulletWorld(time_step)
+
     if isinstance(world, TerrainWorld):
         terrain = world.heightfield(rng, keep_clear)
-        stand_in = KinematicWorld(terrain)
-        build = partial(_build_terrain, terrain, world.lethal_slope, folder)
-    elif isinstance(world, BuildingWorld):
+        return _built(physics(terrain), partial(_build_terrain, terrain, world.lethal_slope, folder))
+    if isinstance(world, BuildingWorld):
         grid = world.grid()
-        stand_in = KinematicWorld(building=grid)
-        build = partial(_build_building, world, grid, folder)
-    elif kinematic:
+        return _built(physics(building=grid), partial(_build_building, world, grid, folder))
+    if kinematic:
         raise ValueError("a robot without physics needs a world with one level")
-    else:
-        return _built(BulletWorld(time_step), partial(_build_levels, world, folder))
-    return _built(stand_in if kinematic else BulletWorld(time_step), build)
+    return _built(BulletWorld(time_step), partial(_build_levels, world, folder))
 
 
 def _built(physics: Physics, build: Callable[[Physics], ScenarioWorld]) -> ScenarioWorld:
