@@ -41,6 +41,30 @@ def test_reversing_never_makes_a_curve_longer(x, y, yaw):
     assert math.hypot(x, y) - 1e-9 <= both <= forward + 1e-6
 
 
+def length_of(x, y, yaw):
+    return np.abs(car_curve(x, y, yaw, True)[:, 1]).sum()
+
+
+@settings(max_examples=200, deadline=None)
+@given(x=coordinates, y=coordinates, yaw=angles)
+def test_a_reeds_shepp_curve_is_as_long_mirrored_reversed_and_driven_the_other_way_round(x, y, yaw):
+    length = length_of(x, y, yaw)
+    assert length_of(x, -y, -yaw) == pytest.approx(length, abs=1e-7)
+    assert length_of(-x, y, -yaw) == pytest.approx(length, abs=1e-7)
+    back_x, back_y = -x * math.cos(yaw) - y * math.sin(yaw), x * math.sin(yaw) - y * math.cos(yaw)
+    assert length_of(back_x, back_y, -yaw) == pytest.approx(length, abs=1e-7)
+
+
+@settings(max_examples=200, deadline=None)
+@given(x=coordinates, y=coordinates, yaw=angles, data=st.data())
+def test_no_detour_over_a_third_pose_shortens_a_reeds_shepp_curve(x, y, yaw, data):
+    """What a shortest length must obey; with families missing some detour is shorter (it was 0.4 radii for parking)."""
+    u, v, turn = data.draw(coordinates), data.draw(coordinates), data.draw(angles)
+    c, s = math.cos(turn), math.sin(turn)
+    onward = length_of(c * (x - u) + s * (y - v), c * (y - v) - s * (x - u), yaw - turn)
+    assert length_of(x, y, yaw) <= length_of(u, v, turn) + onward + 1e-6
+
+
 @pytest.mark.parametrize(
     ("pose", "length"),
     [((4, 0, 0), 4.0), ((0, 2, math.pi), math.pi), ((1, 1, math.pi / 2), math.pi / 2), ((-4, 0, 0), 2 * math.pi + 4)],
