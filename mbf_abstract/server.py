@@ -10,15 +10,11 @@ from __future__ import annotations
 import atexit
 import os
 import weakref
-import zlib
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, ClassVar
-
-import numpy as np
 
 from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.get_path import GetPathAction
@@ -26,10 +22,9 @@ from mbf_abstract.actions.move_base import MoveBaseAction
 from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.actions.refine_path import RefinePathAction
 from mbf_abstract.clock import Clock
-from mbf_abstract.config import Config, PluginDeclaration, PluginSpec
+from mbf_abstract.config import Config
 from mbf_abstract.events import EventBus, EventKind
 from mbf_abstract.execution.callbacks import CallbackThread
-from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.geometry import Path, Pose, Twist
@@ -37,9 +32,8 @@ from mbf_abstract.map_queries import MapQueries
 from mbf_abstract.map_view import FieldView, MapView
 from mbf_abstract.navigation_parameters import NavigationParameters
 from mbf_abstract.parameters import ParameterModel
-from mbf_abstract.plugin_table import PluginTable
-from mbf_abstract.plugins import ControlRequest, PlanRequest, Plugin, PluginContext, PluginKind
-from mbf_abstract.registry import Adapter, PluginRegistry
+from mbf_abstract.plugin_host import PluginHost
+from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
 from mbf_abstract.robot import Robot, RobotInformation
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.sim_clock import SimClock
@@ -47,11 +41,7 @@ from mbf_abstract.transforms import TransformBuffer
 from mbf_abstract.velocity_gate import VelocityGate, VelocityLimits
 
 
-class ServerError(Exception):
-    """A plugin can not be loaded, unloaded or changed; the text says why."""
-
-
-class AbstractNavigationServer(ABC):
+class AbstractNavigationServer(PluginHost):
     """Actions, plugins and the velocity gate of one robot; use it as a context manager or call ``close``.
 
     Parameters
@@ -70,12 +60,6 @@ class AbstractNavigationServer(ABC):
         Seed of the plugins' random generators.
     """
 
-    backend: ClassVar[str]
-    """Prefix of this server's plugin types, e.g. ``mesh``."""
-    plugin_declaration: ClassVar[type[PluginDeclaration]] = PluginDeclaration
-    """Items of the plugin lists, with the options this server knows."""
-    plugin_adapters: ClassVar[Sequence[Adapter]] = ()
-    """Asked about a class that is no MBF plugin, e.g. to wrap a nav_core-style one."""
     config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {}
     """Top-level blocks of a configuration that describe this server's map."""
 
@@ -89,10 +73,8 @@ class AbstractNavigationServer(ABC):
         seed: int = 0,
     ) -> None:
         self.config = config
-        self._seed = seed
         self._closed = False
-        self.runtime = self._make_runtime(config.parameters, robot, clock, transforms, events)
-        self.plugins = PluginTable()
+        super().__init__(self._make_runtime(config.parameters, robot, clock, transforms, events), seed)
         try:
             self.load_map(config)
             for spec in config.plugins:
@@ -111,10 +93,6 @@ class AbstractNavigationServer(ABC):
     @abstractmethod
     def load_map(self, config: Config) -> None:
         """Make the map from the configuration's sections; raises where its files are bad."""
-
-    @abstractmethod
-    def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
-        """Return the context a plugin of this kind is constructed with: ``base`` and the map."""
 
     @property
     @abstractmethod
@@ -147,11 +125,6 @@ class AbstractNavigationServer(ABC):
         """Directions that a planner has found together with a path; None where it has only found the path."""
         return None
 
-    @classmethod
-    def plugin_registry(cls, allow_module_types: bool = True) -> PluginRegistry:
-        """Registry of this server's plugin types."""
-        return PluginRegistry(cls.backend, allow_module_types=allow_module_types, adapters=cls.plugin_adapters)
-
     def map_problem(self) -> str:
         """Why the map must not be driven on right now; empty = it is current."""
         return ""
@@ -160,118 +133,10 @@ class AbstractNavigationServer(ABC):
         """Keep the map alive while a goal of this kind runs."""
         return nullcontext()
 
-    def close_map(self) -> None:  # noqa: B027 - an optional hook
+    def close_map(self) -> None:
         """Give back what the map holds; called once, after all goals were canceled."""
 
-    # ------------------------------------------------------------------------------------------ plugins
-    def load_plugin(self, spec: PluginSpec) -> None:
-        """Construct and add a plugin; raises ServerError with the reason if its constructor fails."""
-        try:
-            self.plugins.add(spec.kind, self._construct(spec))
-        except Exception as error:
-            text = f"{spec.kind.name.lower()} {spec.name!r} ({spec.type_name}): {type(error).__name__}: {error}"
-            if not spec.optional:
-                raise ServerError(text) from error
-            self.runtime.events.emit(EventKind.FAULT, "server", message=f"optional plugin left out: {text}")
-
-    def load_plugin_type(
-        self, kind: PluginKind, name: str, type_name: str, options: Mapping[str, Any] | None = None, **parameters: Any
-    ) -> None:
-        """Load a plugin at run time by its type, as a configuration would.
-
-        Parameters
-        ----------
-        kind, name, type_name
-            As in a plugin list; the type may be a registered name or ``module:Class``.
-        options : mapping
-            Keys of the declaration that this server added, e.g. which costmap to use.
-        **parameters
-            Values of the plugin's parameter block.
-
-        Raises
-        ------
-        PluginError
-            The type is unknown or is no plugin of this kind.
-        pydantic.ValidationError
-            A parameter is not legal.
-        ServerError
-            The name is taken, or the constructor raised.
-        """
-        plugin_class = self.plugin_registry().load(kind, type_name)
-        values = plugin_class.Parameters.model_validate(parameters)  # type: ignore[attr-defined]
-        self.load_plugin(PluginSpec(kind, name, type_name, plugin_class, values, options or {}))
-
-    def reload_plugin(self, kind: PluginKind, name: str) -> None:
-        """Replace a plugin by one of its class's changed source, with its present parameters and its place in the list.
-
-        The old instance stays where anything goes wrong.
-
-        Raises
-        ------
-        PluginError
-            The source does not load any more.
-        pydantic.ValidationError
-            The new class does not take the present parameters.
-        ServerError
-            No such plugin, a goal is using it, or the new constructor raised.
-        """
-        old = self._loaded(kind, name)
-        plugin_class = self.plugin_registry().reload(kind, old.spec.type_name)
-        present = old.instance.parameters.model_dump()
-        values = plugin_class.Parameters.model_validate(present)  # type: ignore[attr-defined]
-        try:
-            new = self._construct(replace(old.spec, plugin_class=plugin_class, parameters=values))
-        except Exception as error:
-            text = f"{kind.name.lower()} {name!r} ({old.spec.type_name}): {type(error).__name__}: {error}"
-            raise ServerError(text) from error
-        if not old.retire():
-            raise ServerError(f"{kind.name.lower()} {name!r} is in use")
-        self.plugins.replace(kind, new)
-
-    def _construct(self, spec: PluginSpec) -> LoadedPlugin[Any]:
-        rng = np.random.default_rng([self._seed, zlib.crc32(spec.name.encode())])
-        runtime = self.runtime
-        base = PluginContext(
-            spec.name, spec.parameters, runtime.clock, rng, runtime.robot, relaxation=runtime.relaxation
-        )
-        instance: Plugin = spec.plugin_class(self.make_context(spec.kind, spec.options, base))
-        return LoadedPlugin(spec, instance, runtime)
-
-    def _loaded(self, kind: PluginKind, name: str) -> LoadedPlugin[Any]:
-        plugin = self.plugins.find(kind, name) if name else None
-        if plugin is None:
-            raise ServerError(f"no {kind.name.lower()} named {name!r} is loaded")
-        return plugin
-
-    def unload_plugin(self, kind: PluginKind, name: str) -> None:
-        """Remove a plugin; raises ServerError if there is none of that name or a goal is using it."""
-        plugin = self._loaded(kind, name)
-        if not plugin.retire():
-            raise ServerError(f"{kind.name.lower()} {name!r} is in use")
-        self.plugins.remove(kind, name)
-
-    def set_plugin_parameters(self, kind: PluginKind, name: str, **changes: Any) -> None:
-        """Change parameters of a plugin between two of its calls.
-
-        Raises
-        ------
-        ServerError
-            No such plugin, or it is in use.
-        pydantic.ValidationError
-            A value is not legal; nothing is changed.
-        """
-        plugin = self._loaded(kind, name)
-        instance = plugin.instance
-        new = type(instance.parameters).model_validate({**instance.parameters.model_dump(), **changes})
-        if not plugin.acquire(self, lambda: True):
-            raise ServerError(f"{kind.name.lower()} {name!r} is in use")
-        try:
-            instance.parameters = new
-            instance.parameters_changed()
-        finally:
-            plugin.release(self)
-        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, name, **changes)
-
+    # --------------------------------------------------------------------------------------- parameters
     def set_parameters(self, **changes: Any) -> None:
         """Change the server's parameters at run time, all or none; raises pydantic.ValidationError."""
         old = self.runtime.parameters

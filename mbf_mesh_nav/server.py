@@ -20,9 +20,10 @@ from mbf_abstract.geometry import Path as PlannedPath
 from mbf_abstract.map_queries import MapQueries
 from mbf_abstract.map_view import FieldView, MeshView
 from mbf_abstract.parameters import ParameterModel
+from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.sensing import RangeScan
-from mbf_abstract.server import AbstractNavigationServer, ServerError
+from mbf_abstract.server import AbstractNavigationServer
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh_io import HDF5_FORMATS, TRIMESH_FORMATS
 from mbf_mesh_nav.mesh_map import MeshMap

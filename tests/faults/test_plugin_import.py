@@ -6,8 +6,8 @@ from mbf_abstract.config import load_config, validate_config
 from mbf_abstract.events import EventKind
 from mbf_abstract.findings import ConfigError
 from mbf_abstract.geometry import Pose
+from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.registry import PluginRegistry
-from mbf_abstract.server import ServerError
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.testing.scripted import ScriptedPlanner

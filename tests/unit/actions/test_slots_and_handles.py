@@ -12,8 +12,8 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import PluginGone
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome as Outcome
+from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PlanResult, PluginKind
-from mbf_abstract.server import ServerError
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import Hang, obedient, slow
 from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan

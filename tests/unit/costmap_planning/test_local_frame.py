@@ -8,8 +8,8 @@ import pytest
 from mbf_abstract.geometry import Path, Pose, Twist, quaternion_from_yaw
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
+from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import ControlRequest, RecoveryRequest
-from mbf_abstract.server import ServerError
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.transforms import Transform, TransformBuffer

@@ -7,8 +7,8 @@ import trimesh
 from mbf_abstract.geometry import Pose
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PluginKind
-from mbf_abstract.server import ServerError
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.transforms import TransformBuffer
