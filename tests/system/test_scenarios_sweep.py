@@ -103,12 +103,15 @@ def test_a_killed_sweep_is_resumed_without_losing_or_doubling_a_run(arguments, t
 
 def test_a_cluster_that_loses_a_worker_at_work_does_every_run_once(arguments, cluster, tmp_path):
     address, workers = cluster
-    with subprocess.Popen([*arguments, "--scheduler", address], stdout=subprocess.PIPE, text=True) as process:
-        next(line for line in process.stdout if line.startswith("seed "))  # every run is handed out by now
-        with Client(address, set_as_default=False) as client:
-            victim = next(name for name in workers if client.processing()[client_address(client, name)])
+    with (
+        Client(address, set_as_default=False) as client,
+        subprocess.Popen([*arguments, "--scheduler", address], stdout=subprocess.DEVNULL) as process,
+    ):
+        victim = None
+        while victim is None:
+            assert process.poll() is None, "the sweep ended before a worker was seen at work"
+            victim = next((name for name in workers if client.processing()[client_address(client, name)]), None)
         workers[victim].kill()
-        process.stdout.read()
 
     assert process.returncode == 0
     rows = logged(tmp_path / "out")
