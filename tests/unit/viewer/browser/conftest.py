@@ -57,9 +57,11 @@ class Page:
 
     async def wait_for(self, expression, seconds=60.0):
         """Poll until a JavaScript expression is true."""
-        async with asyncio.timeout(seconds):
-            while not await self.evaluate(expression):
-                await asyncio.sleep(0.3)
+        await asyncio.wait_for(self._poll(expression), seconds)
+
+    async def _poll(self, expression):
+        while not await self.evaluate(expression):
+            await asyncio.sleep(0.3)
 
     async def open(self, url):
         for domain in ("Page", "Runtime", "Log", "Network"):
@@ -118,10 +120,13 @@ class Chromium:
 
     async def _port(self):
         file = Path(self._profile.name) / "DevToolsActivePort"
-        async with asyncio.timeout(START_TIMEOUT):
-            while not (file.is_file() and file.read_text().strip()):
-                await asyncio.sleep(0.1)
+        await asyncio.wait_for(_text_in(file), START_TIMEOUT)
         return int(file.read_text().split()[0])
+
+
+async def _text_in(file):
+    while not (file.is_file() and file.read_text().strip()):
+        await asyncio.sleep(0.1)
 
 
 @pytest.fixture(scope="module")

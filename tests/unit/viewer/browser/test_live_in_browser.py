@@ -27,6 +27,7 @@ SCENARIO = {
     "goals": [{"x": 9.0, "y": 5.0}],
     "sensors": [{"name": "lidar", "rays": 90}],
 }
+SPEED = "0.1"  # of real time: however slow the browser is, the robot is still under way when the page asks for something
 CANVAS = "document.querySelector('canvas')"
 PLACE = f"(() => {{ const r = {CANVAS}.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
 
@@ -36,8 +37,9 @@ def served_run(tmp_path):
     """Start ``mbf run --view`` on open ground; returns the process, the page's address and the folder of results."""
     (tmp_path / "meadow.yaml").write_text(yaml.safe_dump(SCENARIO))
     start = [sys.executable, "-c", "from mbf_abstract.cli import main; main()", "run", tmp_path / "meadow.yaml"]
-    options = ["--out", tmp_path / "run", "--json", "--view", "--view-port", "18400", "--executive", "navigation"]
-    process = subprocess.Popen([*start, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    options = ["--out", tmp_path / "run", "--json", "--executive", "navigation"]
+    view = ["--view", "--view-port", "18400", "--view-speed", SPEED]
+    process = subprocess.Popen([*start, *options, *view], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     for line in process.stderr:
         if "live view at " in line:
             yield process, line.split()[-1], tmp_path / "run"
