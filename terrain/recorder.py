@@ -6,6 +6,7 @@ Use one per run, on one thread: the runner's, which steps the simulator. Give it
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -14,14 +15,16 @@ from numpy.typing import ArrayLike
 
 from mbf_abstract.events import Event
 from mbf_abstract.geometry import Command, Pose, Twist
-from mbf_abstract.map_view import GridView, MapView
+from mbf_abstract.map_view import GridView, MapView, MeshView
 from terrain.actor_track import ActorTrack
 from terrain.actors import Actor
 from terrain.recorded_grid import RecordedGrid
+from terrain.recorded_mesh import RecordedMesh, add_if_changed
 from terrain.recording import Recording, RobotShape, StampedPoints, Surface
 
-GRID_PERIOD = 5.0  # s at least between two recorded maps
+MAP_PERIOD = 5.0  # s at least between two looks at the map
 MAX_GRID_CELLS = 4_000_000  # larger maps are not recorded
+MAX_MESH_VERTICES = 1_000_000  # nor are these
 
 
 @dataclass(eq=False)
@@ -50,8 +53,10 @@ class Recorder:
     paths: list[StampedPoints] = field(default_factory=list)
     scans: list[StampedPoints] = field(default_factory=list)
     grids: list[RecordedGrid] = field(default_factory=list)
+    meshes: list[RecordedMesh] = field(default_factory=list)
     actors: Sequence[Actor] = ()
     _actor_poses: list[list[list[float]]] = field(default_factory=list)
+    _next_map: float = -math.inf
     _samples: list[list[float]] = field(default_factory=list)
 
     def sample(self, time: float, pose: Pose, velocity: Twist, command: Command) -> None:
@@ -70,12 +75,15 @@ class Recorder:
         self.scans.append((time, np.array(points, dtype=np.float64).reshape(-1, 3)))
 
     def map(self, time: float, look: Callable[[], MapView | None]) -> None:
-        """Add what the map looks like now if it is a grid, not too large, and the last one is some seconds old."""
-        if self.grids and time - self.grids[-1].time < GRID_PERIOD:
+        """Add what the map looks like now, unless it is too large or was looked at some seconds ago."""
+        if time < self._next_map:
             return
+        self._next_map = time + MAP_PERIOD
         view = look()
         if isinstance(view, GridView) and view.costs.size <= MAX_GRID_CELLS:
             self.grids.append(RecordedGrid.of(time, view))
+        elif isinstance(view, MeshView) and view.costs.size <= MAX_MESH_VERTICES:
+            add_if_changed(self.meshes, time, view)
 
     def finish(
         self, success: bool, outcome: str, message: str, events: Sequence[Event] = (), began: float = 0.0
@@ -102,9 +110,11 @@ class Recorder:
             outcome=outcome,
             message=message,
             grids=list(self.grids),
-            actors=self._actor_tracks(),
+            meshes=list(self.meshes),
+            actors=self.actor_tracks(),
         )
 
-    def _actor_tracks(self) -> list[ActorTrack]:
+    def actor_tracks(self) -> list[ActorTrack]:
+        """Return what moves by itself, and where it was at each sample so far."""
         poses = np.array(self._actor_poses, dtype=np.float64).reshape(len(self._samples), len(self.actors), 7)
         return [ActorTrack(a.thing.value, *a.looks, poses[:, number]) for number, a in enumerate(self.actors)]

@@ -20,6 +20,7 @@ from mbf_abstract.events import Event
 from mbf_abstract.geometry import Pose
 from terrain.actor_track import ActorTrack, track_arrays, tracks_from
 from terrain.recorded_grid import RecordedGrid, grid_arrays, grids_from
+from terrain.recorded_mesh import RecordedMesh, mesh_arrays, meshes_from
 from terrain.robot_models import Drive, RobotSpec
 
 FloatArray = NDArray[np.float64]
@@ -108,6 +109,8 @@ class Recording:
     events : tuple of Event
     grids : list of RecordedGrid
         The map the plans were made on, where it is a grid; seldom enough that the file stays small.
+    meshes : list of RecordedMesh
+        The same where it is a mesh.
     actors : list of ActorTrack
         What moved by itself.
     """
@@ -131,6 +134,7 @@ class Recording:
     outcome: str
     message: str
     grids: list[RecordedGrid] = field(default_factory=list)
+    meshes: list[RecordedMesh] = field(default_factory=list)
     actors: list[ActorTrack] = field(default_factory=list)
 
     @cached_property
@@ -153,7 +157,7 @@ class Recording:
             arrays |= _surface_arrays(name, getattr(self, name))
         for name in ("paths", "scans"):
             arrays |= _stamped_arrays(name, getattr(self, name))
-        arrays |= grid_arrays(self.grids) | track_arrays(self.actors)
+        arrays |= grid_arrays(self.grids) | mesh_arrays(self.meshes) | track_arrays(self.actors)
         words: dict[str, Any] = {
             name: getattr(self, name) for name in ("scenario", "backend", "success", "outcome", "message")
         }
@@ -237,5 +241,6 @@ def _recording_from(arrays: dict[str, Any]) -> Recording:
         outcome=words["outcome"],
         message=words["message"],
         grids=grids_from(arrays),
+        meshes=meshes_from(arrays),
         actors=tracks_from(arrays),
     )

@@ -52,6 +52,11 @@ def cost_ramp(levels: ArrayLike) -> NDArray[np.float64]:
     return colours
 
 
+def cost_colours_up_to(top: float, costs: ArrayLike) -> NDArray[np.uint8]:
+    """Colours (n, 3) of costs (n,) on the ramp from 0 to ``top``; inf is forbidden."""
+    return np.round(cost_ramp(np.asarray(costs, dtype=np.float64) / top)).astype(np.uint8)
+
+
 def linear_for_viewer(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Vertex colours (n, 3) as glTF wants them: linear light; sRGB values look washed out there."""
     return np.asarray(np.round((colours / 255.0) ** 2.2 * 255.0), dtype=np.uint8)

@@ -28,6 +28,7 @@ from terrain.viewer.plan_picture import cost_colours
 
 FloatArray = NDArray[np.float64]
 
+MAP_LIFT = 0.02  # m that the map floats above the ground, so that both can be seen
 MICROMETRES = 6  # decimals of scene coordinates [m]; rounded ones compress to a third
 
 

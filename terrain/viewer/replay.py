@@ -84,7 +84,7 @@ class _Player:
         for number, (index, following) in enumerate(zip(frames, [*frames[1:], frames[-1]], strict=True)):
             now = float(recording.times[index])
             self._robot.place(recording.poses[index], angles[index], status_text(recording, int(index)))
-            self._actors.place(int(index))
+            self._actors.place(track.poses[index] for track in recording.actors)
             self._show_new_plans(now)
             self._show_newest_scan(now)
             if number % piece == 0 or index == frames[-1]:

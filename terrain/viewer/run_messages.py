@@ -8,6 +8,7 @@ topic      schema                           contents
 /plan      foxglove.PosesInFrame            every plan the robot followed
 /scan      foxglove.PointCloud              what a range sensor hit
 /map       foxglove.Grid                    the map, where it is a grid
+/mesh_map  foxglove.SceneUpdate             the map, where it is a mesh, in the colours of its costs
 /log       foxglove.Log                     events in words
 /events    mbf.Event                        events as in events.jsonl
 /actions   mbf.ActionStates                 what each action does
@@ -32,6 +33,7 @@ from mbf_abstract.events import Event, EventKind
 from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.metrics import cross_track_errors
 from terrain.recording import Recording
+from terrain.viewer import foxglove_mesh_costs as mesh_costs
 from terrain.viewer import foxglove_messages as message
 from terrain.viewer import foxglove_scene as scene
 from terrain.viewer.event_text import NOTABLE, words
@@ -39,7 +41,6 @@ from terrain.viewer.scene import wheel_angles
 from terrain.viewer.timeline import ACTIONS
 
 TRACK_PIECE = 5.0  # s
-GRID_LIFT = 0.02  # m that the map floats above the ground, so that both can be seen
 ERRORS = {EventKind.FAULT, EventKind.QUARANTINE, EventKind.SINK_FAILED}
 DETAILS = {EventKind.STATE_CHANGED, EventKind.PLUGIN_CALL_STARTED, EventKind.PLUGIN_CALL_ENDED, EventKind.FEEDBACK}
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
@@ -68,7 +69,7 @@ Stamped = tuple[float, str, Any]  # time [s], topic, a protobuf message or a Jso
 
 def messages_of(recording: Recording) -> list[Stamped]:
     """All messages of a run, in the order of time."""
-    frame, height = recording.start.frame_id, recording.start.z + GRID_LIFT
+    frame, height = recording.start.frame_id, recording.start.z + message.MAP_LIFT
     streams: list[Iterator[Stamped]] = [
         ((0.0, "/scene", update) for update in _stage(recording)),
         _transforms(recording),
@@ -76,6 +77,7 @@ def messages_of(recording: Recording) -> list[Stamped]:
         ((time, "/plan", message.poses_along(time, frame, line)) for time, line in recording.paths if len(line)),
         ((time, "/scan", message.point_cloud(time, frame, points)) for time, points in recording.scans),
         ((grid.time, "/map", message.grid(frame, grid, height)) for grid in recording.grids),
+        ((mesh.time, "/mesh_map", update) for mesh, update in mesh_costs.updates(frame, recording.meshes)),
         ((event.time, "/log", _log(event)) for event in recording.events if event.kind is not EventKind.FEEDBACK),
         ((event.time, "/events", _event(event)) for event in recording.events),
         action_states(recording.events),

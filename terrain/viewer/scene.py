@@ -6,7 +6,7 @@ cut low, as in a doll's house, so that one can look into rooms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -189,25 +189,25 @@ class RobotModel:
 
 
 class ActorModels:
-    """People, doors and other robots of a recording in the scene, placed together.
+    """People, doors and other robots in the scene, placed together.
 
     Parameters
     ----------
     scene : viser.SceneApi
     tracks : sequence of ActorTrack
+        What each is and looks like.
     """
 
     def __init__(self, scene: Scene, tracks: Sequence[ActorTrack]) -> None:
-        self._tracks = tracks
         self._frames = [scene.add_frame(f"/actor_{k}", show_axes=False) for k in range(len(tracks))]
         for number, track in enumerate(tracks):
             colour = ACTORS.get(track.thing, OBSTACLE)
             _add_solid(scene, f"/actor_{number}/{track.thing}", Surface(track.vertices, track.faces), colour)
 
-    def place(self, index: int) -> None:
-        """Move all to where they were at a sample of the recording."""
-        for frame, track in zip(self._frames, self._tracks, strict=True):
-            x, y, z, qx, qy, qz, qw = track.poses[index].tolist()
+    def place(self, poses: Iterable[FloatArray]) -> None:
+        """Move each to its pose (7,) x y z qx qy qz qw."""
+        for frame, pose in zip(self._frames, poses, strict=True):
+            x, y, z, qx, qy, qz, qw = pose.tolist()
             frame.position, frame.wxyz = (x, y, z), (qw, qx, qy, qz)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mbf_abstract.map_view import GridView, MapView, MeshView
 from mbf_abstract.server import AbstractNavigationServer
 from terrain.recording import Surface
-from terrain.viewer.colours import FLOOR, SLOPE_COLOURS, WALL, cost_ramp
+from terrain.viewer.colours import FLOOR, SLOPE_COLOURS, WALL, cost_colours_up_to
 from terrain.viewer.live.overlay import Overlay
 from terrain.viewer.plan_picture import COSTLY, cost_colours
 from terrain.viewer.scene import add_ground
@@ -89,8 +89,7 @@ class Ground:
         finite = view.costs[np.isfinite(view.costs)]
         top = float(finite.max(initial=0.0)) or 1.0
         self._legend.content = legend_html(SLOPE_COLOURS, "0", f"{top:.3g}")
-        colours = np.round(cost_ramp(view.costs / top)).astype(np.uint8)
-        return add_ground(self._scene, Surface(view.vertices, view.faces, colours))
+        return add_ground(self._scene, Surface(view.vertices, view.faces, cost_colours_up_to(top, view.costs)))
 
     def _draw_grid(self, view: GridView, name: str, lift: float = 0.0) -> Any:
         if not self._is_level:

@@ -1,4 +1,4 @@
-"""What moves or changes in the live view: the robot, its plan, the way the present command leads, what sensors see."""
+"""What moves or changes in the live view: robot, people, doors, plan, where the command leads, what sensors see."""
 
 from __future__ import annotations
 
@@ -15,7 +15,16 @@ from mbf_abstract.sensing import RangeScan
 from terrain.bench import Bench
 from terrain.viewer.colours import GOAL, PLANNED
 from terrain.viewer.live.overlay import Overlay
-from terrain.viewer.scene import LINE_LIFT, RobotModel, add_path, add_pin, add_scan, add_track_piece, wheel_angles
+from terrain.viewer.scene import (
+    LINE_LIFT,
+    ActorModels,
+    RobotModel,
+    add_path,
+    add_pin,
+    add_scan,
+    add_track_piece,
+    wheel_angles,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -29,7 +38,7 @@ MAX_TRACK = 2000  # points of the track that are drawn
 
 
 class MovingThings:
-    """Robot, goal, plan, vector field, local plan, scans and track.
+    """Robot, actors, goal, plan, vector field, local plan, scans and track.
 
     Parameters
     ----------
@@ -45,6 +54,7 @@ class MovingThings:
         self._pin_height = pin_height
         self._shape = bench.recorder.robot
         self._robot = RobotModel(self._scene, self._shape, pin_height)
+        self._actors = ActorModels(self._scene, bench.recorder.actor_tracks())
         self._angles = np.zeros(len(self._shape.wheels))
         self._time = 0.0
         self._path: Path | None = None
@@ -64,6 +74,7 @@ class MovingThings:
     def show(self, time: float, text: str, is_driving: bool) -> None:
         """Draw the present state with ``text`` above the robot; a plan only while there is a goal."""
         self._show_robot(time, text)
+        self._actors.place(as_row(actor.pose()) for actor in self._bench.recorder.actors)
         self._show_plan(self._path if is_driving else None)
         self._show_scans()
         track = self._bench.simulation.track
@@ -79,7 +90,7 @@ class MovingThings:
         twists = np.tile([velocity.vx, velocity.vy, velocity.wz], (2, 1))
         self._angles = self._angles + wheel_angles(self._shape, times, twists)[-1]
         self._time = time
-        self._robot.place(np.array([*pose.position, *pose.orientation]), self._angles, text)
+        self._robot.place(as_row(pose), self._angles, text)
         motion = self._next_motion()
         if motion is None:
             self._ahead.clear()
@@ -132,6 +143,11 @@ class MovingThings:
             points = np.concatenate([scan.points for scan in scans])
             stamps = tuple(scan.stamp for scan in scans)
             self._scan.update(stamps, lambda: add_scan(self._scene, "/scan", points))
+
+
+def as_row(pose: Pose) -> FloatArray:
+    """Pose as (7,) x y z qx qy qz qw."""
+    return np.array([*pose.position, *pose.orientation])
 
 
 def motion_of(command: Command) -> PlannedMotion | None:

@@ -12,12 +12,13 @@ from mcap_protobuf.decoder import DecoderFactory as ProtobufDecoderFactory
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose
-from mbf_abstract.map_view import GridView
+from mbf_abstract.map_view import GridView, MeshView
 from terrain.actor_track import ActorTrack
-from terrain.recorder import Recorder
+from terrain.recorder import MAP_PERIOD, Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import HUSKY
-from terrain.viewer.foxglove_messages import nanoseconds
+from terrain.viewer.colours import WALL
+from terrain.viewer.foxglove_messages import MAP_LIFT, nanoseconds
 from terrain.viewer.mcap_log import write_mcap
 from terrain.viewer.run_messages import action_states
 
@@ -132,6 +133,43 @@ def test_scans_and_maps_are_unpacked_to_what_was_recorded(log, office):
     np.testing.assert_array_equal(cells[..., 4], [[0, 50, 100], [255, 100, 25]])
     assert (grid.pose.position.x, grid.pose.position.y) == (1.0, -1.0)
     assert (grid.cell_size.x, grid.cell_size.y) == (0.5, 0.5)
+
+
+@pytest.fixture
+def hill_with_costs(hill_recording):
+    """Costs of a hill that grow with x, forbidden on its eastern edge; then a heap in the way that goes again."""
+    ground = hill_recording.ground
+    x = ground.vertices[:, 0]
+    bare = np.where(x > 38.0, np.inf, 0.1 * x).astype(np.float32)
+    heap = np.linalg.norm(ground.vertices[:, :2] - (20.0, 15.0), axis=1) < 1.0
+    recorder = Recorder("", "", hill_recording.robot, hill_recording.start, [])
+    for turn, costs in enumerate((bare, np.where(heap, np.inf, bare), bare)):
+        recorder.map(MAP_PERIOD * turn, lambda costs=costs: MeshView(ground.vertices, ground.faces, costs))
+    return replace(hill_recording, meshes=recorder.meshes)
+
+
+def test_a_mesh_map_is_drawn_in_the_colours_of_its_costs_and_what_changes_is_drawn_over_it(hill_with_costs, tmp_path):
+    write_mcap(tmp_path / "run.mcap", hill_with_costs)
+
+    log, ground = Log(tmp_path / "run.mcap"), hill_with_costs.ground
+    whole, heap, gone = log["/mesh_map"]
+    surface, over = whole.entities[0].triangles[0], heap.entities[0].triangles[0]
+    colours = np.array([(c.r, c.g, c.b) for c in surface.colors])
+
+    assert log.schemas == {topic: schema for topic, schema in SCHEMAS.items() if topic not in ("/scan", "/map")} | {
+        "/mesh_map": "foxglove.SceneUpdate"
+    }
+    np.testing.assert_allclose([(p.x, p.y, p.z - MAP_LIFT) for p in surface.points], ground.vertices, atol=1e-6)
+    assert len(surface.indices) == ground.faces.size
+    forbidden = ground.vertices[:, 0] > 38.0
+    np.testing.assert_allclose(colours[forbidden], np.tile(np.array(WALL) / 255.0, (forbidden.sum(), 1)), atol=1e-3)
+    lightness = colours @ [0.2126, 0.7152, 0.0722]
+    order = np.argsort(ground.vertices[~forbidden, 0], kind="stable")
+    assert (np.diff(lightness[~forbidden][order]) < 0.01).all(), "costly ground is darker"
+    assert {pair.key: pair.value for pair in whole.entities[0].metadata} == {"highest_cost": "3.801"}
+    assert 0 < len(over.indices) < 0.01 * len(surface.indices)
+    assert max(np.hypot(p.x - 20.0, p.y - 15.0) for p in over.points) < 2.0
+    assert [(d.id, d.type) for d in gone.deletions] == [("changed costs", 0)] and heap.entities[0].id == "changed costs"
 
 
 def test_events_and_the_log_tell_what_events_jsonl_tells(log, office):

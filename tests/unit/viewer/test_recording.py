@@ -9,7 +9,7 @@ from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.map_view import GridView, MeshView
 from terrain.mishaps import Thing
-from terrain.recorder import GRID_PERIOD, MAX_GRID_CELLS, Recorder
+from terrain.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, Recorder
 from terrain.recording import Recording, RecordingError, RobotShape
 from terrain.robot_models import CAR, HUSKY, TURTLEBOT
 from terrain.solids import cylinder_triangles
@@ -91,7 +91,7 @@ def test_maps_are_recorded_every_few_seconds_and_come_back_from_the_file(tmp_pat
     views = [
         GridView(np.array([[0.0, np.nan], [0.5, value]], np.float32), (0.0, 1.0, 0.0, 1.0)) for value in (0.2, 9.0)
     ]
-    for time, view in ((0.0, views[0]), (GRID_PERIOD - 0.1, views[1]), (GRID_PERIOD, views[1])):
+    for time, view in ((0.0, views[0]), (MAP_PERIOD - 0.1, views[1]), (MAP_PERIOD, views[1])):
         recorder.map(time, lambda view=view: view)
     recorder.finish(True, "SUCCESS", "").save(tmp_path / "recording.npz")
 
@@ -102,14 +102,36 @@ def test_maps_are_recorded_every_few_seconds_and_come_back_from_the_file(tmp_pat
     np.testing.assert_array_equal(grids[1].cells, [[0, 255], [50, 100]])
 
 
-def test_only_grids_of_a_sensible_size_are_recorded():
+def test_a_mesh_map_is_recorded_when_its_costs_have_changed_and_comes_back_from_the_file(tmp_path):
     recorder = Recorder("mapped", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), [])
-    huge = GridView(np.broadcast_to(np.float32(0.0), (MAX_GRID_CELLS + 1, 1)), (0.0, 1.0, 0.0, 1.0))
+    corners, faces = np.array([[0.0, 0.0, 0.1], [1.0, 0.0, 0.2], [0.0, 1.0, 0.3]]), np.array([[0, 1, 2]], np.int32)
+    for turn, costs in enumerate(([0.0, 1.5, np.inf], [0.0, 1.5, np.inf], [0.0, 1e9, 2.0])):
+        recorder.map(MAP_PERIOD * turn, lambda costs=costs: MeshView(corners, faces, np.array(costs, np.float32)))
+    recorder.finish(True, "SUCCESS", "").save(tmp_path / "recording.npz")
 
-    for view in (None, MeshView(np.zeros((3, 3)), np.zeros((1, 3), np.int32), np.zeros(3, np.float32)), huge):
-        recorder.map(0.0, lambda view=view: view)
+    first, second = Recording.load(tmp_path / "recording.npz").meshes
 
-    assert recorder.grids == []
+    assert (first.time, second.time) == (0.0, 2 * MAP_PERIOD)
+    np.testing.assert_array_equal(first.vertices, corners)
+    np.testing.assert_array_equal(second.faces, faces)
+    assert first.costs.tolist() == [0.0, 1.5, np.inf]
+    assert np.isfinite(second.costs).all(), "what can be crossed at a high cost is not forbidden"
+
+
+def test_only_maps_of_a_sensible_size_are_recorded():
+    recorder = Recorder("mapped", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), [])
+    cells = np.broadcast_to(np.float32(0.0), (MAX_GRID_CELLS + 1, 1))
+    costs = np.broadcast_to(np.float32(0.0), MAX_MESH_VERTICES + 1)
+    views = (
+        None,
+        GridView(cells, (0.0, 1.0, 0.0, 1.0)),
+        MeshView(np.broadcast_to(0.0, (len(costs), 3)), np.zeros((1, 3), np.int32), costs),
+    )
+
+    for turn, view in enumerate(views):
+        recorder.map(MAP_PERIOD * turn, lambda view=view: view)
+
+    assert recorder.grids == [] and recorder.meshes == []
 
 
 class Pacer:

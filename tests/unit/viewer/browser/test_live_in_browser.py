@@ -27,7 +27,7 @@ SCENARIO = {
     "goals": [{"x": 9.0, "y": 5.0}],
     "sensors": [{"name": "lidar", "rays": 90}],
 }
-SPEED = "0.1"  # of real time: however slow the browser is, the robot is still under way when the page asks for something
+SPEED = "0.1"  # of real time: however slow the browser is, the robot is still under way when the page asks for more
 CANVAS = "document.querySelector('canvas')"
 PLACE = f"(() => {{ const r = {CANVAS}.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
 

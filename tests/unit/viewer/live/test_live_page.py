@@ -8,6 +8,7 @@ from terrain.bench import Bench
 from terrain.goal_drivers import make_goal_driver
 from terrain.goal_tour import GoalTour
 from terrain.scenario import PlanarPose, load_scenario
+from terrain.scenario_actors import OtherRobot, Walker
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.page import LivePage
@@ -65,6 +66,24 @@ def test_on_costmaps_the_page_shows_both_maps():
 
     assert nodes == {"map", "local_map", "robot", "plan", "track", "ahead", "scan"}
     assert "No behaviour tree runs" in words
+
+
+def test_people_and_other_robots_are_drawn_where_they_are_now(meadow):
+    route = ((2.0, 2.0), (10.0, 2.0))
+    actors = (Walker(type="walker", route=route), OtherRobot(type="robot", route=route, start=4.0))
+    with Bench(meadow.model_copy(update={"actors": actors})) as bench, page_server(18240) as server:
+        tour = GoalTour(bench, make_goal_driver("move_base", bench.navigator))
+        page = LivePage(server, bench, tour, LiveControls(bench, tour), LiveLog())
+        shown = []
+        for time in (1.0, 2.0):
+            bench.clock.sleep(1.0)
+            page.show(time, History())
+            frames = [server.scene.get_handle_by_name(f"/actor_{number}") for number in range(2)]
+            assert [tuple(frame.position) for frame in frames] == [a.pose().position for a in bench.recorder.actors]
+            shown.append(frames[0].position[0])
+
+        assert shown[1] - shown[0] == pytest.approx(0.8, abs=0.05), "somebody walks at 0.8 m/s"
+        assert server.scene.get_handle_by_name("/actor_0/person") and server.scene.get_handle_by_name("/actor_1/robot")
 
 
 def test_a_mesh_server_shows_each_layer_by_name_the_default_one_first(meadow):
