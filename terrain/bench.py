@@ -44,6 +44,7 @@ from terrain.simulation import Simulation
 
 SENSE_FIRST = 0.5  # s; every sensor has spoken and every map has been updated when a script gets its turn
 MAX_EVENTS = 200_000
+TIME_TO_END = 1.0  # s of simulated time for threads to end; it passes only while somebody waits for it
 
 
 class Bench:
@@ -134,6 +135,8 @@ class Bench:
         """Stop the robot, the server and the simulator."""
         self.loop.stop()
         self.navigator.close()
+        if isinstance(self.clock, SimClock):
+            self.clock.sleep(TIME_TO_END)
         self.events.close()
         self.world.physics.close()
         self._temporary.cleanup()

@@ -24,6 +24,7 @@ from mbf_abstract.server_factory import read_config
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.transform import Transform
 from mbf_abstract.transforms import TransformBuffer
+from terrain.bench import TIME_TO_END
 from terrain.floor_plan import write_map
 from terrain.occupancy import wall_triangles
 from terrain.rays import StaticRays
@@ -115,6 +116,7 @@ class Stage:
     def __exit__(self, *exc: object) -> None:
         self._stopped = True
         self.navigator.close()
+        self.clock.sleep(TIME_TO_END)
         self.events.close()
         self._folder.cleanup()
 

@@ -14,6 +14,7 @@ import pytest
 
 PROGRAM = """
 import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell lets its background jobs ignore it
 from mbf_abstract.actions.goals import ExePathGoal
 from mbf_abstract.clock import WallClock
 from mbf_abstract.testing.bench import Bench

@@ -1,6 +1,9 @@
 """The kinematic stand-in drives scenarios on flat ground: same files, same sensors, same actors, no Bullet."""
 
+import gc
 import sys
+import threading
+import weakref
 
 import pytest
 
@@ -25,6 +28,18 @@ def test_the_crowded_corridor_is_driven_with_lidar_and_people_and_repeats(corrid
     assert runs[0].metrics["real_time_factor"] > 1.0
     logs = [(tmp_path / name / "events.jsonl").read_bytes() for name in ("first", "second")]
     assert logs[0] == logs[1]
+
+
+def test_a_finished_run_leaves_no_thread_and_no_world_behind(corridor, tmp_path):
+    before = threading.active_count()
+    with Bench(corridor, folder=tmp_path) as bench:
+        bench.clock.sleep(1.0)
+        assert threading.active_count() > before
+        world = weakref.ref(bench.world)
+    del bench
+    gc.collect()
+    assert threading.active_count() == before
+    assert world() is None
 
 
 def test_a_person_in_the_way_is_seen_by_the_lidar_and_stops_the_robot(corridor, tmp_path):
