@@ -24,6 +24,8 @@ from mbf_costmap_nav.footprint_check import arc_poses
 from mbf_costmap_nav.path_geometry import look_ahead_point
 from mbf_costmap_nav.path_handling import PATH_LENGTH_TOLERANCE, ControlCycle, PathFollower, to_base_frame
 
+SLOWEST = 0.01  # m/s; slower commands are looked ahead for as long as this one, to bound the work
+
 
 class RegulatedPurePursuitParameters(PluginParameters):
     """Parameters of ``costmap.regulated_pure_pursuit``."""
@@ -57,6 +59,13 @@ class RegulatedPurePursuitParameters(PluginParameters):
     max_cross_track: float = parameter(1.5, "Farther from the path than this it is missed.", unit="m", gt=0.0, le=100.0)
     collision_check: bool = parameter(True, "Simulate the footprint ahead along the arc.")
     collision_check_time: float = parameter(1.0, "How far ahead in time it is simulated.", unit="s", gt=0.0, le=10.0)
+    min_distance_to_obstacle: float = parameter(
+        0.0,
+        "Way ahead that is checked at least, however slow; 0 = what the check time covers.",
+        unit="m",
+        ge=0.0,
+        le=2.0,
+    )
     collision_check_padding: float | None = parameter(
         None, "Padding of the footprint in that simulation; absent = the costmap's.", unit="m", ge=0.0, le=1.0
     )
@@ -195,7 +204,10 @@ class RegulatedPurePursuitController(PathFollower):
         """Refuse a command that leads into an obstacle within the check time, but not beyond the path's end."""
         if not self.parameters.collision_check:
             return ControlResult(ExePathOutcome.SUCCESS, "", command)
-        duration = self.parameters.collision_check_time / cycle.limit_factor
+        duration, shortest = self.parameters.collision_check_time, self.parameters.min_distance_to_obstacle
+        if command.vx != 0.0:  # a robot that may creep as far as the check time allows ends up at the obstacle
+            duration = max(duration, shortest / max(abs(command.vx), SLOWEST))
+        duration /= cycle.limit_factor
         if command.vx != 0.0:
             duration = min(duration, max(cycle.tracker.remaining, 0.0) / abs(command.vx))
         step = min(cycle.costmap.resolution / max(abs(command.vx), 1e-3), 0.1, max(duration, 1e-3))

@@ -109,6 +109,21 @@ def test_obstacle_on_the_path_is_blocked_path_and_says_where(pursuit):
     assert "collide at (0." in result.message
 
 
+@pytest.mark.parametrize(("shortest", "gap"), [(0.0, 0.0), (0.3, 0.3)], ids=["by-time", "by-distance"])
+def test_a_robot_that_may_creep_does_so_up_to_the_distance_it_is_told_to_keep(pursuit, shortest, gap):
+    cells = np.zeros((200, 200), dtype=np.uint8)
+    cells[:, 140:] = 254  # a wall at x = 2
+    controller = pursuit(Costmap(cells, 0.05, -5.0, -5.0), min_distance_to_obstacle=shortest)
+    controller.set_plan(straight())
+    x, speed = 0.0, 0.0
+    for _ in range(600):
+        result = controller.compute_velocity_commands(ControlRequest(Pose.planar(x, 0), Twist.planar(speed)))
+        speed = result.command.vx if result.success else 0.0
+        x += 0.05 * speed
+    nose = x + 0.2
+    assert 2.0 - gap - 0.2 < nose <= 2.0 - gap + 0.05
+
+
 def test_footprint_on_an_obstacle_is_a_collision(pursuit):
     cells = np.zeros((200, 200), dtype=np.uint8)
     cells[100, 103] = 254
