@@ -4,7 +4,9 @@
 
 Truth: ``terrain/geodesic_reference.csv`` of the data folder (342 pairs, exact MMP lengths), and pygeodesic's exact
 solver on plane, sphere, bunny and parking garage in the same run. Per mesh: the potential of the continuous wave,
-the length of its traced path, the any-angle path and the path along edges, all over the exact length.
+the length of its traced path, the any-angle path and the path along edges, all over the exact length. For the whole
+fields, vertices in which two sheets touch are made two (bunny 28, garage 10): the exact solver does not pass from one
+sheet to the other there, the wave may, so the two would answer different questions.
 Pairs nearer than five edges are left out, there any first-order method is as coarse as the mesh.
 """
 
@@ -70,10 +72,28 @@ def compare_pairs(mesh_map: MeshMap, rows: list[dict[str, str]]) -> dict[str, li
     return ratios
 
 
+def without_point_contacts(mesh_map: MeshMap) -> MeshMap:
+    """The same mesh, with one vertex for each fan of faces where several touch in a point."""
+    faces, corners = mesh_map.faces, np.arange(mesh_map.faces.size).reshape(-1, 3)
+    face, side = np.nonzero(mesh_map.face_neighbours >= 0)
+    other = mesh_map.face_neighbours[face, side]
+    joined = [
+        (corners[face, end], corners[other][faces[other] == faces[face, end][:, None]])
+        for end in (side, (side + 1) % 3)
+    ]
+    pairs = np.concatenate(joined, axis=1)
+    graph = coo_matrix((np.ones(pairs.shape[1]), pairs), shape=(faces.size, faces.size))
+    count, fan = connected_components(graph, directed=False)
+    vertices = np.zeros((count, 3))
+    vertices[fan] = mesh_map.vertices[faces.ravel()]
+    return MeshMap.from_arrays(vertices, fan.reshape(-1, 3), repair=("flipped_winding",))
+
+
 def compare_field(mesh_map: MeshMap) -> list[float]:
     """Ratios of the wave's whole field to pygeodesic's exact distances from one vertex."""
     import pygeodesic.geodesic
 
+    mesh_map = without_point_contacts(mesh_map)
     solver = pygeodesic.geodesic.PyGeodesicAlgorithmExact(mesh_map.vertices, mesh_map.faces)
     query = corner_query(mesh_map)
     source = len(mesh_map.vertices) // 2
@@ -122,14 +142,16 @@ def solved_share(side: int, pair_count: int) -> dict[str, float]:
 
 def summary(ratios: list[float]) -> dict[str, float]:
     errors = np.abs(np.array(ratios) - 1.0)
-    return {"mean_error": float(errors.mean()), "max_error": float(errors.max()), "count": len(ratios)}
+    above = int((errors > 0.02).sum())
+    return {"mean_error": float(errors.mean()), "max_error": float(errors.max()), "above": above, "count": len(ratios)}
 
 
 def report(name: str, figures: dict[str, dict[str, float]]) -> None:
     print(f"\n{name}")
     for what, figure in figures.items():
         mean, worst = figure["mean_error"], figure["max_error"]
-        print(f"  {what:16} mean {mean:7.3%}  max {worst:7.3%}  over {figure['count']}")
+        above, count = figure["above"], figure["count"]
+        print(f"  {what:16} mean {mean:7.3%}  max {worst:7.3%}  above 2 %: {above} of {count}")
 
 
 def main() -> None:
