@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrain.recording import Recording
+from terrain.viewer.legend import legend_of
 from terrain.viewer.page_server import page_server
 from terrain.viewer.replay_panel import with_panel
 from terrain.viewer.scene import (
@@ -57,7 +58,7 @@ def replay_html(recording: Recording) -> str:
         if len(recording.times):
             _Player(server, serializer, recording, robot, actors).play()
         page: str = serializer.as_html()
-    return with_panel(page, recording.events)
+    return with_panel(page, recording.events, legend_of(recording))
 
 
 class _Player:

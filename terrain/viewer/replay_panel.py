@@ -1,4 +1,4 @@
-"""The words of a replay: a panel that tells, along the time bar, what has happened and how the behaviour tree stands.
+"""The words of a replay: what has happened along the time bar, how the behaviour tree stands, what the colours mean.
 
 The page of a replay is made by viser and knows scenes only. The panel is HTML and a few lines of script that read the
 time from the time bar; what it shows lies in the page as JSON, so it works from disk and without network.
@@ -13,6 +13,7 @@ from typing import Any
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import SYMBOLS
 from terrain.viewer.event_lines import TOLD, line_of
+from terrain.viewer.legend import Entry, legend_html
 from terrain.viewer.tree_html import COLOURS, INDENT
 
 SHOWN_LINES = 8
@@ -65,7 +66,7 @@ setInterval(() => {
 """
 
 
-def with_panel(page: str, events: Iterable[Event]) -> str:
+def with_panel(page: str, events: Iterable[Event], legend: Iterable[Entry] = ()) -> str:
     """Put the panel into the text of a page, before the end of its body."""
     contents = _data(tuple(events))
     data = json.dumps(contents, separators=(",", ":")).replace("<", "\\u003c")
@@ -73,7 +74,8 @@ def with_panel(page: str, events: Iterable[Event]) -> str:
     tree = tree if contents["trees"] else ""
     panel = (
         f"<style>{STYLE}</style><div id='run'><details open><summary>What happened</summary>"
-        f"<div id='run-lines'></div></details>{tree if contents['trees'] else ''}</div>"
+        f"<div id='run-lines'></div></details>{tree}"
+        f"<details open><summary>Colours</summary><div>{legend_html(legend)}</div></details></div>"
         f"<script type='application/json' id='run-data'>{data}</script><script>{SCRIPT}</script>"
     )
     head, end, tail = page.rpartition("</body>")

@@ -2,9 +2,14 @@
 
 import json
 import re
+from dataclasses import replace
+
+import numpy as np
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import NodeState
+from terrain.actor_track import ActorTrack
+from terrain.viewer.legend import legend_of
 from terrain.viewer.replay_panel import with_panel
 from terrain.viewer.tree_html import worth_showing
 
@@ -73,3 +78,16 @@ def test_idle_nodes_are_shown_below_a_running_one_only():
     assert [node.name for node in worth_showing(nodes)] == [
         "root", "done", "failed below done", "waits", "works", "next"
     ]  # fmt: skip
+
+
+def test_the_legend_names_what_occurs_in_the_run_and_nothing_else(hill_recording, office_recording):
+    nobody = np.zeros((0, 3))
+    people = [ActorTrack("person", nobody, nobody.astype(np.int32), np.zeros((0, 7)))] * 2
+
+    hill = [name for name, _ in legend_of(hill_recording)]
+    office = [name for name, _ in legend_of(replace(office_recording, actors=people))]
+
+    assert hill == ["plan", "driven", "0°", "10°", "20°", "30°", "45°"]
+    assert office == ["plan", "driven", "seen by a sensor", "on no map", "person"]
+    page = with_panel(PAGE, [], legend_of(hill_recording))
+    assert "rgb(25,90,220)" in page and ">plan<" in page
