@@ -32,6 +32,34 @@ def test_every_command_of_the_shell_blocks_exists():
     assert used and used <= known
 
 
+def test_every_option_of_the_shell_blocks_exists():
+    lines = [line.split("#")[0] for block in blocks("sh") for line in block.splitlines()]
+    calls = re.findall(r"(?:^|&& )mbf ([^&\n]*)", "\n".join(lines), re.MULTILINE)
+
+    assert len(calls) > 20
+    for call in calls:
+        command = typer.main.get_command(make_app())
+        for word in call.split():
+            command = getattr(command, "commands", {}).get(word, command)
+        known = {option for parameter in command.params for option in parameter.opts + parameter.secondary_opts}
+        assert set(re.findall(r"--[a-z-]+", call)) <= known | {"--help"}, f"mbf {call}"
+
+
+def test_every_file_of_python_that_is_named_exists():
+    folders = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain", "tests", "benchmarks", "examples", "docs")
+    known = [f"/{file.relative_to(DOCS.parent)}" for name in folders for file in (DOCS.parent / name).rglob("*.py")]
+    named = set(re.findall(r"`([\w/]+\.py)`", TEXTS + (DOCS.parent / "README.md").read_text("utf-8")))
+
+    assert len(named) > 30
+    assert [name for name in named if not any(file.endswith(f"/{name}") for file in known)] == []
+
+
+def test_every_decision_is_linked_from_the_concepts():
+    page = (DOCS / "concepts.md").read_text("utf-8")
+
+    assert [file.name for file in sorted((DOCS / "decisions").glob("*.md")) if file.name not in page] == []
+
+
 def test_every_script_of_the_shell_blocks_exists():
     used = {name for block in blocks("sh") for name in re.findall(r"python (\S+\.py)", block)}
 
