@@ -8,22 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-import os
-import signal
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from terrain.scenario import Scenario
-
-PARENT_CHECK = 1.0  # s between two looks of a worker whether the sweep still lives
-MAX_POOLS = 5  # pools that are started anew after a worker died, before the sweep gives up
+from terrain.worker_pool import run_in_workers
 
 
 @dataclass(frozen=True)
@@ -83,41 +75,8 @@ def run_all(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, dict[str, 
     BrokenProcessPool
         Workers died again and again.
     """
-    left = list(jobs)
-    for attempt in range(MAX_POOLS):
-        try:
-            for job, metrics in _run_in_pool(tuple(left), workers):
-                left.remove(job)
-                yield job, metrics
-            return
-        except BrokenProcessPool:
-            if attempt == MAX_POOLS - 1:
-                raise
+    return run_in_workers(_run_job, jobs, workers)
 
 
-def _run_in_pool(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, dict[str, Any]]]:
-    """Keep a pool busy; no more runs are handed out than it can work on, so that a stop is quick."""
-    waiting, running = iter(jobs), dict[Future[dict[str, Any]], Job]()
-    pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_the_sweep, (os.getpid(),))
-    try:
-        for job in itertools.islice(waiting, workers):
-            running[pool.submit(run_once, *job)] = job
-        while running:
-            for done in wait(running, return_when=FIRST_COMPLETED).done:
-                yield running.pop(done), done.result()
-                for job in itertools.islice(waiting, 1):
-                    running[pool.submit(run_once, *job)] = job
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _end_with_the_sweep(sweep_process: int) -> None:
-    """Let a worker end soon after the sweep was killed; it would wait for work for ever."""
-
-    def check(number: int, frame: FrameType | None) -> None:
-        if os.getppid() != sweep_process:
-            os._exit(1)
-
-    if hasattr(signal, "setitimer"):
-        signal.signal(signal.SIGALRM, check)
-        signal.setitimer(signal.ITIMER_REAL, PARENT_CHECK, PARENT_CHECK)
+def _run_job(job: Job) -> dict[str, Any]:
+    return run_once(*job)

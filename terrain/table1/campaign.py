@@ -7,11 +7,8 @@ interrupted campaign goes on where it was, and a change of any parameter makes a
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
-import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +21,7 @@ from terrain.table1.counting import Leg, Tally
 from terrain.table1.outdoor_stage import OUTDOOR
 from terrain.table1.repetition import run_repetition
 from terrain.table1.world import load_world
+from terrain.worker_pool import run_in_workers
 
 LOG = "runs.jsonl"
 
@@ -110,7 +108,7 @@ class Campaign:
         with SweepLog(self._file) as log:
             known = {job: log.rows.get(self._key(job)) for job in jobs}
             yield from ((job, row) for job, row in known.items() if row is not None)
-            for job, row in _run_all([job for job, row in known.items() if row is None], self.workers):
+            for job, row in run_in_workers(do, [job for job, row in known.items() if row is None], self.workers):
                 log.append(self._key(job), row)
                 yield job, row
 
@@ -126,16 +124,3 @@ def tally_of(row: Mapping[str, Any]) -> Tally:
     """Read back the tally of a row."""
     values = dict(row["tally"])
     return Tally(**{**values, "legs": [Leg(**leg) for leg in values["legs"]]})
-
-
-def _run_all(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, dict[str, Any]]]:
-    """Keep the workers busy; no more jobs are handed out than they can work on, so that a stop is quick."""
-    waiting, running = iter(jobs), dict[Future[dict[str, Any]], Job]()
-    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-        for job in itertools.islice(waiting, workers):
-            running[pool.submit(do, job)] = job
-        while running:
-            for done in wait(running, return_when=FIRST_COMPLETED).done:
-                yield running.pop(done), done.result()
-                for job in itertools.islice(waiting, 1):
-                    running[pool.submit(do, job)] = job

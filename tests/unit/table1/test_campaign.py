@@ -15,13 +15,13 @@ def work(monkeypatch, tally):
     """Let the workers' pool do its jobs here, by a quick substitute, and return the names of what was done."""
     done = []
 
-    def run_all(jobs, workers):
+    def run_all(do, jobs, workers):
         for job in jobs:
             done.append(job.name)
             made = tally(planner=6 + job.seed)
             yield job, {"tally": json.loads(json.dumps(made, default=vars)), "log_hash": job.name}
 
-    monkeypatch.setattr(campaign_module, "_run_all", run_all)
+    monkeypatch.setattr(campaign_module, "run_in_workers", run_all)
     return done
 
 

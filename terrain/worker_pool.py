@@ -1,0 +1,78 @@
+"""Jobs in worker processes of this machine, each done exactly once, also when a worker dies.
+
+When to use: for runs of seconds to minutes, as those of sweeps and experiments. When not: for many short jobs, the
+hand-over costs more than they do.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from types import FrameType
+from typing import TypeVar
+
+J = TypeVar("J")
+R = TypeVar("R")
+
+PARENT_CHECK = 1.0  # s between two looks of a worker whether the process that feeds it still lives
+MAX_POOLS = 5  # pools that are started anew after a worker died, before it is given up
+
+
+def run_in_workers(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Iterator[tuple[J, R]]:
+    """Do all jobs in ``workers`` processes and yield each with its result as it finishes.
+
+    Parameters
+    ----------
+    do : callable
+        Of a module, so that a worker can import it. It runs on the worker's main thread.
+    jobs : sequence
+        Each can be pickled.
+
+    Raises
+    ------
+    BrokenProcessPool
+        Workers died again and again.
+    """
+    left = list(jobs)
+    for attempt in range(MAX_POOLS):
+        try:
+            for job, result in _run_in_pool(do, tuple(left), workers):
+                left.remove(job)
+                yield job, result
+            return
+        except BrokenProcessPool:
+            if attempt == MAX_POOLS - 1:
+                raise
+
+
+def _run_in_pool(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Iterator[tuple[J, R]]:
+    """Keep a pool busy; no more jobs are handed out than it can work on, so that a stop is quick."""
+    waiting, running = iter(jobs), dict[Future[R], J]()
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_the_parent, (os.getpid(),))
+    try:
+        for job in itertools.islice(waiting, workers):
+            running[pool.submit(do, job)] = job
+        while running:
+            for done in wait(running, return_when=FIRST_COMPLETED).done:
+                yield running.pop(done), done.result()
+                for job in itertools.islice(waiting, 1):
+                    running[pool.submit(do, job)] = job
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _end_with_the_parent(parent: int) -> None:
+    """Let a worker end soon after its parent was killed; it would wait for work for ever."""
+
+    def check(number: int, frame: FrameType | None) -> None:
+        if os.getppid() != parent:
+            os._exit(1)
+
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, check)
+        signal.setitimer(signal.ITIMER_REAL, PARENT_CHECK, PARENT_CHECK)
