@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.funnel import pull_taut
-from mbf_mesh_nav.mesh_map import MeshMap, MeshSnapshot
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.snapshot import MeshSnapshot
 
 _MIN_PIECE = 4  # faces; shorter pieces are not split further
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import Pose
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distances
 from mbf_mesh_nav.locate import SurfacePoint
-from mbf_mesh_nav.mesh_map import MeshMap, MeshSnapshot
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.snapshot import MeshSnapshot
 from mbf_mesh_nav.surface_point import corner_distances
 
 NO_TARGETS = np.zeros(0, dtype=np.int32)

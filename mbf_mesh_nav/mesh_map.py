@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.kernels.edge_weights import set_edge_weights
-from mbf_mesh_nav.layer import CostArray, IntArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.layer import IntArray, LayerParameters, MeshLayer
 from mbf_mesh_nav.layer_graph import LayerGraph, union_of
 from mbf_mesh_nav.locate import Location, SurfaceLocator, SurfacePoint
 from mbf_mesh_nav.repair import MeshReport, checked_mesh
+from mbf_mesh_nav.snapshot import MeshSnapshot, SnapshotSeries
 from mbf_mesh_nav.topology import MeshTopology, build_topology
 
 if TYPE_CHECKING:
@@ -28,32 +27,6 @@ if TYPE_CHECKING:
 
 REMEMBERED_CHANGES = 100
 """Number of changes of the default layer a planner may have missed and still repair its last result."""
-
-
-@dataclass(frozen=True, eq=False)
-class MeshSnapshot:
-    """The state of the map at one version, never changed afterwards.
-
-    Attributes
-    ----------
-    version : int
-        Grows by one with every change of a cost, a flag or a weight.
-    costs : (V,) float32
-        Costs of the default layer; may be +inf.
-    lethal : (V,) bool
-        Vertices no plan may touch.
-    edge_weights : (2E,) float32
-        Aligned with ``MeshMap.neighbours``: length plus collected cost, +inf at lethal vertices.
-    """
-
-    version: int
-    costs: CostArray
-    lethal: LethalArray
-    edge_weights: CostArray
-
-    def __post_init__(self) -> None:
-        for array in (self.costs, self.lethal, self.edge_weights):
-            array.flags.writeable = False
 
 
 class MeshMap:
@@ -102,7 +75,7 @@ class MeshMap:
         self.components = topology.components
         self.input_to_internal = topology.input_to_internal
         self.internal_to_input = topology.internal_to_input
-        self._version = -1
+        self._snapshots = SnapshotSeries(topology)
         self._changes: dict[int, IntArray] = {}  # version -> vertices that differ from the version before
         self._overridden: dict[str, tuple[LayerParameters, float]] = {}  # usual parameters, end of the override
         self._lock = threading.RLock()
@@ -208,9 +181,8 @@ class MeshMap:
             self.default_layer = default_layer
             self.edge_cost_factor = edge_cost_factor
             lethal = np.zeros(count, np.bool_) if default_layer is None else layers[default_layer].lethal
-            weights = np.zeros(len(self.neighbours), np.float32)
             self._changes.clear()
-            self._snapshot = self._weighted(costs, lethal, weights, np.arange(count, dtype=np.int32))
+            self._snapshot = self._snapshots.begin(costs, lethal, edge_cost_factor)
 
     def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
         """Change how much costs lengthen edges, at run time."""
@@ -275,15 +247,7 @@ class MeshMap:
         """Make the snapshot that follows a change of the default layer; only edges at changed vertices are touched."""
         if self.default_layer not in changed:
             return
-        layer = self.layers[self.default_layer]
-        weights = self._snapshot.edge_weights.copy()
-        self._snapshot = self._weighted(layer.costs, layer.lethal, weights, changed[self.default_layer])
-        self._changes[self._version] = changed[self.default_layer]
-        self._changes.pop(self._version - REMEMBERED_CHANGES, None)
-
-    def _weighted(self, costs: CostArray, lethal: LethalArray, weights: CostArray, changed: IntArray) -> MeshSnapshot:
-        costs, lethal = costs.copy(), lethal.copy()
-        graph = (self.neighbour_offsets, self.neighbours, self.neighbour_lengths)
-        set_edge_weights(*graph, costs, lethal, float(self.edge_cost_factor), changed, weights)
-        self._version += 1
-        return MeshSnapshot(self._version, costs, lethal, weights)
+        layer, vertices = self.layers[self.default_layer], changed[self.default_layer]
+        self._snapshot = self._snapshots.follow(layer.costs, layer.lethal, vertices)
+        self._changes[self._snapshot.version] = vertices
+        self._changes.pop(self._snapshot.version - REMEMBERED_CHANGES, None)

@@ -21,7 +21,8 @@ from mbf_abstract.map_queries import CellState, PathAnswer, PlaceAnswer, PlaceQu
 from mbf_mesh_nav.kernels.surface_disc import vertices_in_disc
 from mbf_mesh_nav.layer import IntArray
 from mbf_mesh_nav.locate import SurfacePoint
-from mbf_mesh_nav.mesh_map import MeshMap, MeshSnapshot
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.snapshot import MeshSnapshot
 
 SURFACE_DISTANCE = 0.5
 """How far [m] a position may be off the surface to count as on it; less than a storey, more than a wheel."""

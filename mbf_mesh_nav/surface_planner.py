@@ -22,8 +22,8 @@ from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_mesh_nav.kernels.path_poses import orientations_along
 from mbf_mesh_nav.leg_search import Leg, LegQuery, drop_repeated_points, spread_from
 from mbf_mesh_nav.locate import SurfacePoint
-from mbf_mesh_nav.mesh_map import MeshSnapshot
 from mbf_mesh_nav.plugins import MeshPlanner
+from mbf_mesh_nav.snapshot import MeshSnapshot
 from mbf_mesh_nav.surface_point import describe_blockage, nearest_corner, position_text, surface_point_at_vertex
 
 

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.locate import SurfacePoint
-from mbf_mesh_nav.mesh_map import MeshMap, MeshSnapshot
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.snapshot import MeshSnapshot
 
 
 def nearest_corner(mesh_map: MeshMap, point: SurfacePoint) -> int:

@@ -12,7 +12,8 @@ from mbf_mesh_nav.kernels.cvp import propagate_wave
 from mbf_mesh_nav.kernels.descent import trace_descent
 from mbf_mesh_nav.kernels.wave_directions import wave_directions
 from mbf_mesh_nav.leg_search import LegQuery, seeded_arrays
-from mbf_mesh_nav.mesh_map import MeshMap, MeshSnapshot
+from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.snapshot import MeshSnapshot
 from mbf_mesh_nav.vector_field import VectorField
 
 

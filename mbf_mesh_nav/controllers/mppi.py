@@ -28,9 +28,9 @@ from mbf_mesh_nav.kernels.mppi import score_rollouts
 from mbf_mesh_nav.kernels.surface_walk import tangent
 from mbf_mesh_nav.kernels.vectors import Vector
 from mbf_mesh_nav.locate import SurfacePoint
-from mbf_mesh_nav.mesh_map import MeshSnapshot
 from mbf_mesh_nav.path_progress import PathProgress, PathProjection
 from mbf_mesh_nav.plugins import MeshContext, MeshController
+from mbf_mesh_nav.snapshot import MeshSnapshot
 
 _NOISE_HOLD = 3  # steps a noise value is kept for: explores further than independent noise of the same size
 _PATH_SPACING = 0.1  # [m] between the samples of the path ahead

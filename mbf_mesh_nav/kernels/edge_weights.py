@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
 
 IntArray = NDArray[np.int32]
 CostArray = NDArray[np.float32]
+
+_UNCHANGED, _WAITING, _WRITTEN = 0, 1, 2
 
 
 @kernel
@@ -25,27 +27,33 @@ def set_edge_weights(
     """Write the weights of all edges at the ``changed`` vertices, in both directions.
 
     ``w = L + factor * L * (c_i + c_j) / 2``, infinite if an end is lethal or has an infinite or NaN cost
-    (mesh_navigation's rule; adding keeps ``w >= L``, so a straight-line bound stays admissible).
+    (mesh_navigation's rule; adding keeps ``w >= L``, so a straight-line bound stays admissible). A vertex may be named
+    more than once.
     """
-    everything = changed.shape[0] == offsets.shape[0] - 1
+    state = np.zeros(costs.shape[0], dtype=np.uint8)
     for index in range(changed.shape[0]):
-        vertex = changed[index]
+        state[Index(changed[index])] = _WAITING
+    for index in range(changed.shape[0]):
+        vertex = Index(changed[index])
+        if state[vertex] == _WRITTEN:
+            continue
+        state[vertex] = _WRITTEN
         blocked = lethal[vertex] or not np.isfinite(costs[vertex])
-        for entry in range(offsets[vertex], offsets[vertex + 1]):
-            other = neighbours[entry]
+        for entry in range(Index(offsets[vertex]), Index(offsets[vertex + ONE])):
+            other = Index(neighbours[entry])
             weight = np.float32(np.inf)
             if not blocked and not lethal[other] and np.isfinite(costs[other]):
                 mean_cost = 0.5 * (costs[vertex] + costs[other])
                 weight = np.float32(lengths[entry] * (1.0 + edge_cost_factor * mean_cost))
             weights[entry] = weight
-            if everything:
+            if state[other] != _UNCHANGED:
                 continue  # the other end writes its own entry
             # The twin entry of the other end: a binary search in its ascending list.
-            low, high = offsets[other], offsets[other + 1]
+            low, high = Index(offsets[other]), Index(offsets[other + ONE])
             while low < high:
-                middle = (low + high) // 2
-                if neighbours[middle] < vertex:
-                    low = middle + 1
+                middle = (low + high) >> ONE
+                if Index(neighbours[middle]) < vertex:
+                    low = middle + ONE
                 else:
                     high = middle
             weights[low] = weight
