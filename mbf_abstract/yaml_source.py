@@ -194,12 +194,13 @@ class _Reader:
                 self._report(line, path, "a text as key", repr(key_node.value)[:60])
                 continue
             key = key_node.value
+            place = (*path, key)
             if key in values:
-                first = self._lines[(*path, key)]
-                self._report(line, (*path, key), "each key once", f"{key!r} a second time", f"first in line {first}")
+                first = self._lines[place]
+                self._report(line, place, "each key once", f"{key!r} a second time", f"first in line {first}")
                 continue
-            self._lines[(*path, key)] = line
-            values[key] = self._construct(value_node, (*path, key))
+            self._lines[place] = line
+            values[key] = self._construct(value_node, place)
         return values
 
     def _report(self, line: int, path: KeyPath, expected: str, got: str, hint: str = "") -> None:
