@@ -103,15 +103,16 @@ def test_a_killed_sweep_is_resumed_without_losing_or_doubling_a_run(arguments, t
 
 def test_a_cluster_that_loses_a_worker_at_work_does_every_run_once(arguments, cluster, tmp_path):
     address, workers = cluster
-    with (
-        Client(address, set_as_default=False) as client,
-        subprocess.Popen([*arguments, "--scheduler", address], stdout=subprocess.DEVNULL) as process,
-    ):
-        victim = None
-        while victim is None:
-            assert process.poll() is None, "the sweep ended before a worker was seen at work"
-            victim = next((name for name in workers if client.processing()[client_address(client, name)]), None)
-        workers[victim].kill()
+    with Client(address, set_as_default=False) as client:
+        client.wait_for_workers(len(workers), timeout=60)
+        info = client.scheduler_info(n_workers=-1)["workers"]
+        processes = {where: workers[worker["name"]] for where, worker in info.items()}
+        with subprocess.Popen([*arguments, "--scheduler", address], stdout=subprocess.DEVNULL) as process:
+            victim = None
+            while victim is None:
+                assert process.poll() is None, "the sweep ended before a worker was seen at work"
+                victim = next((where for where, tasks in client.processing().items() if tasks), None)
+            processes[victim].kill()
 
     assert process.returncode == 0
     rows = logged(tmp_path / "out")
@@ -121,11 +122,6 @@ def test_a_cluster_that_loses_a_worker_at_work_does_every_run_once(arguments, cl
     assert sorted(zip(table["seed"].to_pylist(), table["variant"].to_pylist(), strict=True)) == [
         (seed, variant) for seed in (0, 1) for variant in ("planner=astar", "planner=dijkstra")
     ]
-
-
-def client_address(client, name):
-    workers = client.scheduler_info(n_workers=-1)["workers"]
-    return next(address for address, worker in workers.items() if worker["name"] == name)
 
 
 def test_a_scheduler_that_does_not_answer_is_told():
