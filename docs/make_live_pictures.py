@@ -48,6 +48,7 @@ class Shot:
 SHOTS = {
     "live_outdoor": Shot("outdoor", r"/[3-9]\d s · going/", settings={"planner": "cvp"}),
     "live_indoor": Shot("indoor", r"/1[2-9] s · going/", executive="navigation", clicks=(FOLLOW,)),
+    "live_people": Shot("crowded_corridor", r"/\b[5-9] s · going/", clicks=(FOLLOW,)),
 }
 
 

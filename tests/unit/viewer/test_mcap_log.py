@@ -14,6 +14,7 @@ from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose
 from mbf_abstract.map_view import GridView, MeshView
 from terrain.actor_track import ActorTrack
+from terrain.bench import Bench
 from terrain.recorder import MAP_PERIOD, Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import HUSKY
@@ -170,6 +171,16 @@ def test_a_mesh_map_is_drawn_in_the_colours_of_its_costs_and_what_changes_is_dra
     assert 0 < len(over.indices) < 0.01 * len(surface.indices)
     assert max(np.hypot(p.x - 20.0, p.y - 15.0) for p in over.points) < 2.0
     assert [(d.id, d.type) for d in gone.deletions] == [("changed costs", 0)] and heap.entities[0].id == "changed costs"
+
+
+def test_a_run_on_a_mesh_keeps_the_costs_it_was_planned_on(meadow):
+    with Bench(meadow) as bench:
+        assert bench.navigator.get_path(bench.goals[0]).success
+        view, recorded = bench.navigator.server.map_view(), bench.recorder.meshes
+
+    assert len(recorded) == 1
+    np.testing.assert_array_equal(recorded[0].faces, view.faces)
+    np.testing.assert_allclose(recorded[0].costs, view.costs, rtol=1e-3, atol=1e-3)
 
 
 def test_events_and_the_log_tell_what_events_jsonl_tells(log, office):
