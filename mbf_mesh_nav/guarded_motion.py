@@ -65,12 +65,6 @@ def run_guarded(
         motion.send(Twist())
 
 
-def blocked_vertices(mesh_map: MeshMap, cost_limit: float) -> NDArray[np.bool_]:
-    """Vertices (V,) of the current map that are lethal or whose cost reaches the limit."""
-    snapshot = mesh_map.snapshot()
-    return np.asarray(snapshot.lethal | ~(snapshot.costs < cost_limit))
-
-
 def free_distance(
     mesh_map: MeshMap,
     blocked: NDArray[np.bool_],

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distances
+from mbf_mesh_nav.kernels.path_poses import distinct_points
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.snapshot import MeshSnapshot
@@ -146,7 +147,5 @@ def straight_leg(mesh_map: MeshMap, query: LegQuery) -> Leg:
 
 def drop_repeated_points(leg: Leg, tolerance: float = 1e-6) -> Leg:
     """Remove inner points closer than ``tolerance`` [m] to the point before or to the last; both ends stay."""
-    steps = np.linalg.norm(np.diff(leg.positions, axis=0), axis=1) > tolerance
-    to_end = np.linalg.norm(leg.positions[1:-1] - leg.positions[-1], axis=1) > tolerance
-    keep = np.concatenate([[True], steps[:-1] & to_end, [True]])
-    return replace(leg, positions=leg.positions[keep], normals=leg.normals[keep])
+    keep = distinct_points(leg.positions, tolerance)
+    return leg if keep.all() else replace(leg, positions=leg.positions[keep], normals=leg.normals[keep])

@@ -42,6 +42,12 @@ class MeshSnapshot:
         for array in (self.costs, self.lethal, self.edge_weights):
             array.flags.writeable = False
 
+    def blocked(self, cost_limit: float) -> LethalArray:
+        """Vertices (V,) a plan with this limit does not touch: lethal, or of a cost that reaches it or is NaN."""
+        blocked = self.costs < cost_limit
+        np.logical_not(blocked, out=blocked)
+        return np.logical_or(blocked, self.lethal, out=blocked)
+
 
 @dataclass(eq=False)
 class _Arrays:

@@ -48,9 +48,9 @@ class SurfacePlanner(MeshPlanner):
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Plan from start over the via points to the goal; see ``AbstractPlanner``."""
-        # 1. Which vertices are free? A cost that is NaN compares False, so it blocks too.
+        # 1. Which vertices are free?
         snapshot = self.mesh_map.snapshot()
-        blocked = snapshot.lethal | ~(snapshot.costs < self.parameters.cost_limit)
+        blocked = snapshot.blocked(self.parameters.cost_limit)
 
         # 2. Where on the surface is everything? Only a problem of the goal can be mended by a tolerance.
         stops, problem = self._locate_stops(request, snapshot, blocked)

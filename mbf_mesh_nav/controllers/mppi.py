@@ -221,7 +221,7 @@ class MPPIController(MeshController):
     def _blocked_at(self, snapshot: MeshSnapshot) -> NDArray[np.bool_]:
         """Vertices (V,) the robot must not touch."""
         if snapshot.version != self._blocked_version:
-            self._blocked = snapshot.lethal | ~(snapshot.costs < self.parameters.cost_limit)
+            self._blocked = snapshot.blocked(self.parameters.cost_limit)
             self._blocked_version = snapshot.version
         return self._blocked
 

@@ -1,4 +1,4 @@
-"""Orientations of a robot driving along a polyline on the surface."""
+"""Poses of a robot driving along a polyline on the surface: which of its points, and how it stands there."""
 
 from __future__ import annotations
 
@@ -7,8 +7,29 @@ import math
 import numpy as np
 
 from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.dijkstra import BoolArray
 from mbf_mesh_nav.kernels.surface_walk import tangent
-from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, difference, row
+from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, difference, norm, row
+
+
+@kernel
+def distinct_points(positions: Float64Array, tolerance: float) -> BoolArray:
+    """Mask (n,) of the points to keep: both ends, and what is farther than this from the point before and the last.
+
+    Parameters
+    ----------
+    positions : (n, 3) float64
+        At least two points of the path [m].
+    tolerance : float
+        Distance [m].
+    """
+    last = len(positions) - 1
+    keep = np.ones(len(positions), dtype=np.bool_)
+    for index in range(1, last):
+        point = row(positions, index)
+        to_end = norm(difference(row(positions, last), point))
+        keep[index] = to_end > tolerance and norm(difference(point, row(positions, index - 1))) > tolerance
+    return keep
 
 
 @kernel

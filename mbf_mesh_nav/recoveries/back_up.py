@@ -16,7 +16,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.goal_approach import arc_to, clamp, in_robot_frame
-from mbf_mesh_nav.guarded_motion import blocked_vertices, free_distance, reports_lost_pose, run_guarded
+from mbf_mesh_nav.guarded_motion import free_distance, reports_lost_pose, run_guarded
 from mbf_mesh_nav.path_progress import PathProgress
 from mbf_mesh_nav.plugins import MeshRecovery
 
@@ -57,7 +57,7 @@ class BackUpRecovery(MeshRecovery):
             spot = self.mesh_map.locate_one(pose.position, 1.0)
             if spot is None:
                 return RecoveryResult(RecoveryOutcome.FAILURE, "the robot is more than 1 m from the surface")
-            blocked = blocked_vertices(self.mesh_map, p.cost_limit)
+            blocked = self.mesh_map.snapshot().blocked(p.cost_limit)
             target = progress.point_at(driven + p.lookahead)
             direction = target - np.asarray(pose.position)
             if free_distance(self.mesh_map, blocked, spot, direction, p.clearance + 0.1) > p.clearance:

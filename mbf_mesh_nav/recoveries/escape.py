@@ -18,7 +18,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.goal_approach import arc_to, clamp
-from mbf_mesh_nav.guarded_motion import blocked_vertices, reports_lost_pose, run_guarded
+from mbf_mesh_nav.guarded_motion import reports_lost_pose, run_guarded
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distances
 from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, seeded_arrays, threshold_step
 from mbf_mesh_nav.locate import SurfacePoint
@@ -50,7 +50,7 @@ class EscapeRecovery(MeshRecovery):
         spot = self.mesh_map.locate_one(request.motion.pose().position, 1.0)
         if spot is None:
             return RecoveryResult(RecoveryOutcome.FAILURE, "the robot is more than 1 m from the surface")
-        blocked = blocked_vertices(self.mesh_map, p.cost_limit)
+        blocked = self.mesh_map.snapshot().blocked(p.cost_limit)
         if not blocked[self.mesh_map.faces[spot.face]].any():
             return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on safe ground")
         way = self._way_to_safety(spot, blocked, request)

@@ -1,11 +1,11 @@
-"""Orientations along a path on the surface."""
+"""Poses along a path on the surface: which points are kept, and the orientations there."""
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import quaternions_from_axes
-from mbf_mesh_nav.kernels.path_poses import orientations_along
+from mbf_mesh_nav.kernels.path_poses import distinct_points, orientations_along
 
 
 @given(seed=st.integers(0, 10**6))
@@ -25,3 +25,16 @@ def test_every_pose_but_the_last_equals_the_frame_of_normal_and_way_ahead(seed):
 def test_a_way_straight_up_the_normal_still_gives_a_pose():
     found = orientations_along(np.array([[0.0, 0, 0], [0, 0, 1]]), np.array([[0.0, 0, 1], [0, 0, 1]]))
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=30, deadline=None)
+def test_only_inner_points_that_repeat_their_forerunner_or_the_end_are_dropped(seed):
+    rng = np.random.default_rng(seed)
+    positions = rng.integers(0, 2, (rng.integers(2, 12), 3)).astype(float)
+    kept = [
+        i in (0, len(positions) - 1)
+        or (np.linalg.norm(p - positions[i - 1]) > 1e-6 and np.linalg.norm(p - positions[-1]) > 1e-6)
+        for i, p in enumerate(positions)
+    ]
+    assert distinct_points(positions, 1e-6).tolist() == kept
