@@ -6,7 +6,8 @@ Rule of mesh_navigation: cast a ray from every point downwards and mark the thre
 inf. Deviations: points within ``ground_tolerance`` of the mesh are explained by it and mark nothing; the ray ends at
 ``robot_height``, which has a finite default, so nothing spills to the storey below; hits may be kept for
 ``decay_time`` and are cleared when later rays pass through them; a sensor that is silent for longer than
-``expected_update_rate`` makes the map not current, so that no controller drives on it.
+``expected_update_rate`` makes the map not current, so that no controller drives on it, and so does clearing until the
+next cloud: what was forgotten may still be there.
 Cost: two tree queries a point, about 2 microseconds.
 """
 
@@ -91,11 +92,12 @@ class ObstacleLayer(MeshLayer):
         return NOTHING_CHANGED if kept.all() else self._change(self._faces[kept], self._hits[kept], self._stamps[kept])
 
     def clear(self) -> IntArray:
-        """Forget all hits."""
+        """Forget all hits, and that there was a cloud."""
+        self._last_cloud = -np.inf
         return self._change(self._faces[:0], self._hits[:0], self._stamps[:0])
 
     def is_current(self, now: float) -> bool:
-        """Whether a cloud came within ``expected_update_rate``."""
+        """Whether a cloud came within ``expected_update_rate``, and since the layer was cleared."""
         limit = self.parameters.expected_update_rate
         return limit == 0.0 or now - self._last_cloud <= limit
 

@@ -1,4 +1,7 @@
-"""Forget all sensed obstacles; the static layers stay. Helps when a passing person left marks, costs nothing."""
+"""Forget all sensed obstacles; the static layers stay. Helps when a passing person left marks, costs nothing.
+
+No controller drives before every sensor has seen again: what was forgotten may still be there.
+"""
 
 from __future__ import annotations
 

@@ -176,6 +176,18 @@ def test_map_is_stale_when_no_cloud_came_within_the_expected_rate():
     assert not floor_map().is_current(1e9), "a silent sensor is noticed by default"
 
 
+def test_a_cleared_map_is_not_current_before_it_sees_again():
+    mesh = floor_map()
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 10.0)
+    assert mesh.is_current(10.1)
+
+    mesh.clear()
+
+    assert not mesh.is_current(10.1)
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 10.2)
+    assert mesh.is_current(10.2)
+
+
 def test_changed_robot_height_applies_to_the_next_cloud():
     mesh = floor_map(robot_height=0.3)
     mesh.insert_points(post(2.0, 2.0, 0.5, 0.9), SENSOR, 1.0)

@@ -9,6 +9,7 @@ from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
+from mbf_abstract.relaxation import NO_SLACK, Slack
 from mbf_mesh_nav.layer import NOTHING_CHANGED, LayerContext
 from mbf_mesh_nav.layer_graph import LayerGraph
 from mbf_mesh_nav.layers.inflation import InflationLayer
@@ -164,6 +165,14 @@ def test_relaxed_inflation_comes_back_by_itself(run, plain, paint, make_plugin):
     np.testing.assert_array_equal(mesh_map.snapshot().costs, relaxed)
     mesh_map.update(20.0)
     np.testing.assert_array_equal(mesh_map.snapshot().costs, usual)
+
+
+def test_relaxing_grants_slack_to_planning_and_arrival_until_its_end(make_plugin, plain):
+    recovery = make_plugin(RelaxRecovery, plain(), layer="", planner_tolerance=0.4, angle_tolerance=0.5, duration=20.0)
+    result = recovery.run_behavior(RecoveryRequest(motion=None))
+    assert result.success and "path ends within 0.4 m" in result.message
+    assert recovery.relaxation.slack(19.9) == Slack(plan_distance=0.4, arrival_distance=0.2, arrival_angle=0.5)
+    assert recovery.relaxation.slack(20.0) == NO_SLACK
 
 
 def test_relaxing_a_layer_that_is_not_there_names_those_that_are(run, plain, paint):
