@@ -5,22 +5,29 @@ from __future__ import annotations
 import importlib
 import os
 import platform
+import re
 import socket
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
+from functools import cache
+from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
 import typer
 
 from mbf_abstract.commands.reporting import FAILURE
 
-NEEDED = ("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "h5py")
+NEEDED = (
+    *("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "h5py"),
+    *("PIL", "lxml", "collada"),
+)
 SIMULATION = ("pybullet", "embreex", "matplotlib", "viser", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf")
 DISTRIBUTIONS = {
     "yaml": "pyyaml",
+    "PIL": "pillow",
+    "collada": "pycollada",
     "mcap_protobuf": "mcap-protobuf-support",
     "rerun": "rerun-sdk",
 }  # where the names differ
@@ -64,7 +71,7 @@ def examine() -> Iterator[Finding]:
         yield _package(name, "pip install mbf-flex", optional=False)
     for name in SIMULATION:
         yield _package(name, "needed by mbf run and pictures: pip install 'mbf-flex[sim]'", optional=True)
-    yield _package("rerun", "only for mbf replay --rrd: pip install 'mbf-flex[rerun]'", optional=True)
+    yield _package("rerun", "only for mbf replay --rrd, Python >= 3.11: pip install 'mbf-flex[rerun]'", optional=True)
     yield _check("plugins", _plugins, "mbf plugins tells which and why")
     yield _check("kernel cache", _kernel_cache, "set NUMBA_CACHE_DIR to a folder that can be written")
     yield _check("loopback port", _loopback_port, "a firewall or sandbox forbids sockets: no replay, no live view")
@@ -75,10 +82,27 @@ def _package(name: str, cure: str, optional: bool) -> Finding:
         importlib.import_module(name)
     except Exception as error:
         return Finding(name, f"{type(error).__name__}: {error}", cure, optional)
+    distribution = DISTRIBUTIONS.get(name, name.replace("_", "-"))
     try:
-        return Finding(name, version(DISTRIBUTIONS.get(name, name)))
+        found = version(distribution)
     except PackageNotFoundError:
         return Finding(name, "importable")
+    oldest = oldest_versions().get(distribution, "0")
+    if _numbers(found) < _numbers(oldest):
+        return Finding(name, f"{found}, {oldest} is needed", f"pip install '{distribution}>={oldest}'", optional)
+    return Finding(name, found)
+
+
+@cache
+def oldest_versions() -> dict[str, str]:
+    """Least version of each distribution that this package's own metadata asks for."""
+    asked = (re.match(r"([\w.-]+)>=([\d.]+)", text) for text in requires("mbf-flex") or ())
+    return {match[1]: match[2] for match in asked if match}
+
+
+def _numbers(of: str) -> tuple[int, ...]:
+    """Major, minor and patch of a version."""
+    return tuple(int(number) for number in re.findall(r"\d+", of)[:3])
 
 
 def _check(what: str, look: Callable[[], str], cure: str) -> Finding:

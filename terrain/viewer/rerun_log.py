@@ -29,7 +29,7 @@ def write_rrd(file: str | Path, recording: Recording) -> None:
     try:
         import rerun
     except ImportError as error:
-        raise ViewerMissing(f"run.rrd needs rerun: pip install 'mbf-flex[rerun]' ({error})") from error
+        raise ViewerMissing(f"run.rrd needs rerun (Python >= 3.11): pip install 'mbf-flex[rerun]' ({error})") from error
     with rerun.RecordingStream("mbf-flex", recording_id=recording.scenario) as stream:
         stream.set_log_time_enabled(False)
         stream.set_log_tick_enabled(False)

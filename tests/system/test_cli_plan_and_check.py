@@ -12,6 +12,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
+from mbf_abstract.commands import doctor
 from terrain.heightfield import Heightfield
 
 OFFICE = Path(__file__).resolve().parents[2] / "terrain" / "data" / "office.yaml"
@@ -132,6 +133,21 @@ def test_doctor_finds_this_installation_healthy():
 
     assert result.exit_code == 0, result.output
     assert "python" in result.stdout and "kernel cache" in result.stdout
+
+
+def test_doctor_tells_which_package_is_too_old_and_how_to_mend_that(monkeypatch):
+    monkeypatch.setitem(doctor.oldest_versions(), "numpy", "99.1")
+
+    result = mbf("doctor")
+
+    assert result.exit_code == 1
+    assert "99.1 is needed" in result.stdout and "pip install 'numpy>=99.1'" in result.stdout
+
+
+def test_doctor_knows_the_least_version_of_every_package_it_looks_at():
+    names = {doctor.DISTRIBUTIONS.get(name, name.replace("_", "-")) for name in doctor.NEEDED + doctor.SIMULATION}
+
+    assert names <= set(doctor.oldest_versions())
 
 
 def test_help_imports_nothing_heavy():
