@@ -105,6 +105,11 @@ ABLATIONS = (
 ARMS = {arm.name: arm for arm in (MAIN_A, MAIN_B, *READINGS, *ABLATIONS)}
 
 
+def outdoors(arm: Arm) -> Arm:
+    """Return the arm for the outdoor table, where nothing moves: what blocks the way stays, so its tree waits less."""
+    return replace(arm, tree=replace(arm.tree, controller_max_retries=3, control_retries=1))
+
+
 def without_traffic(arm: Arm) -> Arm:
     """Return the arm in an empty world, for the first sanity gate."""
     return replace(arm, name=f"{arm.name}/empty", conditions=replace(arm.conditions, robots=0))

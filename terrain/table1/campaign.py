@@ -16,7 +16,7 @@ from typing import Any
 from mbf_abstract.yaml_source import load_yaml
 from terrain.sweep_log import SweepLog
 from terrain.table1 import counting, plugin_wrappers, repetition, stage, traffic
-from terrain.table1.arms import ARMS, without_traffic
+from terrain.table1.arms import ARMS, outdoors, without_traffic
 from terrain.table1.counting import Leg, Tally
 from terrain.table1.outdoor_stage import OUTDOOR
 from terrain.table1.repetition import run_repetition
@@ -44,7 +44,7 @@ class Job:
 
 def do(job: Job) -> dict[str, Any]:
     """Run a job and return its row."""
-    arm = ARMS[job.arm]
+    arm = outdoors(ARMS[job.arm]) if job.world == OUTDOOR else ARMS[job.arm]
     row = run_repetition(without_traffic(arm) if job.empty else arm, job.world, job.seed).to_row()
     return {"arm": job.arm, "seed": job.seed, "empty": job.empty, **row}
 
@@ -53,7 +53,8 @@ def parameters_of(world_file: Path) -> dict[str, Any]:
     """Everything a result depends on beside the code: arms, navigation, world, constants."""
     if world_file == OUTDOOR:
         navigation = load_yaml(OUTDOOR.with_name("outdoor_navigation.yaml")).data
-        return {**_parameters_of_arms(), "world": load_yaml(OUTDOOR).data, "navigation": navigation}
+        arms = {name: asdict(outdoors(arm)) for name, arm in ARMS.items()}
+        return {**_parameters_of_arms(), "arms": arms, "world": load_yaml(OUTDOOR).data, "navigation": navigation}
     world = load_world(world_file)
     grid = world.grid()
     return {
