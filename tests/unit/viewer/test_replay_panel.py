@@ -87,7 +87,7 @@ def test_the_legend_names_what_occurs_in_the_run_and_nothing_else(hill_recording
     hill = [name for name, _ in legend_of(hill_recording)]
     office = [name for name, _ in legend_of(replace(office_recording, actors=people))]
 
-    assert hill == ["plan", "driven", "0°", "10°", "20°", "30°", "45°"]
+    assert hill == ["plan", "driven", "slope 0°", "slope 10°", "slope 20°", "slope 30°", "slope 45°"]
     assert office == ["plan", "driven", "seen by a sensor", "on no map", "person"]
     page = with_panel(PAGE, [], legend_of(hill_recording))
     assert "rgb(25,90,220)" in page and ">plan<" in page
