@@ -104,7 +104,8 @@ def failure_of(metrics: Row) -> str:
         return "error"  # it could not even begin
     if PHYSICS & set(metrics["mishaps"]):
         return "physics"
-    return "planner" if metrics["outcome"] in PLANNER_OUTCOMES else "controller"
+    no_plan = metrics["plans"] == 0  # planner and controller share some codes, such as BLOCKED_GOAL
+    return "planner" if no_plan or metrics["outcome"] in PLANNER_OUTCOMES else "controller"
 
 
 def summarise(rows: list[Row]) -> Row:
