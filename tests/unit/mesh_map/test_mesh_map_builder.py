@@ -65,6 +65,20 @@ def test_unknown_repair_is_refused_with_the_configuration():
         MeshMapParameters(repair=("zero_area", "duplicate"))
 
 
+def test_one_layer_type_may_be_used_under_several_names():
+    names = ["gentle", "usual", "strict"]
+    layers = [{"name": name, "type": "steepness"} for name in names]
+    limits = dict(zip(names, ({"threshold": value} for value in (1.2, 0.6, 0.1)), strict=True))
+
+    mesh = build_mesh_map(
+        MeshMapParameters(layers=layers, default_layer="usual"), limits, vertices=VERTICES, faces=FACES
+    )
+
+    lethal = [int(mesh.layers[name].lethal.sum()) for name in names]
+    assert lethal[0] < lethal[1] < lethal[2]
+    np.testing.assert_array_equal(mesh.snapshot().lethal, mesh.layers["usual"].lethal)
+
+
 def test_layer_class_can_be_named_by_module():
     path = f"{RoughnessLayer.__module__}:RoughnessLayer"
     parameters = MeshMapParameters(layers=[{"name": "mine", "type": path}])

@@ -79,6 +79,18 @@ def test_a_wall_across_the_map_is_no_path_found(planner_class, make_plugin, plai
     assert result.outcome == GetPathOutcome.NO_PATH_FOUND
 
 
+def test_a_lethal_wall_that_costs_nothing_is_not_crossed_either(planner_class, make_plugin, plain, paint):
+    mesh_map = paint(plain(), lambda v: np.zeros(len(v)))
+    lethal = np.isinf(wall(mesh_map.vertices))
+    mesh_map.apply(lambda layer: layer.replace(layer.costs.copy(), lethal))
+    planner = make_plugin(planner_class, mesh_map)
+    result = planner.make_plan(PlanRequest(Pose.planar(1.0, 1.0), Pose.planar(5.0, 3.0)))
+    assert result.outcome == GetPathOutcome.NO_PATH_FOUND
+    assert planner.make_plan(PlanRequest(Pose.planar(3.0, 1.0), Pose.planar(5.0, 3.0))).outcome == (
+        GetPathOutcome.BLOCKED_START
+    )
+
+
 def test_a_gap_in_the_wall_is_used_and_the_wall_is_not_touched(planner_class, make_plugin, plain, paint):
     mesh_map = paint(plain(), lambda v: wall(v, open_above=5.0))
     result = make_plugin(planner_class, mesh_map).make_plan(PlanRequest(Pose.planar(1.0, 1.0), Pose.planar(5.0, 1.0)))
