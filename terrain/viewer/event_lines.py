@@ -9,6 +9,7 @@ from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.viewer.event_text import NOTABLE, words
 
 TOLD = NOTABLE | {EventKind.GOAL_FINISHED, EventKind.GOAL_PAUSED, EventKind.GOAL_RESUMED, EventKind.CUSTOM}
+REPLACED = "preempted by a new plan"  # how exe_path ends a goal while the robot drives on along a newer path
 GOOD, BAD, NEITHER = "#1a7f37", "#cf222e", "#6b7280"
 
 
@@ -25,6 +26,11 @@ class Line:
     def colour(self) -> str:
         """Green, red or grey, for CSS."""
         return NEITHER if self.good is None else (GOOD if self.good else BAD)
+
+
+def is_told(event: Event) -> bool:
+    """Whether a reader wants to know of it; not each time a path is swapped for a newer one."""
+    return event.kind in TOLD and event.data.get("message") != REPLACED
 
 
 def line_of(event: Event) -> Line:

@@ -1,4 +1,4 @@
-"""A run from above: shaded ground, walls, plan, driven track, start and goals, as a PNG by matplotlib.
+"""A run from above: shaded ground, walls, what moved, plan, driven track, start and goals, as a PNG by matplotlib.
 
 Use it for reports and READMEs; one look tells what happened. It takes about a second per hundred thousand
 triangles. For motion see ``terrain.viewer.replay``.
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from terrain.recording import Recording, StampedPoints
-from terrain.viewer.colours import DRIVEN, GOAL, OBSTACLE, PLANNED, START, WALL, slope_legend
+from terrain.viewer.colours import ACTORS, DRIVEN, GOAL, OBSTACLE, PLANNED, START, WALL, slope_legend
 from terrain.viewer.shading import shaded_triangles
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ def picture_png(recording: Recording) -> bytes:
     """Draw a recording as the bytes of a PNG file; raises ViewerMissing without matplotlib."""
     figure, axes = new_figure(_extent(recording))
     _draw_world(axes, recording)
+    _draw_actors(axes, recording)
     draw_paths(axes, recording.paths)
     _draw_track(axes, recording)
     draw_marks(axes, recording.start, recording.goals)
@@ -131,6 +132,19 @@ def draw_paths(axes: Axes, paths: list[StampedPoints]) -> None:
         _line(axes, points, PLANNED, 3.6, zorder=5, label="plan")
 
 
+def _draw_actors(axes: Axes, recording: Recording) -> None:
+    """Where people, doors and other robots have been, dotted, and where they were at the end."""
+    labelled: set[str] = set()
+    for track in recording.actors:
+        if not len(track.poses):
+            continue
+        label = None if track.thing in labelled else track.thing
+        labelled.add(track.thing)
+        style: dict[str, Any] = {"color": np.array(ACTORS[track.thing]) / 255.0, "linestyle": ":", "zorder": 3}
+        axes.plot(track.poses[:, 0], track.poses[:, 1], linewidth=1.5, **style)
+        axes.plot(*track.poses[-1, :2], marker="o", markersize=6, label=label, **style)
+
+
 def _draw_track(axes: Axes, recording: Recording) -> None:
     if len(recording.poses):
         _line(axes, recording.poses[:, :2], DRIVEN, 1.5, zorder=6, label="driven track")
@@ -155,4 +169,4 @@ def _label(axes: Axes, recording: Recording) -> None:
     facts = f"{length:.1f} m driven in {recording.duration:.1f} s, tilt up to {tilt:.0f}°"
     axes.set_title(f"{title}\n", loc="left", fontsize=12, fontweight="bold")
     axes.text(0.0, 1.015, facts, transform=axes.transAxes, fontsize=9, color="#444444")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=5, frameon=False, fontsize=9)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=6, frameon=False, fontsize=9)

@@ -12,7 +12,7 @@ from typing import Any
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import SYMBOLS
-from terrain.viewer.event_lines import TOLD, line_of
+from terrain.viewer.event_lines import is_told, line_of
 from terrain.viewer.legend import Entry, legend_html
 from terrain.viewer.tree_html import COLOURS, INDENT
 
@@ -84,7 +84,7 @@ def with_panel(page: str, events: Iterable[Event], legend: Iterable[Entry] = ())
 
 def _data(events: tuple[Event, ...]) -> dict[str, Any]:
     """What the script goes through: the runs of trees with their changes, and the lines, all by time [s]."""
-    lines = [line_of(event) for event in events if event.kind in TOLD]
+    lines = [line_of(event) for event in events if is_told(event)]
     trees: list[dict[str, Any]] = []
     for event in events:
         if event.kind is EventKind.TREE:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import NodeState, TreeState
-from terrain.viewer.event_lines import TOLD, Line, line_of
+from terrain.viewer.event_lines import Line, is_told, line_of
 
 MAX_LINES = 60
 
@@ -36,11 +36,11 @@ class LiveLog:
 
     def write(self, event: Event) -> None:
         """Take one event."""
-        is_told = event.kind in TOLD
-        if not (is_told or event.kind is EventKind.TREE):
+        told = is_told(event)
+        if not (told or event.kind is EventKind.TREE):
             return
         with self._lock:
-            if is_told:
+            if told:
                 line = line_of(event)
                 self._lines.appendleft(line)
                 if event.kind is EventKind.GOAL_FINISHED:

@@ -1,16 +1,18 @@
 """Pictures show what was recorded: the right colours at the right places."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from mbf_abstract.geometry import Pose
+from terrain.actor_track import ActorTrack
 from terrain.recorder import Recorder
 from terrain.recording import RobotShape, Surface
 from terrain.robot_models import HUSKY
-from terrain.viewer.colours import DRIVEN, OBSTACLE, PLANNED, WALL, linear_for_viewer, slope_colours
+from terrain.viewer.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, WALL, linear_for_viewer, slope_colours
 from terrain.viewer.picture import picture_png, write_picture
 from terrain.viewer.shading import shaded_triangles, vertex_colours
 
@@ -28,6 +30,16 @@ def test_the_picture_of_an_office_shows_walls_plan_track_and_box(office_recordin
 
     for colour in (WALL, PLANNED, DRIVEN, OBSTACLE):
         assert count(pixels, colour) > 100, colour
+
+
+def test_the_picture_of_an_office_shows_where_people_have_been(office_recording):
+    poses = office_recording.poses + np.array([0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    person = ActorTrack("person", np.zeros((0, 3)), np.zeros((0, 3), np.int32), poses)
+
+    with_person = pixels_of(picture_png(replace(office_recording, actors=[person])))
+
+    assert count(with_person, ACTORS["person"]) > 100
+    assert count(pixels_of(picture_png(office_recording)), ACTORS["person"]) == 0
 
 
 def test_the_picture_of_hills_is_written_to_the_file(hill_recording, tmp_path):

@@ -125,6 +125,14 @@ def test_the_log_keeps_the_last_end_of_each_action_and_the_newest_line_first():
     assert snapshot.ends["get_path"].text == "CANCELED: enough"
 
 
+def test_a_path_that_is_swapped_for_a_newer_one_is_no_news():
+    log = LiveLog()
+    log.write(finished(2.0, "exe_path", 101, "preempted by a new plan"))
+    log.write(finished(3.0, "exe_path", 101, "canceled in the live view"))
+
+    assert [line.text for line in log.snapshot().lines] == ["CANCELED: canceled in the live view"]
+
+
 def test_a_snapshot_of_the_tree_does_not_change_when_the_tree_does():
     log = LiveLog()
     log.write(Event(0.0, EventKind.TREE, "tree", {"tree": "t", "nodes": [{"name": "n", "type": "T", "depth": 0}]}))
