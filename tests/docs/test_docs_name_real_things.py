@@ -10,11 +10,16 @@ import yaml
 from mbf_abstract.actions.handle import GoalHandle
 from mbf_abstract.cli import make_app
 from mbf_abstract.config import PLUGIN_LISTS
+from mbf_abstract.geometry import Path as GeometricPath
+from mbf_abstract.geometry import Pose
 from mbf_abstract.map_queries import MapQueries
 from mbf_abstract.navigation_parameters import NavigationParameters
 from mbf_abstract.navigator import Navigator
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_abstract.registry import PluginRegistry
 from mbf_abstract.server import AbstractNavigationServer
+from mbf_mesh_nav.plugins import MeshPlanner
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGES = sorted(page for page in DOCS.glob("*.md"))
@@ -103,3 +108,19 @@ def test_every_parameter_of_the_name_tables_exists():
     table = [name for name in kept if name.startswith(("planner_", "controller_", "oscillation_", "shutdown_"))]
 
     assert table and set(table) <= set(NavigationParameters.model_fields)
+
+
+def test_the_planner_of_the_readme_plans():
+    """The listing has no imports, so that it is short; these are the names it needs."""
+    text = (DOCS.parent / "README.md").read_text("utf-8")
+    listing = next(block for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL) if "(MeshPlanner)" in block)
+    names = {
+        "MeshPlanner": MeshPlanner, "PlanRequest": PlanRequest, "PlanResult": PlanResult, "Path": GeometricPath,
+        "GetPathOutcome": GetPathOutcome,
+    }  # fmt: skip
+    exec(listing, names)
+
+    result = names["StraightLine"].make_plan(None, PlanRequest(Pose.planar(0.0, 0.0), Pose.planar(3.0, 4.0, 1.0)))
+
+    assert result.success and result.path.length == pytest.approx(5.0)
+    assert len(listing.splitlines()) < 20
