@@ -103,20 +103,18 @@ def propagate_wave(
                 continue
             known, free = first, second
             to_known, to_free, between = corner_weights[record, 0], corner_weights[record, 1], corner_weights[record, 2]
-            if states == _ONE_FREE:
-                if state[first] == _FREE:
-                    known, free = second, first
-                    to_known, to_free = to_free, to_known
-            else:  # only an obtuse corner can gain now, and that lies opposite to the longest side
-                if to_free > to_known:
-                    known, free = second, first
-                    to_known, to_free = to_free, to_known
-                if to_known * to_known <= OBTUSE * (to_free * to_free + between * between) or predecessors[free] < 0:
+            if states == _ALL_SETTLED:  # only an obtuse corner can gain now, and that lies opposite to the longest side
+                longer, shorter = max(to_known, to_free), min(to_known, to_free)
+                if longer * longer <= OBTUSE * (shorter * shorter + between * between):
                     continue
+            if state[first] == _FREE or (states == _ALL_SETTLED and to_free > to_known):
+                known, free = second, first
+                to_known, to_free = to_free, to_known
             distance, side = unfolded_distance(
                 distances[vertex], distances[known], distances[free], to_known, to_free, between
             )
-            if not distance < distances[free]:
+            is_seed = states == _ALL_SETTLED and predecessors[free] < 0
+            if is_seed or not distance < distances[free]:
                 continue
             nearer = vertex if side == 1 or (side == 0 and distances[vertex] < distances[known]) else known
             if distance <= distances[nearer]:  # an obtuse corner close behind its long side
