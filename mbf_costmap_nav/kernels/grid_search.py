@@ -36,11 +36,10 @@ FIRST_ROOM = 4096
 LARGEST_FLOAT = np.float32(np.finfo(np.float32).max)
 
 
-@kernel
 def pad_cells(cells: NDArray[np.uint8], border: int) -> NDArray[np.uint8]:
     """Copy (height, width) cells into a flat ((height + 2) * (width + 2),) array framed by ``border``."""
     height, width = cells.shape
-    padded = np.full((height + 2, width + 2), np.uint8(border), dtype=np.uint8)
+    padded = np.full((height + 2, width + 2), border, dtype=np.uint8)
     padded[1:-1, 1:-1] = cells
     return padded.reshape(-1)
 
@@ -53,7 +52,6 @@ def octile_distance(dx: Integer, dy: Integer) -> np.float32:
     return np.float32(dx) + (SQRT2 - np.float32(1.0)) * np.float32(dy)
 
 
-@kernel
 def search(
     cells: NDArray[np.uint8],
     stride: int,
@@ -96,7 +94,29 @@ def search(
         Cost from the start in traversal times cells, inf where not reached. Exact for settled cells, an upper bound
         at the rim of the search.
     """
-    g = np.full(cells.size, INF, dtype=np.float32)
+    # numpy's own arrays, not the kernel's: numpy asks the system for huge pages, and a wave touches many pages at once.
+    g, queued = np.full(cells.size, INF, dtype=np.float32), np.full(cells.size, IDLE, dtype=np.uint8)
+    status = _search(
+        cells, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, g, queued
+    )
+    return status, g
+
+
+@kernel
+def _search(
+    cells: NDArray[np.uint8],
+    stride: int,
+    table: NDArray[np.float32],
+    start: int,
+    goal: int,
+    heuristic_scale: float,
+    cut_corners: bool,
+    interpolated: bool,
+    cancel_flag: NDArray[np.uint8],
+    g: NDArray[np.float32],
+    queued: NDArray[np.uint8],
+) -> int:
+    """Fill ``g``, given full of inf, and return the status; ``queued`` is given full of IDLE."""
     halves = (np.float32(0.5) * table).astype(np.float32)
     side_limit = INF if cut_corners else LARGEST_FLOAT
     scale, columns = np.float32(heuristic_scale), np.uint32(stride)
@@ -106,7 +126,6 @@ def search(
     width = bucket_width(table, 2.0)
     inverse_width = np.float32(1.0) / width
     buckets, counts = np.empty((RING, FIRST_ROOM), dtype=np.int32), np.zeros(RING, dtype=np.int64)
-    queued = np.full(cells.size, IDLE, dtype=np.uint8)
     fresh = np.empty(8 * FIRST_ROOM, dtype=np.int32)
     g[start] = 0.0
     bucket = int(scale * octile_distance(abs(start % stride - goal_x), abs(start // stride - goal_y)) * inverse_width)
@@ -120,10 +139,10 @@ def search(
         if counts[slot] == 0:
             bucket += 1
             if goal >= 0 and np.float32(bucket) * width >= g[goal]:
-                return FOUND, g
+                return FOUND
             continue
         if cancel_flag[0] != 0:
-            return CANCELED, g
+            return CANCELED
 
         # 3. Relax all of it.
         if fresh.size < 8 * counts[slot]:
@@ -151,4 +170,4 @@ def search(
             counts[slot] += is_new
             waiting += is_new
             queued[cell] = slot
-    return (FOUND if goal >= 0 and g[goal] < INF else EXHAUSTED), g
+    return FOUND if goal >= 0 and g[goal] < INF else EXHAUSTED

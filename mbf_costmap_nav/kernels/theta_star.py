@@ -174,7 +174,6 @@ def _expand_bucket(
     return count
 
 
-@kernel
 def theta_search(
     cells: NDArray[np.uint8],
     stride: int,
@@ -199,9 +198,26 @@ def theta_search(
     origin : (n,) uint8
         Codes of where the straight line to a cell comes from, for ``trace_lines``.
     """
-    # The sign of g tells settled cells (negative or zero) from credited ones, so that one look-up answers both.
-    g = np.full(cells.size, INF, dtype=np.float32)
+    # numpy's own arrays, for huge pages, as in grid_search
+    g, queued = np.full(cells.size, INF, dtype=np.float32), np.full(cells.size, IDLE, dtype=np.uint8)
     origin = np.full(cells.size, HERE, dtype=np.uint8)
+    return _search(cells, stride, table, start, goal, cancel_flag, g, queued, origin), g, origin
+
+
+@kernel
+def _search(
+    cells: NDArray[np.uint8],
+    stride: int,
+    table: NDArray[np.float32],
+    start: int,
+    goal: int,
+    cancel_flag: NDArray[np.uint8],
+    g: NDArray[np.float32],
+    queued: NDArray[np.uint8],
+    origin: NDArray[np.uint8],
+) -> int:
+    """Fill ``g`` and ``origin``, given full of inf and HERE, and return the status; ``queued`` is full of IDLE."""
+    # The sign of g tells settled cells (negative or zero) from credited ones, so that one look-up answers both.
     columns = np.uint32(stride)
     goal_x, goal_y = goal % stride, goal // stride
     crossed = (CROSSED[:, :, 0] + stride * CROSSED[:, :, 1]).astype(np.uint64)
@@ -210,7 +226,6 @@ def theta_search(
     width = bucket_width(table, 4.0)
     inverse_width = np.float32(1.0) / width
     buckets, counts = np.empty((RING, FIRST_ROOM), dtype=np.int32), np.zeros(RING, dtype=np.int64)
-    queued = np.full(cells.size, IDLE, dtype=np.uint8)
     fresh = np.empty(8 * FIRST_ROOM, dtype=np.int32)
     g[start] = 0.0
     bucket = int(octile_distance(abs(start % stride - goal_x), abs(start // stride - goal_y)) * inverse_width)
@@ -260,4 +275,4 @@ def theta_search(
         status = FOUND
     for i in range(np.uint64(g.size)):
         g[i] = -g[i] if g[i] <= 0.0 else INF
-    return status, g, origin
+    return status
