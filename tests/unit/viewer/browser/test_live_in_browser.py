@@ -26,6 +26,7 @@ SCENARIO = {
     "start": {"x": 3.0, "y": 5.0},
     "goals": [{"x": 9.0, "y": 5.0}],
     "sensors": [{"name": "lidar", "rays": 90}],
+    "actors": [{"type": "walker", "route": [[6.0, 7.0], [6.5, 7.0]], "speed": 0.1}],
 }
 SPEED = "0.1"  # of real time: however slow the browser is, the robot is still under way when the page asks for more
 CANVAS = "document.querySelector('canvas')"
@@ -77,7 +78,7 @@ def test_the_page_shows_the_run_and_steers_it(chromium, served_run, tmp_path):
     assert_the_log_tells_what_was_asked_for(list(read_events(folder / "events.jsonl")))
     assert answer["outcome_name"] == "CANCELED"
     assert (folder / "replay.html").is_file()
-    assert_the_ground_is_seen(png)
+    assert_the_ground_and_the_person_are_seen(png)
 
 
 def assert_the_log_tells_what_was_asked_for(events):
@@ -90,7 +91,9 @@ def assert_the_log_tells_what_was_asked_for(events):
     assert asked[1].time <= paused[0] < asked[2].time
 
 
-def assert_the_ground_is_seen(png):
+def assert_the_ground_and_the_person_are_seen(png):
     pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
     greenish = (pixels[..., 1] > pixels[..., 2] + 20) & (pixels[..., 1] > pixels[..., 0] - 40)
     assert greenish.mean() > 0.05, "green ground fills a good part of the picture"
+    violet = (pixels[..., 0] > pixels[..., 1] + 50) & (pixels[..., 2] > pixels[..., 0] + 10)
+    assert violet.mean() > 0.001, "somebody stands there"
