@@ -24,7 +24,7 @@ from terrain.viewer.scene import add_surroundings, look_at_route, pin_height
 from terrain.viewer.tree_html import tree_html
 
 PANEL_WIDTH = 320  # pixels
-FARTHER = 1.35  # than in a replay, because the panels leave less room for the scene
+FARTHER = 1.6  # than in a replay, because the panels leave less room for the scene and the labels at its ends
 NO_TREE = "No behaviour tree runs; start with --executive navigation to see one."
 PLOT_EVERY = 5  # frames
 
