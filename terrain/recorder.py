@@ -25,6 +25,7 @@ from terrain.recording import Recording, RobotShape, StampedPoints, Surface
 MAP_PERIOD = 5.0  # s at least between two looks at the map
 MAX_GRID_CELLS = 4_000_000  # larger maps are not recorded
 MAX_MESH_VERTICES = 1_000_000  # nor are these
+MAX_MAP_COSTS = 200_000_000  # of all maps of a run together, a byte or two each; later ones are not recorded
 
 
 @dataclass(eq=False)
@@ -40,6 +41,8 @@ class Recorder:
         More may be added to ``goals`` during the run.
     actors : sequence of Actor
         What moves by itself; looked at with every sample.
+    map_budget : int
+        How many costs of maps may still be recorded.
     """
 
     scenario: str
@@ -55,6 +58,7 @@ class Recorder:
     grids: list[RecordedGrid] = field(default_factory=list)
     meshes: list[RecordedMesh] = field(default_factory=list)
     actors: Sequence[Actor] = ()
+    map_budget: int = MAX_MAP_COSTS
     _actor_poses: list[list[list[float]]] = field(default_factory=list)
     _next_map: float = -math.inf
     _samples: list[list[float]] = field(default_factory=list)
@@ -76,10 +80,11 @@ class Recorder:
 
     def map(self, time: float, look: Callable[[], MapView | None]) -> None:
         """Add what the map looks like now, unless it is too large or was looked at some seconds ago."""
-        if time < self._next_map:
+        if time < self._next_map or self.map_budget <= 0:
             return
         self._next_map = time + MAP_PERIOD
         view = look()
+        self.map_budget -= 0 if view is None else view.costs.size
         if isinstance(view, GridView) and view.costs.size <= MAX_GRID_CELLS:
             self.grids.append(RecordedGrid.of(time, view))
         elif isinstance(view, MeshView) and view.costs.size <= MAX_MESH_VERTICES:

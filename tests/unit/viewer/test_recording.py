@@ -134,6 +134,16 @@ def test_only_maps_of_a_sensible_size_are_recorded():
     assert recorder.grids == [] and recorder.meshes == []
 
 
+def test_a_run_without_end_does_not_record_maps_without_end():
+    recorder = Recorder("mapped", "costmap", RobotShape.of(HUSKY), Pose.planar(0, 0), [], map_budget=10)
+    view = GridView(np.zeros((2, 3), np.float32), (0.0, 1.0, 0.0, 1.0))
+
+    for turn in range(9):
+        recorder.map(MAP_PERIOD * turn, lambda: view)
+
+    assert len(recorder.grids) == 2
+
+
 class Pacer:
     """An actor that takes a step with every look at it."""
 
