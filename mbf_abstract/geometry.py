@@ -297,16 +297,16 @@ class Path:
             orientations = np.array(self.orientations, dtype=np.float64).reshape(-1, 4)
         if len(positions) != len(orientations):
             raise ValueError(f"{len(positions)} positions but {len(orientations)} orientations")
-        bad = np.flatnonzero(~(np.isfinite(positions).all(axis=1) & np.isfinite(orientations).all(axis=1)))
-        if bad.size:
-            i = int(bad[0])
+        # Whole arrays first: which pose is wrong is looked for only if one is.
+        if not (np.isfinite(positions).all() and np.isfinite(orientations).all()):
+            i = int(np.flatnonzero(~np.isfinite(np.hstack([positions, orientations])).all(axis=1))[0])
             raise NonFiniteError(
                 f"pose {i} of the path is not finite: {positions[i].tolist()} {orientations[i].tolist()}"
             )
-        norms = np.sum(orientations**2, axis=1)
-        bad = np.flatnonzero(np.abs(norms - 1.0) > QUATERNION_NORM_TOLERANCE)
-        if bad.size:
-            i = int(bad[0])
+        norms = np.einsum("ij,ij->i", orientations, orientations)
+        wrong = np.abs(norms - 1.0) > QUATERNION_NORM_TOLERANCE
+        if wrong.any():
+            i = int(np.argmax(wrong))
             raise ValueError(f"orientation of pose {i} has squared norm {norms[i]:.6g}, expected 1")
         positions.flags.writeable = False
         orientations.flags.writeable = False
