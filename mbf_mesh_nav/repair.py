@@ -14,9 +14,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from mbf_mesh_nav.kernels.defects import (
-    component_roots,
     face_area_vectors,
     faces_without_area,
     repeated_faces,
@@ -269,18 +270,17 @@ class _Check:
         return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]))
 
     def components(self, mesh: CheckedMesh) -> CheckedMesh:
-        roots = component_roots(mesh.faces, len(mesh.vertices))
-        used = roots >= 0
-        if used.any() and (roots[used] == roots[used][0]).all():
-            return mesh
-        names, first, sizes = np.unique(roots[used], return_index=True, return_counts=True)
+        used = np.zeros(len(mesh.vertices), dtype=np.bool_)
+        used[mesh.faces] = True
+        labels = component_labels(mesh.faces, len(mesh.vertices))
+        names, first, sizes = np.unique(labels[used], return_index=True, return_counts=True)
         if len(names) < 2:
             return mesh
         text = f"{{count}} components, the largest with {sizes.max()} of {sizes.sum()} vertices"
         self.found("components", text, mesh.vertex_source[np.flatnonzero(used)[first]])
         if "small_components" not in self.repair:
             return mesh
-        small = used & (roots != names[np.argmax(sizes)])
+        small = used & (labels != names[np.argmax(sizes)])
         self.found("small_components", "{count} vertices belong to smaller components", mesh.vertex_source[small])
         return mesh.without_faces(small[mesh.faces[:, 0]]).without_vertices(small)
 
@@ -289,3 +289,11 @@ class _Check:
         unused[mesh.faces] = False
         self.found("unreferenced", "{count} vertices belong to no face", mesh.vertex_source[unused])
         return mesh.without_vertices(unused) if unused.any() and "unreferenced" in self.repair else mesh
+
+
+def component_labels(faces: IntArray, vertex_count: int) -> IntArray:
+    """Number of the component of every vertex (V,); vertices without a face are components of their own."""
+    first, second = faces[:, :2].ravel(), faces[:, 1:].ravel()
+    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(vertex_count, vertex_count))
+    labels: IntArray = connected_components(graph, directed=False)[1]
+    return labels

@@ -13,6 +13,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from mbf_mesh_nav.kernels import topology as kernels
 
@@ -115,6 +117,9 @@ def build_topology(
     face_offsets, incident = kernels.faces_of_vertices(sorted_faces, len(sorted_vertices))
     offsets, neighbours = kernels.neighbours_of_vertices(sorted_faces, face_offsets, incident)
     edges, edge_ids, lengths = kernels.edges_of_neighbours(sorted_vertices, offsets, neighbours)
+    graph = csr_array(
+        (np.ones(len(neighbours), dtype=np.int8), neighbours, offsets), shape=(len(vertices), len(vertices))
+    )
     face_normals = kernels.unit_face_normals(sorted_vertices, sorted_faces)
     identity = np.arange(len(vertices), dtype=np.int32) if input_to_given is None else input_to_given
     return MeshTopology(
@@ -130,7 +135,7 @@ def build_topology(
         vertex_face_offsets=face_offsets,
         vertex_faces=incident,
         face_neighbours=kernels.faces_across_edges(sorted_faces, face_offsets, incident),
-        components=kernels.connected_components(offsets, neighbours),
+        components=connected_components(graph, directed=False)[1],
         input_to_internal=np.where(identity >= 0, position[identity], -1).astype(np.int32),
         internal_to_input=_renumbered(vertex_source, vertex_order),
         internal_to_input_faces=_renumbered(face_source, face_order),
@@ -145,7 +150,7 @@ def _locality_order(vertices: FloatArray, faces: IntArray) -> tuple[NDArray[np.i
     """Orders of vertices and of faces (by centroid) along the Morton curve of the bounding cube."""
     lower = vertices.min(axis=0)
     cell = max(float((vertices.max(axis=0) - lower).max()), 1e-12) / (2**21 - 1)
-    centroids = kernels.face_centroids(vertices, faces)
+    centroids = (vertices[faces[:, 0]] + vertices[faces[:, 1]] + vertices[faces[:, 2]]) / 3.0
     vertex_order = np.argsort(kernels.morton_codes(vertices, lower, cell), kind="stable")
     face_order = np.argsort(kernels.morton_codes(centroids, lower, cell), kind="stable")
     return vertex_order, face_order

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
 from mbf_mesh_nav.kernels.near_far import IN_FAR, IN_NEAR, UNQUEUED, after, raise_threshold
 
@@ -105,7 +105,7 @@ def search_towards(
         tail, far_count, threshold = raise_threshold(near, far, state, totals, tail, far_count, threshold, step)
 
 
-@kernel
+@inner_kernel
 def straight_line_bound(vertices: NDArray[np.float64], vertex: int, goal: NDArray[np.float64]) -> np.float32:
     """Straight-line distance [m] from a vertex to the goal, rounded down."""
     dx = vertices[vertex, 0] - goal[0]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -63,7 +63,7 @@ def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, NDAr
     return boxes, starts
 
 
-@kernel
+@inner_kernel
 def squared_distance_to_box(boxes: FloatArray, node: int, x: float, y: float, z: float) -> float:
     """Squared distance [m^2] from a point to a box, 0 inside."""
     dx = max(boxes[node, 0] - x, 0.0, x - boxes[node, 3])

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import Int32Array
 
 
@@ -38,7 +38,7 @@ def build_corner_slots(
     return slots
 
 
-@kernel
+@inner_kernel
 def _slot(neighbour_offsets: Int32Array, neighbours: Int32Array, vertex: int, other: int) -> int:
     slot = neighbour_offsets[vertex]
     while neighbours[slot] != other:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -72,7 +72,7 @@ def surplus_faces(faces: IntArray, face_offsets: IntArray, incident: IntArray) -
     return surplus
 
 
-@kernel
+@inner_kernel
 def runs_along(faces: IntArray, face: int, start: int, end: int) -> bool:
     """Whether the winding of ``face`` passes from ``start`` directly to ``end``."""
     for corner in range(3):
@@ -136,32 +136,3 @@ def face_area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
         areas[face, 0], areas[face, 1], areas[face, 2] = 0.5 * nx, 0.5 * ny, 0.5 * nz
         areas[face, 3] = 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
     return areas
-
-
-@kernel
-def component_roots(faces: IntArray, vertex_count: int) -> IntArray:
-    """For every vertex the least vertex of its component (V,), -1 without a face; union-find over the faces."""
-    roots = np.full(vertex_count, -1, dtype=np.int32)
-    for face in range(faces.shape[0]):
-        for corner in range(3):
-            vertex = faces[face, corner]
-            if roots[vertex] < 0:
-                roots[vertex] = vertex
-    for face in range(faces.shape[0]):
-        for corner in range(2):
-            first, second = faces[face, corner], faces[face, corner + 1]
-            while roots[first] != first:
-                roots[first] = roots[roots[first]]
-                first = roots[first]
-            while roots[second] != second:
-                roots[second] = roots[roots[second]]
-                second = roots[second]
-            if first < second:
-                roots[second] = first
-            else:
-                roots[first] = second
-    # Links point to smaller vertices, so one ascending pass flattens them.
-    for vertex in range(vertex_count):
-        if roots[vertex] >= 0:
-            roots[vertex] = roots[roots[vertex]]
-    return roots

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import Float32Array, Int32Array
 from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, between, difference, dot, norm, row, set_row
 
@@ -111,7 +111,7 @@ def _note(points: Float64Array, point_faces: Int32Array, count: int, point: Vect
     point_faces[count] = face
 
 
-@kernel
+@inner_kernel
 def _grown(points: Float64Array, point_faces: Int32Array, capacity: int) -> tuple[Float64Array, Int32Array]:
     more_points, more_faces = np.empty((capacity, 3)), np.empty(capacity, dtype=np.int32)
     for i in range(len(points)):
@@ -120,17 +120,17 @@ def _grown(points: Float64Array, point_faces: Int32Array, capacity: int) -> tupl
     return more_points, more_faces
 
 
-@kernel
+@inner_kernel
 def _is_reached(corners: Int32Array, distances: Float32Array) -> bool:
     return bool(distances[corners[0]] < np.inf and distances[corners[1]] < np.inf and distances[corners[2]] < np.inf)
 
 
-@kernel
+@inner_kernel
 def _has_corner(corners: Int32Array, vertex: int) -> bool:
     return bool(corners[0] == vertex or corners[1] == vertex or corners[2] == vertex)
 
 
-@kernel
+@inner_kernel
 def _best_corner(vertices: Float64Array, corners: Int32Array, distances: Float32Array, point: Vector) -> int:
     """Return the corner over which the way from ``point`` is shortest."""
     best, best_total = Count(corners[0]), np.inf
@@ -142,14 +142,14 @@ def _best_corner(vertices: Float64Array, corners: Int32Array, distances: Float32
     return best  # type: ignore[no-any-return]
 
 
-@kernel
+@inner_kernel
 def _face_edges(vertices: Float64Array, corners: Int32Array) -> tuple[Vector, Vector]:
     """Edge vectors from corner 0 of a face to corners 1 and 2."""
     origin = row(vertices, Count(corners[0]))
     return difference(row(vertices, Count(corners[1])), origin), difference(row(vertices, Count(corners[2])), origin)
 
 
-@kernel
+@inner_kernel
 def _descent_direction(vertices: Float64Array, corners: Int32Array, distances: Float32Array) -> Vector:
     """Negative gradient of the linear field on a face; its length is the slope of the field."""
     e1, e2 = _face_edges(vertices, corners)
@@ -161,7 +161,7 @@ def _descent_direction(vertices: Float64Array, corners: Int32Array, distances: F
     return s1 * e1[0] + s2 * e2[0], s1 * e1[1] + s2 * e2[1], s1 * e1[2] + s2 * e2[2]
 
 
-@kernel
+@inner_kernel
 def _barycentric_rates(vertices: Float64Array, corners: Int32Array, direction: Vector) -> Vector:
     """Change of the barycentric coordinates per unit of a direction in the face's plane."""
     e1, e2 = _face_edges(vertices, corners)
@@ -172,7 +172,7 @@ def _barycentric_rates(vertices: Float64Array, corners: Int32Array, direction: V
     return -second - third, second, third
 
 
-@kernel
+@inner_kernel
 def _leave_face(
     vertices: Float64Array, corners: Int32Array, distances: Float32Array, point: Vector
 ) -> tuple[Vector, int, float]:
@@ -198,7 +198,7 @@ def _leave_face(
     return exit_point, exit_corner, share
 
 
-@kernel
+@inner_kernel
 def _leads_away_from_edge(
     vertices: Float64Array, corners: Int32Array, distances: Float32Array, left: int, right: int
 ) -> bool:
@@ -212,7 +212,7 @@ def _leads_away_from_edge(
     return False
 
 
-@kernel
+@inner_kernel
 def _steepest_way(
     vertices: Float64Array,
     faces: Int32Array,

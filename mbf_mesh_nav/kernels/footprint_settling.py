@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
 from mbf_mesh_nav.kernels.neighbourhood_layers import collect_neighbourhood
 
 IntArray = NDArray[np.int32]
@@ -22,7 +22,7 @@ LEAST_UPWARD = 0.05
 """z of the normal below which a face is a wall that carries no wheel."""
 
 
-@kernel
+@inner_kernel
 def face_below(
     vertices: FloatArray, faces: IntArray, normals: FloatArray, face_neighbours: IntArray, face: int, x: float, y: float
 ) -> int:
@@ -44,7 +44,7 @@ def face_below(
     return -1
 
 
-@kernel
+@inner_kernel
 def wheel_heights(
     vertices: FloatArray,
     faces: IntArray,
@@ -74,7 +74,7 @@ def wheel_heights(
         heights[index] = vertices[a, 2] - slope / normals[face, 2]
 
 
-@kernel
+@inner_kernel
 def upward_face(normals: FloatArray, offsets: IntArray, incident: IntArray, vertex: int) -> int:
     """Face around a vertex that looks up most, -1 if it has none that carries a wheel."""
     best, best_z = -1, LEAST_UPWARD

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import Int32Array
 from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, between, difference, dot, row, set_row
 
@@ -86,7 +86,7 @@ def pull_taut(
     return points
 
 
-@kernel
+@inner_kernel
 def _unfold(
     vertices: Float64Array,
     faces: Int32Array,
@@ -119,7 +119,7 @@ def _unfold(
     return flat_start, _placed(vertices, a, b, flat_a, flat_b, goal, 1.0)
 
 
-@kernel
+@inner_kernel
 def _placed(
     vertices: Float64Array, a: int, b: int, flat_a: FlatPoint, flat_b: FlatPoint, point: Vector, side: float
 ) -> FlatPoint:
@@ -138,18 +138,18 @@ def _left(flat_portals: Float64Array, index: int) -> FlatPoint:
     return flat_portals[index, 0], flat_portals[index, 1]
 
 
-@kernel
+@inner_kernel
 def _right(flat_portals: Float64Array, index: int) -> FlatPoint:
     return flat_portals[index, 2], flat_portals[index, 3]
 
 
-@kernel
+@inner_kernel
 def _set_portal(flat_portals: Float64Array, index: int, left: FlatPoint, right: FlatPoint) -> None:
     flat_portals[index, 0], flat_portals[index, 1] = left
     flat_portals[index, 2], flat_portals[index, 3] = right
 
 
-@kernel
+@inner_kernel
 def _turn(origin: FlatPoint, first: FlatPoint, second: FlatPoint) -> float:
     """Positive if ``second`` lies to the left of the ray from ``origin`` through ``first``."""
     ax, ay = first[0] - origin[0], first[1] - origin[1]
@@ -157,12 +157,12 @@ def _turn(origin: FlatPoint, first: FlatPoint, second: FlatPoint) -> float:
     return ax * by - ay * bx
 
 
-@kernel
+@inner_kernel
 def _same(first: FlatPoint, second: FlatPoint) -> bool:
     return abs(first[0] - second[0]) + abs(first[1] - second[1]) < 1e-12
 
 
-@kernel
+@inner_kernel
 def _cross_portals(
     vertices: Float64Array,
     portals: Int32Array,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.astar import straight_line_bound
-from mbf_mesh_nav.kernels.compiled import Count, Index, kernel
+from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
 from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
@@ -110,14 +110,14 @@ def search_with_heading(
     return best_state
 
 
-@kernel
+@inner_kernel
 def _shortest_turn(heading: int, new_heading: int) -> int:
     """Steps to turn from one heading to another the short way, left positive."""
     turn = (int(new_heading) - int(heading)) % HEADINGS
     return turn if turn <= HEADINGS // 2 else turn - HEADINGS
 
 
-@kernel
+@inner_kernel
 def _may_turn(allowed: BoolArray, vertex: int, heading: int, turn: int) -> bool:
     """Whether all headings the robot passes, the new one included, are allowed at the vertex."""
     step = 1 if turn > 0 else -1

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -56,7 +56,7 @@ def front_arrival(d1: float, d2: float, bb: float, aa: float, dot: float) -> flo
     return np.inf
 
 
-@kernel
+@inner_kernel
 def face_offer(vertices: FloatArray, vertex: int, v1: int, d1: float, v2: int, d2: float) -> tuple[float, int, int]:
     """Return the least distance one face offers its corner ``vertex``, and the one or two corners it comes from."""
     aa = bb = dot = 0.0

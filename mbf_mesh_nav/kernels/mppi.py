@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import BoolArray, Float32Array, Int32Array
 from mbf_mesh_nav.kernels.surface_walk import turned, walk
 from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, dot, row
@@ -115,12 +115,12 @@ def score_rollouts(
     return scores, collided
 
 
-@kernel
+@inner_kernel
 def _is_forbidden(faces: Int32Array, blocked: BoolArray, face: int) -> bool:
     return bool(blocked[faces[face, 0]] or blocked[faces[face, 1]] or blocked[faces[face, 2]])
 
 
-@kernel
+@inner_kernel
 def _squared_distance(points: Float64Array, index: int, point: Vector) -> float:
     dx, dy, dz = points[index, 0] - point[0], points[index, 1] - point[1], points[index, 2] - point[2]
     return float(dx * dx + dy * dy + dz * dz)

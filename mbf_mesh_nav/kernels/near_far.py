@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
 
 UNQUEUED, IN_NEAR, IN_FAR = 0, 1, 2
 
@@ -25,7 +25,7 @@ def after(place: int, ring: NDArray[np.int32]) -> int:
     return following if following < Index(len(ring)) else Index(0)  # type: ignore[no-any-return]
 
 
-@kernel
+@inner_kernel
 def raise_threshold(
     near: NDArray[np.int32],
     far: NDArray[np.int32],

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
 from mbf_mesh_nav.kernels.vectors import Vector, row
 
 IntArray = NDArray[np.int32]
@@ -20,7 +20,7 @@ _SPHERE = (0.0, 0.0, 0.0)
 """Instead of a normal: distances count in all directions."""
 
 
-@kernel
+@inner_kernel
 def collect_neighbourhood(
     vertices: FloatArray,
     offsets: IntArray,

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import BoolArray
 from mbf_mesh_nav.kernels.surface_walk import tangent
 from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, difference, norm, row
@@ -51,7 +51,7 @@ def orientations_along(positions: Float64Array, normals: Float64Array) -> Float6
     return orientations
 
 
-@kernel
+@inner_kernel
 def _quaternion(a: Vector, b: Vector, c: Vector) -> tuple[float, float, float, float]:
     """Quaternion of the frame with the axes a, b, c (Shepperd's method: start from the largest component)."""
     largest = max(a[0], b[1], c[2], a[0] + b[1] + c[2])

@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.bounding_boxes import BRANCHES, STACK_SIZE
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
 from mbf_mesh_nav.kernels.vectors import Vector, row
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
 
 
-@kernel
+@inner_kernel
 def distance_to_triangle(vertices: FloatArray, faces: IntArray, face: int, origin: Vector, direction: Vector) -> float:
     """Distance along a ray to a triangle, both sides count, inf without a hit (Moeller and Trumbore 1997)."""
     a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
@@ -36,7 +36,7 @@ def distance_to_triangle(vertices: FloatArray, faces: IntArray, face: int, origi
     return distance if distance >= 0.0 else np.inf
 
 
-@kernel
+@inner_kernel
 def distance_to_box(
     boxes: FloatArray,
     node: int,
@@ -58,7 +58,7 @@ def distance_to_box(
     return enter if enter <= leave else np.inf
 
 
-@kernel
+@inner_kernel
 def inverse_component(component: float) -> float:
     """Inverse of a direction's component; a huge number for 0, so that no NaN arises at the side of a box."""
     return 1.0 / component if component != 0.0 else 1e300

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import BoolArray, Float32Array, Int32Array
 
 
@@ -85,7 +85,7 @@ def forget_changed_ways(
     return stack[:seed_count].copy()
 
 
-@kernel
+@inner_kernel
 def _is_among(roots: Int32Array, vertex: int) -> bool:
     for root in roots:
         if root == vertex:

@@ -155,32 +155,6 @@ def unit_vertex_normals(face_normals: FloatArray, face_offsets: IntArray, incide
 
 
 @kernel
-def connected_components(offsets: IntArray, neighbours: IntArray) -> IntArray:
-    """Component of every vertex (V,), numbered from 0 in the order of their first vertex."""
-    vertex_count = offsets.shape[0] - 1
-    components = np.full(vertex_count, -1, dtype=np.int32)
-    stack = np.zeros(vertex_count, dtype=np.int32)
-    count = 0
-    for start in range(vertex_count):
-        if components[start] >= 0:
-            continue
-        components[start] = count
-        stack[0] = start
-        top = 1
-        while top > 0:
-            top -= 1
-            vertex = stack[top]
-            for entry in range(offsets[vertex], offsets[vertex + 1]):
-                other = neighbours[entry]
-                if components[other] < 0:
-                    components[other] = count
-                    stack[top] = other
-                    top += 1
-        count += 1
-    return components
-
-
-@kernel
 def morton_codes(points: FloatArray, lower: FloatArray, cell: float) -> NDArray[np.uint64]:
     """Interleaved 21-bit cell indices of points (n, 3): close codes mean close points."""
     codes = np.zeros(points.shape[0], dtype=np.uint64)
@@ -196,14 +170,3 @@ def morton_codes(points: FloatArray, lower: FloatArray, cell: float) -> NDArray[
             code |= bits << np.uint64(axis)
         codes[index] = code
     return codes
-
-
-@kernel
-def face_centroids(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Centroids (F, 3) of the faces."""
-    centroids = np.zeros((faces.shape[0], 3))
-    for face in range(faces.shape[0]):
-        for axis in range(3):
-            total = vertices[faces[face, 0], axis] + vertices[faces[face, 1], axis] + vertices[faces[face, 2], axis]
-            centroids[face, axis] = total / 3.0
-    return centroids

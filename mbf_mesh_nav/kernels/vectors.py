@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
 
 Float64Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -19,7 +19,7 @@ def row(array: Float64Array, index: int) -> Vector:
     return array[index, 0], array[index, 1], array[index, 2]
 
 
-@kernel
+@inner_kernel
 def set_row(array: Float64Array, index: int, vector: Vector) -> None:
     """Write one row of an (n, 3) array."""
     array[index, 0], array[index, 1], array[index, 2] = vector

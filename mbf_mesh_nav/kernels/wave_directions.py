@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import Float32Array, Int32Array
 
 
@@ -58,7 +58,7 @@ def wave_directions(
     return directions
 
 
-@kernel
+@inner_kernel
 def _crossing_share(u1: float, u2: float, c: float, b: float, a: float) -> float:
     """Where the ray to corner 3 crosses side 12, as a share of the side from corner 1; see ``unfolded_distance``."""
     source_x = (c * c + (u1 - u2) * (u1 + u2)) / (2.0 * c)
