@@ -34,6 +34,8 @@ from mbf_costmap_nav.layers.inflation import cost_table
 
 RESOLUTION = 0.05
 NO_CANCEL = np.zeros(1, dtype=np.uint8)
+INFLATION_RADIUS = 11  # cells
+INFLATION_COSTS = cost_table(INFLATION_RADIUS, RESOLUTION, 0.22, 3.0)  # made once, as the layer does
 # C++ peer / Python peer by size, from the table of peers.md section 4 (ms / ms).
 SMAC_TO_PYASTAR = {384: 28 / 6.5, 1000: 353 / 61, 4000: 13000 / 1600}
 THETA_TO_PYASTAR = {384: 46 / 6.5, 1000: 317 / 61, 4000: 8800 / 1600}
@@ -74,10 +76,8 @@ def rooms(size: int, seed: int = 1) -> np.ndarray:
 def inflated(cells: np.ndarray) -> np.ndarray:
     """Our inflation of 11 cells."""
     out = cells.copy()
-    radius = 11
-    table = cost_table(radius, RESOLUTION, 0.22, 3.0)
     box = CellBox(0, 0, cells.shape[1], cells.shape[0])
-    inflate(out, (cells == 254).astype(np.uint8), box, table, radius, 253)
+    inflate(out, (cells == 254).astype(np.uint8), box, INFLATION_COSTS, INFLATION_RADIUS, 253)
     return out
 
 
