@@ -31,8 +31,8 @@ from mbf_costmap_nav.kernels.open_list import (
 FOUND, EXHAUSTED, CANCELED = 0, 1, 2
 """States of a finished search: goal settled; everything reachable settled; the cancel flag was seen."""
 
-FIRST_ROOM = 4096
-"""Entries each bucket has room for at first."""
+FIRST_ROOM, CELLS_PER_ROOM = 4096, 512
+"""Entries each bucket has room for at first, and on large grids one for so many cells."""
 LARGEST_FLOAT = np.float32(np.finfo(np.float32).max)
 
 
@@ -96,8 +96,9 @@ def search(
     """
     # numpy's own arrays, not the kernel's: numpy asks the system for huge pages, and a wave touches many pages at once.
     g, queued = np.full(cells.size, INF, dtype=np.float32), np.full(cells.size, IDLE, dtype=np.uint8)
+    buckets = np.empty((RING, max(FIRST_ROOM, cells.size // CELLS_PER_ROOM)), dtype=np.int32)
     status = _search(
-        cells, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, g, queued
+        cells, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, g, queued, buckets
     )
     return status, g
 
@@ -115,8 +116,9 @@ def _search(
     cancel_flag: NDArray[np.uint8],
     g: NDArray[np.float32],
     queued: NDArray[np.uint8],
+    buckets: NDArray[np.int32],
 ) -> int:
-    """Fill ``g``, given full of inf, and return the status; ``queued`` is given full of IDLE."""
+    """Fill ``g``, given full of inf, and return the status; ``queued`` is full of IDLE, ``buckets`` any (RING, n)."""
     halves = (np.float32(0.5) * table).astype(np.float32)
     side_limit = INF if cut_corners else LARGEST_FLOAT
     scale, columns = np.float32(heuristic_scale), np.uint32(stride)
@@ -125,7 +127,7 @@ def _search(
     # 1. The open list with the start in it. A step moves the key by its own cost and as much of the heuristic.
     width = bucket_width(table, 2.0)
     inverse_width = np.float32(1.0) / width
-    buckets, counts = np.empty((RING, FIRST_ROOM), dtype=np.int32), np.zeros(RING, dtype=np.int64)
+    counts = np.zeros(RING, dtype=np.int64)
     fresh = np.empty(8 * FIRST_ROOM, dtype=np.int32)
     g[start] = 0.0
     bucket = int(scale * octile_distance(abs(start % stride - goal_x), abs(start // stride - goal_y)) * inverse_width)
