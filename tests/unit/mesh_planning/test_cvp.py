@@ -38,7 +38,7 @@ def wave_from_vertex(mesh_map, source, weights=None, blocked=None):
 
 
 def slow_wave(mesh_map, weights, seeds, distances):
-    """The twin: heapq, the rule with arc cosines, obtuse corners looked at again, in float64."""
+    """The twin: heapq, the rule with arc cosines, obtuse corners looked at again and behind, in float64."""
     count = len(mesh_map.vertices)
     starts = np.repeat(np.arange(count), np.diff(mesh_map.neighbour_offsets))
     length = {
@@ -58,7 +58,10 @@ def slow_wave(mesh_map, weights, seeds, distances):
                 continue
             v3 = free[0]
             v1, v2 = (corner for corner in face if corner != v3)
+            along = min(u[v1] + length[v1, v3], u[v2] + length[v2, v3])
             candidate = angle_rule(u[v1], u[v2], length[v1, v2], length[v1, v3], length[v2, v3])
+            if candidate < along and obtuse_corner(face, length) == v3 and two_fronts(mesh_map, length, u, v1, v2, v3):
+                candidate = along
             candidate = max(candidate, min(u[v1], u[v2]))
             if candidate < u.get(v3, math.inf):
                 u[v3] = candidate
@@ -75,11 +78,26 @@ def obtuse_corner(face, length):
     return None
 
 
-def angle_rule(u1, u2, c, b, a):
+def two_fronts(mesh_map, length, u, v1, v2, v3):
+    """Whether the corner behind the side v1 v2 was reached much later than one front through that side would have."""
+    shared = mesh_map.faces[(mesh_map.faces == v1).any(axis=1) & (mesh_map.faces == v2).any(axis=1)]
+    behind = [corner for corner in shared.ravel().tolist() if corner not in (v1, v2, v3)]
+    if not behind:
+        return True
+    c = length[v1, v2]
+    foretold = from_virtual_source(u[v1], u[v2], c, length[v1, behind[0]], length[v2, behind[0]], below=True)
+    return u.get(behind[0], math.inf) - foretold >= 0.2 * c
+
+
+def from_virtual_source(u1, u2, c, b, a, below=False):
     sx = (c * c + u1 * u1 - u2 * u2) / (2 * c)
     sy = -math.sqrt(max(u1 * u1 - sx * sx, 0))
     p = (b * b + c * c - a * a) / (2 * c)
-    u = math.hypot(p - sx, math.sqrt(max(b * b - p * p, 0)) - sy)
+    return math.hypot(p - sx, math.sqrt(max(b * b - p * p, 0)) * (-1 if below else 1) - sy)
+
+
+def angle_rule(u1, u2, c, b, a):
+    u = from_virtual_source(u1, u2, c, b, a)
     cos1, cos2 = (u * u + b * b - u1 * u1) / (2 * u * b), (a * a + u * u - u2 * u2) / (2 * a * u)
     if abs(cos1) > 1 or abs(cos2) > 1:
         return min(u1 + b, u2 + a)
