@@ -104,7 +104,8 @@ class RobotSpec:
         return np.array(self.footprint, dtype=np.float64)
 
 
-def _rectangle(x_min: float, x_max: float, half_width: float) -> tuple[tuple[float, float], ...]:
+def rectangle(x_min: float, x_max: float, half_width: float) -> tuple[tuple[float, float], ...]:
+    """Footprint [m] from behind to before the base, symmetric to its axis."""
     return ((x_min, -half_width), (x_max, -half_width), (x_max, half_width), (x_min, half_width))
 
 
@@ -118,7 +119,7 @@ def _circle(radius: float, corners: int = 16) -> tuple[tuple[float, float], ...]
 HUSKY = RobotSpec(
     name="husky",
     drive=Drive.SKID_STEER,
-    footprint=_rectangle(-0.50, 0.50, 0.345),
+    footprint=rectangle(-0.50, 0.50, 0.345),
     height=0.37,
     mass=43.9,
     wheel_radius=0.178,
@@ -158,7 +159,7 @@ TURTLEBOT = RobotSpec(
 CAR = RobotSpec(
     name="car",
     drive=Drive.ACKERMANN,
-    footprint=_rectangle(-0.17, 0.75, 0.29),
+    footprint=rectangle(-0.17, 0.75, 0.29),
     height=0.30,
     mass=27.6,
     wheel_radius=0.13,

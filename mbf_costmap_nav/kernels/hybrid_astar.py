@@ -84,6 +84,35 @@ def _bin_of(pose: NDArray[np.float64], geometry: NDArray[np.float64], width: int
 
 
 @kernel
+def _is_free(
+    cells: NDArray[np.uint8],
+    geometry: NDArray[np.float64],
+    samples: NDArray[np.float64],
+    poses: NDArray[np.float64],
+) -> bool:
+    """Whether the footprint touches nothing at any of the poses (n, 3)."""
+    for i in range(poses.shape[0]):
+        if pose_cost(cells, geometry, samples, poses[i]) < 0:
+            return False
+    return True
+
+
+@kernel
+def _states_from_start(poses: NDArray[np.float64], parents: NDArray[np.int64], last: int) -> NDArray[np.float64]:
+    """Poses (n, 3) of the states that lead to ``last``, from the start on."""
+    length, state = 0, last
+    while state >= 0:
+        length += 1
+        state = parents[state]
+    states = np.empty((length, 3))
+    state = last
+    for i in range(length - 1, -1, -1):
+        states[i] = poses[state]
+        state = parents[state]
+    return states
+
+
+@kernel
 def hybrid_search(
     cells: NDArray[np.uint8],
     geometry: NDArray[np.float64],
@@ -150,12 +179,7 @@ def hybrid_search(
             curve = sample_word(
                 pose[0], pose[1], pose[2], _curve_to(pose, goal, radius, reversing), radius, geometry[0]
             )
-            fits = True
-            for i in range(curve.shape[0]):
-                if pose_cost(cells, geometry, samples, curve[i]) < 0:
-                    fits = False
-                    break
-            if fits:
+            if _is_free(cells, geometry, samples, curve):
                 status, last = FOUND, state
                 break
 
@@ -189,15 +213,5 @@ def hybrid_search(
         return status, np.empty((0, 3)), 0.0, expanded
 
     # 3. The states back to the start, then the curve.
-    length = 0
-    state = last
-    while state >= 0:
-        length += 1
-        state = parents[state]
-    result = np.empty((length + curve.shape[0], 3))
-    state = last
-    for i in range(length - 1, -1, -1):
-        result[i] = poses[state]
-        state = parents[state]
-    result[length:] = curve
+    result = np.concatenate((_states_from_start(poses, parents, last), curve))
     return status, result, g[last] + curve.shape[0] * geometry[0], expanded

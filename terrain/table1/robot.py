@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from terrain.robot_models import Drive, RobotSpec
+from terrain.robot_models import Drive, RobotSpec, rectangle
 
 HALF_LENGTH, HALF_WIDTH = 0.35, 0.25  # m
 
 CARRIER = RobotSpec(
     name="carrier",
     drive=Drive.DIFFERENTIAL,
-    footprint=(
-        (-HALF_LENGTH, -HALF_WIDTH),
-        (HALF_LENGTH, -HALF_WIDTH),
-        (HALF_LENGTH, HALF_WIDTH),
-        (-HALF_LENGTH, HALF_WIDTH),
-    ),
+    footprint=rectangle(-HALF_LENGTH, HALF_LENGTH, HALF_WIDTH),
     height=0.4,
     mass=60.0,
     wheel_radius=0.1,
