@@ -16,16 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
-from mbf_costmap_nav.kernels.open_list import (
-    IDLE,
-    INF,
-    RING,
-    SQRT2,
-    Integer,
-    bucket_width,
-    relax_bucket,
-    relax_interpolated,
-    with_room,
+from mbf_costmap_nav.kernels.open_list import INF, RING, SQRT2, Integer, bucket_width, with_room
+from mbf_costmap_nav.kernels.relaxing import relax_bucket, relax_interpolated
+from mbf_costmap_nav.kernels.search_cells import (
+    CAME_SHIFT,
+    KEPT_BITS,
+    SLOT_BITS,
+    Records,
+    natural_steps,
+    search_cells,
 )
 
 FOUND, EXHAUSTED, CANCELED = 0, 1, 2
@@ -92,20 +91,19 @@ def search(
         FOUND, EXHAUSTED or CANCELED.
     g : (n,) float32
         Cost from the start in traversal times cells, inf where not reached. Exact for settled cells, an upper bound
-        at the rim of the search.
+        at the rim of the search. A view into the search's records, so not contiguous.
     """
-    # numpy's own arrays, not the kernel's: numpy asks the system for huge pages, and a wave touches many pages at once.
-    g, queued = np.full(cells.size, INF, dtype=np.float32), np.full(cells.size, IDLE, dtype=np.uint8)
+    records = search_cells(cells, stride)
     buckets = np.empty((RING, max(FIRST_ROOM, cells.size // CELLS_PER_ROOM)), dtype=np.int32)
     status = _search(
-        cells, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, g, queued, buckets
+        records, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, buckets
     )
-    return status, g
+    return status, records["g"]
 
 
 @kernel
 def _search(
-    cells: NDArray[np.uint8],
+    records: Records,
     stride: int,
     table: NDArray[np.float32],
     start: int,
@@ -114,25 +112,25 @@ def _search(
     cut_corners: bool,
     interpolated: bool,
     cancel_flag: NDArray[np.uint8],
-    g: NDArray[np.float32],
-    queued: NDArray[np.uint8],
     buckets: NDArray[np.int32],
 ) -> int:
-    """Fill ``g``, given full of inf, and return the status; ``queued`` is full of IDLE, ``buckets`` any (RING, n)."""
+    """Fill ``g`` of the records, none of them reached, and return the status; ``buckets`` is any (RING, n)."""
     halves = (np.float32(0.5) * table).astype(np.float32)
     side_limit = INF if cut_corners else LARGEST_FLOAT
     scale, columns = np.float32(heuristic_scale), np.uint32(stride)
     goal_x, goal_y = goal % stride, goal // stride
+    natural = natural_steps(stride)
 
     # 1. The open list with the start in it. A step moves the key by its own cost and as much of the heuristic.
     width = bucket_width(table, 2.0)
     inverse_width = np.float32(1.0) / width
     counts = np.zeros(RING, dtype=np.int64)
-    fresh = np.empty(8 * FIRST_ROOM, dtype=np.int32)
-    g[start] = 0.0
+    fresh, came = np.empty(8 * FIRST_ROOM, dtype=np.int32), np.empty(8 * FIRST_ROOM, dtype=np.uint8)
+    records[start].g = 0.0
     bucket = int(scale * octile_distance(abs(start % stride - goal_x), abs(start // stride - goal_y)) * inverse_width)
     slot = bucket & (RING - 1)
-    buckets[slot, 0], counts[slot], queued[start] = start, 1, slot
+    buckets[slot, 0], counts[slot] = start, 1
+    records[start].state = (records[start].state & ~SLOT_BITS) | np.uint32(slot)
     waiting = 1
 
     while waiting > 0:
@@ -140,7 +138,7 @@ def _search(
         slot = bucket & (RING - 1)
         if counts[slot] == 0:
             bucket += 1
-            if goal >= 0 and np.float32(bucket) * width >= g[goal]:
+            if goal >= 0 and np.float32(bucket) * width >= records[goal].g:
                 return FOUND
             continue
         if cancel_flag[0] != 0:
@@ -148,28 +146,30 @@ def _search(
 
         # 3. Relax all of it.
         if fresh.size < 8 * counts[slot]:
-            fresh = np.empty(16 * counts[slot], dtype=np.int32)
+            fresh, came = np.empty(16 * counts[slot], dtype=np.int32), np.empty(16 * counts[slot], dtype=np.uint8)
         in_bucket = buckets[slot, : counts[slot]]
         if interpolated:
-            improved = relax_interpolated(cells, stride, table, in_bucket, slot, queued, g, fresh)
+            improved = relax_interpolated(records, stride, table, in_bucket, slot, fresh, came)
         else:
-            improved = relax_bucket(cells, stride, halves, side_limit, in_bucket, slot, queued, g, fresh)
+            improved = relax_bucket(records, stride, halves, side_limit, natural, in_bucket, slot, fresh, came)
         waiting -= counts[slot]
         counts[slot] = 0
 
-        # 4. Sort the improved cells into buckets by g + h; a cell that already waits there is not added again.
+        # 4. Sort the improved cells into buckets by g + h; a cell that already waits there is not added again. The last
+        #    improvement of a cell is its best one, so the last step to it stands.
         buckets = with_room(buckets, counts, improved)
         for i in range(improved):
             cell = np.uint32(fresh[i])
-            key = g[cell]
+            key = records[cell].g
             if scale > 0.0:
                 y = cell // columns
                 x = cell - y * columns
                 key += scale * octile_distance(abs(np.int32(x) - goal_x), abs(np.int32(y) - goal_y))
             slot = max(int(key * inverse_width), bucket) & (RING - 1)
             buckets[slot, counts[slot]] = cell
-            is_new = np.int64(queued[cell] != slot)
+            state = records[cell].state
+            is_new = np.int64(state & SLOT_BITS != slot)
             counts[slot] += is_new
             waiting += is_new
-            queued[cell] = slot
-    return FOUND if goal >= 0 and g[goal] < INF else EXHAUSTED
+            records[cell].state = (state & KEPT_BITS) | (np.uint32(came[i]) << CAME_SHIFT) | np.uint32(slot)
+    return FOUND if goal >= 0 and records[goal].g < INF else EXHAUSTED

@@ -23,6 +23,18 @@ small_maps = hnp.arrays(
 )
 
 
+@st.composite
+def roomy_maps(draw):
+    """Maps of 9 to 30 cells a side with a few boxes, so that most cells are plain (their neighbours cost the same)."""
+    height, width = draw(st.integers(9, 30)), draw(st.integers(9, 30))
+    cells = np.full((height, width), draw(st.sampled_from([0, 40])), dtype=np.uint8)
+    for _ in range(draw(st.integers(0, 6))):
+        y, x = draw(st.integers(0, height - 1)), draw(st.integers(0, width - 1))
+        side_y, side_x = draw(st.integers(1, 9)), draw(st.integers(1, 9))
+        cells[y : y + side_y, x : x + side_x] = draw(st.sampled_from([0, 40, 120, 254]))
+    return cells
+
+
 def naive_field(cells, table, start, cut_corners):
     """Textbook Dijkstra over (iy, ix)."""
     height, width = cells.shape
@@ -70,6 +82,21 @@ def test_field_equals_the_naive_dijkstra(cells, cut_corners, allow_unknown):
     for cell, g in naive_field(cells, traversal_table(3.0, 253, allow_unknown), (0, 0), cut_corners).items():
         expected[cell] = g
     np.testing.assert_allclose(field, expected, rtol=1e-5)
+
+
+@settings(max_examples=200, deadline=None)
+@given(cells=roomy_maps(), cut_corners=st.booleans(), data=st.data())
+def test_where_neighbours_are_left_out_on_plain_ground_the_field_is_still_the_naive_one(cells, cut_corners, data):
+    start = (data.draw(st.integers(0, cells.shape[0] - 1)), data.draw(st.integers(0, cells.shape[1] - 1)))
+    cells[start] = 0
+    _, field, _, _ = run(cells, start, None, cut_corners=cut_corners)
+    expected = np.full(cells.shape, np.inf)
+    for cell, g in naive_field(cells, traversal_table(3.0, 253, False), start, cut_corners).items():
+        expected[cell] = g
+    np.testing.assert_allclose(field, expected, rtol=1e-5)
+    goal = tuple(np.argwhere(np.isfinite(field))[data.draw(st.integers(0, int(np.isfinite(field).sum()) - 1))])
+    status, g, _, _ = run(cells, start, goal, cut_corners=cut_corners)
+    assert status == FOUND and g[goal] == pytest.approx(expected[goal], rel=1e-5)
 
 
 def test_a_field_may_end_at_a_cell_that_has_its_final_value():
