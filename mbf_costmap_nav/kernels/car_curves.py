@@ -23,7 +23,8 @@ def _turn(angle: float, forward: bool) -> float:
     """Angle in [0, 2 pi) for a curve that may only be driven forward, else in (-pi, pi]."""
     if forward:
         wrapped = angle - TWO_PI * np.floor(angle / TWO_PI)
-        return 0.0 if wrapped > TWO_PI - 1e-9 else wrapped
+        # An angle that rounding left just below 0 is 0, not a whole turn, nor backward by the least of numbers.
+        return 0.0 if wrapped > TWO_PI - 1e-9 else max(0.0, wrapped)
     return float(angle - TWO_PI * np.ceil((angle - np.pi) / TWO_PI))
 
 

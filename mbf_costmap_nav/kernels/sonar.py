@@ -82,7 +82,9 @@ def update_cone(
             dx = lower_left[0] + (ix + 0.5) * resolution - sensor[0]
             dy = lower_left[1] + (iy + 0.5) * resolution - sensor[1]
             distance = math.hypot(dx, dy)
-            angle = math.atan2(axis_x * dy - axis_y * dx, axis_x * dx + axis_y * dy)
+            # The cell in whose middle the sensor sits has no direction but rounding's: it counts as straight ahead.
+            on_sensor = distance < 1e-6 * resolution
+            angle = 0.0 if on_sensor else math.atan2(axis_x * dy - axis_y * dx, axis_x * dx + axis_y * dy)
             if clear:
                 # A cell belongs to the cone if the cone passes within half a cell's diagonal of its centre.
                 beside = distance * math.sin(min(max(0.0, abs(angle) - half_angle), math.pi / 2))

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.cancel import CancelToken
@@ -25,6 +25,7 @@ def plan(planner, start, goal, **request):
 
 @settings(max_examples=200, deadline=None)
 @given(x=coordinates, y=coordinates, yaw=angles, reversing=st.booleans())
+@example(x=0.0, y=0.0, yaw=5e-324, reversing=False)
 def test_every_curve_ends_at_its_pose(x, y, yaw, reversing):
     word = car_curve(x, y, yaw, reversing)
     poses = sample_word(0.0, 0.0, 0.0, word, 1.0, 0.1)
