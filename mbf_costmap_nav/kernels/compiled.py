@@ -1,7 +1,8 @@
 """The one way kernels of this package are compiled; it keeps their annotations visible to mypy.
 
-Nothing is compiled at import: numba specialises a kernel at its first call and keeps the machine code on disk. Kernels
-run without the interpreter lock and in strict IEEE arithmetic, so NaN and inf keep their meaning.
+Nothing is compiled at import: numba specialises a kernel at its first call and keeps the machine code on disk, until a
+file of this folder changes. Kernels run without the interpreter lock and in strict IEEE arithmetic, so NaN and inf keep
+their meaning.
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from mbf_abstract.kernel_cache import compile_lazily
 
 KernelFunction = TypeVar("KernelFunction", bound=Callable[..., Any])
 
 
 def kernel(function: KernelFunction) -> KernelFunction:
     """Compile ``function`` with numba when it is first called."""
-    return cast(KernelFunction, njit(cache=True, nogil=True)(function))
+    return cast(KernelFunction, compile_lazily(function))

@@ -12,7 +12,8 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numba import njit
+
+from mbf_abstract.kernel_cache import compile_lazily
 
 KernelFunction = TypeVar("KernelFunction", bound=Callable[..., Any])
 
@@ -23,14 +24,15 @@ Count: Any = np.int64
 """Type of counters and codes handed on to other kernels."""
 
 
-OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+"""No kernel is called from C, and divisions by zero follow IEEE arithmetic instead of raising."""
 
 
 def kernel(function: KernelFunction) -> KernelFunction:
     """Compile ``function`` with numba at its first call; IEEE arithmetic throughout, also where it divides by zero."""
-    return cast(KernelFunction, njit(**OPTIONS)(function))
+    return cast(KernelFunction, compile_lazily(function, **OPTIONS))
 
 
 def inner_kernel(function: KernelFunction) -> KernelFunction:
     """Compile a step of other kernels. Python itself cannot call it, which saves an eighth of its compilation."""
-    return cast(KernelFunction, njit(**OPTIONS, no_cpython_wrapper=True)(function))
+    return cast(KernelFunction, compile_lazily(function, **OPTIONS, no_cpython_wrapper=True))

@@ -1,0 +1,54 @@
+"""Machine code of numba kernels on disk, made anew when any file of the kernels' folder has changed.
+
+When to use: by the one decorator with which a map backend compiles its kernels. When not: for a kernel that calls none
+of another file; ``cache=True`` alone is right for it.
+
+numba keeps the machine code of a kernel for as long as the very file that defines it stays as it was. But that code
+holds the kernels and constants that were taken from other files too, so that after an upgrade old steps would go on
+working on new arrays (a limitation of caching that numba's manual names). Here all files of the folder count as the
+source of each kernel in it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from numba import njit
+from numba.core.caching import IndexDataCacheFile
+
+
+def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
+    """Compile ``function`` at its first call, without the interpreter lock, and keep the machine code on disk.
+
+    Parameters
+    ----------
+    function : callable
+        The kernel; the kernels it calls stand in the same folder.
+    **options
+        Further options of ``numba.njit``.
+
+    Returns
+    -------
+    dispatcher
+        numba's stand-in for the function.
+    """
+    dispatcher = njit(cache=True, nogil=True, **options)(function)
+    cache = dispatcher._cache
+    stamp = _sources(Path(inspect.getfile(function)).parent)
+    # numba has no option for this; its own constructor makes the same object with the stamp of one file.
+    cache._cache_file = IndexDataCacheFile(cache.cache_path, cache._impl.filename_base, stamp)
+    return dispatcher
+
+
+@lru_cache
+def _sources(folder: Path) -> bytes:
+    """Digest of all Python files of a folder."""
+    digest = hashlib.sha256()
+    for file in sorted(folder.glob("*.py")):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    return digest.digest()

@@ -1,0 +1,36 @@
+"""Machine code on disk: used again by the next process, and made anew when a kernel of another file has changed."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+DECORATOR = "from mbf_abstract.kernel_cache import compile_lazily as kernel\n"
+STEP = DECORATOR + "@kernel\ndef step(x):\n    return x + {}\n"
+SEARCH = DECORATOR + "from kernels.step import step\n@kernel\ndef search(x):\n    return 10 * step(x)\n"
+CALL = """
+from kernels.search import search
+value = search(1)
+print(value, sum(search.stats.cache_hits.values()))
+"""
+
+
+def call_in_a_process_of_its_own(folder: Path) -> tuple[int, int]:
+    """What ``search(1)`` returns, and how many kernels came from the disk."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", CALL]
+    done = subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True, text=True)
+    value, hits = done.stdout.split()
+    return int(value), int(hits)
+
+
+def test_a_kernel_is_compiled_anew_only_when_a_kernel_it_calls_from_another_file_has_changed(tmp_path):
+    kernels = tmp_path / "kernels"
+    kernels.mkdir()
+    (kernels / "__init__.py").touch()
+    (kernels / "search.py").write_text(SEARCH)
+    (kernels / "step.py").write_text(STEP.format(1))
+    assert call_in_a_process_of_its_own(tmp_path) == (20, 0)
+    assert call_in_a_process_of_its_own(tmp_path) == (20, 1)
+    (kernels / "step.py").write_text(STEP.format(2))
+    assert call_in_a_process_of_its_own(tmp_path) == (30, 0)
