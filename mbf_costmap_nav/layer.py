@@ -85,6 +85,8 @@ class CostmapLayer(ABC):
 
     Parameters: ClassVar[type[LayerParameters]] = LayerParameters
     contract_check: ClassVar[str] = "mbf_costmap_nav.testing:check_layer"
+    clearable: ClassVar[bool] = True
+    """Whether clearing an area means this layer although nobody named it; false for what no sensor brings back."""
     geometry: GridGeometry
 
     def __init__(self, context: LayerContext) -> None:

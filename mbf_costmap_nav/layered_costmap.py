@@ -316,7 +316,10 @@ class LayeredCostmap:
         layer_names: Iterable[str] | None = None,
         inside: bool = False,
     ) -> list[str]:
-        """Clear layers (all by default) outside, or inside, a square window around a point.
+        """Clear layers outside, or inside, a square window around a point; return their names.
+
+        By default these are the layers that sensors fill again (``CostmapLayer.clearable``), not the floor plan. A
+        static layer that is named loses the area until ``clear``.
 
         Parameters
         ----------
@@ -333,7 +336,8 @@ class LayeredCostmap:
             A name is no layer of this map.
         """
         with self._lock:
-            chosen = self._chosen(layer_names)
+            clearable = [name for name, layer in self.layers.items() if layer.clearable]
+            chosen = self._chosen(clearable if layer_names is None else layer_names)
             x0, y0 = self._geometry.world_to_cell_unbounded(center_x - size / 2, center_y - size / 2)
             x1, y1 = self._geometry.world_to_cell_unbounded(center_x + size / 2, center_y + size / 2)
             window = CellBox(x0 + 1, y0 + 1, x1, y1)  # costmap_2d's window leaves out its border cells

@@ -33,6 +33,7 @@ class DenoiseLayer(CostmapLayer):
     """Frees small groups. See the module's text for when to use it."""
 
     Parameters = DenoiseLayerParameters
+    clearable = False
     parameters: DenoiseLayerParameters
 
     def match_geometry(self, geometry: GridGeometry) -> None:

@@ -36,6 +36,7 @@ class KeepoutLayer(CostmapLayer):
     """Forbidden areas; clearing the costmap does not remove them. See the module's text for when to use it."""
 
     Parameters = KeepoutLayerParameters
+    clearable = False
     parameters: KeepoutLayerParameters
 
     def __init__(self, context: LayerContext) -> None:

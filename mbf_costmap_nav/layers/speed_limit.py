@@ -41,6 +41,7 @@ class SpeedLimitLayer(CostmapLayer):
     """Slow areas. See the module's text for when to use it."""
 
     Parameters = SpeedLimitLayerParameters
+    clearable = False
     parameters: SpeedLimitLayerParameters
 
     def __init__(self, context: LayerContext) -> None:

@@ -38,6 +38,7 @@ class StaticLayer(GridLayer):
     """A fixed map. See the module's text for when to use it."""
 
     Parameters = StaticLayerParameters
+    clearable = False
     parameters: StaticLayerParameters
 
     def __init__(self, context: LayerContext) -> None:

@@ -281,15 +281,28 @@ def test_a_sonar_that_is_cleared_forgets_its_readings(build):
 
 
 # ---------------------------------------------------------------------------------------------------- clearing
+@pytest.mark.parametrize("inside", [True, False])
+def test_clearing_an_area_forgets_what_was_seen_but_not_the_floor_plan(build, seeing, inside):
+    costmap = build("static", "obstacle", "inflation", obstacle=seeing)
+    costmap.update(None, 0.0)
+    walls = lethal_cells(costmap)
+    costmap.insert_points("laser", [(1.5, 5.5, 0.0)], (0.5, 5.5, 0.0), 0.0)
+    costmap.update(None, 0.0)
+    assert lethal_cells(costmap) == walls | {(1, 5)}
+    assert costmap.clear_area(5.0 if inside else 99.0, 5.0, 30.0, inside=inside) == ["obstacle"]
+    costmap.update(None, 0.1)
+    assert walls and lethal_cells(costmap) == walls
+
+
 def test_clearing_everything_returns_to_the_static_map(build, seeing):
     costmap = build("static", "obstacle", obstacle=seeing)
     costmap.update(None, 0.0)
     walls = lethal_cells(costmap)
     costmap.insert_points("laser", [(1.5, 5.5, 0.0)], (0.5, 5.5, 0.0), 0.0)
     costmap.update(None, 0.0)
-    costmap.clear_area(5.0, 5.0, 30.0, inside=True)
+    costmap.clear_area(5.0, 5.0, 30.0, layer_names=["static", "obstacle"], inside=True)
     costmap.update(None, 0.1)
-    assert lethal_cells(costmap) == set()
+    assert lethal_cells(costmap) == set(), "a static layer that is named loses the area"
     assert costmap.clear() == ["static", "obstacle"]
     costmap.update(None, 0.2)
     assert lethal_cells(costmap) == walls

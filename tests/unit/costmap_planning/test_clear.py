@@ -1,5 +1,6 @@
-"""What the clear recovery forgets: which maps, which layers, which area; walls of the floor plan come back at once."""
+"""What the clear recovery forgets: which maps, which layers, which area; walls of the floor plan always stay."""
 
+import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose
@@ -10,6 +11,7 @@ from mbf_abstract.sensing import RangeScan
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.transforms import TransformBuffer
+from mbf_costmap_nav.map_io import OccupancyMap, save_map
 
 CONFIG = """
 backend: costmap
@@ -17,29 +19,47 @@ planners: [{name: astar, type: astar}]
 recovery_behaviors: [{name: clear, type: clear}]
 clear: {BLOCK}
 global_costmap: &map
-  width: 20.0
-  height: 20.0
-  origin_x: -10.0
-  origin_y: -10.0
   robot_radius: 0.2
-  layers: [{name: front, type: obstacle}, {name: back, type: obstacle}, {name: keepout, type: keepout}]
+  layers:
+    - {name: walls, type: static}
+    - {name: front, type: obstacle}
+    - {name: back, type: obstacle}
+    - {name: keepout, type: keepout}
+  walls: {map_file: walls.yaml}
   front: {sources: {front: {obstacle_max_range: 9.0}}}
   back: {sources: {back: {obstacle_max_range: 9.0}}}
   keepout: {zones: [{name: stairs, polygon: [[-5.0, -5.0], [-4.0, -5.0], [-4.0, -4.0]]}]}
 local_costmap: *map
 """
+GLOBAL_WITHOUT_BACK = CONFIG.replace("global_costmap: &map", "local_costmap: &map").replace(
+    "local_costmap: *map",
+    """global_costmap:
+  robot_radius: 0.2
+  layers: [{name: walls, type: static}, {name: front, type: obstacle}, {name: keepout, type: keepout}]
+  walls: {map_file: walls.yaml}
+  front: {sources: {front: {obstacle_max_range: 9.0}}}
+  keepout: {zones: [{name: stairs, polygon: [[-5.0, -5.0], [-4.0, -5.0], [-4.0, -4.0]]}]}""",
+)
 PLACES = {"near": Pose.planar(1.05, 0.05), "far": Pose.planar(6.05, 0.05), "behind": Pose.planar(-1.05, 0.05)}
-STAIRS = Pose.planar(-4.05, -4.55)
+STAIRS, WALL = Pose.planar(-4.05, -4.55), Pose.planar(0.05, 1.05)
+
+
+def save_walls(folder):
+    """A floor plan of 20 m x 20 m around the origin with one wall, at y = 1 m."""
+    occupancy = np.zeros((200, 200), dtype=np.uint8)
+    occupancy[110] = 100
+    save_map(folder / "walls.yaml", OccupancyMap(occupancy, 0.1, (-10.0, -10.0, 0.0)))
 
 
 @pytest.fixture
 def clear(tmp_path):
     """``clear("costmaps: local")`` runs the recovery and returns its result and what is left on each map."""
     clock, transforms, opened = SimClock(), TransformBuffer(), []
+    save_walls(tmp_path)
 
-    def clear(block):
+    def clear(block, config=CONFIG):
         file = tmp_path / "clear.yaml"
-        file.write_text(CONFIG.replace("BLOCK", block))
+        file.write_text(config.replace("BLOCK", block))
         robot = LoopbackRobot(clock, transforms, Pose.planar(0.0, 0.0))
         opened.extend([navigator := Navigator.from_file(file, robot, clock, transforms), robot])
         for source, names in (("front", ("near", "far")), ("back", ("behind",))):
@@ -49,7 +69,8 @@ def clear(tmp_path):
         queries.update_map()
         result = navigator.recover("clear")
         for local in (False, True):
-            assert queries.check_point(STAIRS, local=local).state is CellState.LETHAL
+            for place in (STAIRS, WALL):
+                assert queries.check_point(place, local=local).state is CellState.LETHAL
         left = [
             {
                 name
@@ -86,8 +107,14 @@ def test_it_forgets_what_it_is_told(clear, block, local, in_global):
     assert (left_local, left_global) == (local, in_global)
 
 
+def test_a_layer_that_only_one_map_has_is_cleared_there(clear):
+    result, left_local, left_global = clear("layers: [back]", GLOBAL_WITHOUT_BACK)
+    assert result.success and "local: back" in result.message and "global" not in result.message
+    assert (left_local, left_global) == ({"near", "far"}, {"near", "far"})
+
+
 def test_a_layer_that_is_not_there_is_a_failure_that_names_the_known_ones(clear):
     result, left_local, _ = clear("layers: [sonar]")
     assert result.outcome == RecoveryOutcome.FAILURE
-    assert "'sonar'" in result.message and "front" in result.message
+    assert "'sonar'" in result.message and "front" in result.message and '"' not in result.message
     assert left_local == EVERYTHING
