@@ -16,6 +16,9 @@ from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.snapshot import MeshSnapshot
 from mbf_mesh_nav.vector_field import VectorField
 
+STEP_SAMPLE = 64
+"""The typical weight of an edge is the mean of one in so many."""
+
 
 @dataclass(frozen=True, eq=False)
 class Wave:
@@ -70,6 +73,7 @@ class WaveSearch:
             seeds,
             np.ascontiguousarray(corners[~query.blocked[corners]]),
             max(overshoot, 2.0 * mesh_map.topology.mean_edge_length),
+            self._step,
             query.cancel_flag,
         )
         if settled < 0 or not np.isfinite(distances[corners]).any():
@@ -123,6 +127,9 @@ class WaveSearch:
     def _gather_weights(self, snapshot: MeshSnapshot) -> None:
         self._weighted_for = snapshot
         self._corner_weights = snapshot.edge_weights[self._corner_slots]
+        sample = snapshot.edge_weights[::STEP_SAMPLE]
+        sample = sample[np.isfinite(sample)]
+        self._step = float(sample.mean()) if len(sample) else self._mesh_map.topology.mean_edge_length
 
     def _seed_around(
         self, query: LegQuery, center: int, distances: NDArray[np.float32], predecessors: NDArray[np.int32]

@@ -7,6 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_mesh_nav.kernels.astar import search_towards
+from mbf_mesh_nav.kernels.bucket_queue import EMPTY, RING, entry_of, item_of, key_of, next_bucket, put, remove_least
+from mbf_mesh_nav.kernels.compiled import kernel
 from mbf_mesh_nav.kernels.dijkstra import propagate_distances
 from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
@@ -134,3 +136,51 @@ def test_the_indexed_heap_returns_items_by_their_lowest_key(pushes):
         size = remove_top(heap, positions, size)
     assert popped == sorted((key, item) for item, key in lowest.items())
     assert (positions == -1).all()
+
+
+@kernel
+def take_all(starts, start_keys, gains, inverse_width):
+    """Queue the starts; each entry taken puts in the item after it, a gain later. Returns keys and items as taken."""
+    room = len(starts) + len(gains)
+    heads, links = np.full(RING, EMPTY, dtype=np.int32), np.empty(room, dtype=np.int32)
+    entries, near = np.empty(room, dtype=np.uint64), np.empty(room, dtype=np.uint64)
+    used, near_size, bucket = np.uint64(0), np.uint64(0), np.int64(0)
+    for i in range(len(starts)):
+        entry = entry_of(start_keys[i], np.uint64(starts[i]))
+        used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
+    keys, items = np.empty(room, dtype=np.float32), np.empty(room, dtype=np.int64)
+    taken = 0
+    while True:
+        if near_size == 0:
+            bucket, near_size = next_bucket(heads, links, entries, near, bucket, inverse_width)
+        if near_size == 0:
+            return keys[:taken], items[:taken]
+        keys[taken], items[taken] = key_of(near[0]), item_of(near[0])
+        near_size = remove_least(near, near_size)
+        if taken < len(gains):
+            entry = entry_of(np.float32(keys[taken] + gains[taken]), np.uint64(items[taken] + 1))
+            used, near_size = put(heads, links, entries, near, used, near_size, bucket, inverse_width, entry)
+        taken += 1
+
+
+@given(
+    st.lists(st.floats(0, 50, width=32), min_size=1, max_size=20),
+    st.lists(st.sampled_from([0.0, 0.125, 1.0, 2.5, 3000.0]), max_size=80),
+    st.sampled_from([0.01, 1.0, 96.0, 1000.0]),
+)
+@settings(max_examples=100, deadline=None)
+def test_the_bucket_queue_gives_entries_in_the_order_of_a_heap_whatever_the_width_of_its_buckets(
+    starts, gains, inverse
+):
+    starts, gains = np.array(starts, np.float32), np.array(gains, np.float32)
+    items = np.arange(len(starts))[::-1].copy()
+    keys, taken = take_all(items, starts, gains, np.float32(inverse))
+    heap = [(float(key), int(item)) for key, item in zip(starts, items, strict=True)]
+    heapq.heapify(heap)
+    expected = []
+    while heap:
+        expected.append(heapq.heappop(heap))
+        if len(expected) <= len(gains):
+            key, item = expected[-1]
+            heapq.heappush(heap, (float(np.float32(key) + gains[len(expected) - 1]), item + 1))
+    assert list(zip(keys.tolist(), taken.tolist(), strict=True)) == expected
