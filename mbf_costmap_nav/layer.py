@@ -128,6 +128,10 @@ class CostmapLayer(ABC):
         """Why the layer's data is too old at ``now`` [s]; empty while it is current."""
         return ""
 
+    def doubt(self) -> str:
+        """What is legal but hardly meant in the layer's parameters, given the footprint; empty if nothing is."""
+        return ""
+
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Allowed speed [m/s] at the point (x, y) [m], at most ``full_speed``."""
         return full_speed

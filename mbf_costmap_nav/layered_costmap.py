@@ -151,6 +151,12 @@ class LayeredCostmap:
             problems = (layer.currency_problem(now) for layer in self._enabled_layers())
             return next((problem for problem in problems if problem), "")
 
+    def doubts(self) -> list[str]:
+        """What is legal but hardly meant in the layers' parameters, e.g. an inflation narrower than the robot."""
+        with self._lock:
+            said = ((layer.name, layer.doubt()) for layer in self._enabled_layers())
+            return [f"layer {name!r}: {doubt}" for name, doubt in said if doubt]
+
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Lowest speed [m/s] the layers allow at the point (x, y) [m]; ``full_speed`` where there is no limit."""
         with self._lock:

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Literal, cast
 import numpy as np
 
 from mbf_abstract.config import Config, PluginDeclaration
+from mbf_abstract.events import EventKind
 from mbf_abstract.map_queries import MapQueries
 from mbf_abstract.map_view import GridView
 from mbf_abstract.parameters import ParameterModel, parameter
@@ -77,6 +78,7 @@ class CostmapNavigationServer(AbstractNavigationServer):
         self._global = self._serve(config, "global_costmap")
         self._local = self._serve(config, "local_costmap")
         self.global_costmap, self.local_costmap = self._global.costmap, self._local.costmap
+        self._tell_doubts("global_costmap", "local_costmap")
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add both maps and the one this plugin is bound to."""
@@ -149,6 +151,12 @@ class CostmapNavigationServer(AbstractNavigationServer):
     def config_for_map(cls, file: Path) -> str | None:
         """Take every image format this package reads, and map_server's YAML."""
         return BARE_MAP.format(file=json.dumps(str(file))) if file.suffix.lower() in MAP_SUFFIXES else None
+
+    def _tell_doubts(self, *maps: str) -> None:
+        """Put into the event log what is legal but hardly meant; the server runs on it all the same, as Nav2 does."""
+        for name in maps:
+            for doubt in getattr(self, name).doubts():
+                self.runtime.events.emit(EventKind.FAULT, name, where="configuration", message=doubt)
 
     def _serve(self, config: Config, key: str) -> ServedCostmap:
         section = config.sections[key]

@@ -65,12 +65,24 @@ class InflationLayer(CostmapLayer):
     def relax(self, factor: float, until: float) -> None:
         """Let the next updates up to the time ``until`` [s] keep ``factor`` of the radius, and decay faster by as much.
 
-        The first update after it restores the configured values. The inscribed radius stays as it is.
+        The first update after it restores the configured values. What the robot's inscribed circle touches stays 253
+        as far as it was configured: relaxing opens no passage that the robot does not fit through.
         """
         self._relief = (factor, until)
 
+    def doubt(self) -> str:
+        """Say that the radius is smaller than the robot, so that plans may lead through walls."""
+        radius = self.parameters.inflation_radius
+        if radius >= self._inscribed_radius:
+            return ""
+        return (
+            f"inflation_radius {radius:g} m is smaller than the inscribed radius of the footprint, "
+            f"{self._inscribed_radius:g} m: cells the robot cannot stand on look free"
+        )
+
     def _tabulate(self) -> None:
-        radius = self.parameters.inflation_radius * self._factor
+        configured = self.parameters.inflation_radius
+        radius = min(configured, max(configured * self._factor, self._inscribed_radius))
         self._radius = math.ceil(radius / self.geometry.resolution)
         if self._radius > LARGEST_RADIUS:
             raise ValueError(

@@ -3,8 +3,8 @@
 When to use: NO_PATH_FOUND or NO_VALID_CMD in a passage that the robot really fits through (inflation), a goal that is
 just occupied (planner tolerance), a controller that cannot reach its goal or its path exactly (arrival, controller
 factor). Two instances with different parameters make the "relax planner" and "relax controller" of the Move Base Flex
-paper. When not: the inscribed radius itself is too wide for the passage; it is never touched, so nothing becomes
-passable that the robot would hit.
+paper. When not: the inscribed radius itself is too wide for the passage; the inflation never gets narrower than it, so
+nothing becomes passable that the robot would hit.
 
 The behaviour returns at once. What it changes ends by the clock, not by this plugin: the inflation with the map's first
 update after ``duration``, the tolerances at that very time, also if the goal was canceled or the plugin unloaded
@@ -30,7 +30,10 @@ class RelaxParameters(PluginParameters):
     """Parameters of ``costmap.relax``."""
 
     inflation_factor: float = parameter(
-        0.5, "What is left of the inflation radius, and what its decay is divided by; 1 = unchanged.", gt=0.0, le=1.0
+        0.5,
+        "What is left of the inflation radius (at least the inscribed one), and what divides its decay; 1 = unchanged.",
+        gt=0.0,
+        le=1.0,
     )
     planner_tolerance: float = parameter(
         0.2, "Paths may end at least this far from the goal; 0 = unchanged.", unit="m", ge=0.0, le=100.0

@@ -395,6 +395,29 @@ def test_a_larger_footprint_is_inflated_from_the_next_update_on(build):
     assert costmap.inscribed_radius == pytest.approx(1.5 * math.cos(math.pi / 16))
 
 
+@pytest.mark.parametrize("factor", [0.01, 0.5, 0.99])
+@pytest.mark.parametrize("inflation_radius", [2.0, 2.5, 4.0])
+def test_relaxing_leaves_every_cell_forbidden_on_which_the_robot_would_touch_something(build, inflation_radius, factor):
+    block = {"inflation_radius": inflation_radius, "cost_scaling_factor": 0.5}
+    costmap = build("static", "inflation", inflation=block, robot_radius=2.4)
+    costmap.update(None, 0.0)
+    before = costmap.snapshot().cells
+    costmap.layers["inflation"].relax(factor, until=5.0)
+    costmap.update(None, 1.0)
+    relaxed = costmap.snapshot().cells
+    assert np.array_equal(relaxed >= 253, before >= 253) and (relaxed <= before).all()
+    costmap.update(None, 5.0)
+    assert np.array_equal(costmap.snapshot().cells, before)
+
+
+def test_an_inflation_narrower_than_the_robot_is_doubted_until_the_robot_is_smaller(build):
+    costmap = build("inflation", inflation={"inflation_radius": 0.3}, robot_radius=0.6)
+    (doubt,) = costmap.doubts()
+    assert doubt.startswith("layer 'inflation': inflation_radius 0.3 m is smaller than the inscribed radius")
+    costmap.set_footprint(type(costmap.footprint).circle(0.3))
+    assert costmap.doubts() == []
+
+
 def test_unknown_cells_are_inflated_only_where_told(build):
     edge = Costmap(np.array([[254, 255, 0, 0, 0, 0]], dtype=np.uint8), 1.0)
     results = []

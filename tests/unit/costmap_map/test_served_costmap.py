@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from mbf_abstract.actions.goals import ExePathGoal, RecoveryGoal
+from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.map_queries import CellState
 from mbf_abstract.navigator import Navigator
@@ -46,12 +47,12 @@ def start(tmp_path):
     """``start(shutdown="false", rate=0)``: a server on simulated time; it and its robot are closed at the end."""
     clock, transforms, opened = SimClock(), TransformBuffer(), []
 
-    def start(shutdown="false", rate=0.0, local="*map"):
+    def start(shutdown="false", rate=0.0, local="*map", events=None):
         file = tmp_path / "maps.yaml"
         text = CONFIG.replace("SHUTDOWN", shutdown).replace("RATE", str(rate))
         file.write_text(text.replace("local_costmap: *map", f"local_costmap: {local}"))
         robot = LoopbackRobot(clock, transforms, Pose.planar(0.0, 0.0))
-        opened.extend([navigator := Navigator.from_file(file, robot, clock, transforms), robot])
+        opened.extend([navigator := Navigator.from_file(file, robot, clock, transforms, events), robot])
         return navigator, clock
 
     yield start
@@ -151,3 +152,10 @@ def test_a_recovery_stands_while_its_map_is_not_current(start):
         see_the_box(navigator, clock)
         clock.sleep(0.2)
     assert handle.wait().success and navigator.robot_pose().x < -0.25
+
+
+def test_a_map_whose_inflation_is_narrower_than_the_robot_is_served_but_told_of(start):
+    events = EventBus(lambda: 0.0, [MemorySink()])
+    start(local="{robot_radius: 0.6, layers: [{name: i, type: inflation}], i: {inflation_radius: 0.3}}", events=events)
+    (fault,) = events.memory.of_kind(EventKind.FAULT)
+    assert fault.source == "local_costmap" and "smaller than the inscribed radius" in fault.data["message"]
