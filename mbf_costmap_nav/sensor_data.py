@@ -6,6 +6,7 @@ A source that has fallen silent is the classic reason for a robot driving into s
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections import deque
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from mbf_costmap_nav.layer import CostmapLayer
 
 MAX_OBSERVATIONS = 256
 """Bound of the memory of one source, however long its persistence."""
+MAX_STAMP_LEAD = 0.2
+"""How far [s] a stamp may lie in the future: what clocks of two computers differ by, not what a broken one does."""
 
 
 class SourceTiming(ParameterModel):
@@ -77,8 +80,10 @@ class Observation:
         Raises
         ------
         ValueError
-            Wrong shapes, or the origin is not finite.
+            Wrong shapes, or the origin or the stamp is not finite.
         """
+        if not math.isfinite(stamp):
+            raise ValueError(f"the stamp of an observation must be finite, got {stamp}")
         start = np.array(origin, dtype=np.float64).reshape(-1)
         points = np.array(ends, dtype=np.float64).reshape(-1, 3)
         mask = np.array(hits, dtype=bool).reshape(-1)
@@ -103,6 +108,9 @@ class Observation:
 class SourceWatch:
     """Notices when a source falls silent, and when nothing of it is in the map yet, at the start or after clearing.
 
+    The age of a source is that of what it said last, not of its newest stamp: a single stamp from the future would
+    otherwise cover its silence. A stamp from the future is a problem until the source says another one.
+
     Parameters
     ----------
     name : str
@@ -113,12 +121,12 @@ class SourceWatch:
     def __init__(self, name: str, timing: SourceTiming) -> None:
         self.name = name
         self._limit = timing.expected_update_rate
-        self._newest: float | None = None
+        self._last: float | None = None
         self._in_map = False
 
     def heard(self, stamp: float) -> None:
         """Note an observation made at ``stamp`` [s]."""
-        self._newest = stamp if self._newest is None else max(self._newest, stamp)
+        self._last = stamp
 
     def used(self) -> None:
         """Note that an update has put an observation into the map."""
@@ -132,9 +140,11 @@ class SourceWatch:
         """Say how late the source is at ``now`` [s]; empty while it is in time."""
         if self._limit == 0.0:
             return ""
-        if self._newest is None:
+        if self._last is None:
             return f"observation source {self.name!r} has not sent anything yet"
-        age = now - self._newest
+        age = now - self._last
+        if age < -MAX_STAMP_LEAD:
+            return f"observation source {self.name!r} has a stamp {-age:.2f} s in the future, is its clock right?"
         if age > self._limit:
             return f"observation source {self.name!r} is silent for {age:.2f} s, expected every {self._limit:.2f} s"
         return "" if self._in_map else f"nothing of observation source {self.name!r} is in the map since it was cleared"
@@ -164,10 +174,19 @@ class ObservationBuffer:
         self.watch.heard(observation.stamp)
 
     def current(self, now: float) -> list[Observation]:
-        """Observations for an update at ``now`` [s], oldest first; older ones are forgotten."""
+        """Observations for an update at ``now`` [s], oldest first; those out of their time are forgotten.
+
+        One from the future is used only as the last one that came, or it would stay until its time.
+        """
         persistence = self.parameters.observation_persistence
-        while persistence > 0.0 and self._observations and self._observations[0].stamp < now - persistence:
-            self._observations.popleft()
+        if persistence > 0.0 and self._observations:
+            last = self._observations[-1]
+            kept = [
+                seen
+                for seen in self._observations
+                if now - persistence <= seen.stamp and (seen is last or seen.stamp <= now + MAX_STAMP_LEAD)
+            ]
+            self._observations = deque(kept, maxlen=MAX_OBSERVATIONS)
         if self._observations:
             self.watch.used()
         return list(self._observations)

@@ -180,6 +180,44 @@ def test_a_silent_sensor_makes_the_map_not_current_by_default(build):
 
 
 @pytest.mark.parametrize("layer", ["obstacle", "voxel", "range_sensor"])
+def test_a_stamp_from_the_future_is_told_and_does_not_cover_silence(build, layer):
+    costmap = build(layer, **{layer: {"sources": {"laser": {}}}})
+
+    def see(stamp, now):
+        costmap.insert_points("laser", [(3.0, 3.0, 0.3)], (1.0, 3.0, 0.3), stamp)
+        costmap.update(None, now)
+
+    see(10.1, 10.0)
+    assert costmap.is_current(10.0), "clocks differ a little"
+    see(1e6, 10.1)
+    for now in (10.1, 50.0, 1000.0):
+        costmap.update(None, now)
+        assert "'laser' has a stamp" in costmap.currency_problem(now)
+    see(1000.0, 1000.0)
+    assert costmap.is_current(1000.0), "the source is right again"
+    costmap.update(None, 1002.0)
+    assert "'laser' is silent for 2.00 s" in costmap.currency_problem(1002.0)
+
+
+@pytest.mark.parametrize("stamp", [math.nan, math.inf, -math.inf])
+def test_a_stamp_that_is_no_time_is_refused(build, seeing, stamp):
+    costmap = build("obstacle", obstacle=seeing)
+    with pytest.raises(ValueError, match="stamp of an observation must be finite"):
+        costmap.insert_points("laser", [(1.0, 1.0, 0.0)], (0.0, 0.0, 0.0), stamp)
+
+
+def test_an_observation_from_the_future_is_not_kept_until_its_time(build, seeing):
+    costmap = build("obstacle", obstacle=seeing)
+    for stamp, x in ((0.0, 1.5), (1e6, 3.5)):
+        costmap.insert_points("laser", [(x, 5.5, 0.0)], (x, 4.5, 0.0), stamp)
+    costmap.update(None, 0.0)
+    assert lethal_cells(costmap) == {(1, 5), (3, 5)}, "the last one is used: an obstacle is never ignored"
+    costmap.insert_scan("laser", (0.5, 5.5, 0.0), [(9.5, 5.5, 0.0)], [False], 20.0)
+    costmap.update(None, 20.0)
+    assert lethal_cells(costmap) == set()
+
+
+@pytest.mark.parametrize("layer", ["obstacle", "voxel", "range_sensor"])
 @pytest.mark.parametrize("clear", [lambda m: m.clear(), lambda m: m.clear_area(5, 5, 4)], ids=["all", "area"])
 def test_a_cleared_map_is_not_current_before_it_sees_again(build, layer, clear):
     costmap = build(layer, **{layer: {"sources": {"laser": {}}}}, width=10, height=10)
