@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray
+from mbf_abstract.transforms import ExtrapolationError, TransformBuffer
+
+TRANSFORM_TOLERANCE = 0.3
+"""How much newer [s] than the newest transform a scan may be; costmap_2d's and Nav2's default."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +40,27 @@ class RangeScan:
     ends: FloatArray
     hits: NDArray[np.bool_]
     stamp: float
+
+    def in_frame(self, frame_id: str, transforms: TransformBuffer, tolerance: float = TRANSFORM_TOLERANCE) -> RangeScan:
+        """Express the scan in another frame, by the transform of the moment it was measured.
+
+        A scan newer than the newest transform by at most ``tolerance`` [s] is placed by that one.
+
+        Raises
+        ------
+        TransformError
+            There is no transform at the scan's stamp.
+        """
+        if frame_id == self.frame_id:
+            return self
+        try:
+            transform = transforms.lookup(frame_id, self.frame_id, self.stamp)
+        except ExtrapolationError:
+            transform = transforms.lookup(frame_id, self.frame_id)
+            if not 0.0 <= self.stamp - transform.stamp <= tolerance:
+                raise
+        origin = transform.apply(np.atleast_2d(self.origin))[0]
+        return replace(self, frame_id=frame_id, origin=origin, ends=transform.apply(self.ends))
 
     @property
     def points(self) -> FloatArray:

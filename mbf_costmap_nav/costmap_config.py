@@ -23,6 +23,7 @@ from typing import Any
 from pydantic import field_validator
 
 from mbf_abstract.parameters import ParameterModel, PluginParameters, parameter
+from mbf_abstract.sensing import TRANSFORM_TOLERANCE
 from mbf_abstract.transforms import TransformBuffer
 from mbf_costmap_nav.costmap import Costmap, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
@@ -72,6 +73,14 @@ class CostmapParameters(ParameterModel):
     update_frequency: float = parameter(5.0, "How often the server updates the map.", unit="Hz", gt=0.0, le=1000.0)
     max_age: float = parameter(
         2.0, "Time after the last update at which the map stops being current; 0 = never.", unit="s", ge=0.0
+    )
+    transform_tolerance: float = parameter(
+        TRANSFORM_TOLERANCE,
+        "A scan this much newer than the newest transform is placed by that one; a newer one is not used.",
+        unit="s",
+        ge=0.0,
+        le=10.0,
+        dynamic=False,
     )
     confine_images: bool = parameter(
         False, "Refuse maps and masks whose image lies out of their YAML file's folder.", dynamic=False

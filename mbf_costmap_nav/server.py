@@ -30,6 +30,7 @@ from mbf_costmap_nav.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.nav_core import wrap_nav_core
 from mbf_costmap_nav.plugins import CostmapContext
 from mbf_costmap_nav.queries import CostmapQueries
+from mbf_costmap_nav.scan_intake import ScanIntake
 from mbf_costmap_nav.served_costmap import ServedCostmap
 
 MAP_SUFFIXES = {".yaml", ".yml", ".pgm", ".png", ".bmp"}
@@ -78,7 +79,8 @@ class CostmapNavigationServer(AbstractNavigationServer):
         self._global = self._serve(config, "global_costmap")
         self._local = self._serve(config, "local_costmap")
         self.global_costmap, self.local_costmap = self._global.costmap, self._local.costmap
-        self._tell_doubts("global_costmap", "local_costmap")
+        self._scans = ScanIntake(self.runtime, {name: self._with_tolerance(config, name) for name in self.map_views})
+        self._tell_doubts(*self.map_views)
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add both maps and the one this plugin is bound to."""
@@ -108,15 +110,16 @@ class CostmapNavigationServer(AbstractNavigationServer):
         )
 
     def take_scan(self, scan: RangeScan) -> None:
-        """Feed a scan to every layer that listens to its source."""
-        for costmap in (self.global_costmap, self.local_costmap):
-            origin, ends = scan.origin, scan.ends
-            if scan.frame_id != costmap.frame_id:
-                transforms = self.runtime.transforms
-                ends = transforms.transform_points(ends, scan.frame_id, costmap.frame_id)
-                origin = transforms.transform_points(np.atleast_2d(origin), scan.frame_id, costmap.frame_id)[0]
-            if scan.source in costmap.source_names:
-                costmap.insert_scan(scan.source, origin, ends, scan.hits, scan.stamp)
+        """Feed a scan to every layer that listens to its source, placed by the transform at its stamp; see ScanIntake.
+
+        Raises
+        ------
+        TransformError
+            None of the maps that listen can place it.
+        ValueError
+            The stamp is not finite.
+        """
+        self._scans.take(scan)
 
     @property
     def map_views(self) -> tuple[str, ...]:
@@ -151,6 +154,10 @@ class CostmapNavigationServer(AbstractNavigationServer):
     def config_for_map(cls, file: Path) -> str | None:
         """Take every image format this package reads, and map_server's YAML."""
         return BARE_MAP.format(file=json.dumps(str(file))) if file.suffix.lower() in MAP_SUFFIXES else None
+
+    def _with_tolerance(self, config: Config, name: str) -> tuple[LayeredCostmap, float]:
+        parameters = cast(CostmapParameters, config.sections[name].parameters)
+        return getattr(self, name), parameters.transform_tolerance
 
     def _tell_doubts(self, *maps: str) -> None:
         """Put into the event log what is legal but hardly meant; the server runs on it all the same, as Nav2 does."""
