@@ -70,6 +70,8 @@ class OccupancyMap:
     def to_costmap(self, frame_id: str = "map", track_unknown_space: bool = True) -> Costmap:
         """Costs of the map: occupied is lethal, free is free, anything between is scaled to 1..253.
 
+        In mode raw all values from 100 to 254 are occupied, as for costmap_2d.
+
         Parameters
         ----------
         frame_id : str
@@ -78,7 +80,8 @@ class OccupancyMap:
             Keep unknown cells unknown; otherwise they become free.
         """
         table = np.full(256, UNKNOWN if track_unknown_space else FREE, dtype=np.uint8)
-        table[: OCCUPIED + 1] = np.arange(OCCUPIED + 1) * LETHAL // OCCUPIED
+        table[:OCCUPIED] = np.arange(OCCUPIED) * LETHAL // OCCUPIED
+        table[OCCUPIED:UNKNOWN_OCCUPANCY] = LETHAL
         flat = self.upright()
         return Costmap(table[flat.occupancy], flat.resolution, flat.origin[0], flat.origin[1], frame_id)
 
@@ -197,10 +200,10 @@ def _resampled(turned: OccupancyMap, x: float, y: float, yaw: float) -> Occupanc
     occupancy = np.full((new_height, new_width), UNKNOWN_OCCUPANCY, dtype=np.uint8)
     occupancy[inside] = turned.occupancy[source[inside][:, 1], source[inside][:, 0]]
 
-    rows, columns = np.nonzero(turned.occupancy == OCCUPIED)
+    rows, columns = np.nonzero((turned.occupancy >= OCCUPIED) & (turned.occupancy != UNKNOWN_OCCUPANCY))
     points = (np.column_stack([columns, rows]) + 0.5) * resolution @ rotation.T - lower
     cells = np.minimum((points / resolution).astype(np.int64), (new_width - 1, new_height - 1))
-    occupancy[cells[:, 1], cells[:, 0]] = OCCUPIED
+    occupancy[cells[:, 1], cells[:, 0]] = turned.occupancy[rows, columns]
     return OccupancyMap(occupancy, resolution, (x + float(lower[0]), y + float(lower[1]), 0.0))
 
 

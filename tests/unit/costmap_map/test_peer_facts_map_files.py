@@ -117,6 +117,18 @@ def test_a_costmap_of_a_map_scales_occupancy(tmp_path):
     assert content.to_costmap(track_unknown_space=False).cells.tolist() == [[0, 127, 254, 0]]
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.3])
+def test_in_raw_mode_everything_from_a_hundred_on_is_occupied_and_only_255_unknown(tmp_path, yaw):
+    grey = np.repeat(np.repeat(np.array([[0, 50, 100, 101, 150, 254, 255]], dtype=np.uint8), 5, axis=0), 5, axis=1)
+    Image.fromarray(grey).save(tmp_path / "map.png")
+    content = load_image(tmp_path / "map.png", 1.0, (0.0, 0.0, yaw), mode=MapMode.RAW)
+    for known, unknown_cost in ((True, 255), (False, 0)):
+        costmap = content.to_costmap(track_unknown_space=known)
+        middles = [(x * np.cos(yaw) - 2.5 * np.sin(yaw), x * np.sin(yaw) + 2.5 * np.cos(yaw)) for x in range(2, 35, 5)]
+        costs = [costmap.cost_at(x + 0.4, y) for x, y in middles]
+        assert costs == [0, 127, 254, 254, 254, 254, unknown_cost]
+
+
 def test_a_quarter_turn_of_the_origin_turns_the_map():
     content = OccupancyMap(np.array([[100, 0, 0]], dtype=np.uint8), 1.0, (5.0, 5.0, np.pi / 2))
     costmap = content.to_costmap()
