@@ -18,6 +18,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_abstract.robot import RobotStateError
+from mbf_mesh_nav.kernels.forbidden_ground import hardness_at, may_enter
 from mbf_mesh_nav.kernels.surface_walk import tangent, walk
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap
@@ -67,7 +68,7 @@ def run_guarded(
 
 def free_distance(
     mesh_map: MeshMap,
-    blocked: NDArray[np.bool_],
+    hardness: NDArray[np.float32],
     spot: SurfacePoint,
     direction: NDArray[np.float64],
     distance: float,
@@ -75,14 +76,15 @@ def free_distance(
 ) -> float:
     """How far [m], up to ``distance``, the ground is free straight ahead of a surface point.
 
-    Faces with a blocked corner and borders end it; faces the robot stands in when they are blocked may be left.
+    Borders end it, and forbidden ground, ``hardness`` (V,); where the robot stands on such ground itself it may leave
+    it, see ``kernels.forbidden_ground``.
     """
     face = spot.face
     x, y, z = spot.point
     normal = mesh_map.face_normals[face]
     point = (float(x), float(y), float(z))
     way = tangent((float(direction[0]), float(direction[1]), float(direction[2])), tuple(normal.tolist()))
-    was_blocked = bool(blocked[mesh_map.faces[face]].any())
+    stands_on = hardness_at(mesh_map.vertices, mesh_map.faces, hardness, face, point)
     travelled = 0.0
     while travelled < distance:
         face, point, way, walked = walk(
@@ -95,10 +97,10 @@ def free_distance(
             way,
             min(stride, distance - travelled),
         )
-        is_blocked = bool(blocked[mesh_map.faces[face]].any())
-        if is_blocked and not was_blocked:
+        comes_to = hardness_at(mesh_map.vertices, mesh_map.faces, hardness, face, point)
+        if not may_enter(stands_on, comes_to):
             break
-        was_blocked = is_blocked
+        stands_on = comes_to
         travelled += walked
         if walked < 1e-6:
             break

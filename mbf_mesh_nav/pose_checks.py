@@ -3,7 +3,7 @@
 The robot is a disc of its inscribed radius, grown by the safety distance, lying on the surface; its part of the map
 are the vertices below it that are connected to the place it stands on, so the storeys above and below do not count.
 
-- OUTSIDE: no surface within ``SURFACE_DISTANCE`` of the position.
+- OUTSIDE: no surface within ``SURFACE_DISTANCE`` above or below the position, or past a border.
 - LETHAL: the disc (of a point: the nearest vertex) touches a lethal vertex or one of infinite cost.
 - INSCRIBED: of a point only: a robot standing there would touch one.
 
@@ -23,6 +23,7 @@ from mbf_mesh_nav.layer import IntArray
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.snapshot import MeshSnapshot
+from mbf_mesh_nav.surface_point import on_surface
 
 SURFACE_DISTANCE = 0.5
 """How far [m] a position may be off the surface to count as on it; less than a storey, more than a wheel."""
@@ -32,7 +33,7 @@ OUTSIDE = PlaceAnswer(CellState.OUTSIDE, 0.0)
 
 def check_point(mesh_map: MeshMap, point: Pose) -> PlaceAnswer:
     """State and interpolated cost of the surface at a point."""
-    place = mesh_map.locate_one(point.position, SURFACE_DISTANCE)
+    place = on_surface(mesh_map, point.position, SURFACE_DISTANCE)
     if place is None:
         return OUTSIDE
     snapshot = mesh_map.snapshot()
@@ -47,7 +48,7 @@ def check_point(mesh_map: MeshMap, point: Pose) -> PlaceAnswer:
 
 def check_pose(mesh_map: MeshMap, pose: Pose, query: PlaceQuery) -> PlaceAnswer:
     """State of the robot's disc at a pose and the sum of the costs of the vertices below it."""
-    place = mesh_map.locate_one(pose.position, SURFACE_DISTANCE)
+    place = on_surface(mesh_map, pose.position, SURFACE_DISTANCE)
     if place is None:
         return OUTSIDE
     snapshot = mesh_map.snapshot()

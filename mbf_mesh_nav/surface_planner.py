@@ -24,7 +24,13 @@ from mbf_mesh_nav.leg_search import Leg, LegQuery, drop_repeated_points, spread_
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.plugins import MeshPlanner
 from mbf_mesh_nav.snapshot import MeshSnapshot
-from mbf_mesh_nav.surface_point import describe_blockage, nearest_corner, position_text, surface_point_at_vertex
+from mbf_mesh_nav.surface_point import (
+    describe_blockage,
+    nearest_corner,
+    on_surface,
+    position_text,
+    surface_point_at_vertex,
+)
 
 
 class SurfacePlannerParameters(PluginParameters):
@@ -32,7 +38,10 @@ class SurfacePlannerParameters(PluginParameters):
 
     cost_limit: float = parameter(1.0, "Vertices whose cost reaches this are impassable.", gt=0.0, allow_inf=True)
     max_surface_distance: float = parameter(
-        0.4, "A start, via point or goal farther than this from the surface is out of the map.", unit="m", gt=0.0
+        0.4,
+        "A start, via point or goal farther than this above or below the surface, or past a border, is out of the map.",
+        unit="m",
+        gt=0.0,
     )
 
 
@@ -101,12 +110,13 @@ class SurfacePlanner(MeshPlanner):
     ) -> SurfacePoint | PlanResult:
         """Put a pose on the surface, or say why that fails."""
         reach = self.parameters.max_surface_distance
-        point = self.mesh_map.locate_one(pose.position, reach)
+        point = on_surface(self.mesh_map, pose.position, reach)
         if point is None:
             distance = self.mesh_map.locate([pose.position]).distances[0]
-            where = f"the {name} {position_text(pose.position)}"
-            message = f"{where} is {distance:.2f} m from the surface, allowed are {reach:g} m"
-            return PlanResult(GetPathOutcome.OUT_OF_MAP, message)
+            where = f"the {name} {position_text(pose.position)} is {distance:.2f} m from the surface"
+            if distance <= reach:
+                return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{where}, past its border")
+            return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{where}, allowed are {reach:g} m")
         vertex = nearest_corner(self.mesh_map, point)
         if blocked[vertex]:
             outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL

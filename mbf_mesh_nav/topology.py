@@ -82,6 +82,14 @@ class MeshTopology:
         """Mean length of the edges [m], the natural unit of steps over the mesh; 1 without edges."""
         return float(np.mean(self.neighbour_lengths)) if len(self.neighbour_lengths) else 1.0
 
+    @cached_property
+    def border_vertices(self) -> NDArray[np.bool_]:
+        """Vertices (V,) at the rim of the mesh and of its holes."""
+        face, corner = np.nonzero(self.face_neighbours < 0)
+        border = np.zeros(len(self.vertices), dtype=np.bool_)
+        border[self.faces[face, corner]] = border[self.faces[face, (corner + 1) % 3]] = True
+        return border
+
     def digest(self) -> str:
         """Hexadecimal SHA-256 of vertices and faces: the identity of the mesh in caches."""
         digest = hashlib.sha256(self.vertices.tobytes())

@@ -85,8 +85,8 @@ class MPPIController(MeshController):
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
-        self._blocked_version = -1
-        self._blocked: NDArray[np.bool_] = np.zeros(0, dtype=np.bool_)
+        self._hardness_version = -1
+        self._hardness: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the map's frame."""
@@ -98,7 +98,7 @@ class MPPIController(MeshController):
         self._strict_below = 0.0
         if p.motion_model == "ackermann":
             radius = p.wheelbase / math.tan(p.max_steering_angle)
-            blocked = self._blocked_at(self.mesh_map.snapshot())
+            blocked = self._hardness_at(self.mesh_map.snapshot()) > 0.0
             bent = with_final_approach(path, self.mesh_map, blocked, _ROOM_TO_STEER * radius)
             # Beyond the goal, for the critic that looks along the path: it shows how to stand there.
             self._run_out = path.positions[-1] + np.outer((0.1, 0.2, 0.3), self._goal.rotation[:, 0])
@@ -206,7 +206,7 @@ class MPPIController(MeshController):
             mesh_map.face_neighbours,
             mesh_map.face_normals,
             snapshot.costs,
-            self._blocked_at(snapshot),
+            self._hardness_at(snapshot),
             spot.face,
             _vector(spot.point),
             tangent(_vector(pose.rotation[:, 0]), _vector(mesh_map.face_normals[spot.face])),
@@ -218,12 +218,12 @@ class MPPIController(MeshController):
             (p.roll_limit, p.pitch_limit),
         )
 
-    def _blocked_at(self, snapshot: MeshSnapshot) -> NDArray[np.bool_]:
-        """Vertices (V,) the robot must not touch."""
-        if snapshot.version != self._blocked_version:
-            self._blocked = snapshot.blocked(self.parameters.cost_limit)
-            self._blocked_version = snapshot.version
-        return self._blocked
+    def _hardness_at(self, snapshot: MeshSnapshot) -> NDArray[np.float32]:
+        """How forbidden the vertices (V,) are to the robot."""
+        if snapshot.version != self._hardness_version:
+            self._hardness = snapshot.hardness(self.parameters.cost_limit)
+            self._hardness_version = snapshot.version
+        return self._hardness
 
     def _as_motions(self, controls: NDArray[np.float64]) -> NDArray[np.float64]:
         """Turn controls (..., 2) into speed and yaw rate (..., 2), where a car has a steering angle."""

@@ -13,14 +13,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.goal_approach import ArrivalLatch, arc_to, braking_speed, clamp, heading_error, is_at_goal
+from mbf_mesh_nav.kernels.forbidden_ground import LETHAL_HARDNESS, may_enter
 from mbf_mesh_nav.path_progress import PathProgress, PathProjection
 from mbf_mesh_nav.plugins import MeshController
+from mbf_mesh_nav.surface_point import beyond_border
 
 OBSTACLE_STEP = 0.1  # m between two looks along the path
 
@@ -93,7 +96,7 @@ class PathFollower(MeshController):
         if self._arrival.update(pose, self._goal):
             turn = self.parameters.turn_gain * heading_error(pose, self._goal)
             return self._command(0.0, turn)
-        blocked_in = self._distance_to_obstacle(projection.travelled)
+        blocked_in = self._distance_to_obstacle(surface.point, projection.travelled)
         if blocked_in is not None:
             return ControlResult(ExePathOutcome.BLOCKED_PATH, f"the path is blocked {blocked_in:.2f} m ahead")
         slope = math.acos(clamp(float(self.mesh_map.face_normals[surface.face, 2]), 1.0))
@@ -103,22 +106,24 @@ class PathFollower(MeshController):
         """Whether the last pose of the plan is reached."""
         return self._goal is not None and is_at_goal(pose, self._goal, dist_tolerance, angle_tolerance)
 
-    def _distance_to_obstacle(self, travelled: float) -> float | None:
-        """Distance [m] along the path to ground the current map forbids; None if there is none in sight.
+    def _distance_to_obstacle(self, here: NDArray[np.float64], travelled: float) -> float | None:
+        """Distance [m] along the path to where the current map forbids to go on; None if that is not in sight.
 
-        A robot that stands on such ground itself may leave it: only what comes after free ground counts.
+        A robot that stands on forbidden ground itself may leave it, see ``kernels.forbidden_ground``. Where the path
+        leads off the surface it is blocked too.
         """
         ahead = np.arange(0.0, self.parameters.obstacle_distance, OBSTACLE_STEP)
-        places = self._progress.points_at(travelled + ahead)
+        places = np.concatenate([here[None], self._progress.points_at(travelled + ahead)])
         location = self.mesh_map.locate(places, self.parameters.max_surface_distance)
-        corners = self.mesh_map.faces[location.faces, np.argmax(location.barycentric, axis=1)]
-        snapshot = self.mesh_map.snapshot()
-        blocked = snapshot.lethal[corners] | ~(snapshot.costs[corners] < self.parameters.cost_limit)
-        blocked &= location.faces >= 0
-        if blocked.all():
-            return None
-        hit = np.flatnonzero(blocked & (np.arange(len(blocked)) > np.argmin(blocked)))
-        return float(ahead[hit[0]]) if hit.size else None
+        corners = self.mesh_map.faces[location.faces]
+        hardness = self.mesh_map.snapshot().hardness(self.parameters.cost_limit, corners)
+        nearest = np.take_along_axis(hardness, np.argmax(location.barycentric, axis=1)[:, None], axis=1)[:, 0]
+        mixed = np.where(nearest > 0.0, (hardness * location.barycentric).sum(axis=1), 0.0)
+        mixed[(location.faces < 0) | beyond_border(self.mesh_map, places, location)] = LETHAL_HARDNESS
+        for distance, before, now in zip(ahead, mixed[:-1], mixed[1:], strict=True):
+            if not may_enter(before, now):
+                return float(distance)
+        return None
 
     def _pursue(self, pose: Pose, projection: PathProjection, slope: float) -> ControlResult:
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import BoolArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.forbidden_ground import hardness_at, may_enter
 from mbf_mesh_nav.kernels.surface_walk import turned, walk
 from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, dot, row
 
@@ -29,7 +30,7 @@ def score_rollouts(
     face_neighbours: Int32Array,
     face_normals: Float64Array,
     costs: Float32Array,
-    blocked: BoolArray,
+    hardness: Float32Array,
     start_face: int,
     start: Vector,
     heading: Vector,
@@ -46,9 +47,9 @@ def score_rollouts(
     ----------
     vertices, faces, face_neighbours, face_normals
         The mesh.
-    costs, blocked : (V,) float32, (V,) bool
-        The current map; a face with a blocked corner is forbidden, unless the rollout has been in forbidden faces from
-        its start: then it may drive out.
+    costs, hardness : (V,) float32
+        The current map; how ground is forbidden, and where a rollout that starts there may go, says
+        ``forbidden_ground.py``.
     start_face, start, heading
         The robot: face, point [m], unit direction in the face.
     controls : (n, t, 2) float64
@@ -73,7 +74,7 @@ def score_rollouts(
     sin_roll, sin_pitch = math.sin(tilt_limits[0]), math.sin(tilt_limits[1])
     for sequence in range(sequence_count):
         face, point, direction = start_face, start, heading
-        was_forbidden = _is_forbidden(faces, blocked, face)
+        stands_on = hardness_at(vertices, faces, hardness, face, point)
         nearest = Count(0)
         score = 0.0
         for step in range(step_count):
@@ -86,11 +87,11 @@ def score_rollouts(
             face, point, way, walked = walk(vertices, faces, face_neighbours, face_normals, face, point, way, distance)
             direction = (sign * way[0], sign * way[1], sign * way[2])
             # 2. Collisions end the rollout.
-            forbidden = _is_forbidden(faces, blocked, face)
-            if walked < distance - 1e-9 or (forbidden and not was_forbidden):
+            comes_to = hardness_at(vertices, faces, hardness, face, point)
+            if walked < distance - 1e-9 or not may_enter(stands_on, comes_to):
                 collided[sequence] = True
                 break
-            was_forbidden = forbidden
+            stands_on = comes_to
             # 3. The path point nearest to here is at or after the one of the step before.
             gap = _squared_distance(path_points, nearest, point)
             while nearest + 1 < len(path_points) and _squared_distance(path_points, nearest + 1, point) <= gap:
@@ -113,11 +114,6 @@ def score_rollouts(
             score += weights[HEADING] * (1.0 - dot(ahead, direction) / length)
         scores[sequence] = score
     return scores, collided
-
-
-@inner_kernel
-def _is_forbidden(faces: Int32Array, blocked: BoolArray, face: int) -> bool:
-    return bool(blocked[faces[face, 0]] or blocked[faces[face, 1]] or blocked[faces[face, 2]])
 
 
 @inner_kernel

@@ -28,9 +28,5 @@ class BorderLayer(MeshLayer):
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = ``border_cost`` at the border, lethal if that exceeds ``threshold``."""
-        faces = self.topology.faces
-        face, corner = np.nonzero(self.topology.face_neighbours < 0)
-        costs = np.zeros(self.topology.vertex_count, dtype=np.float32)
-        costs[faces[face, corner]] = self.parameters.border_cost
-        costs[faces[face, (corner + 1) % 3]] = self.parameters.border_cost
+        costs = np.where(self.topology.border_vertices, self.parameters.border_cost, 0.0).astype(np.float32)
         return costs, costs > self.parameters.threshold

@@ -57,10 +57,10 @@ class BackUpRecovery(MeshRecovery):
             spot = self.mesh_map.locate_one(pose.position, 1.0)
             if spot is None:
                 return RecoveryResult(RecoveryOutcome.FAILURE, "the robot is more than 1 m from the surface")
-            blocked = self.mesh_map.snapshot().blocked(p.cost_limit)
+            hardness = self.mesh_map.snapshot().hardness(p.cost_limit)
             target = progress.point_at(driven + p.lookahead)
             direction = target - np.asarray(pose.position)
-            if free_distance(self.mesh_map, blocked, spot, direction, p.clearance + 0.1) > p.clearance:
+            if free_distance(self.mesh_map, hardness, spot, direction, p.clearance + 0.1) > p.clearance:
                 _, curvature = arc_to(pose, target)
                 return Twist.planar(vx=-p.speed, wz=clamp(-p.speed * curvature, p.yaw_rate))
             outcome = RecoveryOutcome.SUCCESS if driven >= p.min_distance else RecoveryOutcome.IMPASSABLE

@@ -1,9 +1,9 @@
 """Leave ground that has become forbidden: drive slowly to the nearest free vertex over the surface.
 
 For a robot that stands in an inflated or lethal area (a new obstacle, a pushed robot), where every planner answers
-BLOCKED_START. It crosses costly and lethal-by-inflation ground on purpose, so it is slow, short (``max_distance``) and
-measures distance on the surface, never across a gap or to another storey. It does not know what the
-lethal ground really is: order it after ``mesh.clear_layers`` and ``mesh.back_up``.
+BLOCKED_START. It crosses costly ground on purpose, so it is slow, short (``max_distance``) and measures distance on the
+surface, never across a gap or to another storey. Lethal ground it crosses only where the robot stands on it, and does
+not know what that really is: order it after ``mesh.clear_layers`` and ``mesh.back_up``.
 """
 
 from __future__ import annotations
@@ -73,13 +73,15 @@ class EscapeRecovery(MeshRecovery):
     def _way_to_safety(
         self, spot: SurfacePoint, blocked: NDArray[np.bool_], request: RecoveryRequest
     ) -> NDArray[np.float64] | None:
-        """Points (n, 3) over the mesh to the nearest vertex around which no face is forbidden."""
-        mesh_map = self.mesh_map
-        nowhere = np.zeros(len(blocked), dtype=np.bool_)
-        distances, predecessors, seeds = seeded_arrays(mesh_map, nowhere, spot)
-        graph = (mesh_map.neighbour_offsets, mesh_map.neighbours, mesh_map.neighbour_lengths, nowhere)
-        step, flag = threshold_step(mesh_map), request.cancel_token.flag
-        propagate_distances(*graph, distances, predecessors, seeds, step, NO_TARGETS, NO_OFFSETS, flag)
+        """Points (n, 3) over the mesh to the nearest vertex around which no face is forbidden.
+
+        The way leads over costly ground, and over lethal ground only if the robot stands on it: then over that patch.
+        """
+        mesh_map, flag = self.mesh_map, request.cancel_token.flag
+        snapshot = mesh_map.snapshot()
+        lethal = snapshot.lethal | np.isposinf(snapshot.costs)
+        own_patch, _ = self._spread(spot, ~lethal, flag)
+        distances, predecessors = self._spread(spot, lethal & np.isinf(own_patch), flag)
         beside_blocked = blocked[mesh_map.edges].any(axis=1)
         safe = ~blocked
         safe[mesh_map.edges[beside_blocked].ravel()] = False
@@ -89,3 +91,14 @@ class EscapeRecovery(MeshRecovery):
             return None
         chain = follow_predecessors(predecessors, nearest)[::-1]
         return np.concatenate([[spot.point], mesh_map.vertices[chain]])
+
+    def _spread(
+        self, spot: SurfacePoint, closed: NDArray[np.bool_], flag: NDArray[np.uint8]
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Lengths of the ways from the robot to all vertices without those ``closed``, and their predecessors."""
+        mesh_map = self.mesh_map
+        distances, predecessors, seeds = seeded_arrays(mesh_map, closed, spot)
+        graph = (mesh_map.neighbour_offsets, mesh_map.neighbours, mesh_map.neighbour_lengths, closed)
+        step = threshold_step(mesh_map)
+        propagate_distances(*graph, distances, predecessors, seeds, step, NO_TARGETS, NO_OFFSETS, flag)
+        return distances, predecessors

@@ -1,0 +1,50 @@
+"""The one rule for a robot that stands on forbidden ground: it may leave, never towards what is harder.
+
+An obstacle that appears beside a robot forbids the ground it stands on. It has to get away from there, but a rule
+that only asks whether it stood on forbidden ground before lets it drive on through the obstacle. So ground has a
+*hardness*, see ``MeshSnapshot.hardness``, interpolated within a face: from forbidden ground a step leads to free
+ground, or to forbidden ground no harder, and never into what is wholly lethal.
+
+Used by every controller and recovery that looks ahead. Planners do not use it: they answer BLOCKED_START.
+"""
+
+from __future__ import annotations
+
+from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.dijkstra import Float32Array, Int32Array
+from mbf_mesh_nav.kernels.vectors import Float64Array, Vector
+
+LETHAL_HARDNESS = 4.0
+"""Hardness of a lethal vertex; twice that of any that is forbidden by its cost."""
+_SLACK = 1e-3  # float32 costs along a ring of one cost differ by rounding
+
+
+@kernel
+def may_enter(before: float, now: float) -> bool:
+    """Whether a step may lead from ground of hardness ``before`` to ``now``; 0 is free ground."""
+    if now <= 0.0:
+        return True
+    return bool(before > 0.0 and now <= before + _SLACK and now < LETHAL_HARDNESS - _SLACK)
+
+
+@kernel
+def hardness_at(vertices: Float64Array, faces: Int32Array, hardness: Float32Array, face: int, point: Vector) -> float:
+    """Hardness of a point [m] in a face, interpolated between those (V,) of its corners; 0 only if all are free."""
+    a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
+    if hardness[a] == 0.0 and hardness[b] == 0.0 and hardness[c] == 0.0:
+        return 0.0
+    # Barycentric coordinates by dot products (Ericson, Real-Time Collision Detection, section 3.4).
+    aa, ab, bb, ap, bp = 0.0, 0.0, 0.0, 0.0, 0.0
+    for axis in range(3):
+        along_b, along_c = vertices[b, axis] - vertices[a, axis], vertices[c, axis] - vertices[a, axis]
+        offset = point[axis] - vertices[a, axis]
+        aa += along_b * along_b
+        ab += along_b * along_c
+        bb += along_c * along_c
+        ap += offset * along_b
+        bp += offset * along_c
+    area = aa * bb - ab * ab
+    share_b = (bb * ap - ab * bp) / area if area > 0.0 else 0.0
+    share_c = (aa * bp - ab * ap) / area if area > 0.0 else 0.0
+    mixed = (1.0 - share_b - share_c) * hardness[a] + share_b * hardness[b] + share_c * hardness[c]
+    return float(max(mixed, 1e-6))
