@@ -11,10 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.repair import CheckedMesh, MeshError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
+from mbf_mesh_nav.checked_mesh import CheckedMesh, IntArray
+from mbf_mesh_nav.mesh_report import MeshError
 
 
 def densify(mesh: CheckedMesh, max_edge_length: float, max_faces: int = 20_000_000) -> CheckedMesh:

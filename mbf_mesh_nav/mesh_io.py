@@ -90,7 +90,8 @@ def _read_scene(path: Path, part: str) -> MeshArrays:
             continue
         points = np.asarray(geometry.vertices, dtype=np.float64)
         vertices.append(points @ transform[:3, :3].T + transform[:3, 3])
-        faces.append(np.asarray(geometry.faces, dtype=np.int64) + offset)
+        corners = np.asarray(geometry.faces, dtype=np.int64) + offset
+        faces.append(corners[:, ::-1] if np.linalg.det(transform[:3, :3]) < 0.0 else corners)  # mirrored inside out
         offset += len(points)
     if not faces:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)

@@ -4,19 +4,21 @@ A mesh with a defect is refused unless its name stands in the configuration's ``
 was found and done, with counts and indices in the caller's numbering. The caller's arrays and files are never changed.
 
 ``REPAIRS`` maps each defect that can be repaired to what the repair does. Harmless findings (unreferenced vertices,
-several components) never refuse a mesh.
+vertices of holes, several components, a component that faces down, groups of faces that touch in a point) never
+refuse a mesh.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from mbf_mesh_nav.checked_mesh import CheckedMesh, FloatArray, IntArray
 from mbf_mesh_nav.kernels.defects import (
     face_area_vectors,
     faces_without_area,
@@ -24,123 +26,41 @@ from mbf_mesh_nav.kernels.defects import (
     surplus_faces,
     winding_flips,
 )
+from mbf_mesh_nav.kernels.fans import fans_at_vertices
 from mbf_mesh_nav.kernels.topology import faces_across_edges, faces_of_vertices
+from mbf_mesh_nav.mesh_report import Finding, MeshError, MeshReport
+from mbf_mesh_nav.slivers import without_slivers
+from mbf_mesh_nav.welding import close_rims, rounding_distance, same_position
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
+__all__ = ["REPAIRS", "CheckedMesh", "Finding", "MeshError", "MeshReport", "checked_mesh", "component_labels"]
 
 REPAIRS: dict[str, str] = {
     "non_finite": "drop vertices with NaN or inf and their faces",
     "index_out_of_range": "drop faces that name a vertex that does not exist",
-    "duplicate_vertices": "merge vertices at the same position",
-    "zero_area": "drop faces without area",
+    "duplicate_vertices": "merge vertices at the same position, at the rims of parts also those nearly there",
+    "zero_area": "flip faces without area away and join their neighbours; drop those that cannot be",
     "duplicate_faces": "drop faces with the same corners as an earlier one",
     "non_manifold": "drop the third and further faces at an edge, in index order",
     "flipped_winding": "turn faces round whose neighbours are wound the other way",
-    "facing_down": "turn the whole mesh round",
+    "facing_down": "turn every component round that faces down",
+    "point_contacts": "give each of the groups of faces that touch in a point a vertex of its own",
     "unreferenced": "drop vertices without a face",
     "small_components": "keep only the component with the most vertices",
 }
-HARMLESS = frozenset({"unreferenced", "components", "coarse"})
 ZERO_AREA_TOLERANCE = 1e-10
 """Doubled area over the longest edge squared; relative, so that millimetres and kilometres are treated alike."""
 FACING_DOWN_SHARE = 0.05
-"""A mesh faces down if its faces' summed area vector points down by more than this share of the area."""
-
-
-@dataclass(frozen=True, eq=False)
-class Finding:
-    """One kind of defect: its name, a sentence, the caller's indices of the vertices or faces, whether repaired."""
-
-    name: str
-    text: str
-    indices: NDArray[np.int64]
-    repaired: bool = False
-
-    @property
-    def count(self) -> int:
-        """How many vertices or faces are concerned."""
-        return len(self.indices)
-
-    def __str__(self) -> str:
-        shown = ", ".join(str(index) for index in self.indices[:5])
-        more = ", ..." if self.count > 5 else ""
-        return f"{self.name}: {self.text} (indices {shown}{more}){' - repaired' if self.repaired else ''}"
-
-
-@dataclass
-class MeshReport:
-    """All findings of one mesh, in the order of the checks."""
-
-    findings: list[Finding] = field(default_factory=list)
-
-    def __getitem__(self, name: str) -> Finding:
-        return next(finding for finding in self.findings if finding.name == name)
-
-    def __contains__(self, name: str) -> bool:
-        return any(finding.name == name for finding in self.findings)
-
-    @property
-    def refusals(self) -> list[Finding]:
-        """Findings that are neither repaired nor harmless."""
-        return [finding for finding in self.findings if not finding.repaired and finding.name not in HARMLESS]
-
-
-class MeshError(ValueError):
-    """A mesh or its file cannot be used; names the file and every reason.
-
-    Attributes
-    ----------
-    file : str
-        The file, or "arrays".
-    reasons : list of str
-    """
-
-    def __init__(self, file: str, reasons: Sequence[str]) -> None:
-        self.file = file
-        self.reasons = list(reasons)
-        super().__init__(f"{file}: " + "; ".join(self.reasons))
-
-
-@dataclass(frozen=True, eq=False)
-class CheckedMesh:
-    """A mesh without defects and where its parts came from.
-
-    Attributes
-    ----------
-    vertices : (V, 3) float64
-    faces : (F, 3) int32
-    vertex_source, face_source : (V,), (F,) int32
-        The caller's number, -1 = added later.
-    input_to_vertex : (V_input,) int32
-        The other direction; -1 = dropped. Merged vertices share one number.
-    """
-
-    vertices: FloatArray
-    faces: IntArray
-    vertex_source: IntArray
-    face_source: IntArray
-    input_to_vertex: IntArray
-
-    def without_faces(self, dropped: NDArray[np.bool_]) -> CheckedMesh:
-        """Copy without the faces of a mask (F,)."""
-        return replace(self, faces=self.faces[~dropped], face_source=self.face_source[~dropped])
-
-    def without_vertices(self, dropped: NDArray[np.bool_]) -> CheckedMesh:
-        """Copy without the vertices of a mask (V,), none of which a face may use."""
-        renumbered = np.where(dropped, -1, np.cumsum(~dropped) - 1).astype(np.int32)
-        given = self.input_to_vertex
-        return replace(
-            self,
-            vertices=self.vertices[~dropped],
-            faces=renumbered[self.faces],
-            vertex_source=self.vertex_source[~dropped],
-            input_to_vertex=np.where(given >= 0, renumbered[given], -1).astype(np.int32),
-        )
+"""A component faces down if its faces' summed area vector points down by more than this share of the area."""
+UPSIDE_DOWN_SHARE = 0.5
+"""A mesh is refused if components with more than this share of its area face down; fewer may well be ceilings."""
 
 
 def checked_mesh(
-    vertices: ArrayLike, faces: ArrayLike, repair: Sequence[str] = (), file: str = "arrays"
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    repair: Sequence[str] = (),
+    file: str = "arrays",
+    join_distance: float = 0.0,
 ) -> tuple[CheckedMesh, MeshReport]:
     """Check a mesh and apply the allowed repairs.
 
@@ -157,6 +77,9 @@ def checked_mesh(
         Names of ``REPAIRS`` that may be applied.
     file : str
         Named in the error.
+    join_distance : float
+        How far apart [m] vertices at the rims of parts may be for the repair ``duplicate_vertices`` to join them;
+        0 = a millionth of the mesh's extent.
 
     Raises
     ------
@@ -166,12 +89,13 @@ def checked_mesh(
     if unknown := [name for name in repair if name not in REPAIRS]:
         raise MeshError(file, [f"unknown repair '{name}', the repairs are: {', '.join(REPAIRS)}" for name in unknown])
     points, corners = _shaped(vertices, faces, file)
-    check = _Check(repair)
+    check = _Check(repair, join_distance)
     mesh = check.indices(points, corners)
     mesh = check.duplicate_vertices(mesh)
     mesh = check.zero_area(mesh)
     mesh = check.edges(mesh)
     mesh = check.winding(mesh)
+    mesh = check.point_contacts(mesh)
     mesh = check.components(mesh)
     mesh = check.unreferenced(mesh)
     reasons = [str(finding) for finding in check.report.refusals]
@@ -199,8 +123,9 @@ def _shaped(vertices: ArrayLike, faces: ArrayLike, file: str) -> tuple[FloatArra
 class _Check:
     """The single checks; each reports its defect and returns the mesh without it."""
 
-    def __init__(self, repair: Sequence[str]) -> None:
+    def __init__(self, repair: Sequence[str], join_distance: float) -> None:
         self.repair = frozenset(repair)
+        self.join_distance = join_distance
         self.report = MeshReport()
         self._faces: IntArray | None = None
 
@@ -211,39 +136,56 @@ class _Check:
             self._incidence = faces_of_vertices(mesh.faces, len(mesh.vertices))
         return self._incidence
 
-    def found(self, name: str, text: str, indices: NDArray[np.integer]) -> None:
+    def found(self, name: str, text: str, indices: NDArray[np.integer], harmless: bool = False) -> None:
         if len(indices):
             text = text.format(count=len(indices))
-            self.report.findings.append(Finding(name, text, indices.astype(np.int64), name in self.repair))
+            finding = Finding(name, text, indices.astype(np.int64), name in self.repair, harmless)
+            self.report.findings.append(finding)
 
     def indices(self, points: FloatArray, corners: NDArray[np.int64]) -> CheckedMesh:
         identity = np.arange(len(points), dtype=np.int32)
         outside = ((corners < 0) | (corners >= len(points))).any(axis=1)
         text = f"{{count}} faces name vertices outside 0..{len(points) - 1}"
         self.found("index_out_of_range", text, np.flatnonzero(outside))
-        broken = np.asarray(~np.isfinite(points).all(axis=1))
-        self.found("non_finite", "{count} vertices have a NaN or inf coordinate", np.flatnonzero(broken))
         kept = np.flatnonzero(~outside)
         mesh = CheckedMesh(points, corners[kept].astype(np.int32), identity, kept.astype(np.int32), identity)
+        broken = np.asarray(~np.isfinite(points).all(axis=1))
         if not broken.any():
             return mesh
+        # A grid with voids has a vertex without a height for each of them; what no face names, harms nobody.
+        used = mesh.used
+        self.found("non_finite", "{count} vertices have a NaN or inf coordinate", np.flatnonzero(broken & used))
+        text = "{count} vertices without a position belong to no face and are left out"
+        self.found("holes", text, np.flatnonzero(broken & ~used), harmless=True)
         return mesh.without_faces(np.asarray(broken[mesh.faces].any(axis=1))).without_vertices(broken)
 
     def duplicate_vertices(self, mesh: CheckedMesh) -> CheckedMesh:
         # Merging is an offer, not a duty: two walls may touch without being joined.
         if "duplicate_vertices" not in self.repair:
             return mesh
-        _, first, merged = np.unique(mesh.vertices, axis=0, return_index=True, return_inverse=True)
-        target = first[merged.ravel()].astype(np.int32)
-        moved = target != np.arange(len(target))
-        self.found("duplicate_vertices", "{count} vertices repeat a position", mesh.vertex_source[moved])
-        given = np.where(mesh.input_to_vertex >= 0, target[mesh.input_to_vertex], -1).astype(np.int32)
-        return replace(mesh, faces=target[mesh.faces], input_to_vertex=given).without_vertices(moved)
+        exact = same_position(mesh.vertices)
+        moved = mesh.vertex_source[exact != np.arange(len(exact))]
+        mesh = mesh.merged(exact)
+        distance = self.join_distance or rounding_distance(mesh.vertices[mesh.used])
+        target = close_rims(mesh.vertices, faces_across_edges(mesh.faces, *self.incidence(mesh)), mesh.faces, distance)
+        near = mesh.vertex_source[target != np.arange(len(target))]
+        text = "{count} vertices repeat a position"
+        if len(near):
+            text += f", {len(near)} of them to within {distance:.2g} m"
+            mesh = mesh.merged(target)
+        self.found("duplicate_vertices", text, np.sort(np.concatenate([moved, near])))
+        return mesh
 
     def zero_area(self, mesh: CheckedMesh) -> CheckedMesh:
         flat = faces_without_area(mesh.vertices, mesh.faces, ZERO_AREA_TOLERANCE)
-        self.found("zero_area", "{count} faces have no area", mesh.face_source[flat])
-        return mesh.without_faces(flat) if flat.any() else mesh
+        text, sources = "{count} faces have no area", mesh.face_source[flat]
+        if flat.any() and "zero_area" in self.repair:
+            mesh, cracks = without_slivers(mesh, ZERO_AREA_TOLERANCE)
+            text += f"; at {cracks} of them the neighbours cannot be joined, a crack is left" if cracks else ""
+        elif flat.any():
+            mesh = mesh.without_faces(flat)
+        self.found("zero_area", text, sources)
+        return mesh
 
     def edges(self, mesh: CheckedMesh) -> CheckedMesh:
         repeated = repeated_faces(mesh.faces, *self.incidence(mesh))
@@ -256,39 +198,71 @@ class _Check:
     def winding(self, mesh: CheckedMesh) -> CheckedMesh:
         across = faces_across_edges(mesh.faces, *self.incidence(mesh))
         areas = face_area_vectors(mesh.vertices, mesh.faces)
-        flips, contradictions = winding_flips(mesh.faces, across, areas[:, 3])
+        flips, patches, contradictions = winding_flips(mesh.faces, across, areas[:, 3])
         text = "{count} faces are wound against their neighbours"
         if contradictions:
             text += f", and {contradictions} edges of a one-sided surface cannot agree"
         self.found("flipped_winding", text, mesh.face_source[flips])
         if flips.any():
             mesh = replace(mesh, faces=np.where(flips[:, None], mesh.faces[:, ::-1], mesh.faces))
-        upward = float(np.where(flips, -areas[:, 2], areas[:, 2]).sum())
-        if upward >= -FACING_DOWN_SHARE * float(areas[:, 3].sum()):
+        return self.facing_down(mesh, np.where(flips, -areas[:, 2], areas[:, 2]), areas[:, 3], patches)
+
+    def facing_down(self, mesh: CheckedMesh, upward: FloatArray, areas: FloatArray, patches: IntArray) -> CheckedMesh:
+        sizes = np.bincount(patches, areas)
+        down = np.bincount(patches, upward) < -FACING_DOWN_SHARE * sizes
+        concerned = down[patches]
+        text = f"{{count}} faces face down, those of {int(down.sum())} of {len(sizes)} components"
+        harmless = bool(sizes[down].sum() <= UPSIDE_DOWN_SHARE * sizes.sum())
+        self.found("facing_down", text, mesh.face_source[concerned], harmless)
+        if not down.any() or "facing_down" not in self.repair:
             return mesh
-        self.found("facing_down", "the mesh as a whole ({count} faces) faces down", mesh.face_source)
-        return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]))
+        return replace(mesh, faces=np.where(concerned[:, None], mesh.faces[:, ::-1], mesh.faces))
+
+    def point_contacts(self, mesh: CheckedMesh) -> CheckedMesh:
+        offsets, incident = self.incidence(mesh)
+        across = faces_across_edges(mesh.faces, offsets, incident)
+        fans, counts = fans_at_vertices(mesh.faces, across, offsets, incident)
+        several = counts > 1
+        text = "{count} vertices join groups of faces that touch in this point only"
+        self.found("point_contacts", text, mesh.vertex_source[several], harmless=True)
+        if not several.any() or "point_contacts" not in self.repair:
+            return mesh
+        entries = np.flatnonzero(fans > 0)
+        vertex = np.repeat(np.arange(len(counts), dtype=np.int32), np.diff(offsets))[entries]
+        copies_before = np.cumsum(np.maximum(counts - 1, 0)) - np.maximum(counts - 1, 0)
+        faces = mesh.faces.copy()
+        face, corner = np.nonzero(mesh.faces[incident[entries]] == vertex[:, None])
+        faces[incident[entries][face], corner] = len(counts) + (copies_before[vertex] + fans[entries] - 1)[face]
+        return mesh.with_copies(np.repeat(np.arange(len(counts)), np.maximum(counts - 1, 0)), faces)
 
     def components(self, mesh: CheckedMesh) -> CheckedMesh:
-        used = np.zeros(len(mesh.vertices), dtype=np.bool_)
-        used[mesh.faces] = True
+        used = mesh.used
         labels = component_labels(mesh.faces, len(mesh.vertices))
         names, first, sizes = np.unique(labels[used], return_index=True, return_counts=True)
         if len(names) < 2:
             return mesh
         text = f"{{count}} components, the largest with {sizes.max()} of {sizes.sum()} vertices"
-        self.found("components", text, mesh.vertex_source[np.flatnonzero(used)[first]])
+        if "duplicate_vertices" not in self.repair:
+            elsewhere = labels != labels[same_position(np.where(used[:, None], mesh.vertices, np.nan))]
+            text += f"; {elsewhere.sum()} vertices lie on one of another component" if elsewhere.any() else ""
+        numbers = _numbers(mesh)
+        self.found("components", text, numbers[np.flatnonzero(used)[first]], harmless=True)
         if "small_components" not in self.repair:
             return mesh
         small = used & (labels != names[np.argmax(sizes)])
-        self.found("small_components", "{count} vertices belong to smaller components", mesh.vertex_source[small])
+        self.found("small_components", "{count} vertices belong to smaller components", numbers[small])
         return mesh.without_faces(small[mesh.faces[:, 0]]).without_vertices(small)
 
     def unreferenced(self, mesh: CheckedMesh) -> CheckedMesh:
-        unused = np.ones(len(mesh.vertices), dtype=np.bool_)
-        unused[mesh.faces] = False
-        self.found("unreferenced", "{count} vertices belong to no face", mesh.vertex_source[unused])
+        unused = ~mesh.used
+        self.found("unreferenced", "{count} vertices belong to no face", mesh.vertex_source[unused], harmless=True)
         return mesh.without_vertices(unused) if unused.any() and "unreferenced" in self.repair else mesh
+
+
+def _numbers(mesh: CheckedMesh) -> IntArray:
+    """The caller's number of every vertex (V,), that of the original where a repair made a copy."""
+    numbers = mesh.vertex_source
+    return numbers if (numbers >= 0).all() else numbers[same_position(mesh.vertices)]
 
 
 def component_labels(faces: IntArray, vertex_count: int) -> IntArray:

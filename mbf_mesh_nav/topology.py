@@ -48,7 +48,7 @@ class MeshTopology:
     input_to_internal : (V_input,) int32
         Internal vertex of every vertex the caller gave, -1 if a repair dropped it.
     internal_to_input, internal_to_input_faces : (V,), (F,) int32
-        The caller's number of every vertex and face, -1 if densifying made it.
+        The caller's number of every vertex and face, -1 if densifying or a repair made it.
     """
 
     vertices: FloatArray

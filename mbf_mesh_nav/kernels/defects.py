@@ -82,8 +82,10 @@ def runs_along(faces: IntArray, face: int, start: int, end: int) -> bool:
 
 
 @kernel
-def winding_flips(faces: IntArray, face_neighbours: IntArray, areas: FloatArray) -> tuple[BoolArray, int]:
-    """Faces (F,) to turn round so that neighbours agree, and the number of edges where none can (Moebius strips).
+def winding_flips(faces: IntArray, face_neighbours: IntArray, areas: FloatArray) -> tuple[BoolArray, IntArray, int]:
+    """Faces (F,) to turn round so that neighbours agree, patch of every face (F,), and edges where none can.
+
+    Edges at which neighbours cannot agree are those of one-sided surfaces, such as a Moebius strip.
 
     Each patch of faces is oriented from its first face; of the two possible answers the one that turns less area wins.
     """
@@ -91,7 +93,8 @@ def winding_flips(faces: IntArray, face_neighbours: IntArray, areas: FloatArray)
     flip = np.zeros(face_count, dtype=np.bool_)
     seen = np.zeros(face_count, dtype=np.bool_)
     patch = np.zeros(face_count, dtype=np.int32)
-    contradictions = 0
+    patches = np.zeros(face_count, dtype=np.int32)
+    contradictions, patch_count = 0, 0
     for start in range(face_count):
         if seen[start]:
             continue
@@ -102,6 +105,7 @@ def winding_flips(faces: IntArray, face_neighbours: IntArray, areas: FloatArray)
         while position < size:
             face = patch[position]
             position += 1
+            patches[face] = patch_count
             area += areas[face]
             if flip[face]:
                 turned += areas[face]
@@ -121,7 +125,8 @@ def winding_flips(faces: IntArray, face_neighbours: IntArray, areas: FloatArray)
         if turned > 0.5 * area:
             for index in range(size):
                 flip[patch[index]] = not flip[patch[index]]
-    return flip, contradictions
+        patch_count += 1
+    return flip, patches, contradictions
 
 
 @kernel

@@ -1,0 +1,75 @@
+"""A mesh on its way through checks, repairs and densifying, which knows where each of its parts came from.
+
+Use it between reading a mesh and ``topology.build_topology``. It is no map: it has no neighbours and no layers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedMesh:
+    """A mesh without defects and where its parts came from.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float64
+    faces : (F, 3) int32
+    vertex_source, face_source : (V,), (F,) int32
+        The caller's number, -1 = added later. The halves of a split face share the number of the whole.
+    input_to_vertex : (V_input,) int32
+        The other direction; -1 = dropped. Merged vertices share one number.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    vertex_source: IntArray
+    face_source: IntArray
+    input_to_vertex: IntArray
+
+    def without_faces(self, dropped: NDArray[np.bool_]) -> CheckedMesh:
+        """Copy without the faces of a mask (F,)."""
+        return replace(self, faces=self.faces[~dropped], face_source=self.face_source[~dropped])
+
+    def without_vertices(self, dropped: NDArray[np.bool_]) -> CheckedMesh:
+        """Copy without the vertices of a mask (V,), none of which a face may use."""
+        renumbered = np.where(dropped, -1, np.cumsum(~dropped) - 1).astype(np.int32)
+        given = self.input_to_vertex
+        return replace(
+            self,
+            vertices=self.vertices[~dropped],
+            faces=renumbered[self.faces],
+            vertex_source=self.vertex_source[~dropped],
+            input_to_vertex=np.where(given >= 0, renumbered[given], -1).astype(np.int32),
+        )
+
+    def merged(self, target: IntArray) -> CheckedMesh:
+        """Copy in which vertex ``target[v]`` (V,) stands for ``v``; targets stand for themselves."""
+        moved = np.asarray(target != np.arange(len(target)))
+        given = self.input_to_vertex
+        given = np.where(given >= 0, target[given], -1).astype(np.int32)
+        return replace(self, faces=target[self.faces], input_to_vertex=given).without_vertices(moved)
+
+    def with_copies(self, originals: IntArray, faces: IntArray) -> CheckedMesh:
+        """Copy whose faces (F, 3) name copies of vertices, too: number V + i is that of ``originals[i]``."""
+        added = np.full(len(originals), -1, dtype=np.int32)
+        return replace(
+            self,
+            vertices=np.vstack([self.vertices, self.vertices[originals]]),
+            faces=faces,
+            vertex_source=np.concatenate([self.vertex_source, added]),
+        )
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Mask (V,) of the vertices that belong to a face."""
+        mask = np.zeros(len(self.vertices), dtype=np.bool_)
+        mask[self.faces] = True
+        return mask
