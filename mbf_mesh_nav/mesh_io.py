@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.repair import MeshError
+from mbf_mesh_nav.cut_files import refuse_cut_file
+from mbf_mesh_nav.mesh_report import MeshError
 
 TRIMESH_FORMATS = frozenset({".ply", ".obj", ".stl", ".off", ".dae", ".gltf", ".glb"})
 HDF5_FORMATS = frozenset({".h5", ".hdf5"})
@@ -44,7 +45,7 @@ def read_mesh(file: str | Path, part: str = "", max_faces: int = MAX_FACES) -> M
     Raises
     ------
     MeshError
-        Missing, unreadable, too large, no such part, or no triangle in it.
+        Missing, unreadable, cut off, too large, no such part, or no triangle in it.
     """
     path = Path(file)
     ending = path.suffix.lower()
@@ -60,6 +61,7 @@ def read_mesh(file: str | Path, part: str = "", max_faces: int = MAX_FACES) -> M
 
         return read_lvr2_mesh(path, part, max_faces)
     try:
+        refuse_cut_file(path)
         vertices, faces = _read_scene(path, part.strip("/"))
     except MeshError:
         raise
@@ -75,11 +77,15 @@ def read_mesh(file: str | Path, part: str = "", max_faces: int = MAX_FACES) -> M
 def _read_scene(path: Path, part: str) -> MeshArrays:
     import trimesh
 
-    scene = trimesh.load_scene(str(path), process=False)
+    # Texture coordinates would split the vertices of a PLY and so renumber them.
+    options = {"fix_texture": False} if path.suffix.lower() == ".ply" else {}
+    scene = trimesh.load_scene(str(path), process=False, **options)
+    if not scene.graph.nodes_geometry:
+        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     nodes = [node for node in scene.graph.nodes_geometry if _node_path(scene, node, part)]
     if not nodes:
         parts = sorted("/".join(_names_above(scene, node)) for node in scene.graph.nodes_geometry)
-        raise MeshError(str(path), [f"no part '{part}', the parts are: {', '.join(parts) or 'none'}"])
+        raise MeshError(str(path), [f"no part '{part}', the parts are: {', '.join(parts)}"])
     vertices: list[NDArray[np.float64]] = []
     faces: list[NDArray[np.int64]] = []
     offset = 0
