@@ -13,6 +13,9 @@ from mbf_abstract.transforms import ExtrapolationError, TransformBuffer
 TRANSFORM_TOLERANCE = 0.3
 """How much newer [s] than the newest transform a scan may be; costmap_2d's and Nav2's default."""
 
+MAX_STAMP_LEAD = 0.2
+"""How far [s] a stamp may lie in the future: what clocks of two computers differ by, not what a broken one does."""
+
 
 @dataclass(frozen=True, eq=False)
 class RangeScan:

@@ -1,7 +1,7 @@
 """The interface of a mesh layer: one cost and one lethal flag per vertex, recomputed when its inputs change.
 
 A new layer derives ``MeshLayer``, declares ``Parameters`` and writes ``compute``. Layers that can do better than
-starting over after a local change override ``update_from_inputs``; layers fed by a sensor override ``insert_points``,
+starting over after a local change override ``update_from_inputs``; layers fed by a sensor override ``insert_scan``,
 ``expire``, ``clear`` and ``is_current``. A layer never calls another layer: the layer graph hands changes on.
 """
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.sensing import RangeScan
 from mbf_mesh_nav.locate import SurfaceLocator
 from mbf_mesh_nav.topology import MeshTopology
 
@@ -111,8 +112,11 @@ class MeshLayer(ABC):
         """React to changed vertices of the inputs; return the own vertices that changed."""
         return self.recompute() if len(changed) else NOTHING_CHANGED
 
-    def insert_points(self, points: FloatArray, sensor_origin: FloatArray, stamp: float) -> IntArray:
-        """Take in a point cloud (n, 3) [m, map frame] seen from ``sensor_origin`` at ``stamp`` [s]."""
+    def insert_scan(self, scan: RangeScan) -> IntArray:
+        """Take in what a sensor saw, in the map's frame, all of it finite; return the vertices that changed.
+
+        ``scan.source`` names the sensor: one layer may be fed by several.
+        """
         return NOTHING_CHANGED
 
     def expire(self, now: float) -> IntArray:

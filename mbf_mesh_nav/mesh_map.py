@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbf_abstract.sensing import RangeScan
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.layer import IntArray, LayerParameters, MeshLayer
 from mbf_mesh_nav.layer_graph import LayerGraph, union_of
@@ -206,22 +208,48 @@ class MeshMap:
             usual: LayerParameters = self.layers[name].parameters
             return self._overridden[name][0] if name in self._overridden else usual
 
-    def insert_points(self, points: ArrayLike, sensor_origin: ArrayLike, stamp: float) -> None:
-        """Feed a point cloud to the obstacle layers.
+    def insert_points(self, points: ArrayLike, sensor_origin: ArrayLike, stamp: float, source: str = "") -> None:
+        """Feed a point cloud to the obstacle layers, as a scan in which every ray hit something.
 
         Parameters
         ----------
         points : (n, 3) float
-            Hits [m] in the map's frame; rows with NaN or inf are ignored.
+            Hits [m] in the map's frame.
         sensor_origin : (3,) float
             Where the sensor was [m], for range limits and clearing.
         stamp : float
             Time of the measurement [s].
+        source : str
+            Name of the sensor.
+
+        Raises
+        ------
+        ValueError
+            As ``insert_scan``.
         """
-        cloud = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
-        cloud = cloud[np.isfinite(cloud).all(axis=1)]
-        origin = np.asarray(sensor_origin, dtype=np.float64).reshape(3)
-        self.apply(lambda layer: layer.insert_points(cloud, origin, stamp))
+        cloud = np.array(points, dtype=np.float64).reshape(-1, 3)
+        origin = np.array(sensor_origin, dtype=np.float64).reshape(3)
+        self.insert_scan(RangeScan(source, self.frame_id, origin, cloud, np.ones(len(cloud), dtype=np.bool_), stamp))
+
+    def insert_scan(self, scan: RangeScan) -> None:
+        """Feed a scan in the map's frame to the obstacle layers.
+
+        Rays with an end that is not finite are left out; a scan that has no others says nothing and is passed over.
+
+        Raises
+        ------
+        ValueError
+            The scan is in another frame, or its origin or stamp is not finite.
+        """
+        if scan.frame_id != self.frame_id:
+            raise ValueError(f"the scan is in the frame '{scan.frame_id}', the map in '{self.frame_id}'")
+        if not (np.isfinite(scan.origin).all() and np.isfinite(scan.stamp)):
+            raise ValueError(f"origin and stamp of a scan must be finite, got {scan.origin.tolist()} and {scan.stamp}")
+        known = np.asarray(np.isfinite(scan.ends).all(axis=1))
+        if len(known) and not known.any():
+            return
+        seen = scan if known.all() else replace(scan, ends=scan.ends[known], hits=scan.hits[known])
+        self.apply(lambda layer: layer.insert_scan(seen))
 
     def update(self, now: float) -> None:
         """Forget obstacles that are too old at ``now`` [s], end overrides of parameters that are over."""

@@ -136,13 +136,16 @@ class MeshNavigationServer(AbstractNavigationServer):
         return MeshQueries(self.mesh_map, self.runtime.robot, self.runtime.transforms)
 
     def take_scan(self, scan: RangeScan) -> None:
-        """Feed the points that were hit to the obstacle layers."""
-        frame, transforms = self.mesh_map.frame_id, self.runtime.transforms
-        points, origin = scan.points, scan.origin
-        if scan.frame_id != frame:
-            points = transforms.transform_points(points, scan.frame_id, frame)
-            origin = transforms.transform_points(np.atleast_2d(origin), scan.frame_id, frame)[0]
-        self.mesh_map.insert_points(points, origin, scan.stamp)
+        """Feed a scan to the obstacle layers, placed by the transform at its stamp.
+
+        Raises
+        ------
+        TransformError
+            There is none; see ``RangeScan.in_frame``.
+        ValueError
+            Origin or stamp are not finite.
+        """
+        self.mesh_map.insert_scan(scan.in_frame(self.mesh_map.frame_id, self.runtime.transforms))
 
     def ground_height(self, x: float, y: float) -> float:
         """Height of the highest surface at a place."""

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbf_abstract.sensing import RangeScan
 from mbf_abstract.testing.contract.report import ContractBroken, Report
 from mbf_mesh_nav.layer import CostArray, IntArray, LayerContext, LayerParameters, LethalArray, MeshLayer
 from mbf_mesh_nav.mesh_map import MeshMap
@@ -100,10 +101,11 @@ class _LayerCheck:
     def sensing(self, points: NDArray[np.float64], origin: NDArray[np.float64]) -> None:
         """Hand over a cloud, let it grow old, forget it; the state without sensors must come back."""
         unseen = _values(self.layer)
-        self._event("insert_points", lambda layer: layer.insert_points(points, origin, 1.0))
+        scan = RangeScan("sensor", "map", origin, points, np.ones(len(points), dtype=np.bool_), 1.0)
+        self._event("insert_scan", lambda layer: layer.insert_scan(scan))
         seen = _values(self.layer)
-        self._event("recompute after insert_points", lambda layer: layer.recompute())
-        self._expect_same(seen, "recompute lost what insert_points had changed")
+        self._event("recompute after insert_scan", lambda layer: layer.recompute())
+        self._expect_same(seen, "recompute lost what insert_scan had changed")
         self._event("expire", lambda layer: layer.expire(2.0))
         self._event("clear", lambda layer: layer.clear())
         self._expect_same(unseen, "clear did not bring back the state without sensors")

@@ -5,19 +5,23 @@ itself on a badly localised robot; raise ``ground_tolerance`` then.
 Rule of mesh_navigation: cast a ray from every point downwards and mark the three corners of the face it hits, cost
 inf. Deviations: points within ``ground_tolerance`` of the mesh are explained by it and mark nothing; the ray ends at
 ``robot_height``, which has a finite default, so nothing spills to the storey below; hits may be kept for
-``decay_time`` and are cleared when later rays pass through them; a sensor that is silent for longer than
-``expected_update_rate`` makes the map not current, so that no controller drives on it, and so does clearing until the
-next cloud: what was forgotten may still be there.
+``decay_time`` and are cleared when later rays pass through them, also rays that hit nothing. A layer may listen to
+several sensors: what one has seen is forgotten by its own next cloud, and by another's rays only where they pass
+through. A sensor that is silent for longer than ``expected_update_rate`` makes the map not current, so that no
+controller drives on it, and so does clearing until the next cloud: what was forgotten may still be there.
 Cost: two tree queries a point, about 2 microseconds.
 """
 
 from __future__ import annotations
+
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import field_validator
 
 from mbf_abstract.parameters import parameter
+from mbf_abstract.sensing import MAX_STAMP_LEAD, RangeScan
 from mbf_mesh_nav.layer import (
     NOTHING_CHANGED,
     CostArray,
@@ -34,6 +38,9 @@ from mbf_mesh_nav.range_image import RangeImage
 class ObstacleParameters(LayerParameters):
     """Parameters of ``obstacle``."""
 
+    sources: tuple[str, ...] = parameter(
+        (), "Names of the sensors it listens to, each of which must speak; without any: all that speak."
+    )
     robot_height: float = parameter(1.0, "Points higher above the surface are no obstacle.", unit="m", gt=0.0)
     max_obstacle_dist: float = parameter(
         np.inf, "Points farther from the sensor are ignored.", unit="m", gt=0.0, allow_inf=True
@@ -56,6 +63,31 @@ class ObstacleParameters(LayerParameters):
         return axis
 
 
+class Hits(NamedTuple):
+    """What is remembered, one row for each marked face and sensor: face, point [m], time [s], number of the sensor."""
+
+    faces: IntArray
+    points: FloatArray
+    stamps: FloatArray
+    sources: IntArray
+
+    @classmethod
+    def none(cls) -> Hits:
+        """Return no hits."""
+        return cls(np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int32))
+
+    def where(self, rows: NDArray[Any]) -> Hits:
+        """Return some of the rows."""
+        return Hits(*[column[rows] for column in self])
+
+    def before(self, older: Hits) -> Hits:
+        """Add older hits, but for those of faces that the same sensor has marked anew."""
+        both = Hits(*[np.concatenate([new, old]) for new, old in zip(self, older, strict=True)])
+        sensor_count = int(both.sources.max(initial=0)) + 1
+        _, newest = np.unique(both.faces.astype(np.int64) * sensor_count + both.sources, return_index=True)
+        return both.where(newest)
+
+
 class ObstacleLayer(MeshLayer):
     """Lethal vertices below the points of recent clouds."""
 
@@ -64,67 +96,69 @@ class ObstacleLayer(MeshLayer):
 
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
-        self._last_cloud = -np.inf
-        self._keep(np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros(0))
+        self._last_heard: dict[str, float] = {}  # its order numbers the sensors
+        self._hits = Hits.none()
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost inf and lethal at the corners of the marked faces."""
         lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)
-        lethal[self.topology.faces[self._faces]] = True
+        lethal[self.topology.faces[self._hits.faces]] = True
         return np.where(lethal, np.inf, 0.0).astype(np.float32), lethal
 
-    def insert_points(self, points: FloatArray, sensor_origin: FloatArray, stamp: float) -> IntArray:
-        """Mark the faces below a cloud (n, 3), forget what is too old or seen through."""
-        self._last_cloud = max(self._last_cloud, stamp)
-        faces, hits = self._project(points, sensor_origin)
-        kept = self._still_valid(points, sensor_origin, stamp)
-        all_faces = np.concatenate([faces, self._faces[kept]])
-        all_hits = np.vstack([hits, self._hits[kept]])
-        stamps = np.concatenate([np.full(len(faces), stamp), self._stamps[kept]])
-        unique, newest = np.unique(all_faces, return_index=True)
-        return self._change(unique, all_hits[newest], stamps[newest])
+    def insert_scan(self, scan: RangeScan) -> IntArray:
+        """Mark the faces below what was hit, forget what is too old or seen through."""
+        if self.parameters.sources and scan.source not in self.parameters.sources:
+            return NOTHING_CHANGED
+        self._last_heard[scan.source] = scan.stamp
+        sensor = list(self._last_heard).index(scan.source)
+        kept = self._hits.where(self._still_valid(scan, sensor))
+        faces, points = self._project(scan)
+        seen = Hits(faces, points, np.full(len(faces), scan.stamp), np.full(len(faces), sensor, dtype=np.int32))
+        return self._change(seen.before(kept))
 
     def expire(self, now: float) -> IntArray:
         """Forget hits older than ``decay_time``; with 0 they stay until the next cloud."""
         if self.parameters.decay_time == 0.0:
             return NOTHING_CHANGED
-        kept = now - self._stamps <= self.parameters.decay_time
-        return NOTHING_CHANGED if kept.all() else self._change(self._faces[kept], self._hits[kept], self._stamps[kept])
+        kept = now - self._hits.stamps <= self.parameters.decay_time
+        return NOTHING_CHANGED if kept.all() else self._change(self._hits.where(kept))
 
     def clear(self) -> IntArray:
         """Forget all hits, and that there was a cloud."""
-        self._last_cloud = -np.inf
-        return self._change(self._faces[:0], self._hits[:0], self._stamps[:0])
+        self._last_heard = dict.fromkeys(self._last_heard, -np.inf)
+        return self._change(Hits.none())
 
     def is_current(self, now: float) -> bool:
-        """Whether a cloud came within ``expected_update_rate``, and since the layer was cleared."""
-        limit = self.parameters.expected_update_rate
-        return limit == 0.0 or now - self._last_cloud <= limit
+        """Whether each sensor spoke within ``expected_update_rate``, and since the layer was cleared.
 
-    def _project(self, points: FloatArray, sensor_origin: FloatArray) -> tuple[IntArray, FloatArray]:
+        A stamp from the future, but for the difference of two clocks, is no sign of life.
+        """
+        limit = self.parameters.expected_update_rate
+        sources = self.parameters.sources or self._last_heard
+        ages = [now - self._last_heard.get(source, -np.inf) for source in sources]
+        return limit == 0.0 or (bool(ages) and -MAX_STAMP_LEAD <= min(ages) and max(ages) <= limit)
+
+    def _project(self, scan: RangeScan) -> tuple[IntArray, FloatArray]:
         """Faces (k,) below the points that are obstacles, and those points (k, 3)."""
-        settings = self.parameters
-        near = points[np.linalg.norm(points - sensor_origin, axis=1) <= settings.max_obstacle_dist]
+        settings, points = self.parameters, scan.points
+        near = points[np.linalg.norm(points - scan.origin, axis=1) <= settings.max_obstacle_dist]
         near = near[self.locator.locate(near, settings.ground_tolerance).faces < 0]
         down = np.array(settings.down_axis) / np.linalg.norm(settings.down_axis)
         faces, _ = self.locator.cast_rays(near, down, settings.robot_height)
         return faces[faces >= 0], near[faces >= 0]
 
-    def _still_valid(self, points: FloatArray, sensor_origin: FloatArray, stamp: float) -> NDArray[np.bool_]:
-        """Mask of the kept hits that this cloud neither outdates nor sees through."""
-        young = stamp - self._stamps < self.parameters.decay_time
-        if self.parameters.clearing and len(points) and young.any():
-            young &= ~RangeImage(points, sensor_origin).sees_through(self._hits)
-        return np.asarray(young)
+    def _still_valid(self, scan: RangeScan, sensor: int) -> NDArray[np.bool_]:
+        """Mask of the kept hits that this scan neither outdates nor sees through."""
+        valid = (scan.stamp - self._hits.stamps < self.parameters.decay_time) | (self._hits.sources != sensor)
+        if self.parameters.clearing and len(scan.ends) and valid.any():
+            valid &= ~RangeImage(scan.ends, scan.origin).sees_through(self._hits.points)
+        return np.asarray(valid, dtype=np.bool_)
 
-    def _change(self, faces: IntArray, hits: FloatArray, stamps: FloatArray) -> IntArray:
+    def _change(self, hits: Hits) -> IntArray:
         """Replace the hits and write only the vertices that change."""
-        before = np.unique(self.topology.faces[self._faces])
-        self._keep(faces, hits, stamps)
-        after = np.unique(self.topology.faces[self._faces])
+        before = np.unique(self.topology.faces[self._hits.faces])
+        self._hits = hits
+        after = np.unique(self.topology.faces[self._hits.faces])
         self._costs[before], self._lethal[before] = 0.0, False
         self._costs[after], self._lethal[after] = np.inf, True
         return np.setxor1d(before, after, assume_unique=True)
-
-    def _keep(self, faces: IntArray, hits: FloatArray, stamps: FloatArray) -> None:
-        self._faces, self._hits, self._stamps = faces, hits, stamps

@@ -80,8 +80,8 @@ class GoodMeshLayer(MeshLayer):
     def compute(self):
         return np.full_like(self._costs, 1.0 if self.seen else 0.5), np.zeros_like(self._lethal)
 
-    def insert_points(self, points, sensor_origin, stamp):
-        self.seen = len(points) > 0
+    def insert_scan(self, scan):
+        self.seen = scan.hits.any()
         return self.recompute()
 
     def clear(self):

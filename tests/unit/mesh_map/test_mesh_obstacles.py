@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mbf_abstract.sensing import RangeScan
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.layer_graph import LayerGraphError
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
@@ -220,3 +221,79 @@ def test_changed_edge_cost_factor_changes_the_weights():
     finite = np.isfinite(mesh.snapshot().edge_weights)
     np.testing.assert_array_equal(mesh.snapshot().edge_weights[finite], mesh.neighbour_lengths[finite])
     assert not finite.all()
+
+
+def lidar(hits: np.ndarray, stamp: float, source: str = "lidar", frame_id: str = "map") -> RangeScan:
+    """A full turn of rays of 10 m at 0.5 m height from (2, 2); those ``hits`` [rad] end at something 1 m away."""
+    angles = np.radians(np.arange(0.0, 360.0, 0.5))
+    ranges = np.where(np.isin(np.arange(720), hits), 1.0, 10.0)
+    origin = np.array([2.0, 2.0, 0.5])
+    ends = origin + ranges[:, None] * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(720)])
+    return RangeScan(source, frame_id, origin, ends, ranges < 10.0, stamp)
+
+
+def test_rays_that_hit_nothing_clear_what_they_pass_through():
+    mesh = floor_map(decay_time=np.inf)
+    mesh.insert_scan(lidar(np.arange(80, 100), 1.0))
+    assert mesh.snapshot().lethal.any()
+    mesh.insert_scan(lidar(np.zeros(0), 2.0))
+    assert not mesh.snapshot().lethal.any()
+
+
+def test_one_sensor_does_not_make_another_ones_obstacles_forgotten():
+    mesh = floor_map()
+    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0, "front")
+    seen = mesh.snapshot().lethal.copy()
+    mesh.insert_points(post(3.0, 3.0), SENSOR, 1.01, "rear")
+    assert mesh.snapshot().lethal[seen].all() and mesh.snapshot().lethal.sum() > seen.sum()
+    mesh.insert_points(post(3.0, 3.0), SENSOR, 1.02, "front")
+    assert not (mesh.snapshot().lethal & seen).any(), "its own next cloud replaces what it had seen"
+
+
+def test_a_silent_sensor_is_noticed_while_another_speaks():
+    mesh = floor_map(expected_update_rate=0.5)
+    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0, "front")
+    mesh.insert_points(post(3.0, 3.0), SENSOR, 1.0, "rear")
+    mesh.insert_points(post(3.0, 3.0), SENSOR, 2.0, "rear")
+    assert not mesh.is_current(2.0)
+    mesh.insert_points(post(1.0, 1.0), SENSOR, 2.0, "front")
+    assert mesh.is_current(2.0)
+
+
+def test_a_layer_listens_to_its_own_sensors_only_and_waits_for_each():
+    mesh = floor_map(sources=("front", "rear"))
+    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0, "ceiling")
+    assert not mesh.snapshot().lethal.any()
+    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0, "front")
+    assert mesh.snapshot().lethal.any() and not mesh.is_current(1.0)
+    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0, "rear")
+    assert mesh.is_current(1.0)
+
+
+def test_a_cloud_of_nothing_but_unknown_points_says_nothing():
+    mesh = floor_map()
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+    before = mesh.snapshot()
+    mesh.insert_points(np.full((5, 3), np.nan), SENSOR, 3.0)
+    assert mesh.snapshot() is before and not mesh.is_current(3.0)
+
+
+def test_a_stamp_from_the_future_is_no_sign_of_life():
+    mesh = floor_map()
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 1e6)
+    assert not mesh.is_current(2.0)
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 2.1)
+    assert mesh.is_current(2.0), "clocks differ a little"
+
+
+@pytest.mark.parametrize(("origin", "stamp"), [([np.nan, 0.0, 0.5], 1.0), (SENSOR, np.nan), (SENSOR, np.inf)])
+def test_a_scan_from_nowhere_or_of_no_time_is_refused(origin, stamp):
+    mesh = floor_map()
+    with pytest.raises(ValueError, match="must be finite"):
+        mesh.insert_points(post(2.0, 2.0), origin, stamp)
+    assert not mesh.snapshot().lethal.any()
+
+
+def test_a_scan_of_another_frame_is_refused():
+    with pytest.raises(ValueError, match="in the frame 'laser', the map in 'map'"):
+        floor_map().insert_scan(lidar(np.zeros(0), 1.0, frame_id="laser"))
