@@ -7,7 +7,7 @@ A zones file is a YAML mapping with one list::
       - {name: ramp, polygon: [[5.0, 0.0], [7.0, 0.0], [7.0, 2.0], [5.0, 2.0]], speed_limit: 0.3}
 
 Coordinates are metres in the costmap's frame, unless the layer is told another (``map_frame``). A mask image is a
-map_server map; it may have another grid than the costmap, each cell takes the value at its centre.
+map_server map; it may have another grid than the costmap (see ``resampling``).
 """
 
 from __future__ import annotations
@@ -20,10 +20,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError, field_validator
 
 from mbf_abstract.parameters import ParameterModel, parameter
-from mbf_abstract.transform import Transform
-from mbf_costmap_nav.costmap import LETHAL, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.map_description import MapError
-from mbf_costmap_nav.placement import mapped
 
 
 class Zone(ParameterModel):
@@ -77,54 +74,3 @@ def load_zones(file: Path) -> tuple[Zone, ...]:
     except ValidationError as error:
         findings = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors())
         raise MapError(file, findings) from error
-
-
-def sample_costmap(
-    source: Costmap, geometry: GridGeometry, box: CellBox, outside: int, T_source_grid: Transform | None = None
-) -> CellArray:
-    """Values of ``source`` at the centres of another grid's cells.
-
-    Parameters
-    ----------
-    source : Costmap
-    geometry : GridGeometry
-    box : CellBox
-        Cells of ``geometry`` to fill.
-    outside : int
-        Value of cells whose centre is not on ``source``.
-    T_source_grid : Transform, optional
-        From the grid's frame to the source's; none where they are the same. A turned grid can miss single cells, so
-        lethal ones are written once more into the grid's cell their own centre lies in.
-
-    Returns
-    -------
-    (box rows, box columns) uint8
-    """
-    if T_source_grid is not None:
-        return _sample_transformed(source, geometry, box, outside, T_source_grid)
-    x = geometry.origin_x + (np.arange(box.x0, box.x1) + 0.5) * geometry.resolution
-    y = geometry.origin_y + (np.arange(box.y0, box.y1) + 0.5) * geometry.resolution
-    ix = np.floor((x - source.origin_x) / source.resolution).astype(np.int64)
-    iy = np.floor((y - source.origin_y) / source.resolution).astype(np.int64)
-    columns, rows = (ix >= 0) & (ix < source.width), (iy >= 0) & (iy < source.height)
-    values = np.full((len(y), len(x)), outside, dtype=np.uint8)
-    values[np.ix_(rows, columns)] = source.cells[np.ix_(iy[rows], ix[columns])]
-    return values
-
-
-def _sample_transformed(
-    source: Costmap, geometry: GridGeometry, box: CellBox, outside: int, T_source_grid: Transform
-) -> CellArray:
-    values = np.full((max(box.y1 - box.y0, 0), max(box.x1 - box.x0, 0)), outside, dtype=np.uint8)
-    lower = np.array([geometry.origin_x, geometry.origin_y]) + np.array([box.x0, box.y0]) * geometry.resolution
-    rows, columns = (axis.ravel() for axis in np.indices(values.shape))
-    centres = lower + (np.column_stack([columns, rows]) + 0.5) * geometry.resolution
-    cells, inside = source.world_to_cells(mapped(T_source_grid, centres))
-    values[rows[inside], columns[inside]] = source.cells[cells[inside, 1], cells[inside, 0]]
-
-    lethal = np.argwhere(source.cells == LETHAL)[:, ::-1]
-    points = mapped(T_source_grid.inverse(), source.cells_to_world(lethal))
-    x, y = np.floor((points - lower) / geometry.resolution).astype(np.int64).T
-    seen = (x >= 0) & (x < values.shape[1]) & (y >= 0) & (y < values.shape[0])
-    values[y[seen], x[seen]] = LETHAL
-    return values

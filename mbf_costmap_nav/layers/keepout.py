@@ -6,7 +6,8 @@ in the mask, or use the speed-limit layer. Cost: nothing after the first update,
 Known failure: a robot that stands inside such an area finds no plan; the escape recovery leads out.
 
 Every cell a polygon touches is lethal. A mask's occupancy raises costs in proportion (as Nav2's keep-out filter);
-free and unknown parts of a mask say nothing.
+free and unknown parts of a mask say nothing. Of a mask finer than the map the highest cost in a cell counts, so that a
+line one pixel wide keeps out.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from mbf_costmap_nav.kernels.cover import fill_polygon
 from mbf_costmap_nav.layer import CombinationMethod, CostmapLayer, LayerContext, LayerParameters, combine
 from mbf_costmap_nav.map_io import load_costmap
 from mbf_costmap_nav.placement import Placement
-from mbf_costmap_nav.zones import Zone, load_zones, sample_costmap
+from mbf_costmap_nav.resampling import sample_costmap
+from mbf_costmap_nav.zones import Zone, load_zones
 
 
 class KeepoutLayerParameters(LayerParameters):

@@ -21,7 +21,7 @@ from mbf_costmap_nav.costmap import EMPTY_BOX, UNKNOWN, CellArray, CellBox, Grid
 from mbf_costmap_nav.layer import CombinationMethod, GridLayer, LayerContext, LayerParameters, combine
 from mbf_costmap_nav.map_io import load_costmap
 from mbf_costmap_nav.placement import Placement
-from mbf_costmap_nav.zones import sample_costmap
+from mbf_costmap_nav.resampling import sample_costmap
 
 
 class StaticLayerParameters(LayerParameters):
@@ -80,7 +80,7 @@ class StaticLayer(GridLayer):
         self._sample(CellBox(0, box.y1 - dy, box.x1, box.y1) if dy > 0 else CellBox(0, 0, box.x1, -dy))
 
     def _sample(self, box: CellBox) -> None:
-        """Take each cell's value from the map cell at its centre; nothing while the map has no place."""
+        """Take each cell's value from the map, no obstacle getting lost; nothing while the map has no place."""
         box = box.clipped(self.geometry.box)
         if self._placement.known:
             self.cells[box.slices] = sample_costmap(

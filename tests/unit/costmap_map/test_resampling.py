@@ -1,0 +1,106 @@
+"""A map under another grid: the value at each centre, and no wall or line gets lost, however thin."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from mbf_abstract.geometry import Pose, quaternion_from_yaw
+from mbf_abstract.transform import Transform
+from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.resampling import sample_costmap
+
+
+def one_by_one(source, grid, box, outside, T_source_grid=None):
+    """The slow way: the value at each centre, then each cost where its own centre lies."""
+    there = T_source_grid or Transform((0.0, 0.0, 0.0), parent=source.frame_id, child="grid")
+    values = np.full((box.y1 - box.y0, box.x1 - box.x0), outside, dtype=np.uint8)
+    for iy, ix in np.ndindex(*values.shape):
+        x, y = there.apply([(*grid.cell_to_world(ix + box.x0, iy + box.y0), 0.0)])[0, :2]
+        cost = source.cost_at(x, y)
+        values[iy, ix] = outside if cost is None else cost
+    for iy, ix in np.argwhere((source.cells != FREE) & (source.cells != UNKNOWN)):
+        x, y = there.inverse().apply([(*source.cell_to_world(ix, iy), 0.0)])[0, :2]
+        column = math.floor((x - grid.origin_x) / grid.resolution) - box.x0
+        row = math.floor((y - grid.origin_y) / grid.resolution) - box.y0
+        if 0 <= column < values.shape[1] and 0 <= row < values.shape[0]:
+            known = 0 if values[row, column] == UNKNOWN else values[row, column]
+            values[row, column] = max(known, source.cells[iy, ix])
+    return values
+
+
+SIDES = st.floats(0.031, 0.4)
+OFFSETS = st.floats(-1.0, 1.0)
+
+
+@given(SIDES, SIDES, OFFSETS, OFFSETS, st.one_of(st.none(), st.floats(-math.pi, math.pi)), st.integers(0, 99))
+@settings(max_examples=60, deadline=None)
+def test_it_is_the_same_as_looked_up_one_by_one(fine, coarse, x, y, yaw, seed):
+    values = np.array([FREE, FREE, FREE, UNKNOWN, 17, 200, LETHAL], dtype=np.uint8)
+    source = Costmap(np.random.default_rng(seed).choice(values, (14, 18)), fine, x, y)
+    grid, box = GridGeometry(12, 9, coarse, -0.3, -0.2), CellBox(1, 2, 11, 8)
+    turn = None if yaw is None else Transform((y, x, 0.0), quaternion_from_yaw(yaw), "map", "grid")
+    assert np.array_equal(
+        sample_costmap(source, grid, box, UNKNOWN, turn), one_by_one(source, grid, box, UNKNOWN, turn)
+    )
+
+
+@pytest.mark.parametrize("wall", range(40))
+@pytest.mark.parametrize("resolution", [0.07, 0.1, 0.125, 0.15])
+def test_a_wall_one_cell_wide_stays_a_wall_on_every_coarser_grid(wall, resolution):
+    cells = np.zeros((40, 40), dtype=np.uint8)
+    cells[wall] = LETHAL
+    grid = GridGeometry(math.ceil(2.0 / resolution), math.ceil(2.0 / resolution), resolution)
+    sampled = sample_costmap(Costmap(cells, 0.05), grid, grid.box, UNKNOWN) == LETHAL
+    assert sampled.any(axis=0).sum() >= int(2.0 / resolution) and sampled.any(axis=1).sum() == 1
+
+
+@pytest.fixture
+def painted(tmp_path):
+    """``painted(row)`` writes a mask of 5 m x 5 m at 0.05 m with one line of a pixel, and returns its folder."""
+
+    def paint(row):
+        grey = np.full((100, 100), 254, dtype=np.uint8)
+        grey[row] = 0
+        Image.fromarray(grey).save(tmp_path / "line.pgm")
+        (tmp_path / "line.yaml").write_text("image: line.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n")
+        return tmp_path
+
+    return paint
+
+
+@pytest.mark.parametrize("row", [50, 51])
+@pytest.mark.parametrize("rolling", [False, True])
+@pytest.mark.parametrize(("layer", "key"), [("keepout", "mask_file"), ("static", "map_file")])
+def test_a_line_of_one_pixel_keeps_out_on_a_coarser_map(painted, layer, key, rolling, row):
+    parameters = CostmapParameters.model_validate(
+        {"resolution": 0.1, "width": 4.0, "height": 4.0, "rolling_window": rolling, "frame_id": "map"}
+        | {"layers": [{"name": "grid", "type": "obstacle"}, {"name": "line", "type": layer}]}
+    )
+    costmap = build_layered_costmap(parameters, {"line": {key: "line.yaml"}}, base_folder=painted(row))
+    for x in (2.0, 2.3, 2.5):
+        costmap.update(Pose.planar(x, 2.5), 0.0)
+        assert (costmap.snapshot().cells == LETHAL).any(axis=0).all()
+
+
+@given(st.lists(st.tuples(st.integers(-7, 7), st.integers(-7, 7)), min_size=1, max_size=5), st.sampled_from([2, 3, 4]))
+@settings(max_examples=25, deadline=None)
+def test_a_finer_map_under_a_rolling_window_is_the_same_as_sampled_anew(moves, finer):
+    cells = np.random.default_rng(5).choice(np.array([0, 0, 0, 90, 254, 255], dtype=np.uint8), (60, 60))
+    world = Costmap(cells, 0.3 / finer * 2 / 3, -2.0, -2.0)
+    parameters = CostmapParameters.model_validate(
+        {"resolution": 0.3, "width": 2.4, "height": 1.8, "rolling_window": True, "track_unknown_space": True}
+        | {"layers": [{"name": "walls", "type": "static"}]}
+    )
+    rolled = build_layered_costmap(parameters, static_map=world)
+    x = y = 0.0
+    for dx, dy in moves:
+        x, y = x + 0.3 * dx, y + 0.3 * dy
+        fresh = build_layered_costmap(parameters, static_map=world)
+        for costmap in (rolled, fresh):
+            costmap.update(Pose.planar(x, y), 0.0)
+        assert np.array_equal(rolled.snapshot().cells, fresh.snapshot().cells)
