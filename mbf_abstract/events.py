@@ -62,7 +62,7 @@ class EventKind(str, Enum):
     FAULT = "fault"  # where, type, message, traceback
     QUARANTINE = "quarantine"  # plugin, slot, reason
     TREE = "tree"  # tree, then nodes where a run of it begins, or tick and changes: [index, status, message] of each
-    MAP = "map"  # what a map server did: cleared, updated, found stale
+    MAP = "map"  # message: what a map server did or found, such as a defect of the mesh it has loaded
     PARAMETER_CHANGED = "parameter_changed"  # name, old, new
     SINK_FAILED = "sink_failed"  # sink, message
     CUSTOM = "custom"  # anything a user or a plugin wants to see in the log

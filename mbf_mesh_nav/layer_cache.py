@@ -2,14 +2,13 @@
 
 mesh_navigation finds a stored layer by its name alone and so takes one made with another radius; here the file name
 is a digest of everything the values depend on. Files are written beside and renamed, so a broken run leaves no half
-file; a file that cannot be read is computed anew.
+file; a file that cannot be read is computed anew. Nothing here raises: a cache that cannot be used costs time, no map.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -43,17 +42,24 @@ class LayerCache:
         """Values (V,) float32 and (V,) bool of a layer, or None if there are none to be trusted."""
         count = layer.topology.vertex_count
         try:
-            with np.load(self.file_of(layer), allow_pickle=False) as stored:
+            with self.file_of(layer).open("rb") as file, np.load(file, allow_pickle=False) as stored:
                 costs, lethal = stored["costs"], stored["lethal"]
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile):
+        except Exception:  # a damaged zip file raises a dozen kinds of errors; all mean: compute it
             return None
         fits = costs.shape == lethal.shape == (count,) and costs.dtype == np.float32 and lethal.dtype == np.bool_
         return (costs, lethal) if fits else None
 
-    def store(self, layer: MeshLayer) -> None:
-        """Keep the present values of a layer."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+    def store(self, layer: MeshLayer) -> str:
+        """Keep the present values of a layer; why that was not possible, or ""."""
         target = self.file_of(layer)
         unfinished = target.with_suffix(f".{os.getpid()}.npz")
-        np.savez(unfinished, costs=layer.costs, lethal=layer.lethal)
-        unfinished.replace(target)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            try:
+                np.savez(unfinished, costs=layer.costs, lethal=layer.lethal)
+                unfinished.replace(target)
+            finally:
+                unfinished.unlink(missing_ok=True)
+        except OSError as error:
+            return f"{type(error).__name__}: {error.strerror or error}"
+        return ""

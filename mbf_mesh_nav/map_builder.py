@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from mbf_mesh_nav.densify import densify
 from mbf_mesh_nav.layer import LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.layer_cache import LayerCache
 from mbf_mesh_nav.layer_graph import LayerGraph, LayerGraphError, dependency_order
-from mbf_mesh_nav.mesh_io import read_mesh
+from mbf_mesh_nav.mesh_io import SPLIT_CORNERS, read_mesh
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.repair import REPAIRS, Finding, checked_mesh
 from mbf_mesh_nav.topology import build_topology
@@ -55,6 +56,8 @@ LAYER_TYPES: dict[str, str] = {
 }
 """The layers that come with the package; further ones are found through the ``load_layer`` argument."""
 
+JOIN, KEEP_APART = "duplicate_vertices", "-duplicate_vertices"
+
 LayerLoader = Callable[[str], type[MeshLayer]]
 LayerBlocks = Mapping[str, Mapping[str, Any] | LayerParameters]
 
@@ -72,7 +75,20 @@ class MeshMapParameters(ParameterModel):
 
     mesh_file: str = parameter("", "File of the mesh; empty if the mesh is given as arrays.", dynamic=False)
     mesh_part: str = parameter("", "Part of the file: path through the scene graph, or HDF5 group.", dynamic=False)
-    repair: tuple[str, ...] = parameter((), "Defects of the mesh that may be repaired.", dynamic=False)
+    repair: tuple[str, ...] = parameter(
+        (),
+        "Defects of the mesh that may be repaired (see Mesh files). Files of formats without shared corners (STL, OBJ, "
+        "DAE, glTF) get duplicate_vertices unasked; -duplicate_vertices keeps it off.",
+        dynamic=False,
+    )
+    join_distance: float = parameter(
+        0.0,
+        "How far apart vertices at the rims of parts may be for duplicate_vertices to join them; 0 = a millionth of "
+        "the mesh's extent.",
+        unit="m",
+        ge=0.0,
+        dynamic=False,
+    )
     densify: float = parameter(0.0, "Split edges longer than this; 0 = off.", unit="m", ge=0.0, dynamic=False)
     layers: tuple[LayerEntry, ...] = parameter((), "The layers, in any order.", dynamic=False)
     default_layer: str = parameter("", "The layer planners and controllers see; empty = the last one.", dynamic=False)
@@ -88,9 +104,18 @@ class MeshMapParameters(ParameterModel):
     @field_validator("repair")
     @classmethod
     def _repairs_are_known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        if unknown := [name for name in names if name not in REPAIRS]:
+        known = {*REPAIRS, KEEP_APART}
+        if unknown := [name for name in names if name not in known]:
             raise ValueError(f"unknown repairs: {', '.join(unknown)}; the repairs are: {', '.join(REPAIRS)}")
+        if {JOIN, KEEP_APART} <= set(names):
+            raise ValueError(f"{JOIN} and {KEEP_APART} exclude each other")
         return names
+
+    def repairs_for(self, file: str) -> tuple[str, ...]:
+        """Names of ``REPAIRS`` to apply to a mesh from ``file``, "" for arrays: the listed ones and the format's."""
+        listed = tuple(name for name in self.repair if name != KEEP_APART)
+        joins = Path(file).suffix.lower() in SPLIT_CORNERS and KEEP_APART not in self.repair
+        return (*listed, JOIN) if joins and JOIN not in listed else listed
 
 
 def load_builtin_layer(type_name: str) -> type[MeshLayer]:
@@ -167,12 +192,12 @@ def build_mesh_map(
         The mesh cannot be read or has defects that may not be repaired.
     """
     plan = plan_layers(parameters, layer_blocks or {}, load_layer)
-    file = parameters.mesh_file if vertices is None or faces is None else "arrays"
-    repair = parameters.repair
+    file = ""
     if vertices is None or faces is None:
-        vertices, faces = read_mesh(parameters.mesh_file, parameters.mesh_part)
-        repair = (*repair, "duplicate_vertices")  # readers of STL, DAE and OBJ give every face its own corners
-    mesh, report = checked_mesh(vertices, faces, repair, file)
+        file = parameters.mesh_file
+        vertices, faces = read_mesh(file, parameters.mesh_part)
+    repair = parameters.repairs_for(file)
+    mesh, report = checked_mesh(vertices, faces, repair, file or "arrays", parameters.join_distance)
     if parameters.densify > 0.0:
         mesh = densify(mesh, parameters.densify)
     topology = build_topology(mesh.vertices, mesh.faces, mesh.vertex_source, mesh.face_source, mesh.input_to_vertex)
@@ -239,6 +264,7 @@ def _place(location: tuple[int | str, ...]) -> str:
 
 def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer], cache_dir: str) -> LayerGraph:
     cache = LayerCache(cache_dir, mesh_map.topology.digest()) if cache_dir else None
+    complaint = ""
     layers: dict[str, MeshLayer] = {}
     for entry, layer_class, settings in plan:
         inputs = tuple(layers[name] for name in entry.inputs)
@@ -248,9 +274,12 @@ def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer], cache_dir: 
             layer.replace(*stored)
         else:
             layer.recompute()
-            if cache and layer.cacheable:
-                cache.store(layer)
+            if cache and layer.cacheable and not complaint:
+                complaint = cache.store(layer)
         layers[entry.name] = layer
+    if complaint:
+        text = f"layers cannot be kept in {cache_dir}: {complaint}; they are computed at every start"
+        mesh_map.report.findings.append(Finding("cache", text, np.zeros(0, dtype=np.int64), harmless=True))
     return LayerGraph(list(layers.values()))
 
 
@@ -267,4 +296,4 @@ def _warn_if_coarse(mesh_map: MeshMap) -> None:
                 "layers may miss obstacles, consider densify"
             )
             everywhere = np.flatnonzero(np.diff(mesh_map.neighbour_offsets) > 0)
-            mesh_map.report.findings.append(Finding("coarse", text, everywhere))
+            mesh_map.report.findings.append(Finding("coarse", text, everywhere, harmless=True))

@@ -17,6 +17,8 @@ from mbf_mesh_nav.mesh_report import MeshError
 
 TRIMESH_FORMATS = frozenset({".ply", ".obj", ".stl", ".off", ".dae", ".gltf", ".glb"})
 HDF5_FORMATS = frozenset({".h5", ".hdf5"})
+SPLIT_CORNERS = frozenset({".stl", ".obj", ".dae", ".gltf", ".glb"})
+"""Formats whose files, or readers, give faces, materials, parts or seams of a texture corners of their own."""
 MAX_FILE_BYTES = 4 * 2**30
 MAX_FACES = 30_000_000
 

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from mbf_abstract.config import Config
+from mbf_abstract.events import EventKind
 from mbf_abstract.execution.ticker import Ticker
 from mbf_abstract.geometry import Path as PlannedPath
 from mbf_abstract.map_queries import MapQueries
@@ -27,6 +28,7 @@ from mbf_abstract.server import AbstractNavigationServer
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh_io import HDF5_FORMATS, TRIMESH_FORMATS
 from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.mesh_report import SHOWN_INDICES
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.queries import MeshQueries
 from mbf_mesh_nav.vector_field import VectorField
@@ -43,7 +45,7 @@ planners:
   - {{name: cvp, type: cvp}}
 mesh_map:
   mesh_file: {file}
-  repair: [duplicate_vertices, zero_area, duplicate_faces, non_manifold, unreferenced]
+  repair: [duplicate_vertices, zero_area, duplicate_faces, non_manifold, point_contacts, unreferenced]
   inscribed_radius: 0.3
   edge_cost_factor: 1.0
   default_layer: inflation
@@ -71,6 +73,7 @@ class MeshNavigationServer(AbstractNavigationServer):
     def load_map(self, config: Config) -> None:
         """Read the mesh and compute its layers."""
         self.mesh_map = self._build_map(config, mesh_file=None)
+        self._tell_findings()
         clock, events = self.runtime.clock, self.runtime.events
         self._decay = Ticker(clock, events, lambda: self.mesh_map.update(clock.now()), DECAY_PERIOD, "mesh map decay")
 
@@ -107,11 +110,19 @@ class MeshNavigationServer(AbstractNavigationServer):
                 raise ServerError(f"a plugin does not take {mesh_file}: {type(error).__name__}: {error}") from error
             for kind, plugin in renewed:
                 self.plugins.replace(kind, plugin)
+            self._tell_findings()
         finally:
             for plugin in held:
                 plugin.release(self)
         for plugin in held:
             plugin.retire()  # who waited for the old instance is told that it is gone
+
+    def _tell_findings(self) -> None:
+        """One event for everything that was found in, or done to, the mesh of the map."""
+        for found in self.mesh_map.report.findings:
+            facts = {"finding": found.name, "count": found.count, "repaired": found.repaired}
+            indices = found.indices[:SHOWN_INDICES]
+            self.runtime.events.emit(EventKind.MAP, "mesh_map", message=str(found), indices=indices, **facts)
 
     def _build_map(self, config: Config, mesh_file: Path | str | None) -> MeshMap:
         """Read the mesh, the configured one without ``mesh_file``, and compute its layers."""

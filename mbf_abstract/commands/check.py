@@ -18,16 +18,17 @@ def check(
     config: Path = typer.Argument(..., help="Configuration file."),
     load: bool = typer.Option(True, "--load/--no-load", help="Also read the map files and construct the plugins."),
 ) -> None:
-    """Check a configuration: all mistakes at once, exit code 2 if there is any."""
+    """Check a configuration: all mistakes at once, exit code 2 if there is any. Tells what was found in its map."""
     with readable_errors():
-        from mbf_abstract.commands.bench import standing_server
+        from mbf_abstract.commands.bench import map_messages, standing_server
         from mbf_abstract.server_factory import read_config
 
         cls, checked = read_config(config)
         for skipped in checked.skipped:
             typer.echo(f"left out: optional {skipped.kind.name.lower()} {skipped.name!r}: {skipped.reason}")
         if load:
-            with standing_server(cls, checked):
-                pass
+            with standing_server(cls, checked) as server:
+                for note in map_messages(server):
+                    typer.echo(f"map: {note}")
     plugins = ", ".join(f"{spec.name} ({spec.type_name})" for spec in checked.plugins) or "none"
     typer.echo(f"{config}: good; backend {checked.backend}, plugins: {plugins}")

@@ -38,7 +38,7 @@ def plan(
     with readable_errors():
         from mbf_abstract.actions.goals import GetPathGoal
         from mbf_abstract.clock import wall_seconds
-        from mbf_abstract.commands.bench import place_robot, read_config_or_map, standing_server
+        from mbf_abstract.commands.bench import map_messages, place_robot, read_config_or_map, standing_server
         from mbf_abstract.commands.plan_picture import draw_plan
         from mbf_abstract.navigator import Navigator
 
@@ -46,6 +46,7 @@ def plan(
         with ExitStack() as open_server:
             with waiting("building the map and its layers"):
                 server = open_server.enter_context(standing_server(cls, checked))
+            notes = map_messages(server)
             start_pose, goal_pose = _pose(from_place, server), _pose(to_place, server)
             place_robot(server, start_pose)
             began = wall_seconds()
@@ -56,7 +57,7 @@ def plan(
             if png is not None:
                 with waiting("drawing the picture"):
                     draw_plan(png, server, start_pose, goal_pose, result)
-    _tell(result, seconds, as_json)
+    _tell(result, seconds, notes, as_json)
     if not result.success:
         raise typer.Exit(FAILURE)
 
@@ -68,7 +69,8 @@ def _pose(place: Place, server: AbstractNavigationServer) -> Pose:
     return Pose.planar(place.x, place.y, place.yaw, z, frame_id=server.config.parameters.global_frame)
 
 
-def _tell(result: GetPathResult, seconds: float, as_json: bool) -> None:
+def _tell(result: GetPathResult, seconds: float, notes: list[str], as_json: bool) -> None:
+    """Print the result on stdout; what was found in the map on stderr, or as one more entry of the JSON object."""
     path = result.path
     facts: dict[str, Any] = {
         "outcome": int(result.outcome),
@@ -81,8 +83,10 @@ def _tell(result: GetPathResult, seconds: float, as_json: bool) -> None:
     }
     if as_json:
         poses = [] if path is None else [[*pose.position, *pose.orientation] for pose in path]
-        typer.echo(json.dumps({**facts, "poses": poses}))
+        typer.echo(json.dumps({**facts, "map": notes, "poses": poses}))
         return
+    for note in notes:
+        typer.echo(f"map: {note}", err=True)
     facts["poses"] = 0 if path is None else len(path)
     for key, value in facts.items():
         typer.echo(f"{key:13} {'-' if value is None else value}")

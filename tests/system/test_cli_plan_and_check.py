@@ -97,6 +97,27 @@ def test_a_file_that_is_neither_map_nor_mesh_is_refused(tmp_path):
         assert "Traceback" not in result.output
 
 
+def test_plan_and_check_tell_what_was_found_in_the_mesh_and_what_was_repaired(hill, tmp_path):
+    mesh = trimesh.load(hill, process=False)
+    faces = np.vstack([mesh.faces, mesh.faces[-1]])
+    trimesh.Trimesh(mesh.vertices, faces, process=False).export(tmp_path / "twice.ply")
+    config = tmp_path / "twice.yaml"
+    config.write_text(
+        "backend: mesh\nmesh_map: {mesh_file: twice.ply, inscribed_radius: 0.3, repair: [duplicate_faces]}\n"
+    )
+
+    ends = ("--start", 2, 2, "--goal", 9, 9)
+    plain, as_json = mbf("plan", tmp_path / "twice.ply", *ends), mbf("plan", tmp_path / "twice.ply", *ends, "--json")
+    checked = mbf("check", config)
+
+    repaired = "duplicate_faces: 1 faces have the corners of an earlier face (indices 3200) - repaired"
+    coarse = "more than half the inscribed radius (0.15 m)"
+    assert f"map: {repaired}" in plain.stderr and coarse in plain.stderr
+    assert repaired in json.loads(as_json.stdout)["map"]
+    assert f"map: {repaired}" in checked.stdout and coarse in checked.stdout
+    assert (plain.exit_code, checked.exit_code) == (0, 0)
+
+
 def test_check_tells_all_mistakes_with_file_and_line(tmp_path):
     file = tmp_path / "robot.yaml"
     file.write_text(

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
@@ -65,6 +67,58 @@ def test_unknown_repair_is_refused_with_the_configuration():
         MeshMapParameters(repair=("zero_area", "duplicate"))
 
 
+def three_sheets() -> tuple[np.ndarray, np.ndarray]:
+    """A floor, a wall on its edge and a wall below that edge, which touch without being joined."""
+    floor, faces = heightfield_mesh(np.zeros((5, 5)), 1.0, 1.0)
+    wall = floor[:, [0, 2, 1]] + [0.0, 4.0, 0.0]
+    vertices = np.vstack([floor, wall, wall * [1.0, 1.0, -1.0]])
+    return vertices, np.vstack([faces, faces + 25, faces + 50])
+
+
+@pytest.mark.parametrize(
+    ("ending", "repair", "joined"),
+    [
+        ("ply", [], False),
+        ("ply", ["duplicate_vertices"], True),
+        ("off", [], False),
+        ("obj", [], True),
+        ("glb", [], True),
+        ("stl", [], True),
+        ("obj", ["-duplicate_vertices"], False),
+        ("obj", ["zero_area"], True),
+    ],
+)
+def test_vertices_are_joined_where_the_format_shares_none_or_the_configuration_says_so(
+    tmp_path, ending, repair, joined
+):
+    file = tmp_path / f"sheets.{ending}"
+    trimesh.Trimesh(*three_sheets(), process=False).export(file)
+    parameters = MeshMapParameters(mesh_file=str(file), repair=repair)
+
+    if joined:
+        with pytest.raises(MeshError, match="non_manifold: 4 faces are the third"):
+            build_mesh_map(parameters)
+        return
+    mesh = build_mesh_map(parameters)
+    assert len(mesh.vertices) == 75
+    assert "10 vertices lie on one of another component" in mesh.report["components"].text
+
+
+def test_joining_and_keeping_apart_exclude_each_other():
+    with pytest.raises(ValidationError, match="exclude each other"):
+        MeshMapParameters(repair=("duplicate_vertices", "-duplicate_vertices"))
+
+
+def test_arrays_are_joined_only_if_asked_for_and_within_the_distance_given():
+    apart = np.vstack([VERTICES, VERTICES + np.array([0.92, 0.0, 0.0])])
+    faces = np.vstack([FACES, FACES + len(VERTICES)])
+    apart[:, 2] = 0.0
+    joining = MeshMapParameters(repair=("duplicate_vertices",), join_distance=0.03)
+
+    assert len(build_mesh_map(MeshMapParameters(), vertices=apart, faces=faces).vertices) == 240
+    assert len(build_mesh_map(joining, vertices=apart, faces=faces).vertices) == 228
+
+
 def test_one_layer_type_may_be_used_under_several_names():
     names = ["gentle", "usual", "strict"]
     layers = [{"name": name, "type": "steepness"} for name in names]
@@ -114,6 +168,38 @@ def test_damaged_cache_file_is_computed_anew(tmp_path):
     again = build_mesh_map(parameters, vertices=VERTICES, faces=FACES)
 
     np.testing.assert_array_equal(again.layers["rough"].costs, first.layers["rough"].costs)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 100_000))
+def test_whatever_stands_in_a_cache_file_the_map_loads(tmp_path_factory, seed):
+    folder, rng = tmp_path_factory.mktemp("cache"), np.random.default_rng(seed)
+    parameters = MeshMapParameters(layers=[{"name": "rough", "type": "roughness"}], cache_dir=str(folder))
+    first = build_mesh_map(parameters, vertices=VERTICES, faces=FACES)
+    (file,) = folder.iterdir()
+    content = bytearray(file.read_bytes())
+    for place in rng.integers(0, len(content), rng.integers(0, 4)):
+        content[place] ^= rng.integers(1, 256)
+    file.write_bytes(content[: rng.choice([0, rng.integers(len(content)), len(content)])])
+
+    again = build_mesh_map(parameters, vertices=VERTICES, faces=FACES)
+
+    np.testing.assert_array_equal(again.layers["rough"].costs, first.layers["rough"].costs)
+    assert not again.report.findings
+
+
+def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_map_loads(tmp_path):
+    (tmp_path / "file").write_text("no folder")
+    layers = [{"name": "rough", "type": "roughness"}, {"name": "height", "type": "height_diff"}]
+
+    mesh = build_mesh_map(
+        MeshMapParameters(layers=layers, cache_dir=str(tmp_path / "file")), vertices=VERTICES, faces=FACES
+    )
+
+    (finding,) = mesh.report.findings
+    assert (finding.name, finding.harmless, finding.count) == ("cache", True, 0)
+    assert "computed at every start" in str(finding)
+    assert set(mesh.layers) == {"rough", "height"}
 
 
 def test_layers_whose_radius_is_shorter_than_the_edges_are_reported_by_name():

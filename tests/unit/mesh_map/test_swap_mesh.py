@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Pose
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import GetPathOutcome
@@ -22,6 +23,7 @@ planners: [{name: astar, type: astar}, {name: cvp, type: cvp}]
 controllers: [{name: follow, type: path_follower}]
 mesh_map:
   mesh_file: small.ply
+  inscribed_radius: 0.3
   layers: [{name: slopes, type: steepness}]
   slopes: {threshold: 0.5}
 """
@@ -38,10 +40,34 @@ def navigator(tmp_path):
     (tmp_path / "mesh.yaml").write_text(CONFIG)
     clock, transforms = SimClock(), TransformBuffer()
     robot = LoopbackRobot(clock, transforms, Pose.planar(0.45, 0.45))
-    with Navigator.from_file(tmp_path / "mesh.yaml", robot, clock, transforms) as made:
+    events = EventBus(clock.now, [MemorySink()])
+    with Navigator.from_file(tmp_path / "mesh.yaml", robot, clock, transforms, events) as made:
         clock.sleep(0.1)
         yield made
     robot.close()
+
+
+def told(navigator) -> list[tuple[str, int, bool]]:
+    """What the events say of the meshes loaded so far."""
+    events = navigator.server.runtime.events.memory.of_kind(EventKind.MAP)
+    return [(event.data["finding"], event.data["count"], event.data["repaired"]) for event in events]
+
+
+def test_every_finding_in_a_mesh_is_an_event_when_it_is_loaded_and_when_it_is_swapped(navigator, tmp_path):
+    assert told(navigator) == [("coarse", 441, False)]
+    vertices, faces = heightfield_mesh(np.zeros((21, 21)), 0.2, 0.2)
+    far = np.vstack([vertices, vertices + np.array([10.0, 0.0, 0.0])])
+    turned = np.vstack([faces, faces[:, ::-1] + len(vertices)])
+    trimesh.Trimesh(far, turned, process=False).export(tmp_path / "two.ply")
+    with pytest.raises(MeshError):
+        navigator.server.swap_mesh("broken.ply")
+    assert len(told(navigator)) == 1
+
+    navigator.server.swap_mesh("two.ply")
+
+    assert told(navigator)[1:] == [("facing_down", 800, False), ("components", 2, False), ("coarse", 882, False)]
+    messages = [event.data["message"] for event in navigator.server.runtime.events.memory.of_kind(EventKind.MAP)]
+    assert messages[2].startswith("components: 2 components, the largest with 441 of 882 vertices (indices 0, 441)")
 
 
 @pytest.mark.parametrize("planner", ["astar", "cvp"])
