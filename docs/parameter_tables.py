@@ -27,6 +27,11 @@ of its name. The map has a section of its own, with a list of layers and a block
 `mbf check FILE` tells every mistake at once. *While running* says whether a change takes effect on goals that run
 already; otherwise it is read when a goal starts or when the server is made. A default of **required** must be given.
 Range brackets: `[` includes the bound, `(` does not.
+
+What can change while running is changed by a call, all values of it or none: `server.set_parameters(...)`,
+`server.set_plugin_parameters(kind, name, ...)`; on a costmap server also
+`set_layer_parameters("global", "inflation", inflation_radius=0.8)`, `set_costmap_parameters("local", max_age=1.0)` and
+`set_footprint([[0.4, 0.3], ...])`, which reach the cells with the map's next update.
 """
 
 SERVERS = ("costmap", "mesh")
@@ -91,8 +96,8 @@ def _plugin(name: str, plugin_class: Any) -> str:
     return f"### `{name}`\n\n{summary}\n\n{parameter_table(plugin_class.Parameters)}"
 
 
-def parameter_table(model: type[ParameterModel], names: list[str] | None = None) -> str:
-    """Return the Markdown table of a model's parameters, or of some of them."""
+def parameter_table(model: type[ParameterModel], names: list[str] | None = None, dynamic: bool = True) -> str:
+    """Return the Markdown table of a model's parameters, or of some of them; none is dynamic inside one that is not."""
     fields = {name: field for name, field in model.model_fields.items() if names is None or name in names}
     if not fields:
         return "No parameters.\n"
@@ -102,14 +107,16 @@ def parameter_table(model: type[ParameterModel], names: list[str] | None = None)
     ]
     for name, field in fields.items():
         extra: Any = field.json_schema_extra or {}
-        dynamic = "yes" if extra.get("dynamic", True) else "no"
-        cells = (f"`{name}`", _default(field), extra.get("unit", ""), _range(field), dynamic, field.description or "")
+        changes = "yes" if dynamic and extra.get("dynamic", True) else "no"
+        cells = (f"`{name}`", _default(field), extra.get("unit", ""), _range(field), changes, field.description or "")
         rows.append("| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |")
     table = "\n".join(rows) + "\n"
     for name, field in fields.items():
         for inner in _models_in(field.annotation):
             summary = (inspect.getdoc(inner) or "").partition("\n\n")[0]
-            table += f"\nKeys of `{name}`: {summary}\n\n{parameter_table(inner)}"
+            extra = field.json_schema_extra or {}
+            keys = parameter_table(inner, dynamic=dynamic and extra.get("dynamic", True))
+            table += f"\nKeys of `{name}`: {summary}\n\n{keys}"
     return table
 
 

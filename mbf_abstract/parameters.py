@@ -8,7 +8,8 @@ Example
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -21,6 +22,30 @@ class ParameterModel(BaseModel):
 
 class PluginParameters(ParameterModel):
     """Parameters of one plugin instance; derive it in the plugin's module. Without parameters use it as it is."""
+
+
+Parameters = TypeVar("Parameters", bound=ParameterModel)
+
+
+def with_changes(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
+    """Return validated parameters in which some values are changed at run time.
+
+    Raises
+    ------
+    ValueError
+        A value is not legal (pydantic's ValidationError is one), or a parameter is read only once, at the start.
+    """
+    model = type(parameters)
+    new = model.model_validate({**parameters.model_dump(), **changes})
+    fixed = [
+        name
+        for name, field in model.model_fields.items()
+        if not (field.json_schema_extra or {}).get("dynamic", True)  # type: ignore[union-attr]
+        and getattr(new, name) != getattr(parameters, name)
+    ]
+    if fixed:
+        raise ValueError(f"{', '.join(fixed)}: read once, at the start, and cannot be changed at run time")
+    return new
 
 
 def parameter(

@@ -70,7 +70,9 @@ class CostmapParameters(ParameterModel):
     )
     footprint_padding: float = parameter(0.01, "Padding of the footprint (costmap_2d's sign rule).", unit="m", ge=0.0)
     track_unknown_space: bool = parameter(False, "Whether unknown is a value of its own.", dynamic=False)
-    update_frequency: float = parameter(5.0, "How often the server updates the map.", unit="Hz", gt=0.0, le=1000.0)
+    update_frequency: float = parameter(
+        5.0, "How often the server updates the map.", unit="Hz", gt=0.0, le=1000.0, dynamic=False
+    )
     max_age: float = parameter(
         2.0, "Time after the last update at which the map stops being current; 0 = never.", unit="s", ge=0.0
     )

@@ -110,6 +110,12 @@ class CostmapLayer(ABC):
     def set_footprint(self, footprint: Footprint) -> None:  # noqa: B027 - an optional hook
         """Take over the robot's (padded) footprint."""
 
+    def parameters_changed(self) -> None:  # noqa: B027 - an optional hook
+        """Take over ``parameters``, which have just been replaced; the next update recomputes the whole map.
+
+        Needed only where something was derived from them. May raise ValueError: the old ones are then put back.
+        """
+
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Take in new data; return ``box`` grown by the cells that may change (it may reach beyond the grid)."""
         return box

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.layer import CostmapLayer, shifted
+from mbf_costmap_nav.layer import CostmapLayer, LayerParameters, shifted
 from mbf_costmap_nav.sensor_data import Observation, SensorLayer
 
 
@@ -117,6 +117,12 @@ class LayeredCostmap:
     def circumscribed_radius(self) -> float:
         """Distance [m] from the base to the farthest corner of the padded footprint."""
         return self.footprint.circumscribed_radius
+
+    def layer(self, name: str) -> CostmapLayer:
+        """One layer; raises KeyError with the known ones if there is none of that name."""
+        if name not in self.layers:
+            raise KeyError(f"the costmap has no layer {name!r}, only {list(self.layers)}")
+        return self.layers[name]
 
     def snapshot(self) -> Costmap:
         """Read-only copy of the map as of the last update; the same object until the map changes."""
@@ -217,14 +223,40 @@ class LayeredCostmap:
     def _enabled_layers(self) -> Iterable[CostmapLayer]:
         return (layer for layer in self.layers.values() if layer.parameters.enabled)
 
-    def set_footprint(self, footprint: Footprint) -> None:
-        """Replace the robot's outline (given without padding), e.g. when it lifts a load."""
+    # --------------------------------------------------------------------------------------- changes at run time
+    def set_footprint(self, footprint: Footprint, padding: float | None = None) -> None:
+        """Replace the robot's outline (given without padding), e.g. when it lifts a load; ``padding`` [m] too if given.
+
+        The effect on the cells is visible after the next update.
+        """
         with self._lock:
+            self._footprint_padding = self._footprint_padding if padding is None else padding
             self.unpadded_footprint = footprint
             self.footprint = footprint.padded(self._footprint_padding)
             for layer in self.layers.values():
                 layer.set_footprint(self.footprint)
             self._pending = self._geometry.box
+
+    def set_layer_parameters(self, name: str, parameters: LayerParameters) -> None:
+        """Replace the parameters of a layer; the effect is visible after the next update, which recomputes everything.
+
+        Raises
+        ------
+        KeyError
+            There is no such layer.
+        ValueError
+            The layer does not take them; the old ones stay.
+        """
+        with self._lock:
+            layer = self.layer(name)
+            old, layer.parameters = layer.parameters, parameters
+            self._pending = self._geometry.box
+            try:
+                layer.parameters_changed()
+            except Exception:
+                layer.parameters = old
+                layer.parameters_changed()
+                raise
 
     # ------------------------------------------------------------------------------------------- sensor input
     def insert_points(self, source: str, points: ArrayLike, sensor_origin: ArrayLike, stamp: float) -> int:
@@ -353,14 +385,7 @@ class LayeredCostmap:
         return [layer.name for layer in chosen]
 
     def _chosen(self, layer_names: Iterable[str] | None) -> list[CostmapLayer]:
-        if layer_names is None:
-            return list(self.layers.values())
-        chosen = []
-        for name in layer_names:
-            if name not in self.layers:
-                raise KeyError(f"the costmap has no layer {name!r}, only {list(self.layers)}")
-            chosen.append(self.layers[name])
-        return chosen
+        return list(self.layers.values()) if layer_names is None else [self.layer(name) for name in layer_names]
 
 
 def _sources(layer: CostmapLayer) -> tuple[str, ...]:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
+from typing import Any
 
+from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.ticker import Ticker
 from mbf_abstract.geometry import Pose
+from mbf_abstract.parameters import with_changes
 from mbf_abstract.robot import RobotStateError
 from mbf_abstract.transforms import TransformError
+from mbf_costmap_nav.costmap_config import CostmapParameters
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.map_lifecycle import MapLifecycle, MapLifecycleParameters
 
@@ -18,24 +23,71 @@ def _nothing() -> None:
 
 
 class ServedCostmap:
-    """Keeps one costmap up to date.
+    """Keeps one costmap up to date, and changes its parameters.
 
     Parameters
     ----------
-    update_frequency : float
-        Rate of the updates [Hz].
+    parameters : CostmapParameters
+        Those the costmap was built with.
+    name : str
+        Its section in the configuration.
+
+    Attributes
+    ----------
+    parameters : CostmapParameters
+        The present ones.
     """
 
-    def __init__(self, costmap: LayeredCostmap, runtime: Runtime, update_frequency: float, name: str) -> None:
+    def __init__(self, costmap: LayeredCostmap, runtime: Runtime, parameters: CostmapParameters, name: str) -> None:
         self.costmap = costmap
+        self.parameters = parameters
+        self.name = name
         self._runtime = runtime
-        self._parameters = self._lifecycle_parameters()
-        self._lifecycle = MapLifecycle(runtime.clock, self._parameters, self._update, _nothing, self._clear)
-        self._ticker = Ticker(runtime.clock, runtime.events, self._tick, 1.0 / update_frequency, name)
+        self._lifecycle_limits = self._lifecycle_parameters()
+        self._lifecycle = MapLifecycle(runtime.clock, self._lifecycle_limits, self._update, _nothing, self._clear)
+        self._ticker = Ticker(runtime.clock, runtime.events, self._tick, 1.0 / parameters.update_frequency, name)
 
     def in_use(self) -> AbstractContextManager[None]:
         """Keep the map updated for the time of a ``with`` block."""
         return self._lifecycle.in_use()
+
+    def set_parameters(self, changes: Mapping[str, Any]) -> None:
+        """Change parameters of the map, all or none; raises ValueError where a value is not legal or cannot change."""
+        old, new = self.parameters, with_changes(self.parameters, changes)
+        try:
+            self._apply(new)
+        except Exception:
+            self._apply(old)
+            raise
+        self._tell(self.name, changes)
+
+    def _apply(self, parameters: CostmapParameters) -> None:
+        self.costmap.set_footprint(parameters.robot_footprint(), parameters.footprint_padding)
+        self.costmap.max_age = parameters.max_age
+        self.parameters = parameters
+
+    def set_layer_parameters(self, layer: str, changes: Mapping[str, Any]) -> None:
+        """Change parameters of a layer, all or none.
+
+        Raises
+        ------
+        KeyError
+            The map has no such layer.
+        ValueError
+            A value is not legal or cannot change, or the layer does not take it.
+        """
+        new = with_changes(self.costmap.layer(layer).parameters, changes)
+        self.costmap.set_layer_parameters(layer, new)
+        self._tell(f"{self.name}.{layer}", changes)
+
+    def _tell(self, what: str, changes: Mapping[str, Any]) -> None:
+        self._runtime.events.emit(EventKind.PARAMETER_CHANGED, what, **changes)
+        self.tell_doubts()
+
+    def tell_doubts(self) -> None:
+        """Put into the event log what is legal but hardly meant; the map runs on it all the same, as in Nav2."""
+        for doubt in self.costmap.doubts():
+            self._runtime.events.emit(EventKind.FAULT, self.name, where="configuration", message=doubt)
 
     def close(self) -> None:
         """End the updates."""
@@ -43,8 +95,8 @@ class ServedCostmap:
 
     def _tick(self) -> None:
         wanted = self._lifecycle_parameters()
-        if wanted != self._parameters:
-            self._parameters = wanted
+        if wanted != self._lifecycle_limits:
+            self._lifecycle_limits = wanted
             self._lifecycle.configure(wanted)
         self._lifecycle.poll()
         if self._lifecycle.running:

@@ -16,10 +16,10 @@ from typing import Any, ClassVar, Literal, cast
 import numpy as np
 
 from mbf_abstract.config import Config, PluginDeclaration
-from mbf_abstract.events import EventKind
 from mbf_abstract.map_queries import MapQueries
 from mbf_abstract.map_view import GridView
 from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.registry import Adapter
 from mbf_abstract.sensing import RangeScan
@@ -32,6 +32,9 @@ from mbf_costmap_nav.plugins import CostmapContext
 from mbf_costmap_nav.queries import CostmapQueries
 from mbf_costmap_nav.scan_intake import ScanIntake
 from mbf_costmap_nav.served_costmap import ServedCostmap
+
+Which = Literal["local", "global"]
+"""One of the two maps, as a plugin's declaration names it."""
 
 MAP_SUFFIXES = {".yaml", ".yml", ".pgm", ".png", ".bmp"}
 
@@ -79,8 +82,12 @@ class CostmapNavigationServer(AbstractNavigationServer):
         self._global = self._serve(config, "global_costmap")
         self._local = self._serve(config, "local_costmap")
         self.global_costmap, self.local_costmap = self._global.costmap, self._local.costmap
-        self._scans = ScanIntake(self.runtime, {name: self._with_tolerance(config, name) for name in self.map_views})
-        self._tell_doubts(*self.map_views)
+        both = (self._global, self._local)
+        self._scans = ScanIntake(
+            self.runtime, {one.name: (one.costmap, one.parameters.transform_tolerance) for one in both}
+        )
+        for one in both:
+            one.tell_doubts()
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add both maps and the one this plugin is bound to."""
@@ -134,6 +141,57 @@ class CostmapNavigationServer(AbstractNavigationServer):
         geometry = costmap.geometry
         return GridView(costs, (geometry.origin_x, geometry.upper_x, geometry.origin_y, geometry.upper_y))
 
+    # --------------------------------------------------------------------------------------- changes at run time
+    def set_layer_parameters(self, costmap: Which, layer: str, /, **changes: Any) -> None:
+        """Change parameters of a layer of one map, all or none; the map's next update takes them into its cells.
+
+        Raises
+        ------
+        ServerError
+            There is no such map or layer.
+        ValueError
+            A value is not legal (pydantic's ValidationError is one), the parameter is read once only, or the layer does
+            not take it. Nothing is changed.
+        """
+        served = self._served(costmap)
+        if layer not in served.costmap.layers:
+            raise ServerError(f"the {costmap} costmap has no layer {layer!r}, only {list(served.costmap.layers)}")
+        served.set_layer_parameters(layer, changes)
+
+    def set_costmap_parameters(self, costmap: Which, /, **changes: Any) -> None:
+        """Change parameters of one map itself, such as ``footprint_padding`` or ``max_age``; raises as for a layer."""
+        self._served(costmap).set_parameters(changes)
+
+    def set_footprint(self, footprint: str | Sequence[Sequence[float]] | float) -> None:
+        """Replace the robot's outline on both maps, e.g. when it lifts a load.
+
+        Parameters
+        ----------
+        footprint : text, list of (x, y) or number
+            Corners [m] without padding, as in the configuration, or the radius [m] of a round robot.
+
+        Raises
+        ------
+        ValueError
+            It is no polygon, or no radius; nothing is changed.
+        """
+        changes = {"footprint": footprint}
+        if isinstance(footprint, int | float):
+            changes = {"footprint": None, "robot_radius": footprint}  # type: ignore[dict-item]
+        old = {name: getattr(self._global.parameters, name) for name in changes}
+        self._global.set_parameters(changes)
+        try:
+            self._local.set_parameters(changes)
+        except Exception:
+            self._global.set_parameters(old)
+            raise
+
+    def _served(self, costmap: Which) -> ServedCostmap:
+        if costmap not in ("global", "local"):
+            raise ServerError(f"there is no costmap {costmap!r}, only global and local")
+        return self._global if costmap == "global" else self._local
+
+    # ------------------------------------------------------------------------------------------------- life cycle
     @contextmanager
     def using_map(self, kind: PluginKind) -> Iterator[None]:
         """Keep both maps updated: a plugin of any kind may be bound to either of them."""
@@ -155,16 +213,6 @@ class CostmapNavigationServer(AbstractNavigationServer):
         """Take every image format this package reads, and map_server's YAML."""
         return BARE_MAP.format(file=json.dumps(str(file))) if file.suffix.lower() in MAP_SUFFIXES else None
 
-    def _with_tolerance(self, config: Config, name: str) -> tuple[LayeredCostmap, float]:
-        parameters = cast(CostmapParameters, config.sections[name].parameters)
-        return getattr(self, name), parameters.transform_tolerance
-
-    def _tell_doubts(self, *maps: str) -> None:
-        """Put into the event log what is legal but hardly meant; the server runs on it all the same, as Nav2 does."""
-        for name in maps:
-            for doubt in getattr(self, name).doubts():
-                self.runtime.events.emit(EventKind.FAULT, name, where="configuration", message=doubt)
-
     def _serve(self, config: Config, key: str) -> ServedCostmap:
         section = config.sections[key]
         parameters = cast(CostmapParameters, section.parameters)
@@ -176,4 +224,4 @@ class CostmapNavigationServer(AbstractNavigationServer):
             base_folder=config.path.parent,
             transforms=self.runtime.transforms,
         )
-        return ServedCostmap(costmap, self.runtime, parameters.update_frequency, key)
+        return ServedCostmap(costmap, self.runtime, parameters, key)

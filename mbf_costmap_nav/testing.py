@@ -100,6 +100,7 @@ def _check_updates(site: _Site, twin: _Site, report: Report) -> None:
         again = site.update(situation, box, 0.0)
         report.expect(np.array_equal(again, first), f"{situation}: cells changed although nothing else had")
     site.layer.parameters = site.layer.parameters.model_copy(deep=True)
+    site.layer.parameters_changed()
     again = site.update("update with the same parameters", everything, 0.0)
     report.expect(np.array_equal(again, first), "the same parameters, set at run time, gave other cells")
 

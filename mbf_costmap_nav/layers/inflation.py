@@ -62,6 +62,10 @@ class InflationLayer(CostmapLayer):
         self._inscribed_radius = footprint.inscribed_radius
         self._tabulate()
 
+    def parameters_changed(self) -> None:
+        """Make the cost table for the new radius and decay."""
+        self._tabulate()
+
     def relax(self, factor: float, until: float) -> None:
         """Let the next updates up to the time ``until`` [s] keep ``factor`` of the radius, and decay faster by as much.
 

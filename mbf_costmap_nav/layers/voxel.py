@@ -61,16 +61,23 @@ class VoxelLayer(ObstacleLayer):
         for columns in (self.marked, self.seen):
             clear_cells(columns, box.clipped(self.geometry.box), inside, 0)
 
+    def parameters_changed(self) -> None:
+        """Judge all columns by the new thresholds."""
+        self._project(self.geometry.box)
+
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Trace rays through the voxels, then project the touched columns to cells."""
         touched = super().update_bounds(robot_pose, now, EMPTY_BOX).clipped(self.geometry.box)
         if not touched.empty:
-            limits = self.parameters
-            project_columns(
-                self.marked, self.seen, limits.z_voxels, limits.mark_threshold, limits.unknown_threshold,
-                self.default_value, self.cells, touched,
-            )  # fmt: skip
+            self._project(touched)
         return box.union(touched)
+
+    def _project(self, box: CellBox) -> None:
+        limits = self.parameters
+        project_columns(
+            self.marked, self.seen, limits.z_voxels, limits.mark_threshold, limits.unknown_threshold,
+            self.default_value, self.cells, box,
+        )  # fmt: skip
 
     def _clear(self, seen: Observation, limits: SourceParameters, touched: NDArray[np.int64]) -> None:
         clear_voxel_rays(
