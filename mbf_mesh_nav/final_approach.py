@@ -1,8 +1,8 @@
-"""The last stretch of a path for a robot that cannot turn on the spot: it has to come in along the goal's heading.
+"""The first and last stretch of a path for a robot that cannot turn on the spot: a car leaves and arrives on curves.
 
-Where the path arrives otherwise, its end is replaced by the shortest curve of two arcs and a line between (Dubins 1957;
-the lengths after Shkel and Lumelsky, "Classification of the Dubins set", 2001), laid out in the goal's tangent plane
-and put onto the surface.
+Where the path arrives otherwise than along the goal's heading, its end is replaced by the shortest curve of two arcs
+and a line between (Dubins 1957; the lengths after Shkel and Lumelsky, "Classification of the Dubins set", 2001), laid
+out in the goal's tangent plane and put onto the surface. Its begin is treated likewise, seen from the other end.
 """
 
 from __future__ import annotations
@@ -13,18 +13,41 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Path
+from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw, quaternion_multiply
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.path_progress import PathProgress
 
 _SMALL_CORNER = 0.2  # [rad] between the path's end and the goal's heading: driven without an approach
+_SMALL_TURN = 1.2  # [rad] between the robot's heading and the path's begin: steered into without a curve
 _LEAVING = (1.0, 2.0, 3.0, 4.0, 6.0)  # turning radii before the goal at which the curve may leave the path
 _STRAIGHT = 0.3  # [m] straight ahead at the end, to settle in
 _SPACING = 0.1  # [m]
 _SIDES = {"L": 1.0, "S": 0.0, "R": -1.0}
 
 
-def with_final_approach(path: Path, mesh_map: MeshMap, blocked: NDArray[np.bool_], turning_radius: float) -> Path:
+def with_first_turn(
+    path: Path, mesh_map: MeshMap, blocked: NDArray[np.bool_], turning_radius: float, pose: Pose
+) -> Path:
+    """Bend the begin of a path so that a car at ``pose`` drives onto it; the path itself where it leads ahead anyway.
+
+    That is the approach of the way back: from the goal to the pose of the robot, turned about.
+    """
+    backward = np.concatenate([path.positions[:0:-1], [pose.position]])
+    turned_about = quaternion_multiply(pose.orientation, quaternion_from_yaw(math.pi))
+    way_back = Path.from_points(backward, turned_about, frame_id=path.frame_id, stamp=path.stamp)
+    bent = with_final_approach(way_back, mesh_map, blocked, turning_radius, _SMALL_TURN)
+    if bent is way_back:
+        return path
+    return Path.from_points(bent.positions[::-1], path[-1].orientation, frame_id=path.frame_id, stamp=path.stamp)
+
+
+def with_final_approach(
+    path: Path,
+    mesh_map: MeshMap,
+    blocked: NDArray[np.bool_],
+    turning_radius: float,
+    small_corner: float = _SMALL_CORNER,
+) -> Path:
     """Bend the end of a path so that it arrives with the heading of its last pose.
 
     The path stays as it is where it arrives that way already, or where no curve fits on the free surface.
@@ -35,9 +58,11 @@ def with_final_approach(path: Path, mesh_map: MeshMap, blocked: NDArray[np.bool_
         Vertices the curve must not come near.
     turning_radius : float
         Of the arcs [m].
+    small_corner : float
+        Up to this angle [rad] between its end and the goal's heading the path stays as it is.
     """
     progress = PathProgress(path, window=0.0)
-    if progress.length < _SPACING or _corner_at_goal(path) < _SMALL_CORNER:
+    if progress.length < _SPACING or _corner_at_goal(path) < small_corner:
         return path
     best, best_length = path, np.inf
     for distance in [radii * turning_radius for radii in _LEAVING]:

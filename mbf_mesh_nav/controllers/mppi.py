@@ -22,8 +22,8 @@ from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
-from mbf_mesh_nav.final_approach import with_final_approach
-from mbf_mesh_nav.goal_approach import ArrivalLatch, braking_speed, clamp, heading_error, is_at_goal
+from mbf_mesh_nav.final_approach import with_final_approach, with_first_turn
+from mbf_mesh_nav.goal_approach import ArrivalLatch, braking_speed, clamp, ground_distance, heading_error, is_at_goal
 from mbf_mesh_nav.kernels.mppi import score_rollouts
 from mbf_mesh_nav.kernels.surface_walk import tangent
 from mbf_mesh_nav.kernels.vectors import Vector
@@ -39,6 +39,7 @@ _ROOM_TO_STEER = 1.2  # radius of the approach to the goal, in least turning rad
 _STRICT_RADII = 8.0  # before the goal at which a bent approach begins to be followed ...
 _STRICTNESS = 10.0  # ... so many times more closely: who cuts it arrives with the wrong heading
 _STANDSTILL = 0.2  # [m] and [rad] gained over the horizon: less than this is no motion
+_IDLE_CYCLES = 20  # without motion, after which there is none that gets on
 
 
 class MPPIParameters(PluginParameters):
@@ -98,16 +99,28 @@ class MPPIController(MeshController):
         self._strict_below = 0.0
         if p.motion_model == "ackermann":
             radius = p.wheelbase / math.tan(p.max_steering_angle)
-            blocked = self._hardness_at(self.mesh_map.snapshot()) > 0.0
-            bent = with_final_approach(path, self.mesh_map, blocked, _ROOM_TO_STEER * radius)
+            bent = with_final_approach(path, self.mesh_map, self._blocked(), _ROOM_TO_STEER * radius)
             # Beyond the goal, for the critic that looks along the path: it shows how to stand there.
             self._run_out = path.positions[-1] + np.outer((0.1, 0.2, 0.3), self._goal.rotation[:, 0])
             self._strict_below = _STRICT_RADII * radius if bent is not path else 0.0
             path = bent
-        self._progress = PathProgress(path, window=2.0 * p.max_lin_velocity * p.horizon_steps * p.step_time)
+        self._path, self._begun, self._idle_cycles = path, False, 0
+        self._follow(path)
         self._arrival = ArrivalLatch(p.goal_distance)
         self._nominal: NDArray[np.float64] = np.zeros((p.horizon_steps, 2))
         return True
+
+    def _follow(self, path: Path) -> None:
+        p = self.parameters
+        self._progress = PathProgress(path, window=2.0 * p.max_lin_velocity * p.horizon_steps * p.step_time)
+
+    def _begin(self, pose: Pose) -> None:
+        """Lead a car that looks elsewhere onto its path on a curve, now that its pose is known."""
+        p = self.parameters
+        self._begun = True
+        if p.motion_model == "ackermann" and len(self._path) > 1:
+            radius = _ROOM_TO_STEER * p.wheelbase / math.tan(p.max_steering_angle)
+            self._follow(with_first_turn(self._path, self.mesh_map, self._blocked(), radius, pose))
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: locate, sample around the last motion, score, blend, check."""
@@ -118,12 +131,19 @@ class MPPIController(MeshController):
         if spot is None:
             message = f"the robot is more than {p.max_surface_distance:g} m from the surface"
             return ControlResult(ExePathOutcome.OUT_OF_MAP, message)
+        if not self._begun:
+            self._begin(pose)
         projection = self._progress.update(spot.point)
         if projection.deviation > p.max_path_distance:
             message = f"the robot is {projection.deviation:.2f} m from the path, allowed are {p.max_path_distance:g} m"
             return ControlResult(ExePathOutcome.MISSED_PATH, message)
         if self._arrival.update(pose, self._goal):
-            turn = clamp(2.0 * heading_error(pose, self._goal), p.max_ang_velocity)
+            off = heading_error(pose, self._goal)
+            self._idle_cycles += p.motion_model == "ackermann"
+            if self._idle_cycles > _IDLE_CYCLES:
+                message = f"the goal is reached but for {off:.2f} rad, which a car cannot mend where it stands"
+                return ControlResult(ExePathOutcome.NO_VALID_CMD, message)
+            turn = clamp(2.0 * off, p.max_ang_velocity)
             return ControlResult(ExePathOutcome.SUCCESS, "", self._as_command(0.0, turn))
         motion = self._best_motion(spot, pose, projection)
         if motion is None:
@@ -156,10 +176,15 @@ class MPPIController(MeshController):
         # The mean of two free motions, left and right of an obstacle, may hit it.
         if self._score(blended[None], spot, pose, projection)[1][0]:
             blended = np.asarray(controls[int(np.argmin(scores))])
-        # Where most motions collide and the best one hardly moves, standing there would last for ever.
+        # Where most motions collide and the best one hardly moves, standing there would last for ever. So it would
+        # where none leads nearer, as for a car that has passed its goal; a cycle or two of it are chance.
         travel, turn = np.abs(blended.sum(axis=0)) * self.parameters.step_time
-        hemmed_in = collided.mean() > 0.5 and travel < _STANDSTILL and turn < _STANDSTILL
-        return None if hemmed_in or bool(collided.all()) else blended
+        stands = travel < _STANDSTILL and turn < _STANDSTILL
+        assert self._goal is not None
+        has_far_to_go = ground_distance(pose, self._goal) > _STANDSTILL + self.parameters.goal_distance
+        self._idle_cycles = self._idle_cycles + 1 if stands and has_far_to_go else 0
+        stuck = stands and (collided.mean() > 0.5 or self._idle_cycles > _IDLE_CYCLES)
+        return None if stuck or bool(collided.all()) else blended
 
     def _sample(self, max_speed: float) -> NDArray[np.float64]:
         """Motions (samples, horizon_steps, 2) around the last one; the first is that one, the second stands still."""
@@ -217,6 +242,10 @@ class MPPIController(MeshController):
             np.array(weights),
             (p.roll_limit, p.pitch_limit),
         )
+
+    def _blocked(self) -> NDArray[np.bool_]:
+        """Vertices (V,) no curve may come near."""
+        return np.asarray(self._hardness_at(self.mesh_map.snapshot()) > 0.0)
 
     def _hardness_at(self, snapshot: MeshSnapshot) -> NDArray[np.float32]:
         """How forbidden the vertices (V,) are to the robot."""

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Path, Pose
-from mbf_mesh_nav.final_approach import dubins_curve, with_final_approach
+from mbf_mesh_nav.final_approach import dubins_curve, with_final_approach, with_first_turn
 
 PLACES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-math.pi, math.pi))
 
@@ -52,3 +52,20 @@ def test_a_curve_that_does_not_fit_between_walls_is_not_taken(plain, paint):
     blocked = corridor.snapshot().lethal
     assert with_final_approach(path, corridor, blocked, 0.7) is path
     assert with_final_approach(path, corridor, np.zeros_like(blocked), 0.7) is not path
+
+
+def test_a_path_that_begins_behind_the_car_is_joined_on_a_curve_and_keeps_its_end(plain):
+    mesh_map = plain()
+    path, car = straight_path(0.0), Pose.planar(0.8, 2.5, 2.8)
+    bent = with_first_turn(path, mesh_map, mesh_map.snapshot().lethal, 0.7, car)
+    first = bent.positions[3] - bent.positions[0]
+    assert np.allclose(bent.positions[0], car.position)
+    assert abs(math.remainder(math.atan2(first[1], first[0]) - 2.8, math.tau)) < 0.3
+    np.testing.assert_allclose(bent.positions[-1], path.positions[-1], atol=1e-9)
+    assert bent.orientations[-1].tolist() == path.orientations[-1].tolist()
+
+
+def test_a_path_that_leads_ahead_of_the_car_begins_as_it_is(plain):
+    mesh_map = plain()
+    path = straight_path(0.0)
+    assert with_first_turn(path, mesh_map, mesh_map.snapshot().lethal, 0.7, Pose.planar(0.8, 2.5, 0.9)) is path

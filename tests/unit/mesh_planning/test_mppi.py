@@ -70,6 +70,24 @@ def test_an_ackermann_robot_gets_steering_and_reaches_the_goal(make_plugin, plai
     assert controller.is_goal_reached(pose, 0.2, math.pi), pose
 
 
+@pytest.mark.parametrize("yaw", [1.6, 2.4, 2.8, math.pi])
+def test_a_car_turns_round_onto_a_path_that_begins_behind_it(make_plugin, plain, yaw):
+    controller = make_plugin(MPPIController, plain(12.0, 12.0), motion_model="ackermann", wheelbase=0.4)
+    controller.set_plan(Path.from_points([(x, 6.0, 0.0) for x in np.linspace(5.0, 9.0, 41)]))
+    pose = drive_car(controller, Pose.planar(5.0, 6.0, yaw), 0.4, angle_tolerance=math.pi)
+    assert controller.is_goal_reached(pose, 0.2, math.pi), pose
+
+
+def test_a_car_at_the_goal_with_a_wrong_heading_says_so_instead_of_standing_there(make_plugin, plain):
+    controller = make_plugin(MPPIController, plain(), motion_model="ackermann", wheelbase=0.4)
+    controller.set_plan(Path.from_points([(x, 2.5, 0.0) for x in np.linspace(3.4, 4.4, 11)]))
+    for _ in range(60):
+        result = controller.compute_velocity_commands(ControlRequest(Pose.planar(4.4, 2.5, 0.6), Twist()))
+        if not result.success:
+            break
+    assert result.outcome == ExePathOutcome.NO_VALID_CMD and "0.60 rad" in result.message
+
+
 @pytest.mark.parametrize("model", ["differential", "ackermann"])
 def test_it_tells_what_it_means_to_drive_next_with_the_turns_of_a_car_as_yaw_rates(make_plugin, plain, model):
     controller = make_plugin(MPPIController, plain(), motion_model=model, wheelbase=0.4)
