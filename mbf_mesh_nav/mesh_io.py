@@ -1,4 +1,4 @@
-"""Reading meshes from files: PLY, OBJ, STL, OFF, DAE, glTF through trimesh, and the HDF5 layouts of lvr2.
+"""Reading meshes from files: PLY, OBJ, STL, OFF, DAE, glTF through trimesh, the HDF5 layouts of lvr2, elevation models.
 
 Whatever is wrong with a file comes out as one ``MeshError`` that names it. A file is only read, never changed.
 Coordinates are taken as they stand: an up-axis tag of COLLADA is ignored, as mesh_navigation does.
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.cut_files import refuse_cut_file
+from mbf_mesh_nav.elevation_files import elevation_readers, read_elevation
 from mbf_mesh_nav.mesh_report import MeshError
 
 TRIMESH_FORMATS = frozenset({".ply", ".obj", ".stl", ".off", ".dae", ".gltf", ".glb"})
@@ -34,7 +35,7 @@ def read_mesh(file: str | Path, part: str = "", max_faces: int = MAX_FACES) -> M
         The ending decides the format.
     part : str
         Which part of the file: a path of node names through a scene graph ("building/floor_2"), or the group of an
-        HDF5 file. "" and "/" mean everything, joined (HDF5: the only mesh in the file).
+        HDF5 file. "" and "/" mean everything, joined (HDF5: the only mesh in the file). Elevation models have none.
     max_faces : int
         Larger meshes are refused before anything is built from them.
 
@@ -51,9 +52,8 @@ def read_mesh(file: str | Path, part: str = "", max_faces: int = MAX_FACES) -> M
     """
     path = Path(file)
     ending = path.suffix.lower()
-    if ending not in TRIMESH_FORMATS | HDF5_FORMATS:
-        known = ", ".join(sorted(TRIMESH_FORMATS | HDF5_FORMATS))
-        raise MeshError(str(path), [f"unknown ending '{ending}', known are: {known}"])
+    if ending not in (known := known_endings()):
+        raise MeshError(str(path), [f"unknown ending '{ending}', known are: {', '.join(sorted(known))}"])
     if not path.is_file():
         raise MeshError(str(path), ["there is no such file"])
     if path.stat().st_size > MAX_FILE_BYTES:
@@ -62,18 +62,31 @@ def read_mesh(file: str | Path, part: str = "", max_faces: int = MAX_FACES) -> M
         from mbf_mesh_nav.lvr2_io import read_lvr2_mesh  # h5py only for those who use it
 
         return read_lvr2_mesh(path, part, max_faces)
-    try:
-        refuse_cut_file(path)
-        vertices, faces = _read_scene(path, part.strip("/"))
-    except MeshError:
-        raise
-    except Exception as error:  # any parser error of any format; MemoryError of a lying header included
-        raise MeshError(str(path), [f"cannot be read as {ending[1:]}: {type(error).__name__}: {error}"]) from error
+    if ending not in TRIMESH_FORMATS:
+        vertices, faces = read_elevation(path, max_faces)
+    else:
+        vertices, faces = _read_with_trimesh(path, part.strip("/"))
     if len(faces) == 0:
         raise MeshError(str(path), ["there is no face in it"])
     if len(faces) > max_faces:
         raise MeshError(str(path), [f"{len(faces)} faces, the limit is {max_faces}"])
     return vertices, faces
+
+
+def known_endings() -> frozenset[str]:
+    """Endings of the files that can be read, with their dots."""
+    return TRIMESH_FORMATS | HDF5_FORMATS | frozenset(elevation_readers())
+
+
+def _read_with_trimesh(path: Path, part: str) -> MeshArrays:
+    try:
+        refuse_cut_file(path)
+        return _read_scene(path, part)
+    except MeshError:
+        raise
+    except Exception as error:  # any parser error of any format; MemoryError of a lying header included
+        text = f"cannot be read as {path.suffix[1:].lower()}: {type(error).__name__}: {error}"
+        raise MeshError(str(path), [text]) from error
 
 
 def _read_scene(path: Path, part: str) -> MeshArrays:

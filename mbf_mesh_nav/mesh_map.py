@@ -109,20 +109,37 @@ class MeshMap:
 
     @classmethod
     def from_heights(
-        cls, heights: ArrayLike, dx: float, dy: float, x0: float = 0.0, y0: float = 0.0, frame_id: str = "map"
+        cls,
+        heights: ArrayLike,
+        dx: float,
+        dy: float,
+        x0: float = 0.0,
+        y0: float = 0.0,
+        frame_id: str = "map",
+        repair: Sequence[str] = (),
     ) -> MeshMap:
         """Build the map of a heightfield; the surface equals that of Bullet's heightfield shape.
 
         Parameters
         ----------
         heights : (ny, nx) float
-            z [m] at ``(x0 + ix * dx, y0 + iy * dy)``; NaN leaves a hole.
+            z [m] at ``(x0 + ix * dx, y0 + iy * dy)``; NaN leaves a hole. Sample [iy, ix] is the caller's vertex
+            ``iy * nx + ix``, with -1 in ``input_to_internal`` for holes.
         dx, dy : float
             Spacing [m].
         x0, y0 : float
             Position of ``heights[0, 0]`` [m].
+        repair : sequence of str
+            As in ``from_arrays``; ``point_contacts`` parts regions that touch in a sample only.
+
+        Raises
+        ------
+        ValueError
+            Fewer than 2 x 2 samples, or a spacing that is not positive.
+        MeshError
+            No three samples that make a face, see ``from_arrays``.
         """
-        return cls.from_arrays(*heightfield_mesh(heights, dx, dy, x0, y0), frame_id)
+        return cls.from_arrays(*heightfield_mesh(heights, dx, dy, x0, y0, keep_grid=True), frame_id, repair)
 
     # ------------------------------------------------------------------------------------------------- queries
     def locate(self, points: ArrayLike, max_distance: float = np.inf) -> Location:

@@ -26,7 +26,7 @@ from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.server import AbstractNavigationServer
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
-from mbf_mesh_nav.mesh_io import HDF5_FORMATS, TRIMESH_FORMATS
+from mbf_mesh_nav.mesh_io import known_endings
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.mesh_report import SHOWN_INDICES
 from mbf_mesh_nav.plugins import MeshContext
@@ -197,8 +197,4 @@ class MeshNavigationServer(AbstractNavigationServer):
     @classmethod
     def config_for_map(cls, file: Path) -> str | None:
         """Take every mesh format this package reads."""
-        return (
-            BARE_MESH.format(file=json.dumps(str(file)))
-            if file.suffix.lower() in TRIMESH_FORMATS | HDF5_FORMATS
-            else None
-        )
+        return BARE_MESH.format(file=json.dumps(str(file))) if file.suffix.lower() in known_endings() else None

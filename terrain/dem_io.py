@@ -1,8 +1,9 @@
 """Read elevation models: the Jacksboro fault that comes with matplotlib, and files of four common formats.
 
 All readers turn the raster so that y grows northwards (row 0 of every one of these formats is the northern edge),
-put sample [0, 0] at the origin, and give degrees their length in metres at the raster's latitude. Voids are filled
-from the nearest valid sample: a planner must not see a hole where the survey had none.
+put sample [0, 0] at the origin, and give degrees their length in metres at the raster's latitude. For a world to drive
+in, ``read_dem`` fills voids from the nearest valid sample: physics must not meet a hole where the survey had none. For
+a map, ``read_elevation`` leaves them: the mesh server takes it by the entry point ``mbf.elevation_readers``.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 import re
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,14 @@ class TerrainFileError(Exception):
 
     def __init__(self, path: str | Path, reason: str) -> None:
         super().__init__(f"{path}: {reason}")
+
+
+class Elevation(NamedTuple):
+    """Heights (ny, nx) [m], the southern row first and NaN at voids, and the distances [m] between samples."""
+
+    heights: NDArray[np.float64]
+    dx: float
+    dy: float
 
 
 def degree_lengths(latitude: float) -> tuple[float, float]:
@@ -69,7 +78,7 @@ def jacksboro(
         elevation, degrees = np.asarray(data["elevation"]), float(data["dx"])
         latitude = 0.5 * (float(data["ymin"]) + float(data["ymax"]))
     dx, dy = (degrees * length for length in degree_lengths(latitude))
-    terrain = _northern_row_first(elevation, dx, dy)
+    terrain = _filled(_northern_row_first(elevation, dx, dy))
     terrain = terrain.scaled(size_m / terrain.size[0])
     terrain = terrain.with_heights(terrain.heights - terrain.heights.min())
     if spacing is not None:
@@ -82,7 +91,21 @@ def jacksboro(
 
 
 def read_dem(path: str | Path) -> Heightfield:
-    """Read an elevation model by its file name's ending.
+    """Read an elevation model and fill its voids; parameters and errors as in ``read_elevation``.
+
+    Raises
+    ------
+    TerrainFileError
+        Also where more than half of the raster is void.
+    """
+    try:
+        return _filled(read_elevation(path))
+    except ValueError as error:
+        raise TerrainFileError(path, f"cannot be read: {error}") from error
+
+
+def read_elevation(path: str | Path) -> Elevation:
+    """Read an elevation model by its file name's ending; voids are NaN.
 
     Parameters
     ----------
@@ -110,21 +133,27 @@ def read_dem(path: str | Path) -> Heightfield:
         raise TerrainFileError(path, f"cannot be read: {error}") from error
 
 
-def _northern_row_first(raster: NDArray[Any], dx: float, dy: float, void: float | None = None) -> Heightfield:
-    """Flip to y up and fill voids; raises ValueError where more than half of the raster is void."""
+def _northern_row_first(raster: NDArray[Any], dx: float, dy: float, void: float | None = None) -> Elevation:
+    """Flip to y up and mark voids by NaN."""
     heights = raster.astype(np.float64)[::-1]
     bad = ~np.isfinite(heights)
     if void is not None:
         bad |= heights == void
+    return Elevation(np.where(bad, np.nan, heights), dx, dy)
+
+
+def _filled(elevation: Elevation) -> Heightfield:
+    """Fill voids from the nearest valid sample; raises ValueError where more than half of the raster is void."""
+    heights, bad = elevation.heights, np.isnan(elevation.heights)
     if bad.mean() > MAX_VOID_SHARE:
         raise ValueError(f"{bad.mean():.0%} of the samples are void")
     if bad.any():
         _, (rows, columns) = ndimage.distance_transform_edt(bad, return_indices=True)
         heights = heights[rows, columns]
-    return Heightfield(heights.astype(np.float32), dx, dy)
+    return Heightfield(heights.astype(np.float32), elevation.dx, elevation.dy)
 
 
-def _read_esri_ascii(path: Path) -> Heightfield:
+def _read_esri_ascii(path: Path) -> Elevation:
     header: dict[str, float] = {}
     with path.open(encoding="ascii") as file:
         for line in file:
@@ -146,7 +175,7 @@ def _read_esri_ascii(path: Path) -> Heightfield:
     )
 
 
-def _read_hgt(path: Path) -> Heightfield:
+def _read_hgt(path: Path) -> Elevation:
     """SRTM: one degree square of big-endian int16; the name holds the south-west corner, e.g. ``N44W072``."""
     name = re.match(r"([NS])(\d{2})[EW]\d{3}", path.stem, re.IGNORECASE)
     if name is None:
@@ -160,7 +189,7 @@ def _read_hgt(path: Path) -> Heightfield:
     return _northern_row_first(values.reshape(side, side), dx, dy, HGT_VOID)
 
 
-def _read_geotiff(path: Path) -> Heightfield:
+def _read_geotiff(path: Path) -> Elevation:
     from PIL import Image
 
     with warnings.catch_warnings():
@@ -185,7 +214,7 @@ def _read_geotiff(path: Path) -> Heightfield:
     return _northern_row_first(raster, dx, dy, None if no_data is None else float(str(no_data).strip("\0 ")))
 
 
-def _read_npz(path: Path) -> Heightfield:
+def _read_npz(path: Path) -> Elevation:
     with np.load(path, allow_pickle=False) as data:
         missing = [key for key in ("z", "dx", "dy") if key not in data.files]
         if missing:
