@@ -22,6 +22,7 @@ MAX_BYTES = 1_000_000
 MAX_DEPTH = 32
 MAX_ALIASES = 100
 MAX_VALUES = 100_000
+MAX_INT_BITS = 63  # what a longer one means nobody can tell, and Python refuses to print the longest
 
 _PLAIN_TAGS = {
     f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "timestamp", "map", "seq")
@@ -93,8 +94,8 @@ def _read_text(path: Path, findings: list[Finding]) -> str | None:
     try:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        findings.append(Finding(str(path), 1, "", "a readable file", error.strerror or str(error)))
+    except (OSError, ValueError) as error:  # ValueError: a name with a null character
+        findings.append(Finding(str(path), 1, "", "a readable file", getattr(error, "strerror", None) or str(error)))
         return None
     if len(content) > MAX_BYTES:
         findings.append(Finding(str(path), 1, "", f"at most {MAX_BYTES} bytes", "a larger file"))
@@ -181,10 +182,15 @@ class _Reader:
                 self._lines.setdefault((*path, index), item.start_mark.line + 1)
             return [self._construct(item, (*path, index)) for index, item in enumerate(node.value)]
         try:
-            return self._loader.construct_object(node)
-        except ValueError as error:  # e.g. a date with month 13
-            self._report(line, path, "a plain value", f"{node.value!r} ({error})")
+            value = self._loader.construct_object(node)
+        except (ValueError, OverflowError) as error:  # e.g. a date with month 13
+            reason = str(error).partition(";")[0]
+            self._report(line, path, "a plain value", f"{describe_value(node.value)} ({reason})")
             return None
+        if isinstance(value, int) and value.bit_length() > MAX_INT_BITS:
+            self._report(line, path, f"a whole number of at most {MAX_INT_BITS} bits", describe_value(node.value))
+            return None
+        return value
 
     def _construct_mapping(self, node: yaml.MappingNode, path: KeyPath) -> dict[str, Any]:
         values: dict[str, Any] = {}

@@ -7,21 +7,26 @@ mode raw the grey value itself is kept. These are map_server's rules.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from mbf_abstract.findings import ConfigError, Finding, describe_value
+from mbf_abstract.yaml_source import YamlDocument, load_yaml
 
 OccupancyArray = NDArray[np.uint8]
 
 FREE_OCCUPANCY = 0
 OCCUPIED = 100
 UNKNOWN_OCCUPANCY = 255
-MAX_DESCRIPTION_BYTES = 1 << 20
+MAX_TOLD = 10
+"""Findings of one file that its MapError tells."""
+TOLD_WIDTH = 300
+"""Characters of one of them; a key may be as long as the file."""
 
 
 class MapError(Exception):
@@ -60,17 +65,24 @@ class MapDescription(BaseModel):
     free_thresh: float = Field(0.196, ge=0.0, le=1.0)
     mode: MapMode = MapMode.TRINARY
 
+    @field_validator("image")
+    @classmethod
+    def _image_is_a_file_name(cls, value: str) -> str:
+        if "\0" in value:
+            raise ValueError("a file name without a null character")
+        return value
+
     @field_validator("origin", mode="before")
     @classmethod
     def _origin_is_a_list(cls, value: object) -> object:
         if isinstance(value, list | tuple) and len(value) == 3:
             return tuple(value)
-        raise ValueError("expected a list [x, y, yaw]")
+        raise ValueError("a list [x, y, yaw]")
 
     @model_validator(mode="after")
     def _thresholds_are_ordered(self) -> MapDescription:
         if self.free_thresh >= self.occupied_thresh:
-            raise ValueError(f"free_thresh {self.free_thresh} must be below occupied_thresh {self.occupied_thresh}")
+            raise ValueError(f"free_thresh below occupied_thresh, not {self.free_thresh} and {self.occupied_thresh}")
         return self
 
     def occupancy_of_grey(self) -> OccupancyArray:
@@ -96,27 +108,43 @@ def read_description(file: Path) -> MapDescription:
     Raises
     ------
     MapError
-        The file is missing, too large, no YAML mapping, or holds a bad value (all of them are named).
+        The file is missing, breaks a limit of ``mbf_abstract.yaml_source`` or holds a bad value (all of them are
+        named).
     """
+    document = read_mapping(file)
+    return validated_description(file, document.data, document)
+
+
+def read_mapping(file: Path) -> YamlDocument:
+    """Read a YAML file whose top level is a mapping; raises MapError with all that is wrong with it."""
     try:
-        if file.stat().st_size > MAX_DESCRIPTION_BYTES:
-            raise MapError(file, f"is larger than {MAX_DESCRIPTION_BYTES} bytes, which no map description is")
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise MapError(file, error.strerror or str(error)) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise MapError(file, f"is no readable YAML: {error}") from error
-    if not isinstance(content, dict):
-        raise MapError(
-            file, f"expected a mapping with the keys image, resolution, origin; got {type(content).__name__}"
-        )
-    return validated_description(file, content)
+        return load_yaml(file)
+    except ConfigError as error:
+        raise MapError(file, told(error.findings)) from error
 
 
-def validated_description(file: Path, keys: Mapping[str, object]) -> MapDescription:
-    """Check the keys of a description; ``file`` is only named in the MapError."""
+def validated_description(
+    file: Path, keys: Mapping[str, object], document: YamlDocument | None = None
+) -> MapDescription:
+    """Check the keys of a description; ``file`` and the lines of ``document`` are only named in the MapError."""
     try:
         return MapDescription.model_validate(keys)
     except ValidationError as error:
-        findings = (f"{'.'.join(map(str, e['loc'])) or 'map'}: {e['msg']}, got {e['input']!r}" for e in error.errors())
-        raise MapError(file, "; ".join(findings)) from error
+        source = document or YamlDocument(file, {})
+        findings = [
+            source.finding(
+                one["loc"],
+                one["msg"].removeprefix("Value error, ").removeprefix("Input should be "),
+                "nothing" if one["type"] == "missing" else describe_value(one["input"]),
+            )
+            for one in error.errors(include_url=False)
+        ]
+        raise MapError(file, told(findings)) from error
+
+
+def told(findings: Sequence[Finding]) -> str:
+    """Findings of one file as the reason of its MapError, the first ten of them."""
+    texts = [f"line {one.line}: {one.text.removeprefix(f'{one.file}:{one.line}:').strip()}" for one in findings]
+    lines = [text if len(text) <= TOLD_WIDTH else f"{text[:TOLD_WIDTH]}..." for text in texts[:MAX_TOLD]]
+    more = [f"and {len(findings) - MAX_TOLD} more"] if len(findings) > MAX_TOLD else []
+    return "; ".join(lines + more)

@@ -24,6 +24,7 @@ import yaml
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
+from mbf_abstract.findings import describe_value
 from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.map_description import (
     OCCUPIED,
@@ -102,11 +103,17 @@ def load_map(file: Path | str, max_cells: int = MAX_CELLS, *, confined: bool = F
     file = Path(file)
     description = read_description(file)
     image = file.parent / description.image
-    if confined and not image.resolve().is_relative_to(file.parent.resolve()):
-        raise MapError(
-            file, f"image: expected a file in the folder of the map (confine_images), got {description.image!r}"
-        )
+    if confined and not _lies_in(image, file.parent):
+        got = describe_value(description.image)
+        raise MapError(file, f"image: expected a file in the folder of the map (confine_images), got {got}")
     return _decode(_read_pixels(image, max_cells), description)
+
+
+def _lies_in(file: Path, folder: Path) -> bool:
+    try:
+        return file.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError):  # a name too long, a circle of links
+        return False
 
 
 def load_costmap(

@@ -15,12 +15,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
-from pydantic import ValidationError, field_validator
+from pydantic import field_validator
 
+from mbf_abstract.findings import Finding
 from mbf_abstract.parameters import ParameterModel, parameter
-from mbf_costmap_nav.map_description import MapError
+from mbf_abstract.validation import validate
+from mbf_costmap_nav.map_description import MapError, read_mapping, told
 
 
 class Zone(ParameterModel):
@@ -63,14 +64,10 @@ def load_zones(file: Path) -> tuple[Zone, ...]:
     Raises
     ------
     MapError
-        The file is missing, no YAML, or holds something else than zones.
+        The file is missing, breaks a limit of ``mbf_abstract.yaml_source``, or holds something else than zones.
     """
-    try:
-        return ZonesFile.model_validate(yaml.safe_load(file.read_text(encoding="utf-8"))).zones
-    except OSError as error:
-        raise MapError(file, error.strerror or str(error)) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise MapError(file, f"is no readable YAML: {error}") from error
-    except ValidationError as error:
-        findings = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors())
-        raise MapError(file, findings) from error
+    document, findings = read_mapping(file), list[Finding]()
+    content = validate(ZonesFile, document.data, document, (), findings)
+    if content is None:
+        raise MapError(file, told(findings))
+    return content.zones

@@ -1,5 +1,7 @@
 """Fault table, rows 22 and 30: malformed and hostile maps: descriptions, images, a server that is told to use one."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import yaml
@@ -14,7 +16,8 @@ from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.transforms import TransformBuffer
 from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map_description import MapError, read_description
-from mbf_costmap_nav.map_io import load_image, load_map
+from mbf_costmap_nav.map_io import load_costmap, load_image, load_map
+from mbf_costmap_nav.zones import load_zones
 
 GOOD = {"image": "map.pgm", "resolution": 0.05, "origin": [0.0, 0.0, 0.0]}
 BAD_DESCRIPTIONS = {
@@ -44,6 +47,51 @@ def test_a_file_that_is_no_mapping_is_refused(tmp_path, text):
     (tmp_path / "map.yaml").write_text(text)
     with pytest.raises(MapError):
         load_map(tmp_path / "map.yaml")
+
+
+NASTY = {
+    "a date with month 99": ("foo: 2001-99-99", "line 4: foo: expected a plain value"),
+    "a number of 5000 digits": ("foo: " + "9" * 5000, "line 4: foo"),
+    "a number of 5000 hexadecimal digits": ("negate: 0x" + "f" * 5000, "line 4: negate"),
+    "deep nesting": ("foo: " + "[" * 5000 + "]" * 5000, "levels of nesting"),
+    "an alias bomb": ("a: &a [x, x]\n" + "".join(f"b{i}: [{'*a, ' * 50}]\n" for i in range(5)), "100 aliases"),
+    "a key twice": ("resolution: 0.2", "line 4: resolution: expected each key once"),
+    "a long value": ("mode: " + "x" * 100_000, "line 4: mode: expected 'trinary', 'scale' or 'raw', got 'xxx"),
+    "a long key twice": ("k" * 50_000 + ": 1\n" + "k" * 50_000 + ": 2", "line 5: kkk"),
+    "a python object": ("foo: !!python/object/apply:os.system [ls]", "the YAML tag"),
+}
+
+
+@pytest.mark.parametrize("confined", [False, True])
+@pytest.mark.parametrize("case", NASTY)
+def test_a_nasty_description_is_refused_with_its_line_in_a_short_message(tmp_path, case, confined):
+    text, says = NASTY[case]
+    (tmp_path / "map.yaml").write_text("image: map.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n" + text)
+    with pytest.raises(MapError) as caught:
+        load_map(tmp_path / "map.yaml", confined=confined)
+    assert says in str(caught.value) and len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize("image", ['"a\\0.pgm"', "a" * 5000 + ".pgm"])
+@pytest.mark.parametrize("confined", [False, True])
+def test_an_image_whose_name_is_no_file_name_is_refused(tmp_path, image, confined):
+    (tmp_path / "map.yaml").write_text(f"image: {image}\nresolution: 0.05\norigin: [0, 0, 0]\n")
+    with pytest.raises(MapError):
+        load_map(tmp_path / "map.yaml", confined=confined)
+
+
+@pytest.mark.parametrize("text", [*(text for text, _ in NASTY.values()), "zones: [" + "{}, " * 9000 + "]"])
+def test_a_nasty_zones_file_is_refused_in_a_short_message(tmp_path, text):
+    (tmp_path / "zones.yaml").write_text(text)
+    with pytest.raises(MapError, match=r"zones\.yaml: line \d+: ") as caught:
+        load_zones(tmp_path / "zones.yaml")
+    assert len(str(caught.value)) < 2000
+
+
+def test_a_file_whose_name_holds_a_null_character_is_refused():
+    for load in (load_map, load_costmap, load_zones):
+        with pytest.raises(MapError):
+            load(Path("map\0.yaml"))
 
 
 BAD_IMAGES = {

@@ -46,6 +46,8 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
         ("a: 1\nb: !!python/name:os.system x\n", 2, "b: expected a plain value, got the YAML tag"),
         ("a: 1\nb: !!set {x}\n", 2, "b: expected a plain value, got the YAML tag"),
         ("a: 2020-13-45\n", 1, "a: expected a plain value"),
+        ("a: 1\nb: " + "9" * 5000 + "\n", 2, "b: expected a plain value, got '999"),
+        ("a: 0x" + "f" * 5000 + "\n", 1, "a: expected a whole number of at most 63 bits, got '0xfff"),
         ("a: *nowhere\n", 1, "expected YAML, got found undefined alias"),
         ("a: &a [*a]\n", 1, "aliases expanded"),
         ("x: &x 1\ny: [" + "*x, " * 101 + "]\n", 2, "expected at most 100 aliases, got more"),
@@ -63,6 +65,7 @@ def test_a_bad_file_is_refused_with_line_and_reason(tmp_path, text, line, expect
     assert [finding.line for finding in error.value.findings] == [line]
     assert expected in str(error.value)
     assert str(error.value).startswith(f"{tmp_path / 'c.yaml'}:{line}:")
+    assert len(str(error.value)) < 400 + len(str(tmp_path))
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
