@@ -13,10 +13,19 @@ from numpy.typing import NDArray
 from mbf_mesh_nav.topology import MeshTopology
 
 
+def vertex_names(topology: MeshTopology) -> NDArray[np.int64]:
+    """Name (V,) of every vertex as a node of the graph: the caller's number if it has one.
+
+    Vertices that densifying or a repair made have none; they are called ``-1 - internal number``.
+    """
+    internal = np.arange(topology.vertex_count)
+    return np.where(topology.internal_to_input >= 0, topology.internal_to_input, -1 - internal)
+
+
 def build_vertex_graph(
     topology: MeshTopology, costs: NDArray[np.float32], edge_weights: NDArray[np.float32]
 ) -> networkx.Graph[int]:
-    """Graph whose nodes are the caller's vertex numbers.
+    """Graph whose nodes are the caller's vertex numbers, see ``vertex_names``.
 
     Parameters
     ----------
@@ -25,20 +34,15 @@ def build_vertex_graph(
         Becomes the node attribute ``cost``; ``position`` is the (x, y, z) tuple [m].
     edge_weights : (2E,) float32
         Becomes the edge attribute ``weight``, beside ``length`` [m]. Impassable edges (infinite) are left out.
-
-    Notes
-    -----
-    A vertex made by densifying has no number of the caller; it gets ``-1 - internal number``.
     """
-    internal = np.arange(topology.vertex_count)
-    names = np.where(topology.internal_to_input >= 0, topology.internal_to_input, -1 - internal).tolist()
+    names = vertex_names(topology).tolist()
     graph: networkx.Graph[int] = networkx.Graph()
     positions = topology.vertices.tolist()
     graph.add_nodes_from(
         (name, {"position": tuple(position), "cost": cost})
         for name, position, cost in zip(names, positions, costs.tolist(), strict=True)
     )
-    starts = np.repeat(internal, np.diff(topology.neighbour_offsets))
+    starts = np.repeat(np.arange(topology.vertex_count), np.diff(topology.neighbour_offsets))
     once = (starts < topology.neighbours) & np.isfinite(edge_weights)
     graph.add_edges_from(
         (names[start], names[end], {"weight": weight, "length": length})

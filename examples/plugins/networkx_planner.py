@@ -11,21 +11,29 @@ from itertools import pairwise
 import networkx
 import numpy as np
 
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Path
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_mesh_nav.plugins import MeshPlanner
+from mbf_mesh_nav.vertex_graph import vertex_names
+
+MAX_DISTANCE = 1.0  # m; how far a pose may be from the surface
 
 
 class NetworkxPlanner(MeshPlanner):
     """Cheapest way along edges by ``networkx.shortest_path``; lethal edges are not in the graph."""
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
-        """Search from the vertex next to the start to the vertex next to the goal; via poses in between."""
+        """Search from the corner next to the start to the corner next to the goal; via poses in between."""
         if request.cancel_token.cancelled:
             return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
-        graph = self.mesh_map.vertex_graph()
-        stops = [self._nearest_vertex(pose) for pose in (request.start, *request.via, request.goal)]
+        poses = (request.start, *request.via, request.goal)
+        below = self.mesh_map.locate([pose.position for pose in poses], MAX_DISTANCE)
+        if (below.faces < 0).any():
+            return PlanResult(GetPathOutcome.OUT_OF_MAP, f"no surface within {MAX_DISTANCE:g} m of a pose")
+        graph, names = self.mesh_map.vertex_graph(), vertex_names(self.mesh_map.topology)
+        corners = self.mesh_map.faces[below.faces]
+        stops = names[corners[np.arange(len(poses)), below.barycentric.argmax(axis=1)]].tolist()
         nodes = stops[:1]
         for start, end in pairwise(stops):
             try:
@@ -34,10 +42,3 @@ class NetworkxPlanner(MeshPlanner):
                 return PlanResult(GetPathOutcome.NO_PATH_FOUND, str(error))
         points = [graph.nodes[node]["position"] for node in nodes]
         return PlanResult(GetPathOutcome.SUCCESS, "along edges", Path.from_points(points, request.goal.orientation))
-
-    def _nearest_vertex(self, pose: Pose) -> int:
-        """Number, in the graph, of the nearest corner of the face below the pose."""
-        face = self.mesh_map.locate([pose.position]).faces[0]
-        corners = self.mesh_map.faces[face]
-        distances = np.linalg.norm(self.mesh_map.vertices[corners] - pose.position, axis=1)
-        return int(self.mesh_map.internal_to_input[corners[distances.argmin()]])

@@ -10,6 +10,7 @@ from PIL import Image
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
+from mbf_abstract.plugins import PlanRequest, PluginContext
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.contract import check_controller, check_planner, check_recovery
 from mbf_abstract.testing.loopback import LoopbackRobot
@@ -121,6 +122,22 @@ def test_the_planners_keep_the_contract(target, place):
         make_context=place,
         cancel_within=CANCEL_WITHIN,
     )
+
+
+def test_the_networkx_planner_drives_on_a_densified_map_and_refuses_goals_off_it():
+    square = np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [8.0, 8.0, 0.0], [0.0, 8.0, 0.0]])
+    coarse = MeshMapParameters(densify=0.5)
+    mesh_map = build_mesh_map(coarse, vertices=square, faces=np.array([[0, 1, 2], [0, 2, 3]]))
+    planner_class = load("networkx_planner:NetworkxPlanner")
+    base = PluginContext("graph", planner_class.Parameters(), SimClock(), np.random.default_rng(0), robot=None)
+    planner = planner_class(MeshContext(**vars(base), mesh_map=mesh_map))
+
+    result = planner.make_plan(PlanRequest(Pose.planar(1.0, 1.0), Pose.planar(6.0, 5.0)))
+
+    assert result.success
+    assert np.linalg.norm(result.path.positions[[0, -1], :2] - [[1.0, 1.0], [6.0, 5.0]], axis=1).max() < 0.5
+    far = planner.make_plan(PlanRequest(Pose.planar(1.0, 1.0), Pose.planar(60.0, 5.0)))
+    assert far.outcome == GetPathOutcome.OUT_OF_MAP
 
 
 @pytest.mark.parametrize(
