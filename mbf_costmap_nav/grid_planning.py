@@ -1,8 +1,8 @@
-"""What the grid planners share: parameters, the padded search grid, the checks, and the way from cells to a path.
+"""What the grid planners share: the checks, tolerance and via poses, and the way from cells to a path.
 
-A grid planner derives ``GridPlanner`` and writes one method, ``search``: from a start cell to a goal cell on a
-``SearchGrid``. Everything a client can ask for beside that - exact start and goal poses, goal tolerance, via poses,
-outcomes with a message that names cell, cost and distance, cancelling - is done once, here.
+A grid planner derives ``GridPlanner`` and writes one method, ``search``: from a start to a goal on a ``SearchGrid``.
+Everything a client can ask for beside that - exact start and goal poses, goal tolerance, via poses, outcomes with a
+message that names cell, cost and distance, cancelling - is done once, here.
 """
 
 from __future__ import annotations
@@ -16,116 +16,33 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_costmap_nav.costmap import LETHAL, UNKNOWN, Costmap
-from mbf_costmap_nav.kernels.grid_search import pad_cells
-from mbf_costmap_nav.path_geometry import resample
+from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.path_geometry import arc_lengths, resample
 from mbf_costmap_nav.plugins import CostmapPlanner
-
-Cell = tuple[int, int]
+from mbf_costmap_nav.search_grid import Cell, GridPlannerParameters, SearchGrid
 
 NEAR_END = 0.75
 """Points this near [cells] to an exact start or goal are dropped: going there first would be a step back."""
-
-
-class GridPlannerParameters(PluginParameters):
-    """Parameters every grid planner has."""
-
-    cost_factor: float = parameter(
-        3.0, "How much longer a way through cells of cost 252 counts, in lengths; 0 = shortest way.", ge=0.0, le=1000.0
-    )
-    lethal_cost: int = parameter(
-        253, "Cells of this cost and above are obstacles (unknown is asked apart).", ge=1, le=254
-    )
-    allow_unknown: bool = parameter(True, "Plan through unknown cells, counted like cost 252.")
-
-
-@dataclass(frozen=True)
-class SearchGrid:
-    """One snapshot, prepared for the kernels: flat and padded by one blocked cell on every side.
-
-    Attributes
-    ----------
-    costmap : Costmap
-    cells : (n,) uint8
-        Flat padded costs.
-    stride : int
-        Row length of the padded grid.
-    table : (256,) float32
-        Traversal of each cost, 1 for free, inf for blocked.
-    """
-
-    costmap: Costmap
-    cells: NDArray[np.uint8]
-    stride: int
-    table: NDArray[np.float32]
-
-    @classmethod
-    def build(cls, costmap: Costmap, parameters: GridPlannerParameters) -> SearchGrid:
-        """Prepare a snapshot by the costs a planner wants."""
-        table = traversal_table(parameters.cost_factor, parameters.lethal_cost, parameters.allow_unknown)
-        return cls(costmap, pad_cells(costmap.cells, LETHAL), costmap.width + 2, table)
-
-    def index(self, cell: Cell) -> int:
-        """Flat padded index of a cell (ix, iy)."""
-        return (cell[1] + 1) * self.stride + cell[0] + 1
-
-    def points(self, indices: NDArray[np.int32]) -> NDArray[np.float64]:
-        """Centres (n, 2) [m] of flat padded indices (n,)."""
-        return self.costmap.cells_to_world(np.column_stack([indices % self.stride - 1, indices // self.stride - 1]))
-
-    def is_blocked(self, cell: Cell) -> bool:
-        """Whether the planner may not enter a cell."""
-        return math.isinf(self.table[self.costmap.cost(*cell)])
-
-    def nearest_reached(self, g: NDArray[np.float32], goal: Pose, tolerance: float) -> Cell | None:
-        """Cell of finite ``g`` whose centre is nearest to the goal, at most ``tolerance`` [m] away; None without one.
-
-        Equally near cells are told apart by their ``g``.
-        """
-        radius = math.ceil(tolerance / self.costmap.resolution) + 1
-        gx, gy = self.costmap.world_to_cell_clamped(goal.x, goal.y)
-        xs = np.arange(max(gx - radius, 0), min(gx + radius + 1, self.costmap.width))
-        ys = np.arange(max(gy - radius, 0), min(gy + radius + 1, self.costmap.height))
-        cells = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
-        distances = np.linalg.norm(self.costmap.cells_to_world(cells) - (goal.x, goal.y), axis=1)
-        reached = g[(cells[:, 1] + 1) * self.stride + cells[:, 0] + 1]
-        candidates = np.flatnonzero((distances <= tolerance) & np.isfinite(reached))
-        if candidates.size == 0:
-            return None
-        best = candidates[np.lexsort((reached[candidates], np.round(distances[candidates], 6)))[0]]
-        return int(cells[best, 0]), int(cells[best, 1])
-
-
-def traversal_table(cost_factor: float, lethal_cost: int, allow_unknown: bool) -> NDArray[np.float32]:
-    """(256,) float32: what a cell's cost makes of a metre, 1 + cost_factor * cost / 252; inf where blocked."""
-    costs = np.minimum(np.arange(256), 252)
-    table = (1.0 + cost_factor * costs / 252.0).astype(np.float32)
-    table[lethal_cost:UNKNOWN] = np.inf
-    table[UNKNOWN] = table[UNKNOWN] if allow_unknown else np.inf
-    return table
 
 
 @dataclass(frozen=True)
 class Leg:
     """What a search found: points on the map from the start to the end, and the cost [m, weighted].
 
-    ``reached_goal`` is False where the leg ends at the nearest reachable cell within the tolerance instead.
-    ``canceled`` and an empty leg (no points) say why there is none.
+    ``reached_goal`` is False where the leg ends at the nearest reachable cell within the tolerance instead. Without a
+    way, or when the token was set, there are no points.
     """
 
     points: NDArray[np.float64]
     cost: float = 0.0
     reached_goal: bool = True
-    canceled: bool = False
 
 
 NO_LEG = Leg(np.zeros((0, 2)))
-CANCELED_LEG = Leg(np.zeros((0, 2)), canceled=True)
 
 
 class GridPlanner(CostmapPlanner):
@@ -140,14 +57,16 @@ class GridPlanner(CostmapPlanner):
         return 0.0
 
     @abstractmethod
-    def search(self, grid: SearchGrid, start: Cell, goal: Pose, tolerance: float, token: CancelToken) -> Leg:
-        """Find a way from ``start``, a free cell, to the goal's cell or a reachable one within ``tolerance`` [m]."""
+    def search(self, grid: SearchGrid, start: Pose, goal: Pose, tolerance: float) -> Leg:
+        """Find a way from ``start``, in a free cell, to the goal or to a reachable cell within ``tolerance`` [m] of it.
+
+        The grid's token is to be polled.
+        """
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Plan from the start over the via poses to the goal."""
-        if request.cancel_token.cancelled:
-            return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
-        grid = SearchGrid.build(self.costmap.snapshot(), self.parameters)
+        check_tolerance(request.dist_tolerance)
+        grid = SearchGrid.build(self.costmap.snapshot(), self.parameters, request.cancel_token)
         poses = (request.start, *request.via, request.goal)
         failure = self._check_start(grid, request.start)
         pieces: list[NDArray[np.float64]] = []
@@ -157,18 +76,15 @@ class GridPlanner(CostmapPlanner):
             tolerance = request.dist_tolerance if is_last else 0.0
             name = "goal" if is_last else f"via pose {number}"
             failure = failure or _check_goal(grid, goal, tolerance, name)
-            start_cell = grid.costmap.world_to_cell(start.x, start.y)
-            if failure or start_cell is None:
-                return failure or PlanResult(GetPathOutcome.OUT_OF_MAP)
-            leg = self.search(grid, start_cell, goal, tolerance, request.cancel_token)
-            if leg.canceled:
+            leg = NO_LEG if failure or request.cancel_token.cancelled else self.search(grid, start, goal, tolerance)
+            if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if len(leg.points) == 0:
-                return _no_path(grid, start, goal, tolerance, name)
-            piece = _with_exact_ends(leg, start, goal, grid.costmap.resolution)
+                return failure or _no_path(grid, start, goal, tolerance, name)
+            reached_goal = leg.reached_goal and grid.costmap.contains(goal.x, goal.y)
+            piece = _with_exact_ends(grid, leg.points, start, goal if reached_goal else None)
             pieces.append(resample(piece, self.pose_spacing) if self.pose_spacing > 0.0 else piece)
             cost += leg.cost
-            reached_goal = leg.reached_goal
         path = _assemble(pieces, request, reached_goal, grid.costmap.frame_id, self.clock.now())
         message = f"{len(path)} poses, {path.length:.2f} m"
         if not reached_goal:
@@ -179,21 +95,31 @@ class GridPlanner(CostmapPlanner):
     def _check_start(self, grid: SearchGrid, start: Pose) -> PlanResult | None:
         cell = grid.costmap.world_to_cell(start.x, start.y)
         if cell is None:
-            return PlanResult(
-                GetPathOutcome.OUT_OF_MAP, f"start ({start.x:.2f}, {start.y:.2f}) is outside {grid.costmap}"
-            )
+            return off_map(grid.costmap, start, "start")
         if grid.is_blocked(cell):
             return PlanResult(GetPathOutcome.BLOCKED_START, _blocked(grid, "start", start, cell))
         return None
 
 
+def check_tolerance(tolerance: float) -> None:
+    """Raise ValueError unless a tolerance [m] is 0 or more; inf means anywhere."""
+    if not tolerance >= 0.0:
+        raise ValueError(f"dist_tolerance must be 0 m or more (inf = anywhere), got {tolerance}")
+
+
+def off_map(costmap: Costmap, pose: Pose, name: str, tolerance: float = 0.0) -> PlanResult | None:
+    """Say that a pose is off the map, unless a cell's centre is within ``tolerance`` [m] of it."""
+    centre = costmap.cell_to_world(*costmap.world_to_cell_clamped(pose.x, pose.y))
+    if costmap.contains(pose.x, pose.y) or math.dist(centre, (pose.x, pose.y)) <= tolerance:
+        return None
+    return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{name} ({pose.x:.2f}, {pose.y:.2f}) is outside {costmap}")
+
+
 def _check_goal(grid: SearchGrid, goal: Pose, tolerance: float, name: str) -> PlanResult | None:
-    cell = grid.costmap.world_to_cell(goal.x, goal.y)
-    if cell is None:
-        return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{name} ({goal.x:.2f}, {goal.y:.2f}) is outside {grid.costmap}")
-    if grid.is_blocked(cell) and tolerance <= 0.0:
+    cell = grid.cell_of(goal)
+    if grid.is_blocked(cell) and tolerance <= 0.0 and grid.costmap.contains(goal.x, goal.y):
         return PlanResult(GetPathOutcome.BLOCKED_GOAL, _blocked(grid, name, goal, cell))
-    return None
+    return off_map(grid.costmap, goal, name, tolerance)
 
 
 def _blocked(grid: SearchGrid, name: str, pose: Pose, cell: Cell) -> str:
@@ -202,8 +128,8 @@ def _blocked(grid: SearchGrid, name: str, pose: Pose, cell: Cell) -> str:
 
 def _no_path(grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, name: str) -> PlanResult:
     """Tell a goal without a reachable cell around it from a goal behind walls."""
-    cell = grid.costmap.world_to_cell(goal.x, goal.y)
-    if cell is not None and grid.is_blocked(cell):
+    cell = grid.cell_of(goal)
+    if grid.is_blocked(cell) or not grid.costmap.contains(goal.x, goal.y):
         text = f"{_blocked(grid, name, goal, cell)}, and no cell within {tolerance:.2f} m of it can be reached"
         return PlanResult(GetPathOutcome.BLOCKED_GOAL, text)
     distance = math.hypot(goal.x - start.x, goal.y - start.y)
@@ -213,20 +139,31 @@ def _no_path(grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, name: 
     return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)
 
 
-def _with_exact_ends(leg: Leg, start: Pose, goal: Pose, resolution: float) -> NDArray[np.float64]:
-    """Replace the centres of the first and last cell, and what lies as near to the exact ends, by those."""
-    first = np.array([[start.x, start.y]])
-    last = np.array([[goal.x, goal.y]]) if leg.reached_goal else leg.points[-1:]
-    inner = leg.points[1:-1]
-    clear = np.minimum(np.hypot(*(inner - first).T), np.hypot(*(inner - last).T)) > NEAR_END * resolution
-    return np.concatenate([first, inner[clear], last])
+def _with_exact_ends(
+    grid: SearchGrid, points: NDArray[np.float64], start: Pose, goal: Pose | None
+) -> NDArray[np.float64]:
+    """Put the exact start, and the exact goal if it was reached, in the place of the centres of their cells."""
+    points = _from_exactly(grid, np.array([start.x, start.y]), points)
+    return points if goal is None else _from_exactly(grid, np.array([goal.x, goal.y]), points[::-1])[::-1]
 
 
-def _heights(points: NDArray[np.float64], request: PlanRequest) -> NDArray[np.float64]:
+def _from_exactly(grid: SearchGrid, exact: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Begin with a point of the first point's cell instead of that point, and of what lies as near.
+
+    Where the line from there to the rest is blocked, all points stay: in its own cell it is free.
+    """
+    if len(points) == 1:
+        return np.stack([exact, points[0]])
+    far = np.hypot(*(points[1:-1] - exact).T) > NEAR_END * grid.costmap.resolution
+    rest = points[1 + (int(np.argmax(far)) if far.any() else len(far)) :]
+    return np.vstack([exact, rest if grid.is_free_line(exact, rest[0]) else points])
+
+
+def heights_along(points: NDArray[np.float64], request: PlanRequest) -> NDArray[np.float64]:
     """Heights [m] of a path on a flat map: from the start's to the goal's in even measure, as no map knows better."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    along = arc_lengths(points)
     share = along / along[-1] if along[-1] > 0.0 else along
-    return request.start.z + share * (request.goal.z - request.start.z)
+    return np.asarray(request.start.z + share * (request.goal.z - request.start.z))
 
 
 def _assemble(
@@ -234,7 +171,7 @@ def _assemble(
 ) -> Path:
     """Join the legs; inner poses head along the path, the first and the last keep the orientations asked for."""
     points = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
-    path = Path.from_points(np.column_stack([points, _heights(points, request)]), request.goal.orientation)
+    path = Path.from_points(np.column_stack([points, heights_along(points, request)]), request.goal.orientation)
     assert path.orientations is not None
     orientations = path.orientations.copy()
     orientations[0] = request.start.orientation

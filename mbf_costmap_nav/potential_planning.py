@@ -9,50 +9,34 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose
-from mbf_costmap_nav.grid_planning import CANCELED_LEG, NO_LEG, Cell, Leg, SearchGrid
+from mbf_costmap_nav.grid_planning import NO_LEG, Leg
 from mbf_costmap_nav.kernels.grid_path import trace_cells, trace_gradient
 from mbf_costmap_nav.kernels.grid_search import CANCELED, search
+from mbf_costmap_nav.search_grid import Cell, SearchGrid
 
 
 def plan_down_potential(
-    grid: SearchGrid,
-    start: Cell,
-    goal: Pose,
-    tolerance: float,
-    token: CancelToken,
-    *,
-    interpolated: bool,
-    gradient_path: bool = True,
+    grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, *, interpolated: bool, gradient_path: bool = True
 ) -> Leg:
     """Spread from the goal to the start and walk back; a blocked goal is first replaced by the nearest reachable cell.
 
     Parameters
     ----------
-    grid, start, goal, tolerance, token
+    grid, start, goal, tolerance
         As for ``GridPlanner.search``.
     interpolated : bool
         navfn's quadratic update instead of the cost of eight-connected steps.
     gradient_path : bool
         Descend the gradient; otherwise go from cell to cell.
     """
-    end: Cell | None = grid.costmap.world_to_cell_clamped(goal.x, goal.y)
+    source, end = grid.index(grid.cell_of(start)), grid.cell_of(goal)
     reached_goal = True
-    assert end is not None
-    g = _spread(grid, end, start, interpolated, token) if not grid.is_blocked(end) else None
-    if g is None or np.isinf(g[grid.index(start)]):
-        if token.cancelled:
-            return CANCELED_LEG
-        from_start = _spread(grid, start, None, interpolated, token)
-        end = grid.nearest_reached(from_start, goal, tolerance) if from_start is not None else None
-        reached_goal = False
-        g = _spread(grid, end, start, interpolated, token) if end is not None else None
-    if token.cancelled:
-        return CANCELED_LEG
+    g = _spread(grid, end, source, interpolated) if not grid.is_blocked(end) else None
+    if not grid.token.cancelled and (g is None or np.isinf(g[source])):
+        g, reached_goal = _from_nearest_end(grid, start, goal, tolerance, interpolated), False
     if g is None:
         return NO_LEG
-    source = grid.index(start)
     cost = float(g[source]) * grid.costmap.resolution
     if not gradient_path:
         cells = trace_cells(grid.cells, grid.stride, grid.table, g, source, False)
@@ -61,10 +45,17 @@ def plan_down_potential(
     return Leg(grid.costmap.cells_to_world(points), cost, reached_goal)
 
 
-def _spread(
-    grid: SearchGrid, source: Cell, until: Cell | None, interpolated: bool, token: CancelToken
+def _from_nearest_end(
+    grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, interpolated: bool
 ) -> NDArray[np.float32] | None:
-    """Field from ``source`` up to ``until``, or everywhere; None when cancelled."""
-    first, last = grid.index(source), -1 if until is None else grid.index(until)
-    status, g = search(grid.cells, grid.stride, grid.table, first, last, 0.0, False, interpolated, token.flag)
+    """Field up to the start from the reachable cell nearest to the goal; None without one, or when cancelled."""
+    from_start = _spread(grid, grid.cell_of(start), -1, interpolated)
+    end = None if from_start is None else grid.nearest_reached(from_start, goal, tolerance)
+    return None if end is None else _spread(grid, end, grid.index(grid.cell_of(start)), interpolated)
+
+
+def _spread(grid: SearchGrid, source: Cell, until: int, interpolated: bool) -> NDArray[np.float32] | None:
+    """Field from ``source`` up to the padded index ``until``, or everywhere for -1; None when cancelled."""
+    first, flag = grid.index(source), grid.token.flag
+    status, g = search(grid.cells, grid.stride, grid.table, first, until, 0.0, False, interpolated, flag)
     return None if status == CANCELED else g

@@ -32,14 +32,29 @@ FOUND, EXHAUSTED, CANCELED = 0, 1, 2
 
 FIRST_ROOM, CELLS_PER_ROOM = 4096, 512
 """Entries each bucket has room for at first, and on large grids one for so many cells."""
+CELLS_PER_POLL = 1 << 20
+"""How many cells are copied between two looks at the cancel flag; at most a millisecond."""
+NEVER_CANCELED = np.zeros(1, dtype=np.uint8)
 LARGEST_FLOAT = np.float32(np.finfo(np.float32).max)
 
 
-def pad_cells(cells: NDArray[np.uint8], border: int) -> NDArray[np.uint8]:
-    """Copy (height, width) cells into a flat ((height + 2) * (width + 2),) array framed by ``border``."""
+def pad_cells(
+    cells: NDArray[np.uint8], border: int, cancel_flag: NDArray[np.uint8] = NEVER_CANCELED
+) -> NDArray[np.uint8]:
+    """Copy (height, width) cells into a flat ((height + 2) * (width + 2),) array framed by ``border``.
+
+    With the flag set it ends early, and what is not copied yet holds anything; ``search`` then starts nowhere.
+    """
     height, width = cells.shape
-    padded = np.full((height + 2, width + 2), border, dtype=np.uint8)
-    padded[1:-1, 1:-1] = cells
+    padded = np.empty((height + 2, width + 2), dtype=np.uint8)
+    padded[[0, -1]] = border
+    rows = max(1, CELLS_PER_POLL // max(1, width))
+    for begin in range(0, height, rows):
+        if cancel_flag[0] != 0:
+            break
+        end = min(begin + rows, height)
+        block = padded[1 + begin : 1 + end]  # the frame too, as the first touch of a page is what takes the time
+        block[:, [0, -1]], block[:, 1:-1] = border, cells[begin:end]
     return padded.reshape(-1)
 
 
@@ -83,7 +98,7 @@ def search(
         along rows and columns, and needs a ``heuristic_scale`` of 0: a cell's value may come from two neighbours, of
         which a heuristic settles one too late.
     cancel_flag : (1,) uint8
-        Polled at every bucket.
+        Polled at every row of the preparation and at every bucket.
 
     Returns
     -------
@@ -93,7 +108,7 @@ def search(
         Cost from the start in traversal times cells, inf where not reached. Exact for settled cells, an upper bound
         at the rim of the search. A view into the search's records, so not contiguous.
     """
-    records = search_cells(cells, stride)
+    records = search_cells(cells, stride, cancel_flag)
     buckets = np.empty((RING, max(FIRST_ROOM, cells.size // CELLS_PER_ROOM)), dtype=np.int32)
     status = _search(
         records, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, buckets

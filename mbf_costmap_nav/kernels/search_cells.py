@@ -42,20 +42,22 @@ _UNTOUCHED = np.uint64(int(NOWHERE << CAME_SHIFT) | int(IDLE)) << np.uint64(32) 
 """A record without its cost: waits nowhere, reached from nowhere, and g = inf (its bits)."""
 
 
-def search_cells(cells: NDArray[np.uint8], stride: int) -> Records:
-    """Records (n,) of a padded grid (n,) with rows of ``stride``, none of them reached."""
+def search_cells(cells: NDArray[np.uint8], stride: int, cancel_flag: NDArray[np.uint8]) -> Records:
+    """Records (n,) of a padded grid (n,) with rows of ``stride``, none of them reached; unfinished if cancelled."""
     # numpy's own array, not the kernel's: numpy asks the system for huge pages, and a wave touches many pages at once.
     records = np.empty(cells.size, dtype=CELL)
-    _fill(cells.reshape(-1, stride), records.view(np.uint64).reshape(-1, stride))
+    _fill(cells.reshape(-1, stride), records.view(np.uint64).reshape(-1, stride), cancel_flag)
     return records
 
 
 @kernel
-def _fill(cells: NDArray[np.uint8], words: NDArray[np.uint64]) -> None:
-    """Write all records as whole words; the padding is never plain."""
+def _fill(cells: NDArray[np.uint8], words: NDArray[np.uint64], cancel_flag: NDArray[np.uint8]) -> None:
+    """Write all records as whole words, unless cancelled; the padding is never plain."""
     height, width = cells.shape
     cost_shift, plain_shift = np.uint64(48), np.uint64(47)
     for y in range(height):
+        if cancel_flag[0] != 0:
+            return
         below, here, above = cells[max(y - 1, 0)], cells[y], cells[min(y + 1, height - 1)]
         row = words[y]
         row[0] = _UNTOUCHED | (np.uint64(here[0]) << cost_shift)

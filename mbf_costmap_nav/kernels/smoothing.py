@@ -2,42 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.line_cells import cost_along
 
-
-@kernel
-def _cost_at(cells: NDArray[np.uint8], x: float, y: float) -> int:
-    """Cost of the cell at a point [cells]; outside counts as lethal, unknown as free."""
-    ix, iy = int(np.floor(x)), int(np.floor(y))
-    if ix < 0 or iy < 0 or ix >= cells.shape[1] or iy >= cells.shape[0]:
-        return 254
-    return int(cells[iy, ix]) if cells[iy, ix] < 255 else 0
-
-
-@kernel
-def cost_along(cells: NDArray[np.uint8], x0: float, y0: float, x1: float, y1: float) -> int:
-    """Highest cost of the cells a line [cells] runs through, cell by cell as Amanatides and Woo (1987)."""
-    highest = _cost_at(cells, x0, y0)
-    ix, iy, last_x, last_y = math.floor(x0), math.floor(y0), math.floor(x1), math.floor(y1)
-    dx, dy = x1 - x0, y1 - y0
-    step_x, step_y = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
-    # The share of the line at which it crosses the next border on each axis.
-    next_x = ((ix + (dx > 0.0)) - x0) / dx if dx != 0.0 else math.inf
-    next_y = ((iy + (dy > 0.0)) - y0) / dy if dy != 0.0 else math.inf
-    for _ in range(abs(last_x - ix) + abs(last_y - iy)):
-        if next_x < next_y:
-            ix += step_x
-            next_x += abs(1.0 / dx)
-        else:
-            iy += step_y
-            next_y += abs(1.0 / dy)
-        highest = max(highest, _cost_at(cells, float(ix), float(iy)))
-    return highest
+UNKNOWN_AS = 0
+"""Unknown cells do not push a path away."""
 
 
 @kernel
@@ -88,11 +60,12 @@ def relax_path(
             )
             before, after = smoothed[i - 1], smoothed[i + 1]
             cost = max(
-                cost_along(cells, before[0], before[1], x_new, y_new),
-                cost_along(cells, x_new, y_new, after[0], after[1]),
+                cost_along(cells, UNKNOWN_AS, before[0], before[1], x_new, y_new),
+                cost_along(cells, UNKNOWN_AS, x_new, y_new, after[0], after[1]),
             )
             if cost > highest_cost and cost >= max(
-                cost_along(cells, before[0], before[1], x, y), cost_along(cells, x, y, after[0], after[1])
+                cost_along(cells, UNKNOWN_AS, before[0], before[1], x, y),
+                cost_along(cells, UNKNOWN_AS, x, y, after[0], after[1]),
             ):
                 continue
             smoothed[i, 0], smoothed[i, 1] = x_new, y_new

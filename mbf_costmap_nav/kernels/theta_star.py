@@ -22,7 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
-from mbf_costmap_nav.kernels.grid_search import CANCELED, EXHAUSTED, FIRST_ROOM, FOUND, octile_distance
+from mbf_costmap_nav.kernels.grid_search import (
+    CANCELED,
+    CELLS_PER_POLL,
+    EXHAUSTED,
+    FIRST_ROOM,
+    FOUND,
+    octile_distance,
+)
 from mbf_costmap_nav.kernels.open_list import IDLE, INF, RING, SQRT2, Integer, bucket_width, with_room
 from mbf_costmap_nav.kernels.short_lines import (
     BASE,
@@ -194,13 +201,18 @@ def theta_search(
     status : int
         FOUND, EXHAUSTED or CANCELED.
     g : (n,) float32
-        Cost of the settled cells; inf for all others.
+        Cost of the settled cells; inf for all others. Means nothing when cancelled, as ``origin``.
     origin : (n,) uint8
         Codes of where the straight line to a cell comes from, for ``trace_lines``.
     """
     # numpy's own arrays, for huge pages, as in grid_search
-    g, queued = np.full(cells.size, INF, dtype=np.float32), np.full(cells.size, IDLE, dtype=np.uint8)
-    origin = np.full(cells.size, HERE, dtype=np.uint8)
+    g, queued = np.empty(cells.size, dtype=np.float32), np.empty(cells.size, dtype=np.uint8)
+    origin = np.empty(cells.size, dtype=np.uint8)
+    for begin in range(0, cells.size, CELLS_PER_POLL):
+        if cancel_flag[0] != 0:
+            return CANCELED, g, origin
+        block = slice(begin, begin + CELLS_PER_POLL)
+        g[block], queued[block], origin[block] = INF, IDLE, HERE
     return _search(cells, stride, table, start, goal, cancel_flag, g, queued, origin), g, origin
 
 
@@ -271,7 +283,9 @@ def _search(
             counts[slot] += is_new
             waiting += is_new
             queued[cell] = slot
-    if status != CANCELED and g[goal] <= 0.0:
+    if status == CANCELED:
+        return status
+    if g[goal] <= 0.0:
         status = FOUND
     for i in range(np.uint64(g.size)):
         g[i] = -g[i] if g[i] <= 0.0 else INF

@@ -18,21 +18,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_costmap_nav.grid_planning import (
-    CANCELED_LEG,
-    NO_LEG,
-    Cell,
-    GridPlanner,
-    GridPlannerParameters,
-    Leg,
-    SearchGrid,
-)
+from mbf_costmap_nav.grid_planning import NO_LEG, GridPlanner, Leg
 from mbf_costmap_nav.kernels.grid_path import trace_cells
 from mbf_costmap_nav.kernels.grid_search import CANCELED, search
 from mbf_costmap_nav.potential_planning import plan_down_potential
+from mbf_costmap_nav.search_grid import GridPlannerParameters, SearchGrid
 
 
 class AStarParameters(GridPlannerParameters):
@@ -48,18 +40,16 @@ class AStarPlanner(GridPlanner):
     Parameters: ClassVar[type[PluginParameters]] = AStarParameters
     parameters: AStarParameters
 
-    def search(self, grid: SearchGrid, start: Cell, goal: Pose, tolerance: float, token: CancelToken) -> Leg:
+    def search(self, grid: SearchGrid, start: Pose, goal: Pose, tolerance: float) -> Leg:
         """Search from the start; a goal that is not reached leaves the whole reachable field to choose from."""
         if self.parameters.interpolated_potential:
-            return plan_down_potential(grid, start, goal, tolerance, token, interpolated=True)
-        cut = self.parameters.cut_corners
-        goal_cell = grid.costmap.world_to_cell_clamped(goal.x, goal.y)
-        status, g = search(
-            grid.cells, grid.stride, grid.table, grid.index(start), grid.index(goal_cell), 1.0, cut, False, token.flag
-        )
+            return plan_down_potential(grid, start, goal, tolerance, interpolated=True)
+        cut, goal_cell = self.parameters.cut_corners, grid.cell_of(goal)
+        first, last, flag = grid.index(grid.cell_of(start)), grid.index(goal_cell), grid.token.flag
+        status, g = search(grid.cells, grid.stride, grid.table, first, last, 1.0, cut, False, flag)
         if status == CANCELED:
-            return CANCELED_LEG
-        end = goal_cell if g[grid.index(goal_cell)] < float("inf") else grid.nearest_reached(g, goal, tolerance)
+            return NO_LEG
+        end = goal_cell if g[last] < float("inf") else grid.nearest_reached(g, goal, tolerance)
         if end is None:
             return NO_LEG
         trace = trace_cells(grid.cells, grid.stride, grid.table, g, grid.index(end), cut)

@@ -20,11 +20,11 @@ from typing import ClassVar
 
 from pydantic import model_validator
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_costmap_nav.grid_planning import Cell, GridPlanner, GridPlannerParameters, Leg, SearchGrid
+from mbf_costmap_nav.grid_planning import GridPlanner, Leg
 from mbf_costmap_nav.potential_planning import plan_down_potential
+from mbf_costmap_nav.search_grid import GridPlannerParameters, SearchGrid
 
 
 class DijkstraParameters(GridPlannerParameters):
@@ -46,15 +46,8 @@ class DijkstraPlanner(GridPlanner):
     Parameters: ClassVar[type[PluginParameters]] = DijkstraParameters
     parameters: DijkstraParameters
 
-    def search(self, grid: SearchGrid, start: Cell, goal: Pose, tolerance: float, token: CancelToken) -> Leg:
+    def search(self, grid: SearchGrid, start: Pose, goal: Pose, tolerance: float) -> Leg:
         """Spread from the goal to the start and walk downhill."""
         p = self.parameters
-        return plan_down_potential(
-            grid,
-            start,
-            goal,
-            tolerance,
-            token,
-            interpolated=p.interpolated_potential,
-            gradient_path=p.gradient_path,
-        )
+        potential, gradient = p.interpolated_potential, p.gradient_path
+        return plan_down_potential(grid, start, goal, tolerance, interpolated=potential, gradient_path=gradient)

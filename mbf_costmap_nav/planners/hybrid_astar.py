@@ -6,13 +6,15 @@ Known failure: like every search with bins it can miss a passage hardly wider th
 time it takes to say so.
 
 Formula: Dolgov et al. 2010, curves after Dubins and after Reeds and Shepp; see ``kernels.hybrid_astar`` and
-``kernels.car_curves``. The footprint is checked at every state and along the final curve. The goal tolerance applies
-where the goal itself does not fit: the nearest cell centre within it at the goal's heading is taken.
+``kernels.car_curves``. The footprint is checked all along the path, whose poses are at most a cell apart. The goal
+tolerance applies where the robot does not fit at the goal or cannot get there: the path then ends at the nearest place
+within it that can be reached at the goal's heading (exactly, or within half a bin of the search).
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
@@ -23,14 +25,19 @@ from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.costmap import LETHAL, Costmap
 from mbf_costmap_nav.footprint_check import FootprintCheck
-from mbf_costmap_nav.grid_planning import GridPlannerParameters, SearchGrid
-from mbf_costmap_nav.kernels.grid_search import CANCELED, search
-from mbf_costmap_nav.kernels.hybrid_astar import hybrid_search, pose_cost
+from mbf_costmap_nav.grid_planning import check_tolerance, heights_along, off_map
+from mbf_costmap_nav.kernels.driven_arcs import pose_cost
+from mbf_costmap_nav.kernels.grid_search import FOUND, search
+from mbf_costmap_nav.kernels.hybrid_astar import GAVE_UP, hybrid_search
 from mbf_costmap_nav.plugins import CostmapPlanner
+from mbf_costmap_nav.search_grid import GridPlannerParameters, SearchGrid
 
 FloatArray = NDArray[np.float64]
+
+UNKNOWN_AS = 252
+"""Cost of the unknown cells that may be driven through, as for the other planners."""
 
 
 class HybridAStarParameters(PluginParameters):
@@ -38,11 +45,46 @@ class HybridAStarParameters(PluginParameters):
 
     min_turning_radius: float = parameter(0.5, "Radius of the tightest curve.", unit="m", gt=0.0, le=100.0)
     allow_reversing: bool = parameter(True, "Reeds-Shepp curves; otherwise Dubins curves, forward only.")
+    allow_unknown: bool = parameter(True, "Plan through unknown cells, counted like cost 252.")
     cost_factor: float = parameter(2.0, "How much longer a way through cells of cost 252 counts.", ge=0.0, le=1000.0)
     reverse_penalty: float = parameter(2.0, "Factor on the length driven backward.", ge=1.0, le=100.0)
     change_penalty: float = parameter(0.3, "Cost of a change of direction.", unit="m", ge=0.0, le=100.0)
     turning_penalty: float = parameter(1.05, "Factor on the length of curves.", ge=1.0, le=100.0)
     max_states: int = parameter(1_000_000, "Give up after so many states.", ge=100, le=100_000_000)
+
+
+@dataclass(frozen=True)
+class _World:
+    """One snapshot, and the robot on it: ``samples`` (n, 2) [m] cover its footprint, ``unknown`` cells cost that."""
+
+    grid: SearchGrid
+    samples: FloatArray
+    unknown: int
+
+    @property
+    def costmap(self) -> Costmap:
+        return self.grid.costmap
+
+    def fits(self, pose: Pose) -> bool:
+        """Whether the whole footprint lies on the map and off lethal cells, the centre off inscribed ones."""
+        cost = pose_cost(self.costmap.cells, self.unknown, self.grid.geometry, self.samples, _planar(pose))
+        return bool(cost >= 0)
+
+    def field(self, source: Pose) -> NDArray[np.float32]:
+        """(n,) distance [cells] of the padded grid's cells from a pose's cell around what blocks the centre."""
+        grid, first = self.grid, self.grid.index(self.grid.cell_of(source))
+        _, g = search(grid.cells, grid.stride, grid.table, first, -1, 0.0, True, False, grid.token.flag)
+        return g
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """What came of the search between two poses (``status`` as of the kernel); without poses there is no way."""
+
+    status: int
+    poses: FloatArray
+    cost: float
+    states: int
 
 
 class HybridAStarPlanner(CostmapPlanner):
@@ -53,90 +95,95 @@ class HybridAStarPlanner(CostmapPlanner):
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Plan from the start over the via poses to the goal, each with its heading."""
-        costmap = self.costmap.snapshot()
-        check = FootprintCheck(self.costmap.footprint, costmap.resolution)
-        names = ["start", *(f"via pose {i}" for i in range(len(request.via))), "goal"]
-        poses = [request.start, *request.via, request.goal]
-        if request.dist_tolerance > 0.0:
-            poses[-1] = self._fitting_goal(costmap, check, request.goal, request.dist_tolerance)
-        for name, pose in zip(names, poses, strict=True):
-            failure = self._check(costmap, check, name, pose)
-            if failure:
-                return failure
-        pieces: list[FloatArray] = []
-        cost = 0.0
-        for start, goal in pairwise(poses):
-            status, piece, leg_cost, expanded = self._search(costmap, check, start, goal, request)
-            if status == CANCELED:
+        check_tolerance(request.dist_tolerance)
+        world = self._world(request)
+        legs: list[_Leg] = []
+        failure = _misfit(world, "start", request.start)
+        for number, (start, goal) in enumerate(pairwise((request.start, *request.via, request.goal))):
+            is_last = number == len(request.via)
+            tolerance = request.dist_tolerance if is_last else 0.0
+            failure = failure or _misfit(world, "goal" if is_last else f"via pose {number}", goal, tolerance)
+            leg = None if failure or request.cancel_token.cancelled else self._search(world, start, goal, tolerance)
+            if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
-            if len(piece) == 0:
-                text = f"no drivable way from ({start.x:.2f}, {start.y:.2f}) to ({goal.x:.2f}, {goal.y:.2f})"
-                return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"{text} after {expanded} states")
-            pieces.append(piece if not pieces else piece[1:])
-            cost += leg_cost
-        path = to_path(np.concatenate(pieces), costmap.frame_id, self.clock.now())
-        return PlanResult(GetPathOutcome.SUCCESS, f"{len(path)} poses, {path.length:.2f} m", path, cost)
+            if leg is None or len(leg.poses) == 0:
+                return failure or self._no_way(world, start, goal, leg, tolerance)
+            legs.append(leg)
+        poses = np.concatenate([legs[0].poses, *(leg.poses[1:] for leg in legs[1:])])
+        path = to_path(poses, heights_along(poses[:, :2], request), world.costmap.frame_id, self.clock.now())
+        message = f"{len(path)} poses, {path.length:.2f} m"
+        off = math.dist(poses[-1, :2], (request.goal.x, request.goal.y))
+        if legs[-1].status != FOUND or off > 1e-6:
+            message += f", ends {off:.2f} m from the goal (tolerance {request.dist_tolerance:.2f} m)"
+        return PlanResult(GetPathOutcome.SUCCESS, message, path, sum(leg.cost for leg in legs))
 
-    def _search(
-        self, costmap: Costmap, check: FootprintCheck, start: Pose, goal: Pose, request: PlanRequest
-    ) -> tuple[int, FloatArray, float, int]:
-        p, flag = self.parameters, request.cancel_token.flag
-        grid = SearchGrid.build(costmap, GridPlannerParameters(cost_factor=0.0, allow_unknown=False))
-        goal_cell = grid.index(costmap.world_to_cell_clamped(goal.x, goal.y))
-        status, g = search(grid.cells, grid.stride, grid.table, goal_cell, -1, 0.0, True, False, flag)
-        if status == CANCELED:
-            return CANCELED, np.zeros((0, 3)), 0.0, 0
-        field = np.ascontiguousarray(g.reshape(-1, grid.stride)[1:-1, 1:-1])
-        return hybrid_search(
-            costmap.cells,
-            np.array([costmap.resolution, costmap.origin_x, costmap.origin_y]),
-            check.samples,
-            field,
-            np.array([start.x, start.y, start.yaw]),
-            np.array([goal.x, goal.y, goal.yaw]),
+    def _world(self, request: PlanRequest) -> _World:
+        costmap, may_enter = self.costmap.snapshot(), self.parameters.allow_unknown
+        rules = GridPlannerParameters(cost_factor=0.0, allow_unknown=may_enter)
+        samples = FootprintCheck(self.costmap.footprint, costmap.resolution).samples
+        grid = SearchGrid.build(costmap, rules, request.cancel_token)
+        return _World(grid, samples, UNKNOWN_AS if may_enter else LETHAL)
+
+    def _search(self, world: _World, start: Pose, goal: Pose, tolerance: float) -> _Leg | None:
+        """Search to the goal or, if it cannot be reached, to what can within the tolerance; None if nothing can."""
+        p, grid, wanted = self.parameters, world.grid, goal
+        field = world.field(goal) if world.fits(goal) else None
+        if field is None or math.isinf(field[grid.index(grid.cell_of(start))]):
+            from_start = None if grid.token.cancelled else world.field(start)
+            end = None if from_start is None else grid.nearest_reached(from_start, goal, tolerance, world.samples)
+            if end is None:
+                return None
+            goal = Pose((*world.costmap.cell_to_world(*end), goal.z), goal.orientation, goal.frame_id, goal.stamp)
+            field = world.field(goal)
+        status, poses, cost, states = hybrid_search(
+            world.costmap.cells,
+            world.unknown,
+            grid.geometry,
+            world.samples,
+            field.reshape(-1, grid.stride)[1:-1, 1:-1],
+            _planar(start),
+            _planar(goal),
+            _planar(wanted),
+            tolerance,
             p.min_turning_radius,
             p.allow_reversing,
             np.array([p.cost_factor, p.reverse_penalty, p.change_penalty, p.turning_penalty]),
             p.max_states,
-            flag,
+            grid.token.flag,
         )
+        return _Leg(status, poses, cost, states)
 
-    def _check(self, costmap: Costmap, check: FootprintCheck, name: str, pose: Pose) -> PlanResult | None:
-        if not costmap.contains(pose.x, pose.y):
-            text = f"{name} ({pose.x:.2f}, {pose.y:.2f}) is outside {costmap}"
-            return PlanResult(GetPathOutcome.OUT_OF_MAP, text)
-        if fits(costmap, check, pose):
-            return None
-        outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
-        text = f"the robot does not fit at the {name} ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad)"
-        return PlanResult(outcome, f"{text}, centre cost {costmap.cost_at(pose.x, pose.y)}")
-
-    def _fitting_goal(self, costmap: Costmap, check: FootprintCheck, goal: Pose, tolerance: float) -> Pose:
-        """Return the goal, or the nearest cell centre within the tolerance where the robot fits, if there is one."""
-        if fits(costmap, check, goal):
-            return goal
-        reach = math.ceil(tolerance / costmap.resolution)
-        ix, iy = costmap.world_to_cell_clamped(goal.x, goal.y)
-        around = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), axis=-1)
-        centres = costmap.cells_to_world(around.reshape(-1, 2) + np.array([ix, iy]))
-        distances = np.hypot(centres[:, 0] - goal.x, centres[:, 1] - goal.y)
-        for i in np.argsort(distances, kind="stable").tolist():
-            if distances[i] > tolerance:
-                break
-            candidate = Pose.planar(centres[i, 0], centres[i, 1], goal.yaw, frame_id=goal.frame_id)
-            if fits(costmap, check, candidate):
-                return candidate
-        return goal
+    def _no_way(self, world: _World, start: Pose, goal: Pose, leg: _Leg | None, tolerance: float) -> PlanResult:
+        """Say whether the goal is walled off, the car cannot get there, or the search gave up."""
+        ends = f"from ({start.x:.2f}, {start.y:.2f}) to ({goal.x:.2f}, {goal.y:.2f})"
+        if leg is None and not world.fits(goal):
+            text = f"the robot does not fit at the goal ({goal.x:.2f}, {goal.y:.2f}, {goal.yaw:.2f} rad)"
+            text += f", and no place within {tolerance:.2f} m of it can be reached"
+            return PlanResult(GetPathOutcome.BLOCKED_GOAL, text)
+        if leg is None:
+            return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no way {ends}, not even for a robot that is a point")
+        if leg.status == GAVE_UP:
+            text = f"no way {ends} within {leg.states} states; there may be one, see max_states"
+            return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)
+        return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no drivable way {ends}, all {leg.states} states were tried")
 
 
-def fits(costmap: Costmap, check: FootprintCheck, pose: Pose) -> bool:
-    """Whether the whole footprint lies on the map and off lethal cells, the centre off inscribed ones."""
-    geometry = np.array([costmap.resolution, costmap.origin_x, costmap.origin_y])
-    return bool(pose_cost(costmap.cells, geometry, check.samples, np.array([pose.x, pose.y, pose.yaw])) >= 0)
+def _misfit(world: _World, name: str, pose: Pose, tolerance: float = 0.0) -> PlanResult | None:
+    """Why nothing can be planned to or from a pose, if it shows without a search."""
+    problem = off_map(world.costmap, pose, name, tolerance)
+    if problem or tolerance > 0.0 or world.fits(pose):
+        return problem
+    outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
+    text = f"the robot does not fit at the {name} ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad)"
+    return PlanResult(outcome, f"{text}, centre cost {world.costmap.cost_at(pose.x, pose.y)}")
 
 
-def to_path(poses: FloatArray, frame_id: str, stamp: float) -> Path:
-    """Path of poses (n, 3: x, y, yaw); where the robot reverses the headings look against the way."""
+def _planar(pose: Pose) -> FloatArray:
+    """(3,) x, y [m], yaw [rad]."""
+    return np.array([pose.x, pose.y, pose.yaw])
+
+
+def to_path(poses: FloatArray, heights: FloatArray, frame_id: str, stamp: float) -> Path:
+    """Path of poses (n, 3: x, y, yaw) at heights (n,); where the robot reverses the headings look against the way."""
     orientations = np.array([quaternion_from_yaw(yaw) for yaw in poses[:, 2]])
-    positions = np.column_stack([poses[:, :2], np.zeros(len(poses))])
-    return Path(positions, orientations, frame_id, stamp)
+    return Path(np.column_stack([poses[:, :2], heights]), orientations, frame_id, stamp)

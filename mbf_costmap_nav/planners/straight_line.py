@@ -9,16 +9,20 @@ Cost: microseconds. With a goal tolerance the line may end at its last free cell
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_costmap_nav.grid_planning import NO_LEG, Cell, GridPlanner, GridPlannerParameters, Leg, SearchGrid
-from mbf_costmap_nav.kernels.grid_line import line_cost
+from mbf_costmap_nav.grid_planning import NO_LEG, GridPlanner, Leg
 from mbf_costmap_nav.path_geometry import resample
+from mbf_costmap_nav.search_grid import GridPlannerParameters, SearchGrid
+
+SAMPLES_PER_CELL = 10
+"""For the cost of a line: how many samples a cell's length has."""
 
 
 class StraightLineParameters(GridPlannerParameters):
@@ -38,17 +42,24 @@ class StraightLinePlanner(GridPlanner):
         """Fill the line with poses."""
         return self.parameters.spacing
 
-    def search(self, grid: SearchGrid, start: Cell, goal: Pose, tolerance: float, token: CancelToken) -> Leg:
-        """Try the goal's cell, then the cells before it on the line, as far back as the tolerance reaches."""
-        source = grid.index(start)
-        ends = np.array([grid.costmap.cell_to_world(*start), (goal.x, goal.y)])
+    def search(self, grid: SearchGrid, start: Pose, goal: Pose, tolerance: float) -> Leg:
+        """Go along the line as far as it is free; that must be the goal, or within the tolerance of it."""
+        ends = np.array([[start.x, start.y], [goal.x, goal.y]])
+        if grid.is_free_line(*ends):
+            return Leg(ends, _weighted_length(grid, ends))
+        if tolerance == 0.0:
+            return NO_LEG
         line = resample(ends, min(self.parameters.spacing, grid.costmap.resolution))
-        for x, y in line[::-1].tolist():
-            off = math.hypot(goal.x - x, goal.y - y)
-            if off > tolerance and off > 0.0:
-                break
-            cell = grid.costmap.world_to_cell_clamped(x, y)
-            cost = float(line_cost(grid.cells, grid.stride, grid.table, source, grid.index(cell)))
-            if math.isfinite(cost):
-                return Leg(np.array([ends[0], (x, y)]), cost * grid.costmap.resolution, off == 0.0)
-        return NO_LEG
+        last_free = next(i for i, (a, b) in enumerate(pairwise(line)) if not grid.is_free_line(a, b))
+        if math.dist(line[last_free], ends[1]) > tolerance:
+            return NO_LEG
+        ends = line[[0, last_free]]
+        return Leg(ends, _weighted_length(grid, ends), reached_goal=False)
+
+
+def _weighted_length(grid: SearchGrid, ends: NDArray[np.float64]) -> float:
+    """Cost [m, weighted] of the free line between two points (2, 2) [m]."""
+    samples = resample(ends, grid.costmap.resolution / SAMPLES_PER_CELL)
+    cells, _ = grid.costmap.world_to_cells(0.5 * (samples[1:] + samples[:-1]))
+    traversal = grid.table[grid.costmap.cells[cells[:, 1], cells[:, 0]]]
+    return float(np.mean(traversal, dtype=np.float64)) * math.dist(ends[0], ends[1])

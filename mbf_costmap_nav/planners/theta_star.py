@@ -19,22 +19,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_costmap_nav.grid_planning import (
-    CANCELED_LEG,
-    NO_LEG,
-    Cell,
-    GridPlanner,
-    GridPlannerParameters,
-    Leg,
-    SearchGrid,
-)
+from mbf_costmap_nav.grid_planning import NO_LEG, GridPlanner, Leg
 from mbf_costmap_nav.kernels.grid_line import line_cost, pull_string
 from mbf_costmap_nav.kernels.grid_search import CANCELED, FOUND
 from mbf_costmap_nav.kernels.short_lines import trace_lines
 from mbf_costmap_nav.kernels.theta_star import theta_search
+from mbf_costmap_nav.search_grid import GridPlannerParameters, SearchGrid
 
 
 class ThetaStarParameters(GridPlannerParameters):
@@ -54,13 +46,13 @@ class ThetaStarPlanner(GridPlanner):
         """Fill the straight pieces with poses."""
         return self.parameters.spacing
 
-    def search(self, grid: SearchGrid, start: Cell, goal: Pose, tolerance: float, token: CancelToken) -> Leg:
+    def search(self, grid: SearchGrid, start: Pose, goal: Pose, tolerance: float) -> Leg:
         """Search and pull the string."""
-        goal_cell = grid.costmap.world_to_cell_clamped(goal.x, goal.y)
-        source = grid.index(start)
-        status, g, origin = theta_search(grid.cells, grid.stride, grid.table, source, grid.index(goal_cell), token.flag)
+        goal_cell, source = grid.cell_of(goal), grid.index(grid.cell_of(start))
+        last, flag = grid.index(goal_cell), grid.token.flag
+        status, g, origin = theta_search(grid.cells, grid.stride, grid.table, source, last, flag)
         if status == CANCELED:
-            return CANCELED_LEG
+            return NO_LEG
         end = goal_cell if status == FOUND else grid.nearest_reached(g, goal, tolerance)
         if end is None:
             return NO_LEG

@@ -18,7 +18,8 @@ from mbf_costmap_nav.kernels.critics import (
     mean_of,
 )
 from mbf_costmap_nav.kernels.footprint_cost import OUTSIDE, footprint_cost
-from mbf_costmap_nav.kernels.smoothing import cost_along, relax_path
+from mbf_costmap_nav.kernels.line_cells import cost_along
+from mbf_costmap_nav.kernels.smoothing import relax_path
 from mbf_costmap_nav.kernels.sonar import FADE_DISTANCE, LEAST_PROBABILITY, occupied_given_reading, update_cone
 
 seeds = st.integers(0, 2**32 - 1)
@@ -93,7 +94,8 @@ def test_the_relaxed_path_is_that_of_the_plain_sweeps(seed):
         for before, here, after, origin in zip(expected, expected[1:], expected[2:], points[1:], strict=False):
             moved = here + 0.1 * (origin - here) + 0.35 * (before + after - 2 * here)
             old, new = (
-                max(cost_along(cells, *before, *place), cost_along(cells, *place, *after)) for place in (here, moved)
+                max(cost_along(cells, 0, *before, *place), cost_along(cells, 0, *place, *after))
+                for place in (here, moved)
             )
             if new <= 100 or new < old:
                 here[:] = moved

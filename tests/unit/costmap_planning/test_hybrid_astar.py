@@ -1,6 +1,7 @@
 """Curves of a car, and the planner built on them."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,8 +12,11 @@ from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose, normalize_angle
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
+from mbf_costmap_nav.costmap import Costmap
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.kernels.car_curves import car_curve, sample_word
+from mbf_costmap_nav.kernels.driven_arcs import MOTIONS, direction_of, driven_cost, path_to, steering_of
+from mbf_costmap_nav.kernels.nearest_cell import nearest_reached
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
 
 coordinates, angles = st.floats(-6, 6), st.floats(-math.pi, math.pi)
@@ -118,3 +122,156 @@ def test_start_walls_and_cancel_are_told(make_plugin):
     assert plan(planner, (1, 1, 0), (5, 5, 0)).outcome == GetPathOutcome.NO_PATH_FOUND
     assert plan(planner, (1, 1, 0), (2, 2, 0), cancel_token=token).outcome == GetPathOutcome.CANCELED
     assert plan(planner, (1, 1, 0), (9, 2, 0)).outcome == GetPathOutcome.OUT_OF_MAP
+
+
+@pytest.mark.parametrize("radius", [4.0, 12.0, 20.0])
+def test_a_large_turning_circle_does_not_lead_through_a_wall(make_plugin, radius):
+    cells = np.zeros((200, 200), dtype=np.uint8)
+    cells[:, 100] = 254
+    planner = make_plugin(HybridAStarPlanner, cells, resolution=0.1, min_turning_radius=radius, max_states=20000)
+    assert not plan(planner, (5.0, 5.0, 0.0), (15.0, 5.0, 0.0)).success
+
+
+@pytest.mark.parametrize("radius", [0.5, 3.0])
+def test_the_path_is_free_between_its_poses_too_and_they_are_a_cell_apart(make_plugin, closed_loop, radius):
+    cells = np.zeros((200, 200), dtype=np.uint8)
+    cells[:120, 100] = 254
+    grid = Costmap(closed_loop.inflated(cells, 0.1, 0.2, 0.6), 0.1)
+    result = plan(make_plugin(HybridAStarPlanner, grid, min_turning_radius=radius), (5, 5, 0.0), (15, 5, 0.0))
+    steps = np.hypot(*np.diff(result.path.positions[:, :2], axis=0).T)
+    assert result.success and steps.max() <= 0.1 + 1e-9
+    states = [(pose.x, pose.y, pose.yaw) for pose in result.path]
+    vertices = 0.999 * np.array([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]])
+    assert not any(closed_loop.lethal_under(grid, vertices, state) for state in states)
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), radius=st.floats(0.3, 8.0))
+def test_arcs_are_joined_without_a_gap_and_turn_by_their_length(seed, radius):
+    rng = np.random.default_rng(seed)
+    motions = np.append(1, rng.integers(0, MOTIONS, 4)).astype(np.int8)
+    poses = np.empty((5, 3))
+    poses[0] = rng.uniform(-3.0, 3.0, 3)
+    for i, motion in enumerate(motions[1:].tolist()):
+        along, turn = 0.5 * direction_of(motion), 0.5 * direction_of(motion) * steering_of(motion) / radius
+        chord = along * np.sinc(turn / (2.0 * np.pi))  # of the circle, at half the turn
+        heading = poses[i, 2] + 0.5 * turn
+        poses[i + 1] = poses[i] + (chord * np.cos(heading), chord * np.sin(heading), turn)
+    path = path_to(poses, np.arange(-1, 4), motions, 4, 0.5, radius, 7)
+    assert path[::7] == pytest.approx(poses, abs=1e-9)
+    assert np.hypot(*np.diff(path[:, :2], axis=0).T).max() <= 0.5 / 7 + 1e-9
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_what_is_driven_costs_the_mean_of_its_poses_and_nothing_blocked_is_driven(seed):
+    rng = np.random.default_rng(seed)
+    cells = rng.choice(np.array([0, 0, 0, 0, 100, 254], dtype=np.uint8), (20, 20))
+    start, poses = rng.uniform(0.0, 2.0, 3), rng.uniform(0.0, 2.0, (2, 3))
+    cost = driven_cost(cells, 252, np.array([0.1, 0.0, 0.0]), np.zeros((1, 2)), start, poses)
+    corners = np.vstack([start, poses])[:, :2]
+    dense = np.concatenate([a + np.linspace(0, 1, 2001)[:, None] * (b - a) for a, b in pairwise(corners)])
+    crossed = cells[tuple((dense / 0.1).astype(int).T[::-1])]
+    if cost >= 0.0:
+        assert crossed.max() < 253
+        assert cost == pytest.approx(cells[tuple((poses[:, :2] / 0.1).astype(int).T[::-1])].mean())
+    else:
+        assert (crossed >= 253).any() or min_gap_to_blocked(cells, dense) < 2e-3
+
+
+def min_gap_to_blocked(cells, points):
+    """Least distance [m] from points to a blocked cell: lines may clip a corner between two samples."""
+    iy, ix = np.nonzero(cells >= 253)
+    low = np.column_stack([ix, iy]) * 0.1
+    gaps = np.maximum(np.maximum(low - points[:, None], points[:, None] - low - 0.1), 0.0)
+    return np.hypot(gaps[..., 0], gaps[..., 1]).min()
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    goal=st.tuples(st.floats(-2.0, 3.0), st.floats(-2.0, 3.0)),
+    tolerance=st.one_of(st.floats(0.0, 4.0), st.just(math.inf)),
+)
+def test_the_nearest_reached_cell_is_the_one_a_look_at_all_cells_finds(seed, goal, tolerance):
+    rng = np.random.default_rng(seed)
+    height, width = rng.integers(1, 12, 2)
+    g = rng.choice(np.array([1.0, 2.0, np.inf, np.inf], dtype=np.float32), (height + 2, width + 2))
+    cells = np.zeros((height, width), dtype=np.uint8)
+    geometry, wanted = np.array([0.2, -0.4, 0.3]), np.array([*goal, 0.0])
+    found = nearest_reached(
+        g.reshape(-1), cells, 252, geometry, np.zeros((0, 2)), wanted, tolerance, np.zeros(1, dtype=np.uint8)
+    )
+    iy, ix = np.nonzero(np.isfinite(g[1:-1, 1:-1]))
+    distances = np.hypot(-0.4 + (ix + 0.5) * 0.2 - goal[0], 0.3 + (iy + 0.5) * 0.2 - goal[1])
+    if not (distances <= tolerance).any():
+        assert found == (-1, -1)
+        return
+    best = np.flatnonzero(distances <= distances.min() + 1e-9)
+    chosen = np.flatnonzero((ix == found[0]) & (iy == found[1]))[0]
+    assert chosen in best
+    assert g[1:-1, 1:-1][iy[chosen], ix[chosen]] == g[1:-1, 1:-1][iy[best], ix[best]].min()
+
+
+def closet():
+    """10 m x 10 m with a closed closet of 1.5 m in the middle."""
+    cells = np.zeros((100, 100), dtype=np.uint8)
+    cells[40:58, [40, 57]] = 254
+    cells[[40, 57], 40:58] = 254
+    return cells
+
+
+def test_a_goal_behind_walls_is_replaced_by_the_nearest_reachable_place_within_the_tolerance(make_plugin):
+    planner = make_plugin(HybridAStarPlanner, closet(), resolution=0.1)
+    unreachable = plan(planner, (1, 5, 0), (4.9, 4.9, 0))
+    assert (
+        unreachable.outcome == GetPathOutcome.NO_PATH_FOUND and "not even for a robot that is a" in unreachable.message
+    )
+    assert plan(planner, (1, 5, 0), (4.9, 4.9, 0), dist_tolerance=0.5).outcome == GetPathOutcome.NO_PATH_FOUND
+    result = plan(planner, (1, 5, 0), (4.9, 4.9, 0), dist_tolerance=2.0)
+    assert result.success and "m from the goal (tolerance 2.00 m)" in result.message
+    assert not 4.0 < result.path[-1].x < 5.8 or not 4.0 < result.path[-1].y < 5.8
+
+
+def test_a_goal_in_a_thick_wall_ends_on_the_side_of_the_start(make_plugin):
+    cells = np.zeros((100, 100), dtype=np.uint8)
+    cells[:, 50:56] = 254
+    result = plan(make_plugin(HybridAStarPlanner, cells, resolution=0.1), (1, 5, 0), (5.4, 5, 0), dist_tolerance=2.0)
+    assert result.success and result.path[-1].x < 5.0
+
+
+def test_where_the_car_cannot_turn_round_the_nearest_state_of_the_goals_heading_will_do(make_plugin):
+    corridor = np.full((12, 120), 254, dtype=np.uint8)
+    corridor[2:10, 2:100] = 0
+    corridor[2:10, 100:118] = 0
+    planner = make_plugin(HybridAStarPlanner, corridor, resolution=0.1, min_turning_radius=2.0, allow_reversing=False)
+    assert plan(planner, (6.0, 0.6, 0.0), (4.0, 0.6, 0.0)).outcome == GetPathOutcome.NO_PATH_FOUND
+    result = plan(planner, (6.0, 0.6, 0.0), (4.0, 0.6, 0.0), dist_tolerance=2.5)
+    assert result.success and result.path[-1].distance_to(Pose.planar(4.0, 0.6)) <= 2.5
+    assert abs(result.path[len(result.path) - 1].yaw) <= math.pi / 72
+
+
+def test_giving_up_is_told_from_having_tried_everything(make_plugin):
+    cells = closet()
+    cells[48, 57] = 0  # a hole that only a point gets through
+    tired = plan(make_plugin(HybridAStarPlanner, cells, resolution=0.1, max_states=500), (1, 5, 0), (4.9, 4.9, 0))
+    assert tired.outcome == GetPathOutcome.NO_PATH_FOUND and "see max_states" in tired.message
+    small = np.full((30, 30), 254, dtype=np.uint8)
+    small[2:9, 2:28] = small[12:28, 2:28] = small[9:12, 14] = 0
+    done = plan(make_plugin(HybridAStarPlanner, small, resolution=0.1), (0.6, 0.55, 0), (1.0, 2.0, 0))
+    assert done.outcome == GetPathOutcome.NO_PATH_FOUND and "states were tried" in done.message
+
+
+def test_unknown_ground_is_driven_unless_it_is_not_allowed(make_plugin):
+    cells = np.zeros((60, 60), dtype=np.uint8)
+    cells[:, 25:35] = 255
+    assert plan(make_plugin(HybridAStarPlanner, cells, resolution=0.1), (1, 3, 0), (5, 3, 0)).success
+    careful = make_plugin(HybridAStarPlanner, cells, resolution=0.1, allow_unknown=False)
+    assert plan(careful, (1, 3, 0), (5, 3, 0)).outcome == GetPathOutcome.NO_PATH_FOUND
+
+
+def test_the_heights_of_start_and_goal_are_kept(make_plugin):
+    planner = make_plugin(HybridAStarPlanner, np.zeros((60, 60)), resolution=0.1)
+    start, goal = (Pose((x, 3.0, z), (0.0, 0.0, 0.0, 1.0)) for x, z in ((1.0, 5.0), (5.0, 6.0)))
+    heights = planner.make_plan(PlanRequest(start, goal)).path.positions[:, 2]
+    assert (heights[0], heights[-1]) == (5.0, 6.0) and (np.diff(heights) > 0.0).all()

@@ -13,7 +13,7 @@ from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
 from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.kernels.smoothing import cost_along
+from mbf_costmap_nav.kernels.line_cells import cost_along
 from mbf_costmap_nav.path_geometry import resample
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.refiners.smoother import SmootherRefiner, curvatures
@@ -93,7 +93,7 @@ def highest_cost_of_cells_cut(cells, line, slack):
 @settings(max_examples=100, deadline=None)
 def test_the_cost_along_a_line_is_the_highest_of_the_cells_it_cuts(line, seed):
     cells = np.random.default_rng(seed).integers(0, 254, (10, 10)).astype(np.uint8)
-    highest = cost_along(cells, *line)
+    highest = cost_along(cells, 0, *line)
     assert highest_cost_of_cells_cut(cells, line, -1e-6) <= highest <= highest_cost_of_cells_cut(cells, line, 1e-6)
 
 
