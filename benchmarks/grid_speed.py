@@ -3,9 +3,8 @@
     python benchmarks/grid_speed.py [--quick] [--json]
 
 Maps: rooms of 6 m with doors at 0.05 m, 1 % boxes, inflated (0.55 m, inscribed 0.22 m, scaling 3.0), corner to corner;
-384^2, 1000^2 and 4000^2 cells (``--quick``: the first two). Medians are of 7 pairs, of 3 with the peers that take 10 s
-and more at 4000^2. Ours and the peer alternate; a line shows both medians [ms]
-and the median of the ratios ours / peer. ``C++`` is what the ratio of that Python peer to a C++ peer, measured on a
+384^2, 1000^2 and 4000^2 cells (``--quick``: the first two). Medians are of 7 pairs. Ours and the peer alternate; a line
+shows both medians [ms] and the median of the ratios ours / peer. ``C++`` is what the ratio of that Python peer to a C++ peer, measured on a
 quiet machine (peers.md, section 4), makes of ours: how many times faster we are than that C++ planner.
 A peer that is not installed is skipped with a note. Times are CPU times of the one thread, so that other load on the
 machine counts less.
@@ -26,13 +25,15 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.costmap import CellBox
 from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.grid_planning import traversal_table
 from mbf_costmap_nav.kernels.grid_search import CANCELED, FOUND, pad_cells, search
 from mbf_costmap_nav.kernels.inflation import inflate
 from mbf_costmap_nav.kernels.theta_star import theta_search
 from mbf_costmap_nav.layers.inflation import cost_table
+from mbf_costmap_nav.search_grid import traversal_table
 
 RESOLUTION = 0.05
+REPEATS = 7
+"""Pairs a median is taken of."""
 NO_CANCEL = np.zeros(1, dtype=np.uint8)
 INFLATION_RADIUS = 11  # cells
 INFLATION_COSTS = cost_table(INFLATION_RADIUS, RESOLUTION, 0.22, 3.0)  # made once, as the layer does
@@ -81,11 +82,11 @@ def inflated(cells: np.ndarray) -> np.ndarray:
     return out
 
 
-def compare(ours: Callable[[], object], theirs: Callable[[], object], repeats: int) -> tuple[float, float, float]:
+def compare(ours: Callable[[], object], theirs: Callable[[], object]) -> tuple[float, float, float]:
     """Median times [ms] and median ratio of alternating calls, after one of each to compile and warm up."""
     times = []
     ours(), theirs()
-    for _ in range(repeats):
+    for _ in range(REPEATS):
         row = []
         for function in (ours, theirs):
             begin = thread_time()
@@ -99,9 +100,8 @@ def compare(ours: Callable[[], object], theirs: Callable[[], object], repeats: i
 class Suite:
     """One size of map: all comparisons on it."""
 
-    def __init__(self, size: int, repeats: int, results: dict[str, float]) -> None:
-        self.size, self.repeats, self.results = size, repeats, results
-        self.slow_repeats = 3 if size > 1000 else repeats
+    def __init__(self, size: int, results: dict[str, float]) -> None:
+        self.size, self.results = size, results
         self.lethal = rooms(size)
         self.cells = inflated(self.lethal)
         self.table = traversal_table(2.0, 253, False)
@@ -118,11 +118,9 @@ class Suite:
         ours: Callable[[], object],
         theirs: Callable[[], object],
         cpp: tuple[str, float] | None = None,
-        *,
-        slow: bool = False,
     ) -> None:
-        """Measure one pair and print it; ``slow`` peers are asked less often on the largest map."""
-        mine, other, ratio = compare(ours, theirs, self.slow_repeats if slow else self.repeats)
+        """Measure one pair and print it."""
+        mine, other, ratio = compare(ours, theirs)
         self.results[f"{name}_{self.size}"] = ratio
         text = f"{self.size:5d}^2 {name:28s} {mine:9.2f} ms, peer {other:9.2f} ms, ratio {ratio:6.3f}"
         print(text + (f"   = {cpp[1] / ratio:.1f} x {cpp[0]} (C++)" if cpp else ""), flush=True)
@@ -167,13 +165,13 @@ class Suite:
         integer = np.where(np.isfinite(self.weights), self.weights * 10.0, 0.0).astype(np.int32)
         if tcod:
             cpp = ("NavFn", NAVFN_TO_TCOD[size])
-            self.line("field_over_tcod", self.field, lambda: tcod_field(tcod, integer), cpp, slow=True)
+            self.line("field_over_tcod", self.field, lambda: tcod_field(tcod, integer), cpp)
             theirs = lambda: tcod.path.AStar(integer, 1.41).get_path(20, 20, *self.goal_cell)  # noqa: E731
-            self.line("astar_over_tcod", self.astar, theirs, slow=True)
+            self.line("astar_over_tcod", self.astar, theirs)
         if graph:
             costs = np.where(np.isfinite(self.weights), self.weights, -1.0)
             theirs = lambda: graph.MCP_Geometric(costs).find_costs([(20, 20)])  # noqa: E731
-            self.line("field_over_skimage", self.field, theirs, slow=True)
+            self.line("field_over_skimage", self.field, theirs)
 
     def answers(self) -> None:
         """Which planners find the way (on 4000^2 NavFn's A* does not), and how long a cancel takes."""
@@ -237,14 +235,14 @@ def tcod_field(tcod: ModuleType, costs: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="two sizes, three repeats")
+    parser.add_argument("--quick", action="store_true", help="two sizes")
     parser.add_argument("--json", action="store_true", help="last line is one JSON object")
     arguments = parser.parse_args()
     results: dict[str, float] = {}
     results["rolling_local_map_ms"] = rolling_local_map(15 if arguments.quick else 101)
     print(f"rolling local map, 200^2 cells, 720 beams: {results['rolling_local_map_ms']:.3f} ms a full update")
     for size in (384, 1000) if arguments.quick else (384, 1000, 4000):
-        Suite(size, 3 if arguments.quick else 7, results).run()
+        Suite(size, results).run()
     if arguments.json:
         print(json.dumps(results))
 
