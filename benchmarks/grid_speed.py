@@ -4,8 +4,9 @@
 
 Maps: rooms of 6 m with doors at 0.05 m, 1 % boxes, inflated (0.55 m, inscribed 0.22 m, scaling 3.0), corner to corner;
 384^2, 1000^2 and 4000^2 cells (``--quick``: the first two). Medians are of 7 pairs. Ours and the peer alternate; a line
-shows both medians [ms] and the median of the ratios ours / peer. ``C++`` is what the ratio of that Python peer to a C++ peer, measured on a
-quiet machine (peers.md, section 4), makes of ours: how many times faster we are than that C++ planner.
+shows both medians [ms] and the median of the ratios ours / peer. ``C++`` is what the ratio of that Python peer to a C++
+peer, measured on a quiet machine (peers.md, section 4), makes of ours: how many times faster we are than that C++
+planner.
 A peer that is not installed is skipped with a note. Times are CPU times of the one thread, so that other load on the
 machine counts less.
 """
