@@ -23,6 +23,9 @@ INSCRIBED = 253
 LETHAL = 254
 UNKNOWN = 255
 
+MAX_CELLS = 64_000_000
+"""Default limit of a map's size, 8000 x 8000 cells; checked before memory is taken."""
+
 
 class CellBox(NamedTuple):
     """A half-open rectangle of cells: x0 <= ix < x1, y0 <= iy < y1. It is empty where an end is not after a start."""

@@ -20,12 +20,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pydantic import field_validator
+from pydantic import field_validator, model_validator
 
 from mbf_abstract.parameters import ParameterModel, PluginParameters, parameter
 from mbf_abstract.sensing import TRANSFORM_TOLERANCE
 from mbf_abstract.transforms import TransformBuffer
-from mbf_costmap_nav.costmap import Costmap, GridGeometry
+from mbf_costmap_nav.costmap import MAX_CELLS, Costmap, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.layer import CostmapLayer, LayerContext, LayerParameters
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
@@ -97,6 +97,15 @@ class CostmapParameters(ParameterModel):
         if value is not None:
             Footprint.parse(value)
         return value
+
+    @model_validator(mode="after")
+    def _size_has_a_limit(self) -> CostmapParameters:
+        columns, rows = self.width / self.resolution, self.height / self.resolution
+        if columns * rows > MAX_CELLS:
+            raise ValueError(
+                f"at most {MAX_CELLS} cells, not the {columns:g} x {rows:g} of width, height and resolution"
+            )
+        return self
 
     def robot_footprint(self) -> Footprint:
         """Return the robot's outline without padding."""

@@ -5,11 +5,10 @@ from bottom to top. Channels of a colour image are averaged, then rounded. In mo
 unknown; elsewhere opacity is ignored.
 
 Origins with a yaw are kept in ``OccupancyMap``. A ``Costmap`` has axes parallel to its frame, so ``to_costmap``
-resamples such a map onto the smallest upright grid around it: nothing that was occupied gets lost, what lies outside
-the turned image is unknown.
+resamples such a map onto the smallest upright grid around it (see ``turned_map``).
 
-A bad file raises one ``MapError`` that names the file and the reason. The number of cells is checked against a limit
-before the pixels are read.
+A bad file raises one ``MapError`` that names the file and the reason. The number of cells, also of the upright grid, is
+checked against a limit before memory is taken for them.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from mbf_abstract.findings import describe_value
-from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, Costmap
+from mbf_costmap_nav.costmap import FREE, LETHAL, MAX_CELLS, UNKNOWN, Costmap
 from mbf_costmap_nav.map_description import (
     OCCUPIED,
     UNKNOWN_OCCUPANCY,
@@ -36,9 +35,8 @@ from mbf_costmap_nav.map_description import (
     read_description,
     validated_description,
 )
+from mbf_costmap_nav.turned_map import turned_upright, upright_shape
 
-MAX_CELLS = 64_000_000
-"""Default limit; 8000 x 8000 cells, checked before an image is decoded."""
 IMAGE_SUFFIXES = {".pgm", ".png", ".bmp"}
 BARE_IMAGE_RESOLUTION = 0.05  # m, what most map makers use
 GREY_MODES = {"1", "L", "LA", "P", "RGB", "RGBA"}
@@ -63,10 +61,19 @@ class OccupancyMap:
     resolution: float
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
-    def upright(self) -> OccupancyMap:
-        """Return the same map with yaw 0, resampled if it has a yaw."""
+    def upright(self, max_cells: int = MAX_CELLS) -> OccupancyMap:
+        """Return the same map with yaw 0, resampled if it has a yaw.
+
+        Raises
+        ------
+        ValueError
+            The smallest upright grid around it has more than ``max_cells`` cells.
+        """
         x, y, yaw = self.origin
-        return self if math.remainder(yaw, 2.0 * math.pi) == 0.0 else _resampled(self, x, y, yaw)
+        if math.remainder(yaw, 2.0 * math.pi) == 0.0:
+            return self
+        occupancy, (dx, dy) = turned_upright(self.occupancy, yaw, max_cells)
+        return OccupancyMap(occupancy, self.resolution, (x + dx * self.resolution, y + dy * self.resolution, 0.0))
 
     def to_costmap(self, frame_id: str = "map", track_unknown_space: bool = True) -> Costmap:
         """Costs of the map: occupied is lethal, free is free, anything between is scaled to 1..253.
@@ -106,7 +113,7 @@ def load_map(file: Path | str, max_cells: int = MAX_CELLS, *, confined: bool = F
     if confined and not _lies_in(image, file.parent):
         got = describe_value(description.image)
         raise MapError(file, f"image: expected a file in the folder of the map (confine_images), got {got}")
-    return _decode(_read_pixels(image, max_cells), description)
+    return _decode(image, max_cells, description)
 
 
 def _lies_in(file: Path, folder: Path) -> bool:
@@ -159,7 +166,7 @@ def load_image(
         "free_thresh": free_thresh,
         "mode": mode,
     }
-    return _decode(_read_pixels(file, max_cells), validated_description(file, keys))
+    return _decode(file, max_cells, validated_description(file, keys))
 
 
 def _read_pixels(file: Path, max_cells: int) -> NDArray[np.uint8]:
@@ -185,33 +192,16 @@ def _read_pixels(file: Path, max_cells: int) -> NDArray[np.uint8]:
     return np.stack([((colour_sum + 1) // 3).astype(np.uint8), pixels[..., 3]], axis=2)
 
 
-def _decode(pixels: NDArray[np.uint8], description: MapDescription) -> OccupancyMap:
+def _decode(file: Path, max_cells: int, description: MapDescription) -> OccupancyMap:
+    pixels = _read_pixels(file, max_cells)
+    try:
+        upright_shape(pixels.shape[:2], description.origin[2], max_cells)
+    except ValueError as error:
+        raise MapError(file, str(error)) from error
     occupancy = description.occupancy_of_grey()[pixels[..., 0]]
     if description.mode is MapMode.SCALE:
         occupancy[pixels[..., 1] < 255] = UNKNOWN_OCCUPANCY
     return OccupancyMap(np.ascontiguousarray(occupancy[::-1]), description.resolution, description.origin)
-
-
-def _resampled(turned: OccupancyMap, x: float, y: float, yaw: float) -> OccupancyMap:
-    """Nearest cell at each centre of an upright grid; occupied cells are written once more at their own centres."""
-    height, width = turned.occupancy.shape
-    resolution = turned.resolution
-    rotation = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-    corners = np.array([[0, 0], [width, 0], [width, height], [0, height]]) * resolution @ rotation.T
-    lower = corners.min(axis=0)
-    new_width, new_height = np.ceil((corners.max(axis=0) - lower) / resolution - 1e-9).astype(int)
-
-    centres = np.stack(np.meshgrid(np.arange(new_width), np.arange(new_height)), axis=-1) + 0.5
-    source = np.floor((centres * resolution + lower) @ rotation / resolution).astype(np.int64)
-    inside = np.all((source >= 0) & (source < (width, height)), axis=-1)
-    occupancy = np.full((new_height, new_width), UNKNOWN_OCCUPANCY, dtype=np.uint8)
-    occupancy[inside] = turned.occupancy[source[inside][:, 1], source[inside][:, 0]]
-
-    rows, columns = np.nonzero((turned.occupancy >= OCCUPIED) & (turned.occupancy != UNKNOWN_OCCUPANCY))
-    points = (np.column_stack([columns, rows]) + 0.5) * resolution @ rotation.T - lower
-    cells = np.minimum((points / resolution).astype(np.int64), (new_width - 1, new_height - 1))
-    occupancy[cells[:, 1], cells[:, 0]] = turned.occupancy[rows, columns]
-    return OccupancyMap(occupancy, resolution, (x + float(lower[0]), y + float(lower[1]), 0.0))
 
 
 def save_map(
@@ -219,7 +209,7 @@ def save_map(
     content: OccupancyMap,
     *,
     image_format: str = "pgm",
-    mode: MapMode = MapMode.TRINARY,
+    mode: MapMode | str = MapMode.TRINARY,
     negate: bool = False,
     occupied_thresh: float = 0.65,
     free_thresh: float = 0.196,
@@ -229,7 +219,7 @@ def save_map(
     Parameters
     ----------
     image_format : {"pgm", "png", "bmp"}
-    mode : MapMode
+    mode : MapMode or its value
         Trinary keeps 0, 100 and unknown; raw keeps every value; scale keeps 0..100, and unknown only in a png.
     occupied_thresh, free_thresh : float
         In scale mode 99 exists only if ``occupied_thresh`` is a multiple of 1/255, such as 0.6.
@@ -237,21 +227,27 @@ def save_map(
     Raises
     ------
     MapError
-        The map holds an occupancy that this mode and these thresholds cannot express, or the file cannot be written.
+        The map is empty or holds an occupancy that this mode and these thresholds cannot express, an argument is not
+        legal, ``file`` has the image's name, or a file cannot be written.
     """
     file = Path(file)
     image_file = file.with_suffix(f".{image_format}")
+    if image_format not in ("pgm", "png", "bmp"):
+        raise MapError(image_file, f"image_format must be pgm, png or bmp, got {image_format!r}")
+    if image_file == file:
+        raise MapError(file, "is the name of the image; the YAML file beside it needs another one, such as .yaml")
+    if content.occupancy.dtype != np.uint8 or content.occupancy.ndim != 2 or content.occupancy.size == 0:
+        got = f"{content.occupancy.dtype} {content.occupancy.shape}"
+        raise MapError(file, f"expected occupancies as (height, width) uint8 with at least one cell, got {got}")
     keys: dict[str, object] = {
         "image": image_file.name,
-        "mode": mode.value,
+        "mode": getattr(mode, "value", mode),
         "resolution": content.resolution,
         "origin": list(content.origin),
         "negate": int(negate),
         "occupied_thresh": occupied_thresh,
         "free_thresh": free_thresh,
     }
-    if image_format not in ("pgm", "png", "bmp"):
-        raise MapError(image_file, f"image_format must be pgm, png or bmp, got {image_format!r}")
     description = validated_description(file, keys)
     grey, opaque = _encode(image_file, content.occupancy[::-1], description)
     try:

@@ -417,6 +417,14 @@ def test_bad_configurations_are_refused():
         build_layered_costmap(layers({"name": "a", "type": "pathlib:Path"}))
 
 
+@pytest.mark.parametrize(
+    "size", [{"width": 1e6, "height": 1e6}, {"width": 1e300}, {"width": 900.0, "height": 900.0, "resolution": 1e-4}]
+)
+def test_a_map_of_absurd_size_is_refused_before_memory_is_taken(size):
+    with pytest.raises(ValidationError, match="at most 64000000 cells"):
+        CostmapParameters.model_validate(size)
+
+
 def test_a_disabled_layer_takes_no_part(build):
     costmap = build("static", static={"enabled": False})
     costmap.update(None, 0.0)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from mbf_costmap_nav import turned_map
 from mbf_costmap_nav.map_description import MapError, MapMode
 from mbf_costmap_nav.map_io import OccupancyMap, load_image, load_map, save_map
 
@@ -150,3 +151,51 @@ def test_a_turned_map_keeps_every_obstacle_where_it_is(yaw):
 def test_a_map_with_more_cells_than_asked_for_is_refused(spectrum):
     with pytest.raises(MapError, match="16 x 16 pixels are more than the limit of 255"):
         load_image(spectrum, 0.1, max_cells=255)
+
+
+def test_a_turned_map_larger_than_the_limit_is_refused_before_memory_is_taken(tmp_path):
+    Image.fromarray(np.full((1, 2000), 254, dtype=np.uint8)).save(tmp_path / "map.png")
+    (tmp_path / "map.yaml").write_text("{image: map.png, resolution: 0.05, origin: [0, 0, 0.785]}")
+    says = "1416 x 1415 cells, more than the limit of 1000000"
+    with pytest.raises(MapError, match=rf"map\.png: turned by 0\.785 rad it needs {says}"):
+        load_map(tmp_path / "map.yaml", max_cells=1_000_000)
+    with pytest.raises(ValueError, match=says):
+        OccupancyMap(np.zeros((1, 2000), np.uint8), 0.05, (0.0, 0.0, 0.785)).upright(max_cells=1_000_000)
+    assert load_map(tmp_path / "map.yaml").upright().occupancy.shape == (1415, 1416)
+
+
+@pytest.mark.parametrize("block_cells", [1, 40, 100_000])
+def test_a_map_turned_in_blocks_is_the_same_as_turned_at_once(monkeypatch, block_cells):
+    occupancy = np.random.default_rng(4).choice(np.array([0, 40, 100, 150, 255], dtype=np.uint8), (17, 23))
+    content = OccupancyMap(occupancy, 0.2, (1.0, 2.0, 2.2))
+    at_once = content.upright()
+    monkeypatch.setattr(turned_map, "BLOCK_CELLS", block_cells)
+    assert np.array_equal(content.upright().occupancy, at_once.occupancy)
+    assert content.upright().origin == at_once.origin
+
+
+BAD_SAVES = {
+    "the image's own name": ("map.png", {"image_format": "png"}, "is the name of the image"),
+    "an unknown format": ("map.yaml", {"image_format": "jpg"}, "must be pgm, png or bmp"),
+    "an unknown mode": ("map.yaml", {"mode": "binary"}, "mode: expected 'trinary', 'scale' or 'raw'"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_SAVES)
+def test_a_map_that_cannot_be_saved_so_is_refused_and_nothing_is_written(tmp_path, case):
+    name, options, says = BAD_SAVES[case]
+    with pytest.raises(MapError, match=says):
+        save_map(tmp_path / name, OccupancyMap(np.zeros((3, 3), np.uint8), 0.1), **options)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("occupancy", [np.zeros((0, 0), np.uint8), np.zeros((3, 3), int), np.zeros(3, np.uint8)])
+def test_occupancies_that_are_no_map_are_not_saved(tmp_path, occupancy):
+    with pytest.raises(MapError, match="at least one cell"):
+        save_map(tmp_path / "map.yaml", OccupancyMap(occupancy, 0.1))
+
+
+@pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
+def test_a_mode_may_be_given_by_its_name(tmp_path, mode):
+    save_map(tmp_path / "map.yaml", OccupancyMap(np.array([[0, 100]], np.uint8), 0.1), mode=mode)
+    assert load_map(tmp_path / "map.yaml").occupancy.tolist() == [[0, 100]]
