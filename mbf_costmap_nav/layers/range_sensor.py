@@ -133,8 +133,9 @@ class RangeSensorLayer(SensorLayer):
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
         """Write decided cells; free ones replace only unknown ones."""
-        decided = np.full(cells.shape, UNKNOWN, dtype=np.uint8)
         window = self.probability[box.slices]
-        decided[box.slices][window > self.parameters.mark_threshold] = LETHAL
-        decided[box.slices][window < self.parameters.clear_threshold] = FREE
-        combine(cells, decided, box, CombinationMethod.MAXIMUM)
+        decided = np.full(window.shape, UNKNOWN, dtype=np.uint8)
+        decided[window > self.parameters.mark_threshold] = LETHAL
+        decided[window < self.parameters.clear_threshold] = FREE
+        whole = CellBox(0, 0, box.x1 - box.x0, box.y1 - box.y0)
+        combine(cells[box.slices], decided, whole, CombinationMethod.MAXIMUM)

@@ -1,6 +1,7 @@
 """The layered costmap: update windows, the rolling window, snapshots, currency, clearing, filters, sensors."""
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -316,6 +317,19 @@ def test_a_sonar_that_is_cleared_forgets_its_readings(build):
     costmap.clear()
     costmap.update(None, 0.1)
     assert lethal_cells(costmap) == set()
+
+
+@pytest.mark.parametrize("layer", ["obstacle", "voxel", "range_sensor"])
+def test_a_reading_on_a_large_map_costs_what_its_box_costs(build, layer):
+    costmap = build(layer, **{layer: {"sources": {"eye": {}}}}, width=2000.0, height=2000.0)
+    costmap.update(None, 0.0)
+    costmap.insert_scan("eye", (1000.5, 1000.5, 0.2), [(1002.5, 1000.5, 0.2)], [True], 0.1)
+    tracemalloc.start()
+    assert not costmap.update(None, 0.1).empty
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 200_000, "nothing of the size of the map is made"
+    assert lethal_cells(costmap) == {(1002, 1000)}
 
 
 # ---------------------------------------------------------------------------------------------------- clearing
