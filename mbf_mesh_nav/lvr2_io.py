@@ -1,8 +1,8 @@
-"""The HDF5 files of lvr2 and mesh_navigation: both layouts read, the present one ("MeshIO") written.
+"""The HDF5 files of lvr2 and mesh_navigation, both of their layouts read and written.
 
-Layout of a part: ``geometry/vertices`` (V, 3) float32 and ``geometry/face_indices`` (F, 3) uint32, per-vertex
-attributes such as layer costs below ``vertex_attributes``. Files made before December 2024 keep everything in
-``<part>/channels``.
+``mesh_io``, the present one: ``<part>/geometry/vertices`` (V, 3) float32 and ``<part>/geometry/face_indices`` (F, 3)
+uint32, per-vertex attributes such as layer costs below ``<part>/vertex_attributes``. ``channels``, of lvr2 before
+December 2024: all of these in ``<part>/channels``. Write the old one only for a program that reads no other.
 
 Unlike mesh_navigation we never write into the input and never take a stored layer for a computed one: a stored layer
 does not say which parameters made it.
@@ -10,7 +10,9 @@ does not say which parameters made it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.repair import MeshError
+from mbf_mesh_nav.mesh_report import MeshError
 
 FloatArray = NDArray[np.float64]
-GEOMETRIES = ("geometry", "channels")
-VERTEX_ATTRIBUTES = ("vertex_attributes", "channels")
+LAYOUTS: dict[str, tuple[str, str]] = {
+    "mesh_io": ("geometry", "vertex_attributes"),
+    "channels": ("channels", "channels"),
+}
+"""Groups below a part that hold its geometry and its per-vertex attributes."""
+GEOMETRY_CHANNELS = {"vertices": "fiu", "face_indices": "iu"}
+"""Channels of the geometry and the kinds of numbers they may hold."""
 
 
 def read_lvr2_mesh(path: Path, part: str, max_faces: int) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -34,15 +41,12 @@ def read_lvr2_mesh(path: Path, part: str, max_faces: int) -> tuple[FloatArray, N
     MeshError
         Not an HDF5 file, no or several meshes, a missing or misshapen channel, or more faces than ``max_faces``.
     """
-    try:
-        with h5py.File(path, "r") as file:
-            geometry = _geometry(file, path, part.strip("/"))
-            faces, vertices = geometry["face_indices"], geometry["vertices"]
-            if faces.shape[0] > max_faces or vertices.shape[0] > 3 * max_faces:
-                raise MeshError(str(path), [f"{faces.shape[0]} faces, the limit is {max_faces}"])
-            return vertices[()].astype(np.float64), faces[()].astype(np.int64)
-    except OSError as error:
-        raise MeshError(str(path), [f"cannot be read as HDF5: {error}"]) from error
+    with _opened(path) as file:
+        geometry = _geometry(file, path, part.strip("/"))
+        faces, vertices = geometry["face_indices"], geometry["vertices"]
+        if faces.shape[0] > max_faces or vertices.shape[0] > 3 * max_faces:
+            raise MeshError(str(path), [f"{faces.shape[0]} faces, the limit is {max_faces}"])
+        return vertices[()].astype(np.float64), faces[()].astype(np.int64)
 
 
 def read_lvr2_vertex_attributes(path: Path, part: str = "") -> dict[str, NDArray[np.float32]]:
@@ -52,16 +56,20 @@ def read_lvr2_vertex_attributes(path: Path, part: str = "") -> dict[str, NDArray
     -------
     dict
         Name -> (V,) or (V, n) float32.
+
+    Raises
+    ------
+    MeshError
+        As ``read_lvr2_mesh``.
     """
-    with h5py.File(path, "r") as file:
+    with _opened(path) as file:
         geometry = _geometry(file, path, part.strip("/"))
         count = geometry["vertices"].shape[0]
-        groups = [geometry.parent[name] for name in VERTEX_ATTRIBUTES if name in geometry.parent]
-        attributes: dict[str, Any] = dict(groups[0]) if groups else {}
+        groups = [geometry.parent[name] for _, name in LAYOUTS.values() if name in geometry.parent]
         return {
-            name: np.squeeze(values[()]).astype(np.float32)
-            for name, values in attributes.items()
-            if name not in ("vertices", "face_indices") and values.shape[:1] == (count,)
+            name: _without_last_axis(values[()].astype(np.float32))
+            for name, values in (groups[0].items() if groups else ())
+            if name not in GEOMETRY_CHANNELS and _is_numbers(values, "fiub") and values.shape[:1] == (count,)
         }
 
 
@@ -71,49 +79,102 @@ def write_lvr2_mesh(
     faces: NDArray[Any],
     vertex_attributes: Mapping[str, NDArray[Any]] | None = None,
     part: str = "mesh",
+    layout: str = "mesh_io",
 ) -> None:
-    """Write a mesh and per-vertex attributes in the MeshIO layout; refuses to overwrite a file.
+    """Write a mesh and per-vertex attributes; refuses to overwrite a file, and leaves none if it fails.
 
     Parameters
     ----------
     vertices : (V, 3) float
-        Stored as float32, the layout's type.
+        Stored as float32, the layouts' type.
     faces : (F, 3) int
     vertex_attributes : mapping, optional
         Name -> (V,) or (V, n) numbers, e.g. layer costs.
+    part : str
+        Group of the mesh, with slashes for groups in groups.
+    layout : str
+        A name of ``LAYOUTS``.
+
+    Raises
+    ------
+    MeshError
+        The file exists or cannot be written, there is no such layout, or an attribute does not fit.
     """
     if path.exists():
         raise MeshError(str(path), ["the file exists; it is not overwritten"])
-    with h5py.File(path, "w") as file:
-        group = file.create_group(part)
-        group.attrs["IO"] = "MeshIO"
-        group.attrs["CLASS"] = "MeshBuffer"
-        group["geometry/vertices"] = np.asarray(vertices, dtype=np.float32)
-        group["geometry/face_indices"] = np.asarray(faces, dtype=np.uint32)
-        for name, values in (vertex_attributes or {}).items():
-            group[f"vertex_attributes/{name}"] = np.asarray(values, dtype=np.float32).reshape(len(vertices), -1)
+    attributes = dict(vertex_attributes or {})
+    if reasons := _misfits(attributes, len(vertices), part, layout):
+        raise MeshError(str(path), reasons)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with h5py.File(unfinished, "w") as file:
+            _fill(file.create_group(part), vertices, faces, attributes, LAYOUTS[layout])
+        unfinished.replace(path)
+    except (OSError, RuntimeError, TypeError, ValueError) as error:
+        raise MeshError(str(path), [f"cannot be written: {error}"]) from error
+    finally:
+        unfinished.unlink(missing_ok=True)
 
 
-def write_lvr2_map(path: Path, mesh_map: MeshMap, part: str = "mesh") -> None:
+def _misfits(attributes: dict[str, NDArray[Any]], vertex_count: int, part: str, layout: str) -> list[str]:
+    """Everything that is wrong with the arguments of a write."""
+    reasons = [] if layout in LAYOUTS else [f"unknown layout '{layout}', the layouts are: {', '.join(LAYOUTS)}"]
+    if not part.strip("/"):
+        reasons.append("a mesh needs a part to be written to")
+    for name, values in attributes.items():
+        if np.shape(values)[:1] != (vertex_count,):
+            reasons.append(f"attribute '{name}' has shape {np.shape(values)}, expected ({vertex_count}, ...)")
+        if not name or "/" in name or name in GEOMETRY_CHANNELS:
+            reasons.append(f"an attribute cannot be called '{name}'")
+    return reasons
+
+
+def _fill(
+    group: Any, vertices: FloatArray, faces: NDArray[Any], attributes: dict[str, NDArray[Any]], layout: tuple[str, str]
+) -> None:
+    geometry, attribute_group = layout
+    group.attrs["IO"] = "MeshIO"
+    group.attrs["CLASS"] = "MeshBuffer"
+    group[f"{geometry}/vertices"] = np.asarray(vertices, dtype=np.float32)
+    group[f"{geometry}/face_indices"] = np.asarray(faces, dtype=np.uint32)
+    for name, values in attributes.items():
+        group[f"{attribute_group}/{name}"] = np.asarray(values, dtype=np.float32).reshape(len(vertices), -1)
+
+
+def write_lvr2_map(path: Path, mesh_map: MeshMap, part: str = "mesh", layout: str = "mesh_io") -> None:
     """Write a map with the costs of all its layers, in the caller's numbering as far as vertices come from the caller.
 
-    Vertices that densifying added follow after them; merged and dropped ones are not in the file.
+    Vertices that densifying or a repair added follow after them; merged and dropped ones are not in the file.
+    Parameters and errors as in ``write_lvr2_mesh``.
     """
     source = mesh_map.internal_to_input.astype(np.int64)
     order = np.argsort(np.where(source >= 0, source, np.iinfo(np.int64).max), kind="stable")
     position = np.argsort(order)
     attributes: dict[str, NDArray[Any]] = {name: layer.costs[order] for name, layer in mesh_map.layers.items()}
     attributes["vertex_normals"] = mesh_map.vertex_normals[order]
-    write_lvr2_mesh(path, mesh_map.vertices[order], position[mesh_map.faces], attributes, part)
+    write_lvr2_mesh(path, mesh_map.vertices[order], position[mesh_map.faces], attributes, part, layout)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[h5py.File]:
+    """Open a file to read, and turn whatever the HDF5 library raises on damaged ones into a ``MeshError``."""
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except MeshError:
+        raise
+    except Exception as error:
+        raise MeshError(str(path), [f"cannot be read as HDF5: {error}"]) from error
 
 
 def _geometry(file: h5py.File, path: Path, part: str) -> Any:
     """Group with the channels ``vertices`` and ``face_indices`` of a part, whichever layout."""
     found: dict[str, Any] = {}
+    groups = {geometry for geometry, _ in LAYOUTS.values()}
 
     def visit(name: str, item: Any) -> None:
         above, _, last = name.rpartition("/")
-        if last in GEOMETRIES and isinstance(item, h5py.Group) and "vertices" in item and "face_indices" in item:
+        if last in groups and isinstance(item, h5py.Group) and all(channel in item for channel in GEOMETRY_CHANNELS):
             found[above] = item
 
     file.visititems(visit)
@@ -122,14 +183,30 @@ def _geometry(file: h5py.File, path: Path, part: str) -> Any:
         wanted = f"no mesh '{part}'" if part else "which mesh?"
         raise MeshError(str(path), [f"{wanted} The meshes in it are: {', '.join(found) or 'none'}"])
     geometry = found[chosen[0]]
-    wrong = [
-        f"{geometry.name}/{name} has shape {geometry[name].shape}, expected (n, 3)"
-        for name in ("vertices", "face_indices")
-        if geometry[name].ndim != 2 or geometry[name].shape[1] != 3
-    ]
-    kind = geometry.parent.attrs.get("IO", "MeshIO")
+    wrong = [text for name, kinds in GEOMETRY_CHANNELS.items() if (text := _wrong_channel(geometry, name, kinds))]
+    kind = np.ravel(geometry.parent.attrs.get("IO", "MeshIO"))[0]
     if (kind.decode() if isinstance(kind, bytes) else kind) != "MeshIO":
         wrong.append(f"{geometry.parent.name} holds '{kind}', expected 'MeshIO'")
     if wrong:
         raise MeshError(str(path), wrong)
     return geometry
+
+
+def _wrong_channel(geometry: Any, name: str, kinds: str) -> str:
+    """What is wrong with a channel of the geometry, or ""."""
+    channel = geometry[name]
+    if not isinstance(channel, h5py.Dataset):
+        return f"{geometry.name}/{name} is a group, expected an array"
+    if channel.ndim != 2 or channel.shape[1] != 3:
+        return f"{geometry.name}/{name} has shape {channel.shape}, expected (n, 3)"
+    wanted = "numbers" if "f" in kinds else "integers"
+    return "" if _is_numbers(channel, kinds) else f"{geometry.name}/{name} holds {channel.dtype}, expected {wanted}"
+
+
+def _is_numbers(item: Any, kinds: str) -> bool:
+    return isinstance(item, h5py.Dataset) and item.dtype.kind in kinds
+
+
+def _without_last_axis(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(V, 1) as (V,), anything else as it is."""
+    return values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values

@@ -117,6 +117,26 @@ class MeshNavigationServer(AbstractNavigationServer):
         for plugin in held:
             plugin.retire()  # who waited for the old instance is told that it is gone
 
+    def save_map(self, file: Path | str, layout: str = "mesh_io") -> None:
+        """Write the mesh with the present costs of all layers, as an HDF5 file that mesh_navigation reads.
+
+        Parameters
+        ----------
+        file : path
+            Absolute, or relative to the configuration; it must not exist yet.
+        layout : str
+            "mesh_io", or "channels" for programs built with lvr2 of before December 2024.
+
+        Raises
+        ------
+        MeshError
+            The file exists or cannot be written; no part of one is left.
+        """
+        from mbf_mesh_nav.lvr2_io import write_lvr2_map  # h5py only for those who use it
+
+        write_lvr2_map(self.config.path.parent / file, self.mesh_map, layout=layout)
+        self.runtime.events.emit(EventKind.MAP, "mesh_map", message=f"the map was saved to {file}")
+
     def _tell_findings(self) -> None:
         """One event for everything that was found in, or done to, the mesh of the map."""
         for found in self.mesh_map.report.findings:

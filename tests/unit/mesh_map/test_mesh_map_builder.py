@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.layers.roughness import RoughnessLayer
-from mbf_mesh_nav.lvr2_io import read_lvr2_vertex_attributes, write_lvr2_map, write_lvr2_mesh
+from mbf_mesh_nav.lvr2_io import write_lvr2_mesh
 from mbf_mesh_nav.map_builder import (
     LayerGraphError,
     MeshMapParameters,
@@ -252,49 +252,6 @@ def test_parts_of_a_scene_are_found_by_name_and_moved_into_place(tmp_path):
         read_mesh(file, "cellar")
 
 
-def test_lvr2_file_round_trip_with_layer_costs(tmp_path):
-    file = tmp_path / "map.h5"
-    costs = np.arange(len(VERTICES), dtype=np.float32)
-
-    write_lvr2_mesh(file, VERTICES, FACES, {"height_diff": costs, "vertex_normals": VERTICES})
-
-    vertices, faces = read_mesh(file)
-    np.testing.assert_allclose(vertices, VERTICES, atol=1e-6)
-    np.testing.assert_array_equal(faces, FACES)
-    attributes = read_lvr2_vertex_attributes(file)
-    np.testing.assert_array_equal(attributes["height_diff"], costs)
-    assert attributes["vertex_normals"].shape == (len(VERTICES), 3)
-    with pytest.raises(MeshError, match="not overwritten"):
-        write_lvr2_mesh(file, VERTICES, FACES)
-
-
-def test_map_is_saved_with_its_layers_in_the_callers_numbering(tmp_path):
-    order = np.random.default_rng(1).permutation(len(VERTICES))
-    shuffled, corners = VERTICES[order], np.argsort(order)[FACES]
-    parameters = MeshMapParameters(layers=[{"name": "rough", "type": "roughness"}])
-    mesh = build_mesh_map(parameters, vertices=shuffled, faces=corners)
-
-    write_lvr2_map(tmp_path / "map.h5", mesh)
-
-    vertices, faces = read_mesh(tmp_path / "map.h5")
-    np.testing.assert_allclose(vertices, shuffled, atol=1e-6)
-    assert {tuple(sorted(face)) for face in faces.tolist()} == {tuple(sorted(face)) for face in corners.tolist()}
-    stored = read_lvr2_vertex_attributes(tmp_path / "map.h5")["rough"]
-    np.testing.assert_array_equal(stored, mesh.to_input_order(mesh.layers["rough"].costs).astype(np.float32))
-
-
-def test_old_lvr2_layout_is_read(tmp_path):
-    h5py = pytest.importorskip("h5py")
-    file = tmp_path / "old.h5"
-    with h5py.File(file, "w") as handle:
-        handle["mesh/channels/vertices"] = VERTICES.astype(np.float32)
-        handle["mesh/channels/face_indices"] = FACES.astype(np.uint32)
-        handle["mesh/channels/roughness"] = np.ones((len(VERTICES), 1), np.float32)
-
-    np.testing.assert_array_equal(read_mesh(file, "mesh")[1], FACES)
-    assert read_lvr2_vertex_attributes(file)["roughness"].shape == (len(VERTICES),)
-
-
 @pytest.mark.parametrize(
     ("name", "content", "text"),
     [
@@ -330,17 +287,3 @@ def test_too_many_faces_are_refused(tmp_path):
     for path in (file, tmp_path / "mesh.h5"):
         with pytest.raises(MeshError, match="the limit is 10"):
             read_mesh(path, max_faces=10)
-
-
-def test_hdf5_without_or_with_another_mesh_names_what_is_there(tmp_path):
-    h5py = pytest.importorskip("h5py")
-    file = tmp_path / "odd.h5"
-    with h5py.File(file, "w") as handle:
-        handle["a/geometry/vertices"] = np.zeros((3, 3))
-        handle["a/geometry/face_indices"] = np.zeros((1, 4), np.uint32)
-        handle["a"].attrs["IO"] = "PointIO"
-
-    with pytest.raises(MeshError, match="no mesh 'b' The meshes in it are: a"):
-        read_mesh(file, "b")
-    with pytest.raises(MeshError, match=r"expected \(n, 3\).*expected 'MeshIO'"):
-        read_mesh(file)

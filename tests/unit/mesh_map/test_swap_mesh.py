@@ -14,6 +14,7 @@ from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.transforms import TransformBuffer
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.lvr2_io import read_lvr2_vertex_attributes
 from mbf_mesh_nav.repair import MeshError
 
 CONFIG = """
@@ -100,4 +101,19 @@ def test_while_a_goal_uses_a_plugin_the_mesh_stays(navigator):
         server.swap_mesh("large.ply")
     busy.release("a goal")
     assert server.mesh_map is before
+    assert navigator.get_path(Pose.planar(3.0, 3.0), planner="astar").success
+
+
+@pytest.mark.parametrize("layout", ["mesh_io", "channels"])
+def test_a_saved_map_has_the_costs_of_its_layers_and_is_a_map_again(navigator, tmp_path, layout):
+    server = navigator.server
+
+    server.save_map("saved.h5", layout=layout)
+
+    slopes = read_lvr2_vertex_attributes(tmp_path / "saved.h5")["slopes"]
+    np.testing.assert_array_equal(slopes, server.mesh_map.to_input_order(server.mesh_map.layers["slopes"].costs))
+    assert server.runtime.events.memory.of_kind(EventKind.MAP)[-1].data["message"] == "the map was saved to saved.h5"
+    with pytest.raises(MeshError, match="not overwritten"):
+        server.save_map("saved.h5")
+    server.swap_mesh("saved.h5")
     assert navigator.get_path(Pose.planar(3.0, 3.0), planner="astar").success
