@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.sensing import MAX_STAMP_LEAD
 from mbf_costmap_nav.layer import CostmapLayer
 
 MAX_OBSERVATIONS = 256
 """Bound of the memory of one source, however long its persistence."""
-MAX_STAMP_LEAD = 0.2
-"""How far [s] a stamp may lie in the future: what clocks of two computers differ by, not what a broken one does."""
 
 
 class SourceTiming(ParameterModel):
