@@ -26,7 +26,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from terrain_meshes import add_layer, fractal_terrain
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.plugins import PlanRequest
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
@@ -68,8 +68,15 @@ def compare_pairs(mesh_map: MeshMap, rows: list[dict[str, str]]) -> dict[str, li
                 raise RuntimeError(f"{row['mesh']}: {result.message}")
             ratios[name].append(result.path.length / exact)
             if name == "cvp_path":
-                ratios["cvp_field"].append(result.cost / exact)
+                ratios["cvp_field"].append(field_at(mesh_map, result.path, start) / exact)
     return ratios
+
+
+def field_at(mesh_map: MeshMap, path: Path, start: Pose) -> float:
+    """The field's distance at the start: of the best corner of its face, and to it."""
+    corners = mesh_map.faces[mesh_map.locate_one(start.position).face]
+    steps = np.linalg.norm(mesh_map.vertices[corners] - np.array(start.position), axis=1)
+    return float(np.min(path.guidance[0].distances[corners] + steps))
 
 
 def without_point_contacts(mesh_map: MeshMap) -> MeshMap:

@@ -18,6 +18,7 @@ from mbf_abstract.config import PluginDeclaration, PluginSpec
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.parameters import with_changes
 from mbf_abstract.plugin_table import PluginTable
 from mbf_abstract.plugins import Plugin, PluginContext, PluginKind
 from mbf_abstract.registry import Adapter, PluginRegistry
@@ -144,12 +145,13 @@ class PluginHost(ABC):
         ------
         ServerError
             No such plugin, or it is in use.
-        pydantic.ValidationError
-            A value is not legal; nothing is changed.
+        ValueError
+            A value is not legal (pydantic's ValidationError is one), or the parameter is read once only; nothing is
+            changed.
         """
         plugin = self._loaded(kind, name)
         instance = plugin.instance
-        new = type(instance.parameters).model_validate({**instance.parameters.model_dump(), **changes})
+        new = with_changes(instance.parameters, changes)
         if not plugin.acquire(self, lambda: True):
             raise ServerError(f"{kind.name.lower()} {name!r} is in use")
         try:

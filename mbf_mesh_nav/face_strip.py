@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.funnel import pull_taut
 from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.path_cost import cost_along
 from mbf_mesh_nav.snapshot import MeshSnapshot
 
 _MIN_PIECE = 4  # faces; shorter pieces are not split further
@@ -23,7 +24,7 @@ class FaceStrip:
 
     def __init__(self, mesh_map: MeshMap, snapshot: MeshSnapshot, blocked: NDArray[np.bool_]) -> None:
         self._mesh_map = mesh_map
-        self._costs = snapshot.costs
+        self._snapshot = snapshot
         self._blocked = blocked
 
     def shorten(
@@ -119,17 +120,4 @@ class FaceStrip:
         return np.concatenate([head[0], tail[0][1:]]), np.concatenate([head[1], tail[1][1:]])
 
     def _cost(self, positions: NDArray[np.float64], point_faces: NDArray[np.int32]) -> float:
-        """Length plus collected cost [m] of a path, costs interpolated in its faces."""
-        lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-        if self._mesh_map.edge_cost_factor == 0.0:
-            return float(lengths.sum())
-        middles = (positions[1:] + positions[:-1]) / 2.0
-        corners = self._mesh_map.faces[point_faces[1:]]
-        a, b, c = (self._mesh_map.vertices[corners[:, k]] for k in range(3))
-        normals = np.cross(b - a, c - a)
-        squared = np.sum(normals**2, axis=1)
-        weight_b = np.sum(np.cross(middles - a, c - a) * normals, axis=1) / squared
-        weight_c = np.sum(np.cross(b - a, middles - a) * normals, axis=1) / squared
-        weights = np.stack([1.0 - weight_b - weight_c, weight_b, weight_c], axis=1)
-        costs = np.sum(weights * self._costs[corners], axis=1)
-        return float(np.sum(lengths * (1.0 + self._mesh_map.edge_cost_factor * costs)))
+        return cost_along(self._mesh_map, self._snapshot, positions, point_faces)

@@ -107,16 +107,31 @@ class LayerGraph(Mapping[str, MeshLayer]):
 
         A combination reads the weights of its inputs, so a new ``combination_weight`` counts as a change of every
         vertex of the layer.
+
+        Raises
+        ------
+        TypeError
+            The parameters are those of another type of layer.
+        Exception
+            Whatever the layer raises that cannot compute with them; it keeps the old ones and their values.
         """
         layer = self._layers[name]
-        weight_changed = layer.parameters.combination_weight != parameters.combination_weight
-        layer.parameters = parameters
+        old = layer.parameters
+        if not isinstance(parameters, type(old)):
+            raise TypeError(f"layer '{name}' takes {type(old).__name__}, got {type(parameters).__name__}")
+        weight_changed = old.combination_weight != parameters.combination_weight
 
         def event(visited: MeshLayer) -> IntArray:
             if visited is not layer:
                 return NOTHING_CHANGED
-            changed = visited.recompute()
-            return np.arange(len(visited.costs), dtype=np.int32) if weight_changed else changed
+            layer.parameters = parameters
+            try:
+                changed = layer.recompute()
+            except Exception:
+                layer.parameters = old
+                layer.recompute()
+                raise
+            return np.arange(len(layer.costs), dtype=np.int32) if weight_changed else changed
 
         return self.apply(event)
 

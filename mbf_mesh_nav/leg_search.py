@@ -17,6 +17,7 @@ from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distanc
 from mbf_mesh_nav.kernels.path_poses import distinct_points
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.path_cost import cost_along
 from mbf_mesh_nav.snapshot import MeshSnapshot
 from mbf_mesh_nav.surface_point import corner_distances
 
@@ -141,8 +142,9 @@ def vertex_path_leg(
 def straight_leg(mesh_map: MeshMap, query: LegQuery) -> Leg:
     """Join start and goal by a line; they lie in one face."""
     positions = np.array([query.start.point, query.goal.point])
-    cost = float(np.linalg.norm(positions[1] - positions[0]))
-    return Leg(positions, mesh_map.face_normals[[query.start.face, query.goal.face]], cost)
+    point_faces = np.array([query.start.face, query.goal.face], dtype=np.int32)
+    cost = cost_along(mesh_map, query.snapshot, positions, point_faces)
+    return Leg(positions, mesh_map.face_normals[point_faces], cost)
 
 
 def drop_repeated_points(leg: Leg, tolerance: float = 1e-6) -> Leg:

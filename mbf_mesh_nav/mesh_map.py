@@ -204,20 +204,29 @@ class MeshMap:
             self._snapshot = self._snapshots.begin(costs, lethal, edge_cost_factor)
 
     def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
-        """Change how much costs lengthen edges, at run time."""
+        """Change how much costs lengthen edges, at run time.
+
+        Raises
+        ------
+        ValueError
+            It is negative or not finite.
+        """
+        if not (np.isfinite(edge_cost_factor) and edge_cost_factor >= 0.0):
+            raise ValueError(f"edge_cost_factor must be a finite number of at least 0, got {edge_cost_factor}")
         self.set_layers(self.layers, self.default_layer, edge_cost_factor)
 
     def set_layer_parameters(self, name: str, parameters: LayerParameters, until: float = np.inf) -> None:
         """Change the parameters of one layer at run time; everything that depends on them follows.
 
         With a time ``until`` [s] the change is an override: ``update`` restores the usual parameters once it is over.
+        Raises as ``LayerGraph.set_parameters``; nothing has changed then.
         """
         with self._lock:
             usual = self.usual_parameters(name)
+            self._publish(self.layers.set_parameters(name, parameters))
             self._overridden.pop(name, None)
             if until < np.inf:
                 self._overridden[name] = usual, until
-            self._publish(self.layers.set_parameters(name, parameters))
 
     def usual_parameters(self, name: str) -> LayerParameters:
         """Parameters of a layer apart from a timed override."""

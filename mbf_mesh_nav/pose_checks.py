@@ -77,14 +77,20 @@ def check_path(
 
 
 def find_valid_pose(mesh_map: MeshMap, pose: Pose, dist_tolerance: float, query: PlaceQuery) -> PoseAnswer:
-    """Nearest pose within ``dist_tolerance`` [m] where the disc fits: the pose itself, else a vertex near it."""
+    """Nearest pose within ``dist_tolerance`` [m] where the disc fits: the pose itself, else a vertex near it.
+
+    Near a pose on the surface only vertices of the same storey count.
+    """
     first = check_pose(mesh_map, pose, query)
     if first.state < CellState.LETHAL:
         return PoseAnswer(first.state, first.cost, pose)
-    distances = np.linalg.norm(mesh_map.vertices - np.array(pose.position), axis=1)
-    free = ~_blocked(mesh_map.snapshot(), np.arange(len(distances), dtype=np.int32))
-    candidates = np.flatnonzero(free & (distances <= dist_tolerance))
-    for vertex in candidates[np.argsort(distances[candidates], kind="stable")]:
+    place = on_surface(mesh_map, pose.position, SURFACE_DISTANCE)
+    everywhere = np.arange(len(mesh_map.vertices), dtype=np.int32)
+    near = everywhere if place is None else _disc(mesh_map, place, dist_tolerance)
+    near = near[~_blocked(mesh_map.snapshot(), near)]
+    distances = np.linalg.norm(mesh_map.vertices[near] - np.array(pose.position), axis=1)
+    order = np.argsort(distances, kind="stable")
+    for vertex in near[order[distances[order] <= dist_tolerance]]:
         x, y, z = mesh_map.vertices[vertex].tolist()
         there = replace(pose, position=(x, y, z))
         answer = check_pose(mesh_map, there, query)

@@ -20,7 +20,7 @@ from mbf_abstract.execution.ticker import Ticker
 from mbf_abstract.geometry import Path as PlannedPath
 from mbf_abstract.map_queries import MapQueries
 from mbf_abstract.map_view import FieldView, MeshView
-from mbf_abstract.parameters import ParameterModel
+from mbf_abstract.parameters import ParameterModel, with_changes
 from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.sensing import RangeScan
@@ -202,6 +202,27 @@ class MeshNavigationServer(AbstractNavigationServer):
             return None
         leads = np.isfinite(fields[0].distances) & fields[0].directions.any(axis=1)
         return FieldView(self.mesh_map.vertices[leads], fields[0].directions[leads])
+
+    # --------------------------------------------------------------------------------------- changes at run time
+    def set_layer_parameters(self, layer: str, /, **changes: Any) -> None:
+        """Change parameters of a layer, all or none; whatever reads the layer follows at once.
+
+        Raises
+        ------
+        ServerError
+            There is no such layer.
+        ValueError
+            A value is not legal (pydantic's ValidationError is one), or the parameter is read once only.
+        """
+        if layer not in self.mesh_map.layers:
+            raise ServerError(f"the mesh map has no layer {layer!r}, only {list(self.mesh_map.layers)}")
+        self.mesh_map.set_layer_parameters(layer, with_changes(self.mesh_map.usual_parameters(layer), changes))
+        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, f"mesh_map.{layer}", **changes)
+
+    def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
+        """Change how much costs lengthen edges; ValueError if it is negative or not finite."""
+        self.mesh_map.set_edge_cost_factor(edge_cost_factor)
+        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "mesh_map", edge_cost_factor=edge_cost_factor)
 
     def map_problem(self) -> str:
         """Name the obstacle layer whose sensor is silent, if there is one."""

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import itertools
 from abc import abstractmethod
+from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,9 +53,22 @@ class SurfacePlanner(MeshPlanner):
     Parameters = SurfacePlannerParameters
     parameters: SurfacePlannerParameters
 
+    way: ClassVar[str] = "along edges"
+    """What a way of this planner consists of, for messages."""
+
     @abstractmethod
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Return the best leg, None if there is none (or the search was cancelled)."""
+
+    def reach(self, query: LegQuery) -> NDArray[np.float32] | None:
+        """Distances (V,) [m] from the query's start to all this planner finds a way to, inf elsewhere; None: cancelled.
+
+        Here: along the edges of free vertices.
+        """
+        distances, _, finished = spread_from(
+            self.mesh_map, query.snapshot, query.blocked, query.start, query.cancel_flag
+        )
+        return distances if finished else None
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Plan from start over the via points to the goal; see ``AbstractPlanner``."""
@@ -141,8 +156,8 @@ class SurfacePlanner(MeshPlanner):
         component = self.mesh_map.components == self.mesh_map.components[nearest_corner(self.mesh_map, start)]
         share = float(np.mean(blocked[component]))
         message = (
-            f"no free way from {position_text(start.point)} to {position_text(goal.point)}: {share:.1%} of the surface "
-            f"between them is lethal or has cost >= {self.parameters.cost_limit:g}"
+            f"no free way {self.way} from {position_text(start.point)} to {position_text(goal.point)}: {share:.1%} of "
+            f"the surface between them is lethal or has cost >= {self.parameters.cost_limit:g}"
         )
         return PlanResult(GetPathOutcome.NO_PATH_FOUND, message)
 
@@ -151,16 +166,17 @@ class SurfacePlanner(MeshPlanner):
     ) -> Leg | None:
         """Leg to the reachable vertex nearest to the goal, if one lies within ``dist_tolerance``."""
         mesh_map = self.mesh_map
-        flag = request.cancel_token.flag
-        distances, _, finished = spread_from(mesh_map, snapshot, blocked, start, flag)
+        last_pose = (request.start, *request.via)[-1]
+        query = LegQuery(start, start, snapshot, blocked, request.cancel_token.flag, last_pose, request.goal)
+        distances = self.reach(query)
+        if distances is None:
+            return None
         offsets = np.linalg.norm(mesh_map.vertices - np.asarray(request.goal.position), axis=1)
         offsets[~np.isfinite(distances)] = np.inf
         vertex = int(np.argmin(offsets))
-        if not finished or offsets[vertex] > request.dist_tolerance:
+        if offsets[vertex] > request.dist_tolerance:
             return None
-        goal = surface_point_at_vertex(mesh_map, vertex)
-        last_pose = (request.start, *request.via)[-1]
-        return self.find_leg(LegQuery(start, goal, snapshot, blocked, flag, last_pose, request.goal))
+        return self.find_leg(replace(query, goal=surface_point_at_vertex(mesh_map, vertex)))
 
     def _assemble(self, legs: list[Leg], goal: Pose, goal_reached_exactly: bool) -> Path:
         positions = np.concatenate([legs[0].positions[:1]] + [leg.positions[1:] for leg in legs])

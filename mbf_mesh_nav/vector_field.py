@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.topology import MeshTopology
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,8 @@ class VectorField:
         Where the field leads to [m].
     map_version : int
         Version of the snapshot it was computed on.
+    topology : MeshTopology
+        The mesh it belongs to; on another one its vectors mean nothing.
     """
 
     directions: NDArray[np.float32]
@@ -37,6 +40,7 @@ class VectorField:
     goal_face: int
     goal: NDArray[np.float64]
     map_version: int
+    topology: MeshTopology
 
     def __post_init__(self) -> None:
         for array in (self.directions, self.distances, self.goal):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,37 +54,16 @@ class WaveSearch:
 
     def spread(self, query: LegQuery, overshoot: float) -> Wave | None:
         """Spread a wave from the goal until it is ``overshoot`` [m] past the start; None: not reached, or cancelled."""
-        mesh_map = self._mesh_map
-        distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal)
-        if len(seeds) == 1:
-            seeds = self._seed_around(query, int(seeds[0]), distances, predecessors)
-        cut_records = np.full(len(distances), -1, dtype=np.int32)
-        corners = mesh_map.faces[query.start.face]
-        if query.snapshot is not self._weighted_for:
-            self._gather_weights(query.snapshot)
-        settled = propagate_wave(
-            mesh_map.vertex_face_offsets,
-            self._corner_ends,
-            self._corner_weights,
-            query.blocked,
-            distances,
-            predecessors,
-            cut_records,
-            seeds,
-            np.ascontiguousarray(corners[~query.blocked[corners]]),
-            max(overshoot, 2.0 * mesh_map.topology.mean_edge_length),
-            self._step,
-            query.cancel_flag,
-        )
-        if settled < 0 or not np.isfinite(distances[corners]).any():
-            return None
-        return Wave(distances, predecessors, cut_records)
+        corners = self._mesh_map.faces[query.start.face]
+        targets = np.ascontiguousarray(corners[~query.blocked[corners]])
+        wave = self._propagated(query, targets, max(overshoot, 2.0 * self._mesh_map.topology.mean_edge_length))
+        return wave if wave is not None and np.isfinite(wave.distances[corners]).any() else None
 
-    def potential(self, query: LegQuery, wave: Wave) -> float:
-        """Cost of the way from the start to the goal [m]."""
-        mesh_map, start = self._mesh_map, query.start
-        corners = mesh_map.faces[start.face]
-        return float(np.min(wave.distances[corners] + np.linalg.norm(mesh_map.vertices[corners] - start.point, axis=1)))
+    def reach(self, query: LegQuery) -> NDArray[np.float32] | None:
+        """Distances (V,) from the start to all that a way over free faces leads to, inf elsewhere; None: cancelled."""
+        from_start = replace(query, start=query.goal, goal=query.start)
+        wave = self._propagated(from_start, np.zeros(0, dtype=np.int32), 0.0)
+        return None if wave is None else wave.distances
 
     def trace(self, query: LegQuery, wave: Wave) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Positions (n, 3) from start to goal down the field, and the face (n,) the way to each of them lies in."""
@@ -122,7 +101,34 @@ class WaveSearch:
         corners = mesh_map.faces[goal.face]
         towards_goal = goal.point - mesh_map.vertices[corners]
         directions[corners] = towards_goal / np.maximum(np.linalg.norm(towards_goal, axis=1, keepdims=True), 1e-9)
-        return VectorField(directions, wave.distances, goal.face, goal.point.copy(), query.snapshot.version)
+        return VectorField(
+            directions, wave.distances, goal.face, goal.point.copy(), query.snapshot.version, mesh_map.topology
+        )
+
+    def _propagated(self, query: LegQuery, targets: NDArray[np.int32], overshoot: float) -> Wave | None:
+        """Run the kernel from the goal of a query; None if cancelled."""
+        mesh_map = self._mesh_map
+        if query.snapshot is not self._weighted_for:
+            self._gather_weights(query.snapshot)
+        distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal)
+        if len(seeds) == 1:
+            seeds = self._seed_around(query, int(seeds[0]), distances, predecessors)
+        cut_records = np.full(len(distances), -1, dtype=np.int32)
+        settled = propagate_wave(
+            mesh_map.vertex_face_offsets,
+            self._corner_ends,
+            self._corner_weights,
+            query.blocked,
+            distances,
+            predecessors,
+            cut_records,
+            seeds,
+            targets,
+            overshoot,
+            self._step,
+            query.cancel_flag,
+        )
+        return None if settled < 0 else Wave(distances, predecessors, cut_records)
 
     def _gather_weights(self, snapshot: MeshSnapshot) -> None:
         self._weighted_for = snapshot

@@ -53,9 +53,11 @@ class VectorFieldController(MeshController):
     _goal: Pose | None = None
 
     def set_plan(self, path: Path) -> bool:
-        """Take over a path that brings its vector fields along; refuse others."""
+        """Take over a path that brings its vector fields along; refuse others, and those of another mesh or frame."""
         fields = path.guidance if isinstance(path.guidance, tuple) else ()
-        if len(path) == 0 or not fields or not all(isinstance(field, VectorField) for field in fields):
+        if len(path) == 0 or path.frame_id != self.mesh_map.frame_id or not fields:
+            return False
+        if not all(isinstance(one, VectorField) and one.topology is self.mesh_map.topology for one in fields):
             return False
         self._goal = path[-1]
         self._fields: tuple[VectorField, ...] = fields

@@ -41,7 +41,7 @@ def search_with_heading(
     goal: NDArray[np.float64],
     goal_heading: int,
     cancel_flag: FlagArray,
-) -> int:
+) -> tuple[int, float]:
     """Relax ``distances`` and ``predecessors`` in place until the best target state is settled.
 
     Parameters
@@ -62,13 +62,15 @@ def search_with_heading(
         Goal vertices and what is left from them to the goal.
     goal : (3,) float64 [m]
     goal_heading : int
-        Turning to it at the goal costs, too; -1 = any heading will do.
+        Turning to it at the goal costs, too, and has to be allowed; -1 = any heading will do.
     cancel_flag : (1,) uint8
 
     Returns
     -------
-    int
+    state : int
         The best target state, -1 if there is none, -2 if cancelled.
+    total : float
+        What the way there costs [m], the rest to the goal and the last turn included.
     """
     state_count = len(distances)
     heap = np.empty(state_count, dtype=np.uint64)
@@ -81,16 +83,16 @@ def search_with_heading(
     settled = 0
     while size > 0 and top_key(heap) < best_total:
         if settled % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
-            return -2
+            return -2, np.inf
         state = Count(top_item(heap))
         size = remove_top(heap, positions, size)
         settled += 1
         vertex, heading = state // HEADINGS, state % HEADINGS
         for i in range(len(targets)):
             if targets[i] == vertex:
-                turn = 0 if goal_heading < 0 else abs(_shortest_turn(heading, goal_heading))
-                total = distances[state] + target_offsets[i] + turning_cost * HEADING_STEP * turn
-                if total < best_total:
+                turn = 0 if goal_heading < 0 else _shortest_turn(heading, goal_heading)
+                total = distances[state] + target_offsets[i] + turning_cost * HEADING_STEP * abs(turn)
+                if total < best_total and _may_turn(allowed, vertex, heading, turn):
                     best_state, best_total = state, total
         for slot in range(neighbour_offsets[vertex], neighbour_offsets[vertex + 1]):
             neighbour, new_heading = neighbours[slot], Count(edge_headings[slot])
@@ -107,7 +109,7 @@ def search_with_heading(
                 predecessors[following] = state
                 key = candidate + straight_line_bound(vertices, Index(neighbour), goal)
                 size = push_or_decrease(heap, positions, size, Index(following), key)
-    return best_state
+    return best_state, best_total
 
 
 @inner_kernel

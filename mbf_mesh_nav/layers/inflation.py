@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import model_validator
 
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.kernels.inflation import finite_rim, forget_dependents, spread
@@ -38,6 +39,15 @@ class InflationParameters(LayerParameters):
     lethal_value: float = parameter(1.0, "Cost of lethal vertices; .inf is the safe choice.", ge=0.0, allow_inf=True)
     inscribed_value: float = parameter(0.99, "Cost up to the inscribed radius.", ge=0.0)
     cost_scaling_factor: float = parameter(1.0, "Rate of the exponential fall-off.", unit="1/m", ge=0.0)
+
+    @model_validator(mode="after")
+    def _reaches_the_robot(self) -> InflationParameters:
+        if self.inflation_radius < self.inscribed_radius:
+            raise ValueError(
+                f"inflation_radius {self.inflation_radius:g} m is less than inscribed_radius "
+                f"{self.inscribed_radius:g} m: ground the robot's body touches would be free"
+            )
+        return self
 
 
 class InflationLayer(MeshLayer):

@@ -10,8 +10,12 @@ wrong side of a vertex, and the taut path stays on it; densify the map (``mesh_m
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mbf_mesh_nav.face_strip import FaceStrip
 from mbf_mesh_nav.leg_search import Leg, LegQuery
+from mbf_mesh_nav.path_cost import cost_along
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.surface_planner import SurfacePlanner
 from mbf_mesh_nav.wave_search import WaveSearch
@@ -20,9 +24,15 @@ from mbf_mesh_nav.wave_search import WaveSearch
 class AnyAnglePlanner(SurfacePlanner):
     """Wave from the goal, descent from the start, shortened by a funnel."""
 
+    way = "over whole faces"
+
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
         self._search = WaveSearch(self.mesh_map)
+
+    def reach(self, query: LegQuery) -> NDArray[np.float32] | None:
+        """As for every planner; here over free faces."""
+        return self._search.reach(query)
 
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Trace the wave's path and pull it taut."""
@@ -32,4 +42,4 @@ class AnyAnglePlanner(SurfacePlanner):
         strip = FaceStrip(self.mesh_map, query.snapshot, query.blocked)
         positions, point_faces = strip.shorten(*self._search.trace(query, wave))
         normals = self.mesh_map.face_normals[point_faces]
-        return Leg(positions, normals, self._search.potential(query, wave))
+        return Leg(positions, normals, cost_along(self.mesh_map, query.snapshot, positions, point_faces))

@@ -9,8 +9,12 @@ Cost: about 0.4 us a vertex nearer than the goal. The C++ original's rule and de
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.leg_search import Leg, LegQuery
+from mbf_mesh_nav.path_cost import cost_along
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.surface_planner import SurfacePlanner, SurfacePlannerParameters
 from mbf_mesh_nav.wave_search import WaveSearch
@@ -27,12 +31,18 @@ class CVPParameters(SurfacePlannerParameters):
 class CVPPlanner(SurfacePlanner):
     """Wave from the goal, descent from the start."""
 
+    way = "over whole faces"
+
     Parameters = CVPParameters
     parameters: CVPParameters
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
         self._search = WaveSearch(self.mesh_map)
+
+    def reach(self, query: LegQuery) -> NDArray[np.float32] | None:
+        """As for every planner; here over free faces."""
+        return self._search.reach(query)
 
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Spread the wave until the robot's face is settled, trace the path, keep the field."""
@@ -41,5 +51,5 @@ class CVPPlanner(SurfacePlanner):
             return None
         positions, point_faces = self._search.trace(query, wave)
         normals = self.mesh_map.face_normals[point_faces]
-        cost = self._search.potential(query, wave)
+        cost = cost_along(self.mesh_map, query.snapshot, positions, point_faces)
         return Leg(positions, normals, cost, self._search.field(query, wave))

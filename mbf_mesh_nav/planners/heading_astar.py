@@ -9,17 +9,25 @@ a cost of roll or turning too high for the map makes it slow. Cost: up to 16 x t
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.parameters import parameter
+from mbf_abstract.plugins import PlanResult
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors
 from mbf_mesh_nav.kernels.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
 from mbf_mesh_nav.layers.tilt import TiltLayer, heading_index
 from mbf_mesh_nav.leg_search import Leg, LegQuery, straight_leg
+from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.surface_planner import SurfacePlanner, SurfacePlannerParameters
-from mbf_mesh_nav.surface_point import corner_distances
+from mbf_mesh_nav.surface_point import corner_distances, nearest_corner
+
+AT_ONE_PLACE = 1e-6
+"""Start and goal this near [m] have no direction between them."""
 
 
 class HeadingAStarParameters(SurfacePlannerParameters):
@@ -38,6 +46,8 @@ class HeadingAStarPlanner(SurfacePlanner):
     Parameters = HeadingAStarParameters
     parameters: HeadingAStarParameters
 
+    _tilt_at_ends = ""
+
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
         mesh_map = self.mesh_map
@@ -49,9 +59,9 @@ class HeadingAStarPlanner(SurfacePlanner):
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Search from the start's corners, with the robot's heading, to the goal's corners."""
         mesh_map = self.mesh_map
-        if query.start.face == query.goal.face:
-            return straight_leg(mesh_map, query)
         allowed, roll = self._tilt()
+        if query.start.face == query.goal.face and self._may_drive_straight(query, allowed):
+            return straight_leg(mesh_map, query)
         distances = np.full(HEADINGS * len(mesh_map.vertices), np.inf, dtype=np.float32)
         predecessors = np.full(len(distances), -1, dtype=np.int32)
         heading = 0 if query.start_pose is None else heading_index(query.start_pose.yaw)
@@ -59,7 +69,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         seeds = corners * np.int32(HEADINGS) + np.int32(heading)
         distances[seeds] = offsets
         targets, target_offsets = corner_distances(mesh_map, query.blocked, query.goal)
-        best = search_with_heading(
+        best, cost = search_with_heading(
             mesh_map.vertices,
             mesh_map.neighbour_offsets,
             mesh_map.neighbours,
@@ -80,12 +90,36 @@ class HeadingAStarPlanner(SurfacePlanner):
             query.cancel_flag,
         )
         if best < 0:
+            self._tilt_at_ends = self._describe_ends(query, allowed)
             return None
         chain = follow_predecessors(predecessors, best)[::-1] // HEADINGS
         positions = np.concatenate([[query.start.point], mesh_map.vertices[chain], [query.goal.point]])
         ends = mesh_map.face_normals[[query.start.face]], mesh_map.face_normals[[query.goal.face]]
         normals = np.concatenate([ends[0], mesh_map.vertex_normals[chain], ends[1]])
-        return Leg(positions, normals, float(distances[best]))
+        return Leg(positions, normals, cost)
+
+    def _no_path(self, start: SurfacePoint, goal: SurfacePoint, blocked: NDArray[np.bool_]) -> PlanResult:
+        """Name the tilt where it, and not a blocked vertex, closes the way."""
+        result = super()._no_path(start, goal, blocked)
+        return replace(result, message=result.message + self._tilt_at_ends)
+
+    def _describe_ends(self, query: LegQuery, allowed: NDArray[np.bool_]) -> str:
+        """Which of the two poses the tilt forbids, else that it may close ways in between."""
+        ends = (("start", query.start, query.start_pose), ("goal", query.goal, query.goal_pose))
+        tilted = [
+            f"; tilt forbids the heading {pose.yaw:.2f} rad at the {name}"
+            for name, point, pose in ends
+            if pose is not None and not allowed[nearest_corner(self.mesh_map, point), heading_index(pose.yaw)]
+        ]
+        return "".join(tilted) or f"; tilt forbids {1.0 - float(allowed.mean()):.1%} of all headings"
+
+    def _may_drive_straight(self, query: LegQuery, allowed: NDArray[np.bool_]) -> bool:
+        """Whether all corners of the face allow the heading of the line to the goal, and those at both ends."""
+        line = query.goal.point - query.start.point
+        poses = [pose.yaw for pose in (query.start_pose, query.goal_pose) if pose is not None]
+        yaws = [*poses, math.atan2(line[1], line[0])] if np.hypot(line[0], line[1]) > AT_ONE_PLACE else poses
+        corners = self.mesh_map.faces[query.goal.face]
+        return all(bool(allowed[corners, heading_index(yaw)].all()) for yaw in yaws)
 
     def _tilt(self) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
         """Allowed headings (V, 16) and roll (V, 16) [rad]: of the tilt layer, or of the vertex normals."""

@@ -1,8 +1,8 @@
 """Be less strict for a while: smaller inflation, wider tolerances of planner and arrival, restored by the clock.
 
 For a robot that finds no way although one is there, say a door narrower than the distance it usually keeps, for a goal
-that is just occupied, or one that cannot be reached exactly. When not: if the configured inscribed radius has no
-margin, the body may touch (leave the inflation alone then, ``layer: ""``); on stale obstacles ``mesh.clear_layers`` is
+that is just occupied, or one that cannot be reached exactly. It opens no way narrower than the robot: a layer's
+inscribed radius shrinks to that of the map at most. When not: on stale obstacles, for which ``mesh.clear_layers`` is
 the cure. The robot does not move: the behaviour returns at once and planning goes on with what is relaxed. Running it
 again meanwhile only prolongs it. Cost: the layer is computed twice, when relaxed and when restored.
 """
@@ -13,9 +13,8 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_abstract.relaxation import Slack
+from mbf_mesh_nav.layers.inflation import InflationParameters
 from mbf_mesh_nav.plugins import MeshRecovery
-
-RADII = ("inscribed_radius", "inflation_radius")
 
 
 class RelaxParameters(PluginParameters):
@@ -62,8 +61,11 @@ class RelaxRecovery(MeshRecovery):
             known = ", ".join(self.mesh_map.layers) or "none"
             return RecoveryResult(RecoveryOutcome.FAILURE, f"the map has no layer '{p.layer}'; its layers are: {known}")
         usual = self.mesh_map.usual_parameters(p.layer)
-        relaxed = {name: p.scale * getattr(usual, name) for name in RADII if hasattr(usual, name)}
-        if not relaxed:
+        if not isinstance(usual, InflationParameters):
             return RecoveryResult(RecoveryOutcome.FAILURE, f"the layer '{p.layer}' has no radius to relax")
+        robot = self.mesh_map.inscribed_radius or usual.inscribed_radius
+        inscribed = min(usual.inscribed_radius, max(p.scale * usual.inscribed_radius, robot))
+        inflation = max(p.scale * usual.inflation_radius, inscribed)
+        relaxed = {"inscribed_radius": inscribed, "inflation_radius": inflation}
         self.mesh_map.set_layer_parameters(p.layer, usual.model_copy(update=relaxed), until=until)
         return f"layer '{p.layer}' with " + ", ".join(f"{name} {value:g} m" for name, value in relaxed.items())

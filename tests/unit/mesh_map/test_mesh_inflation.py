@@ -17,7 +17,8 @@ from mbf_mesh_nav.mesh_map import MeshMap
 def chain(mesh: MeshMap, lethal: np.ndarray, **parameters: float) -> tuple[KeepOutLayer, InflationLayer]:
     source = KeepOutLayer(LayerContext("source", mesh.topology, mesh.locator, KeepOutParameters()))
     source.replace(lethal.astype(np.float32), lethal.copy())
-    settings_ = InflationParameters(**{"inflation_radius": 1.0, **parameters})
+    radius = parameters.get("inflation_radius", 1.0)
+    settings_ = InflationParameters(**{"inflation_radius": 1.0, "inscribed_radius": min(0.25, radius), **parameters})
     inflation = InflationLayer(LayerContext("inflation", mesh.topology, mesh.locator, settings_, (source,)))
     inflation.recompute()
     return source, inflation
@@ -154,3 +155,8 @@ def test_costs_follow_new_parameters_at_run_time():
     _, fresh = chain(mesh, lethal, inflation_radius=0.8, lethal_value=np.inf)
     np.testing.assert_array_equal(layer.costs, fresh.costs)
     assert np.isinf(layer.costs[40])
+
+
+def test_an_inflation_narrower_than_the_robot_is_refused():
+    with pytest.raises(ValueError, match="is less than inscribed_radius 1 m"):
+        InflationParameters(inflation_radius=0.4, inscribed_radius=1.0)

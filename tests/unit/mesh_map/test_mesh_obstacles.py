@@ -212,6 +212,25 @@ def test_changed_inflation_radius_reaches_the_snapshot():
     assert (mesh.snapshot().costs > 0).sum() > reach
 
 
+def test_parameters_a_layer_cannot_take_leave_it_as_it_was():
+    mesh = floor_map()
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+    before, layer = mesh.snapshot(), mesh.layers["inflation"]
+
+    with pytest.raises(TypeError, match="layer 'inflation' takes InflationParameters, got ObstacleParameters"):
+        mesh.set_layer_parameters("inflation", mesh.layers["seen"].parameters, until=5.0)
+
+    assert mesh.snapshot() is before and mesh.usual_parameters("inflation") is layer.parameters
+    mesh.insert_points(post(3.0, 3.0), SENSOR, 2.0)
+    assert (mesh.snapshot().costs > 0).any()
+
+
+@pytest.mark.parametrize("factor", [np.nan, np.inf, -1.0])
+def test_an_edge_cost_factor_that_is_none_is_refused(factor):
+    with pytest.raises(ValueError, match="edge_cost_factor"):
+        floor_map().set_edge_cost_factor(factor)
+
+
 def test_changed_edge_cost_factor_changes_the_weights():
     mesh = floor_map()
     mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)

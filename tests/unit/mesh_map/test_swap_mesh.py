@@ -117,3 +117,28 @@ def test_a_saved_map_has_the_costs_of_its_layers_and_is_a_map_again(navigator, t
         server.save_map("saved.h5")
     server.swap_mesh("saved.h5")
     assert navigator.get_path(Pose.planar(3.0, 3.0), planner="astar").success
+
+
+def test_layer_parameters_change_at_run_time_and_are_an_event(navigator):
+    server = navigator.server
+    server.set_layer_parameters("slopes", threshold=0.4)
+    server.set_edge_cost_factor(0.5)
+    assert server.mesh_map.layers["slopes"].parameters.threshold == 0.4
+    assert server.mesh_map.edge_cost_factor == 0.5
+    told = server.runtime.events.memory.of_kind(EventKind.PARAMETER_CHANGED)
+    assert told[-2].data["threshold"] == 0.4 and told[-1].data["edge_cost_factor"] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("layer", "changes", "error", "text"),
+    [
+        ("slope", {"threshold": 0.4}, ServerError, "no layer 'slope', only.*'slopes'"),
+        ("slopes", {"threshold": "steep"}, ValueError, "threshold"),
+        ("slopes", {"angle": 0.4}, ValueError, "angle"),
+    ],
+)
+def test_a_layer_parameter_that_is_not_legal_changes_nothing(navigator, layer, changes, error, text):
+    before = navigator.server.mesh_map.snapshot()
+    with pytest.raises(error, match=text):
+        navigator.server.set_layer_parameters(layer, **changes)
+    assert navigator.server.mesh_map.snapshot() is before

@@ -158,7 +158,7 @@ def test_distances_on_a_sphere_are_within_the_accepted_percent(shared_data):
     assert (np.abs(distances - exact)[beyond] / exact[beyond]).max() <= 0.0125
 
 
-def test_every_reachable_random_pair_gets_a_path_as_long_as_its_potential(make_plugin, paint):
+def test_every_reachable_random_pair_gets_a_path_as_long_as_its_field_says(make_plugin, paint):
     rng = np.random.default_rng(5)
     x, y = np.meshgrid(np.arange(80), np.arange(80))
     heights = 0.3 * np.sin(x / 5) * np.cos(y / 7) + rng.uniform(0, 0.03, x.shape)
@@ -178,9 +178,15 @@ def test_every_reachable_random_pair_gets_a_path_as_long_as_its_potential(make_p
         result = planner.make_plan(PlanRequest(Pose(tuple(start)), Pose(tuple(goal))))
         assert result.success or "is blocked" in result.message or "no free way" in result.message
         if result.success:
-            ratios.append(result.path.length / result.cost)
-    assert len(ratios) > 250
-    assert np.mean(ratios) < 1.01 and max(ratios) < 1.25
+            spot = mesh_map.locate_one(start)
+            corners = mesh_map.faces[spot.face]
+            ways = result.path.guidance[0].distances[corners] + np.linalg.norm(
+                mesh_map.vertices[corners] - start, axis=1
+            )
+            if ways.min() > 1.0:
+                ratios.append(result.path.length / ways.min())
+    assert len(ratios) > 200
+    assert np.mean(ratios) < 1.01 and max(ratios) < 1.05
 
 
 def test_the_field_points_at_the_goal_everywhere_on_a_plane(make_plugin, plain):

@@ -15,6 +15,13 @@ from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
 
 
+def passed_headings(heading, new):
+    """Headings a robot passes on the short way from one to another, the new one included."""
+    turn = (new - heading) % 16
+    turn = turn if turn <= 8 else turn - 16
+    return [(heading + np.sign(turn) * k) % 16 for k in range(1, abs(turn) + 1)]
+
+
 def slow_search(mesh_map, edge_headings, allowed, roll, roll_cost, turning_cost, start, target, offset, goal_heading):
     """The twin: Dijkstra over (vertex, heading) with heapq."""
     best, queue, total = {start: 0.0}, [(0.0, start)], np.inf
@@ -23,17 +30,16 @@ def slow_search(mesh_map, edge_headings, allowed, roll, roll_cost, turning_cost,
         if cost > best[vertex, heading]:
             continue
         if vertex == target:
-            turn = abs((goal_heading - heading + 8) % 16 - 8)
-            total = min(total, cost + offset + turning_cost * HEADING_STEP * turn)
+            last_turn = passed_headings(heading, goal_heading)
+            if all(allowed[vertex, h] for h in last_turn):
+                total = min(total, cost + offset + turning_cost * HEADING_STEP * len(last_turn))
         for slot in range(mesh_map.neighbour_offsets[vertex], mesh_map.neighbour_offsets[vertex + 1]):
             other, new = int(mesh_map.neighbours[slot]), int(edge_headings[slot])
-            turn = (new - heading) % 16
-            turn = turn if turn <= 8 else turn - 16
-            passed = [(heading + np.sign(turn) * k) % 16 for k in range(1, abs(turn) + 1)]
+            passed = passed_headings(heading, new)
             if not allowed[other, new] or not all(allowed[vertex, h] for h in passed):
                 continue
             drive = mesh_map.neighbour_lengths[slot] * (1 + roll_cost * abs(roll[other, new]))
-            new_cost = cost + drive + turning_cost * HEADING_STEP * abs(turn)
+            new_cost = cost + drive + turning_cost * HEADING_STEP * len(passed)
             if new_cost < best.get((other, new), np.inf):
                 best[other, new] = new_cost
                 heapq.heappush(queue, (new_cost, (other, new)))
@@ -51,18 +57,15 @@ def test_the_search_finds_the_cost_of_the_naive_one(make_plugin, seed):
     start, target, goal_heading = 0, count - 1, int(rng.integers(16))
     distances, predecessors = np.full(16 * count, np.inf, np.float32), np.full(16 * count, -1, np.int32)
     distances[start * HEADINGS + 2] = 0.0
-    state = search_with_heading(
+    state, total = search_with_heading(
         mesh_map.vertices, mesh_map.neighbour_offsets, mesh_map.neighbours, mesh_map.neighbour_lengths, headings,
         np.zeros(count, bool), allowed, roll, 0.7, 0.2, distances, predecessors,
         np.array([start * HEADINGS + 2], np.int32), np.array([target], np.int32), np.full(1, 0.1, np.float32),
         mesh_map.vertices[target], goal_heading, np.zeros(1, np.uint8),
     )  # fmt: skip
     expected = slow_search(mesh_map, headings, allowed, roll, 0.7, 0.2, (start, 2), target, 0.1, goal_heading)
-    if state < 0:
-        assert expected == np.inf
-    else:
-        turn = abs((goal_heading - state % 16 + 8) % 16 - 8)
-        assert distances[state] + 0.1 + 0.2 * HEADING_STEP * turn == pytest.approx(expected, rel=1e-5)
+    assert total == pytest.approx(expected, rel=1e-5)
+    assert (state < 0) == (expected == np.inf)
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +97,16 @@ def test_a_flank_too_steep_to_climb_is_no_path(make_plugin, ridge):
     planner = make_plugin(HeadingAStarPlanner, ridge, max_roll=0.2, max_pitch=0.3)
     result = planner.make_plan(PlanRequest(Pose.planar(2.0, 1.0, 1.57), Pose.planar(2.0, 11.0, 1.57)))
     assert result.outcome == GetPathOutcome.NO_PATH_FOUND
+
+
+@pytest.mark.parametrize(
+    "goal", [Pose.planar(2.0, 4.5, 0.0, z=0.6), Pose.planar(2.02, 4.0, 0.0, z=0.4)], ids=["far", "same-face"]
+)
+def test_a_goal_heading_that_tilts_too_far_is_refused_and_named(make_plugin, ridge, goal):
+    planner = make_plugin(HeadingAStarPlanner, ridge, max_roll=0.2, max_pitch=0.5)
+    result = planner.make_plan(PlanRequest(Pose.planar(2.0, 4.0, 1.57, z=0.4), goal))
+    assert result.outcome == GetPathOutcome.NO_PATH_FOUND
+    assert "tilt forbids the heading 0.00 rad at the goal" in result.message
 
 
 def test_turning_costs_make_paths_with_fewer_turns(make_plugin, hills):

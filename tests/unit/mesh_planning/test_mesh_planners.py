@@ -5,6 +5,7 @@ import pytest
 
 from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose
+from mbf_abstract.map_queries import PlaceQuery
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_mesh_nav.mesh_map import MeshMap
@@ -14,6 +15,7 @@ from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
 from mbf_mesh_nav.planners.repairing import RepairingPlanner
+from mbf_mesh_nav.pose_checks import find_valid_pose
 
 PLANNERS = [DijkstraPlanner, AStarPlanner, CVPPlanner, RepairingPlanner, AnyAnglePlanner, HeadingAStarPlanner]
 
@@ -157,3 +159,48 @@ def test_costs_move_the_path_aside(planner_class, make_plugin, plain, paint):
     assert np.abs(direct.path.positions[:, 1] - 3).max() < 0.3
     assert np.abs(aside.path.positions[:, 1] - 3).max() > 0.5
     assert aside.cost > direct.cost
+
+
+@pytest.mark.parametrize("edge_cost_factor", [0.0, 2.0])
+def test_the_cost_of_a_plan_is_its_length_and_what_the_map_collects_along_it(
+    planner_class, make_plugin, plain, paint, edge_cost_factor
+):
+    mesh_map = paint(plain(), lambda v: 0.1 * v[:, 0], edge_cost_factor)
+    planner = make_plugin(
+        planner_class, mesh_map, **({"turning_cost": 0.0} if "Heading" in planner_class.__name__ else {})
+    )
+    for start, goal in [
+        ((1.0, 1.0), (1.0, 1.0)),
+        ((1.02, 1.02), (1.05, 1.03)),
+        ((1.1, 1.1), (1.2, 1.2)),
+        ((1, 1), (5, 4)),
+    ]:
+        result = planner.make_plan(PlanRequest(Pose.planar(*start), Pose.planar(*goal)))
+        points = np.linspace(result.path.positions[:-1], result.path.positions[1:], 101)
+        means = 1.0 + edge_cost_factor * 0.1 * points[:, :, 0].mean(axis=0)
+        lengths = np.linalg.norm(np.diff(result.path.positions, axis=0), axis=1)
+        straight_ends = 0.3 * edge_cost_factor * 0.4  # planners on edges count the steps within the end faces bare
+        assert result.cost == pytest.approx(lengths @ means, abs=straight_ends + 1e-5)
+
+
+def test_the_tolerance_finds_what_the_planner_itself_can_reach(planner_class, make_plugin, plain, paint):
+    # A lethal disc around the goal with a spit of single free vertices into it: no way over whole faces.
+    def costs(vertices):
+        in_disc = np.hypot(vertices[:, 0] - 4.0, vertices[:, 1] - 3.0) < 1.1
+        spit = (np.abs(vertices[:, 1] - 3.0) < 0.05) & (vertices[:, 0] < 3.9)
+        return np.where(in_disc & ~spit, np.inf, 0.0)
+
+    planner = make_plugin(planner_class, paint(plain(), costs))
+    request = PlanRequest(Pose.planar(1.0, 3.0), Pose.planar(4.0, 3.0), dist_tolerance=1.5)
+    result = planner.make_plan(request)
+    assert result.success, result.message
+    assert np.linalg.norm(result.path.positions[-1] - [4.0, 3.0, 0.0]) <= 1.5
+
+
+def test_a_place_for_the_robot_is_looked_for_on_its_own_storey_only(plain, paint):
+    floor = plain(3.0, 3.0)
+    storeys = [floor.vertices, floor.vertices + np.array([0.0, 0.0, 1.2])]
+    mesh_map = MeshMap.from_arrays(np.vstack(storeys), np.vstack([floor.faces, floor.faces + len(floor.vertices)]))
+    paint(mesh_map, lambda v: np.where(v[:, 2] > 1.0, np.inf, 0.0))
+    below, above = (find_valid_pose(mesh_map, Pose.planar(1.5, 1.5, z=z), 2.0, PlaceQuery()) for z in (0.0, 1.2))
+    assert below.pose is not None and above.pose is None
