@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 
 from mbf_mesh_nav.checked_mesh import CheckedMesh, FloatArray, IntArray
 from mbf_mesh_nav.kernels.defects import (
-    face_area_vectors,
+    face_shapes,
     faces_without_area,
     repeated_faces,
     surplus_faces,
@@ -197,15 +197,15 @@ class _Check:
 
     def winding(self, mesh: CheckedMesh) -> CheckedMesh:
         across = faces_across_edges(mesh.faces, *self.incidence(mesh))
-        areas = face_area_vectors(mesh.vertices, mesh.faces)
-        flips, patches, contradictions = winding_flips(mesh.faces, across, areas[:, 3])
+        shapes = face_shapes(mesh.vertices, mesh.faces)
+        flips, patches, contradictions = winding_flips(mesh.faces, across, shapes[:, 3])
         text = "{count} faces are wound against their neighbours"
         if contradictions:
             text += f", and {contradictions} edges of a one-sided surface cannot agree"
         self.found("flipped_winding", text, mesh.face_source[flips])
         if flips.any():
             mesh = replace(mesh, faces=np.where(flips[:, None], mesh.faces[:, ::-1], mesh.faces))
-        return self.facing_down(mesh, np.where(flips, -areas[:, 2], areas[:, 2]), areas[:, 3], patches)
+        return self.facing_down(mesh, np.where(flips, -shapes[:, 2], shapes[:, 2]), shapes[:, 3], patches)
 
     def facing_down(self, mesh: CheckedMesh, upward: FloatArray, areas: FloatArray, patches: IntArray) -> CheckedMesh:
         sizes = np.bincount(patches, areas)

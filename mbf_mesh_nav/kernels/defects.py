@@ -13,21 +13,31 @@ BoolArray = NDArray[np.bool_]
 
 
 @kernel
-def faces_without_area(vertices: FloatArray, faces: IntArray, tolerance: float) -> BoolArray:
-    """Mask (F,) of faces whose doubled area is at most ``tolerance`` times their longest edge squared."""
-    flat = np.zeros(faces.shape[0], dtype=np.bool_)
+def face_shapes(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Area vector (x, y, z), area and longest edge squared of every face, (F, 5) [m^2].
+
+    The vector points where the face looks.
+    """
+    shapes = np.zeros((faces.shape[0], 5))
     for face in range(faces.shape[0]):
         a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
         ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
         wx, wy, wz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
         nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        longest = max(
+        shapes[face, 0], shapes[face, 1], shapes[face, 2] = 0.5 * nx, 0.5 * ny, 0.5 * nz
+        shapes[face, 3] = 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
+        shapes[face, 4] = max(
             ux * ux + uy * uy + uz * uz,
             wx * wx + wy * wy + wz * wz,
             (ux - wx) ** 2 + (uy - wy) ** 2 + (uz - wz) ** 2,
         )
-        flat[face] = np.sqrt(nx * nx + ny * ny + nz * nz) <= tolerance * longest
-    return flat
+    return shapes
+
+
+def faces_without_area(vertices: FloatArray, faces: IntArray, tolerance: float) -> BoolArray:
+    """Mask (F,) of faces whose doubled area is at most ``tolerance`` times their longest edge squared."""
+    shapes = face_shapes(vertices, faces)
+    return np.asarray(2.0 * shapes[:, 3] <= tolerance * shapes[:, 4])
 
 
 @kernel
@@ -127,17 +137,3 @@ def winding_flips(faces: IntArray, face_neighbours: IntArray, areas: FloatArray)
                 flip[patch[index]] = not flip[patch[index]]
         patch_count += 1
     return flip, patches, contradictions
-
-
-@kernel
-def face_area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Area vectors (x, y, z) and areas of faces, (F, 4) [m^2]; the vector points where the face looks."""
-    areas = np.zeros((faces.shape[0], 4))
-    for face in range(faces.shape[0]):
-        a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
-        ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
-        wx, wy, wz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
-        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        areas[face, 0], areas[face, 1], areas[face, 2] = 0.5 * nx, 0.5 * ny, 0.5 * nz
-        areas[face, 3] = 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
-    return areas
