@@ -1,7 +1,7 @@
 """Keep-out: regions the robot must not enter, as polygons on the map.
 
-When to use: stairs, flower beds, areas closed by rule rather than by shape. When not: moving obstacles. A region
-narrower than the mesh's edges may contain no vertex: densify the mesh.
+When to use: stairs, flower beds, areas closed by rule rather than by shape. When not: moving obstacles. Where a region
+is narrower than the mesh's edges, the ends of the edges that cross it are closed too; a denser mesh keeps it narrower.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ class KeepOutLayer(MeshLayer):
     parameters: KeepOutParameters
 
     def compute(self) -> tuple[CostArray, LethalArray]:
-        """Cost 1 and lethal inside any region, else 0."""
-        lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)
+        """Cost 1 and lethal inside any region and at what closes it between vertices, else 0."""
+        mesh = self.topology
+        lethal = np.zeros(mesh.vertex_count, dtype=np.bool_)
         for region in self.parameters.regions:
-            lethal |= region.mask(self.topology.vertices)
+            lethal |= region.closed_mask(mesh.vertices, mesh.edges, mesh.faces)
         return lethal.astype(np.float32), lethal

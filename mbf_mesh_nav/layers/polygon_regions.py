@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from pydantic import field_validator
+from pydantic import field_validator, model_validator
 
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.kernels.polygons import inside_polygon
-from mbf_mesh_nav.layer import FloatArray, LethalArray
+from mbf_mesh_nav.layer import FloatArray, IntArray, LethalArray
 
 
 class Region(ParameterModel):
@@ -24,7 +24,53 @@ class Region(ParameterModel):
             raise ValueError(f"a polygon needs at least 3 corners, got {len(polygon)}")
         return polygon
 
+    @model_validator(mode="after")
+    def _has_a_height(self) -> Region:
+        if self.z_min > self.z_max:
+            raise ValueError(f"z_min {self.z_min:g} m is above z_max {self.z_max:g} m: the region is empty")
+        return self
+
     def mask(self, vertices: FloatArray) -> LethalArray:
         """Mask (V,) of the vertices (V, 3) inside, corners on the outline included by the even-odd rule."""
         inside = inside_polygon(vertices, np.array(self.polygon, dtype=np.float64))
-        return np.asarray(inside & (vertices[:, 2] >= self.z_min) & (vertices[:, 2] <= self.z_max))
+        return np.asarray(inside & self._within_heights(vertices))
+
+    def closed_mask(self, vertices: FloatArray, edges: IntArray, faces: IntArray) -> LethalArray:
+        """Like ``mask``, and what closes the region between vertices: no edge between others passes through it.
+
+        Both ends of an edge (E, 2) that crosses the outline without an end inside are added, and the corners of a face
+        (F, 3) that has a corner of the polygon in its middle.
+        """
+        mask = self.mask(vertices)
+        outline = np.array(self.polygon, dtype=np.float64)
+        low, high = outline.min(axis=0), outline.max(axis=0)
+        flat, at_height = vertices[:, :2], self._within_heights(vertices)
+        outside = edges[~mask[edges].any(axis=1) & at_height[edges].any(axis=1)]
+        ends = flat[outside]
+        outside = outside[((ends.max(axis=1) >= low) & (ends.min(axis=1) <= high)).all(axis=1)]
+        for begin, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+            crossing = _segments_cross(flat[outside[:, 0]], flat[outside[:, 1]], begin, end)
+            mask[outside[crossing].ravel()] = True
+        around = faces[~mask[faces].any(axis=1) & at_height[faces].any(axis=1)]
+        for corner in outline:
+            a, b, c = (flat[around[:, k]] for k in range(3))
+            sides = [_side_of(p, q, corner) for p, q in ((a, b), (b, c), (c, a))]
+            covers = np.all([side > 0.0 for side in sides], axis=0) | np.all([side < 0.0 for side in sides], axis=0)
+            mask[around[covers].ravel()] = True
+        return mask
+
+    def _within_heights(self, vertices: FloatArray) -> LethalArray:
+        return np.asarray((vertices[:, 2] >= self.z_min) & (vertices[:, 2] <= self.z_max))
+
+
+def _side_of(p: FloatArray, q: FloatArray, point: FloatArray) -> FloatArray:
+    """Positive where a point lies to the left of the line from p to q, all (..., 2)."""
+    along, to_point = q - p, point - p
+    return np.asarray(along[..., 0] * to_point[..., 1] - along[..., 1] * to_point[..., 0])
+
+
+def _segments_cross(p: FloatArray, q: FloatArray, begin: FloatArray, end: FloatArray) -> LethalArray:
+    """Which of the segments pq (n, 2) cross the one from ``begin`` to ``end`` (2,); to touch it is not enough."""
+    across = _side_of(p, q, begin) * _side_of(p, q, end) < 0.0
+    along = _side_of(begin, end, p) * _side_of(begin, end, q) < 0.0
+    return np.asarray(across & along)

@@ -17,6 +17,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import model_validator
 
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.kernels.footprint_settling import settle_footprints, wheel_directions
@@ -42,6 +43,15 @@ class TiltParameters(LayerParameters):
     needed_headings: float = parameter(
         0.0, "Least share of headings that must be allowed; 0 = any one, 1 = all of them.", ge=0.0, le=1.0
     )
+
+    @model_validator(mode="after")
+    def _stands_on_its_wheels(self) -> TiltParameters:
+        if abs(self.center_of_mass_x) >= self.wheelbase / 2.0:
+            raise ValueError(
+                f"center_of_mass_x {self.center_of_mass_x:g} m is not between the wheels of a wheelbase of "
+                f"{self.wheelbase:g} m: the robot would tip over on flat ground"
+            )
+        return self
 
 
 class TiltLayer(MeshLayer):

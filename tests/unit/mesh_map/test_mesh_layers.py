@@ -184,3 +184,36 @@ def test_layers_do_not_depend_on_scale_and_offset(scale, offset):
         np.testing.assert_allclose(
             moved.to_input_order(found.costs), plain.to_input_order(expected.costs) * unit, rtol=1e-4, atol=1e-9
         )
+
+
+def crosses(p, q, a, b):
+    """Whether two segments share a point that is an end of neither."""
+    side = lambda u, v, w: np.sign((v[0] - u[0]) * (w[1] - u[1]) - (v[1] - u[1]) * (w[0] - u[0]))  # noqa: E731
+    return side(p, q, a) * side(p, q, b) < 0 and side(a, b, p) * side(a, b, q) < 0
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10**6), width=st.floats(0.001, 0.6))
+def test_no_free_edge_leads_through_a_keep_out_region_however_narrow(seed, width):
+    rng = np.random.default_rng(seed)
+    mesh = MeshMap.from_heights(np.zeros((12, 12)), 0.25, 0.25)
+    begin, end = rng.uniform(0.3, 2.4, (2, 2))
+    aside = np.array([begin[1] - end[1], end[0] - begin[0]]) / np.linalg.norm(end - begin) * width / 2.0
+    outline = [begin + aside, end + aside, end - aside, begin - aside]
+    layer = computed(mesh, KeepOutLayer, regions=[{"polygon": [tuple(corner) for corner in outline]}])
+    sides = list(zip(outline, [*outline[1:], outline[0]], strict=True))
+    assert layer.lethal.any()
+    for p, q in mesh.edges[~layer.lethal[mesh.edges].any(axis=1)]:
+        assert not any(crosses(mesh.vertices[p], mesh.vertices[q], a, b) for a, b in sides)
+
+
+def test_a_keep_out_region_inside_one_face_closes_that_face():
+    mesh = MeshMap.from_heights(np.zeros((3, 3)), 1.0, 1.0)
+    layer = computed(mesh, KeepOutLayer, regions=[{"polygon": [(0.2, 0.2), (0.3, 0.2), (0.25, 0.3)]}])
+    closed = mesh.faces[mesh.locate([[0.25, 0.23, 0.0]]).faces[0]]
+    assert set(np.flatnonzero(layer.lethal)) == set(closed.tolist())
+
+
+def test_a_region_whose_heights_are_exchanged_is_refused():
+    with pytest.raises(ValueError, match="z_min 2 m is above z_max 1 m"):
+        KeepOutLayer.Parameters(regions=[{"polygon": ((0, 0), (1, 0), (0, 1)), "z_min": 2.0, "z_max": 1.0}])

@@ -159,3 +159,8 @@ def test_the_share_of_headings_that_is_needed_decides_what_is_lethal_and_what_it
     assert (half.costs[middle] > any_one.costs[middle]).all()
     worst = np.arctan(np.tan(0.4)) / 0.45  # straight up uses most of the limits
     assert half.costs[middle] == pytest.approx(worst, abs=1e-4)
+
+
+def test_a_centre_of_mass_beyond_the_wheels_is_refused():
+    with pytest.raises(ValueError, match="would tip over on flat ground"):
+        TiltLayer.Parameters(wheelbase=0.5, center_of_mass_x=-0.25)
