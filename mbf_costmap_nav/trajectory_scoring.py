@@ -28,7 +28,12 @@ def build_critics(weights: CriticParameters) -> Mapping[str, Critic]:
 
 
 def roll_out(
-    cycle: ControlCycle, velocities: Float32Array, dt: float, reach: float, poses: Float32Array | None = None
+    cycle: ControlCycle,
+    velocities: Float32Array,
+    dt: float,
+    reach: float,
+    poses: Float32Array | None = None,
+    turning_radius: float = 0.0,
 ) -> Rollouts:
     """Integrate velocities (3, steps, samples) and lay out the path ahead for the critics.
 
@@ -40,6 +45,8 @@ def roll_out(
         Length of a step [s].
     reach : float
         Farthest a sample can get [m]; the path is laid out a little beyond, but not past a change of direction.
+    turning_radius : float
+        Of the tightest curve the velocities hold [m]; 0 = they may turn on the spot.
     """
     pose, tracker = cycle.request.pose, cycle.tracker
     to_cusp = tracker.to_cusp if tracker.to_cusp > CUSP_REACHED else tracker.remaining
@@ -61,6 +68,7 @@ def roll_out(
         cycle.costmap,
         (pose.x, pose.y),
         footprint_discs(cycle.footprint.footprint),
+        turning_radius,
     )
 
 

@@ -68,8 +68,8 @@ class DwaController(PathFollower):
 
     @property
     def full_speed(self) -> float:
-        """Largest forward speed [m/s]."""
-        return self.parameters.max_vel_x
+        """Largest speed in any direction [m/s]."""
+        return max(self.parameters.max_vel_x, self.parameters.max_vel_y)
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """Sample, roll out, score, and take the cheapest arc that the full footprint can drive."""
@@ -98,20 +98,28 @@ class DwaController(PathFollower):
         change = np.array([p.acc_lim_x, p.acc_lim_y, p.acc_lim_theta], dtype=np.float32) * np.float32(p.sim_step)
         limit = np.full(3, np.inf, dtype=np.float32)
         measured = np.array([now.vx, now.vy, now.wz], dtype=np.float32)
-        clip_velocities(velocities, measured, -limit, limit, change, 0.0)
+        clip_velocities(velocities, measured, -limit, limit, change, 0.0, np.inf)
         return velocities
 
     def _window(self, cycle: ControlCycle) -> FloatArray:
         """Velocities (n, 3) the robot can reach within the window time."""
         p, now = self.parameters, cycle.request.velocity
-        slowest, fastest = max(p.min_vel_x, -cycle.speed_limit), cycle.speed_limit
+        slowest, fastest = max(p.min_vel_x, -cycle.speed_limit), min(p.max_vel_x, cycle.speed_limit)
         vx = sample_window(now.vx, slowest, fastest, p.acc_lim_x * p.window_time, p.vx_samples)
         vy = np.zeros(1)
         if p.max_vel_y > 0.0:
             sideways = min(p.max_vel_y, cycle.speed_limit)
             vy = sample_window(now.vy, -sideways, sideways, p.acc_lim_y * p.window_time, p.vy_samples)
         wz = sample_window(now.wz, -p.max_vel_theta, p.max_vel_theta, p.acc_lim_theta * p.window_time, p.vtheta_samples)
-        return np.stack(np.meshgrid(vx, vy, wz, indexing="ij"), axis=-1).reshape(-1, 3)
+        window = np.stack(np.meshgrid(vx, vy, wz, indexing="ij"), axis=-1).reshape(-1, 3)
+        return slowed_down(window, cycle.speed_limit)
+
+
+def slowed_down(velocities: FloatArray, top_speed: float) -> FloatArray:
+    """Velocities (n, 3) whose (vx, vy) is shortened to ``top_speed`` [m/s] where it is longer."""
+    speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+    shares = np.divide(top_speed, speeds, out=np.ones_like(speeds), where=speeds > top_speed)
+    return np.asarray(velocities * np.column_stack([shares, shares, np.ones_like(shares)]))
 
 
 def sample_velocities(low: float, high: float, count: int) -> FloatArray:

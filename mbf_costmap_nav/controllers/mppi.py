@@ -107,8 +107,9 @@ class MppiController(PathFollower):
 
     @property
     def full_speed(self) -> float:
-        """Largest forward speed [m/s]."""
-        return self.parameters.vx_max
+        """Largest speed in any direction [m/s]."""
+        p = self.parameters
+        return max(p.vx_max, p.vy_max) if p.motion_model == "omni" else p.vx_max
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: sample around the nominal sequence, score, average, check, shift."""
@@ -139,7 +140,7 @@ class MppiController(PathFollower):
         add_noise(self._nominal, noise, self._deviation, velocities)
         self._clip(cycle, velocities)
         reach = p.vx_max * p.model_dt * p.time_steps
-        rollouts = roll_out(cycle, velocities, p.model_dt, reach, self._poses)
+        rollouts = roll_out(cycle, velocities, p.model_dt, reach, self._poses, self._radius)
         costs = score(self._critics, rollouts, cycle.tracker.driving_backward)
         if rollouts.collided.all():
             return None
@@ -161,7 +162,7 @@ class MppiController(PathFollower):
         now = np.array([measured.vx, measured.vy, measured.wz], dtype=np.float32)
         limit = np.array([cycle.speed_limit, cycle.speed_limit, np.inf], dtype=np.float32)
         low, high = np.maximum(self._low, -limit), np.minimum(self._high, limit)
-        clip_velocities(velocities, now, low, high, self._change, self._radius)
+        clip_velocities(velocities, now, low, high, self._change, self._radius, cycle.speed_limit)
 
     def _control_cost(self, velocities: Float32Array) -> Float32Array:
         """(samples,) price of the first step's distance from the nominal one, per variance (Williams 2018, eq. 29)."""

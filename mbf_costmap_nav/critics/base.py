@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry import normalize_angle
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_costmap_nav.costmap import Costmap
 from mbf_costmap_nav.kernels.critics import furthest_reached
 
 Float32Array = NDArray[np.float32]
+
+AHEAD = 4
+"""How many path points beyond the furthest reached one the robot should look at."""
+FACING = 0.785
+"""Angle [rad] to that point below which the robot faces the path."""
 
 
 class CriticParameters(ParameterModel):
@@ -55,6 +62,8 @@ class Rollouts:
         The robot's position [m] in the map, to look cells up.
     discs : (k,) float32
         Offsets [m] along the robot's x axis of the discs of its inscribed radius that stand for its footprint.
+    turning_radius : float
+        Of the tightest curve [m]; 0 = the robot turns on the spot.
     collided : (samples,) bool
         Set by the obstacle critic.
     """
@@ -70,6 +79,7 @@ class Rollouts:
     costmap: Costmap
     robot: tuple[float, float]
     discs: Float32Array
+    turning_radius: float = 0.0
     collided: NDArray[np.bool_] = field(init=False)
     furthest: int = field(init=False)
 
@@ -81,6 +91,17 @@ class Rollouts:
     def samples(self) -> int:
         """Number of trajectories."""
         return int(self.poses.shape[2])
+
+    @property
+    def direction_ahead(self) -> float:
+        """Direction [rad] from the robot to the path point it should look at."""
+        x, y = self.path[min(max(self.furthest, AHEAD) + AHEAD, len(self.path) - 1)].tolist()
+        return math.atan2(y, x)
+
+    @property
+    def faces_path(self) -> bool:
+        """Whether the robot roughly looks along its path."""
+        return abs(normalize_angle(self.direction_ahead - float(self.poses[2, 0, 0]))) < FACING
 
 
 class Critic(ABC):

@@ -15,6 +15,18 @@ Float32Array = NDArray[np.float32]
 
 
 @kernel
+def _slow_down(velocities: Float32Array, top_speed: np.float32) -> None:
+    """Shorten (vx, vy) of velocities (3, steps, samples) to ``top_speed`` [m/s] where they are longer."""
+    for t in range(velocities.shape[1]):
+        forward, left = velocities[0, t], velocities[1, t]
+        for n in range(velocities.shape[2]):
+            speed = np.sqrt(forward[n] * forward[n] + left[n] * left[n])
+            if speed > top_speed:
+                forward[n] *= top_speed / speed
+                left[n] *= top_speed / speed
+
+
+@kernel
 def clip_velocities(
     velocities: Float32Array,
     now: Float32Array,
@@ -22,8 +34,9 @@ def clip_velocities(
     high: Float32Array,
     change: Float32Array,
     min_turning_radius: float,
+    top_speed: float,
 ) -> None:
-    """Limit velocities (3, steps, samples: vx, vy, wz) in place by range, by change per step, by turning radius.
+    """Limit velocities (3, steps, samples: vx, vy, wz) in place: range, change per step, turning radius, speed.
 
     Parameters
     ----------
@@ -33,6 +46,9 @@ def clip_velocities(
         Range of each component and its largest change from step to step.
     min_turning_radius : float
         abs(wz) is at most abs(vx) / radius [m]; 0 = can turn in place.
+    top_speed : float
+        Limit [m/s] of the length of (vx, vy), which keeps its direction; looked at where the robot can go sideways.
+        The change per step then holds for its length, not for each component.
     """
     _, steps, samples = velocities.shape
     per_radius = np.float32(1.0 / min_turning_radius) if min_turning_radius > 0.0 else np.float32(0.0)
@@ -53,6 +69,8 @@ def clip_velocities(
                 value = lowest if value < lowest else value
                 row[n] = value
                 last[n] = value
+    if low[1] != high[1]:
+        _slow_down(velocities, np.float32(top_speed))
     if per_radius > 0.0:
         for t in range(steps):
             forward, turn = velocities[0, t], velocities[2, t]

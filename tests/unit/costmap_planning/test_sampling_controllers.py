@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
-from mbf_costmap_nav.controllers.dwa import DwaController, sample_velocities, sample_window
+from mbf_costmap_nav.controllers.dwa import DwaController, sample_velocities, sample_window, slowed_down
 from mbf_costmap_nav.controllers.mppi import MppiController
 from mbf_costmap_nav.costmap import Costmap
 from mbf_costmap_nav.critics.obstacle import VALUE_OF_COST
@@ -45,17 +45,33 @@ def test_integrated_poses_equal_step_by_step_rotation(seed, yaw):
 
 
 @settings(max_examples=20, deadline=None)
-@given(seed=seeds, radius=st.sampled_from([0.0, 0.5]))
-def test_clipped_velocities_keep_all_limits(seed, radius):
+@given(seed=seeds, radius=st.sampled_from([0.0, 0.5]), top_speed=st.sampled_from([0.45, math.inf]))
+def test_clipped_velocities_keep_all_limits(seed, radius, top_speed):
     velocities = random_velocities(seed, spread=3.0)
     now, low, high = np.zeros(3), np.array([-0.3, -0.2, -1.0]), np.array([0.5, 0.2, 1.0])
     change = np.array([0.15, 0.15, 0.2])
-    clip_velocities(velocities, *(a.astype(np.float32) for a in (now, low, high, change)), radius)
+    clip_velocities(velocities, *(a.astype(np.float32) for a in (now, low, high, change)), radius, top_speed)
     steps = np.diff(np.concatenate([np.zeros((3, 1, 7)), velocities], axis=1), axis=1)
     assert (velocities >= low[:, None, None] - 1e-6).all() and (velocities <= high[:, None, None] + 1e-6).all()
-    assert (abs(steps[:2]) <= change[:2, None, None] + 1e-6).all()
+    if top_speed == math.inf:
+        assert (abs(steps[:2]) <= change[:2, None, None] + 1e-6).all()
+    assert np.hypot(steps[0], steps[1]).max() <= np.hypot(*change[:2]) + 1e-6
+    assert np.hypot(velocities[0], velocities[1]).max() <= top_speed + 1e-6
     if radius:
         assert (abs(velocities[2]) * radius <= abs(velocities[0]) + 1e-6).all()
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds, top_speed=st.floats(0.0, 2.0))
+def test_a_velocity_above_the_speed_limit_keeps_its_direction(seed, top_speed):
+    given_ones = random_velocities(seed).reshape(3, -1).T.astype(float)
+    for vx, vy, wz in given_ones:
+        speed = math.hypot(vx, vy)
+        share = min(1.0, top_speed / speed)
+        assert slowed_down(np.array([[vx, vy, wz]]), top_speed)[0] == pytest.approx((share * vx, share * vy, wz))
+    clipped, wide = random_velocities(seed), np.full(3, 1e3, dtype=np.float32)
+    clip_velocities(clipped, np.zeros(3, dtype=np.float32), -wide, wide, wide, 0.0, top_speed)
+    assert clipped.reshape(3, -1).T == pytest.approx(slowed_down(given_ones, top_speed), abs=1e-5)
 
 
 def test_noise_is_scaled_and_added_to_the_nominal_sequence():
@@ -261,3 +277,36 @@ def test_a_differential_robot_never_moves_sideways(make_plugin):
     for _ in range(5):
         command = controller.compute_velocity_commands(ControlRequest(Pose.planar(0, 0), Twist())).command
         assert command.vy == 0.0
+
+
+@pytest.mark.parametrize("radius", [1.0, 2.0])
+@pytest.mark.parametrize("off", [math.pi / 4, math.pi / 2], ids=["45 degrees", "90 degrees"])
+def test_a_car_that_looks_away_from_its_path_turns_onto_it(make_plugin, closed_loop, radius, off):
+    controller = make_plugin(
+        MppiController, FREE_MAP, motion_model="ackermann", min_turning_radius=radius, batch_size=1000
+    )
+    path = Path.from_points([(x, 0.0, 0.0) for x in np.linspace(-3.0, 3.0, 121)])
+    robot, outcome, _ = closed_loop.follow(
+        controller, path, FREE_MAP, start=(-3.0, 0.0, off), seconds=35.0, dist_tolerance=0.2, angle_tolerance=0.3
+    )
+    assert outcome == 0, f"ended at {robot.state}"
+
+
+@pytest.mark.parametrize(
+    ("controller_class", "parameters"),
+    [(MppiController, {"motion_model": "omni", "batch_size": 500}), (DwaController, {"max_vel_y": 0.5})],
+    ids=["mppi", "dwa"],
+)
+def test_an_omnidirectional_robot_keeps_the_speed_limit_on_a_slant_too(
+    make_plugin, closed_loop, monkeypatch, controller_class, parameters
+):
+    controller = make_plugin(controller_class, FREE_MAP, **parameters)
+    monkeypatch.setattr(controller.costmap, "speed_limit", lambda x, y, full: min(full, 0.3))
+    path = Path.from_points([(x, x, 0.0) for x in np.linspace(0, 3, 61)], Pose.planar(0, 0, 0).orientation)
+    controller.set_plan(path)
+    robot, speeds = closed_loop.robot(0.0, 0.0, 0.0), []
+    for _ in range(60):
+        command = controller.compute_velocity_commands(ControlRequest(robot.pose(), robot.velocity())).command
+        speeds.append(math.hypot(command.vx, command.vy))
+        robot.drive(command)
+    assert 0.25 < max(speeds) <= 0.3 + 1e-6
