@@ -53,6 +53,12 @@ class FootprintCheck:
         cells, inside = costmap.world_to_cells(points)
         return int(np.count_nonzero(costmap.cells[cells[inside, 1], cells[inside, 0]] == LETHAL))
 
+    def outside_count(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
+        """Number of covering points off the map."""
+        c, s = math.cos(yaw), math.sin(yaw)
+        points = self.samples @ np.array([[c, s], [-s, c]]) + (x, y)
+        return int(np.count_nonzero(~costmap.world_to_cells(points)[1]))
+
     def first_collision(self, costmap: Costmap, poses: FloatArray) -> int:
         """Index of the first colliding pose of (n, 3) poses (x, y, yaw), or -1."""
         return int(

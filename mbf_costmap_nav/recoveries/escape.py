@@ -4,8 +4,9 @@ When to use: the planner answers BLOCKED_START or a controller COLLISION because
 lethal or inscribed. When not: the marks are ghosts; clear the costmap first. It stops (IMPASSABLE) where neither
 direction is better than staying.
 
-Rule: among forward, back and both turns, each tried over ``probe_distance``, take the one with the fewest covered
-lethal points and then the lowest cost at the centre; repeat until the centre is below ``free_cost``.
+Rule: among forward, back and both turns, each tried over ``probe_distance``, take the one with the fewest covering
+points of the footprint on lethal cells or off the map, and then the lowest cost at the centre; repeat until the centre
+is below ``free_cost``. An unknown cell there is free, as nothing is known to be hit; outside the map is not.
 """
 
 from __future__ import annotations
@@ -16,8 +17,12 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+from mbf_costmap_nav.costmap import UNKNOWN
 from mbf_costmap_nav.footprint_check import FootprintCheck, arc_poses
 from mbf_costmap_nav.guarded_motion import GuardedMotionParameters, GuardedRecovery
+
+OFF_MAP = 256
+"""Cost of a centre outside the map: more than that of any cell."""
 
 
 class EscapeParameters(GuardedMotionParameters):
@@ -53,9 +58,11 @@ class EscapeRecovery(GuardedRecovery):
         result = self.drive(request, velocity, finished)
         moved = start.distance_to(request.motion.pose())
         if stuck:
-            return RecoveryResult(
-                RecoveryOutcome.IMPASSABLE, f"no motion leads out of the collision, moved {moved:.2f} m"
-            )
+            touched, cost = self._badness(request.motion.pose(), Twist())
+            state = f"{touched} points of the footprint touch obstacles or lie off the map"
+            centre = "lies off the map" if cost == OFF_MAP else f"costs {cost}"
+            text = f"no motion leads out of the collision, moved {moved:.2f} m: {state}, the centre {centre}"
+            return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
         return RecoveryResult(result.outcome, f"{result.message or 'free'}, moved {moved:.2f} m")
 
     def _motions(self) -> list[Twist]:
@@ -66,9 +73,13 @@ class EscapeRecovery(GuardedRecovery):
         return motions
 
     def _badness(self, pose: Pose, motion: Twist) -> tuple[int, int]:
-        """Covered lethal points and cost of the centre after the probe distance; staying is judged where it is."""
+        """Points in collision and cost of the centre after the probe distance; staying is judged where it is."""
         costmap, pose = self.costmap.snapshot(), self.on_map(pose)
         check = FootprintCheck(self.costmap.footprint, costmap.resolution)
         duration = self.parameters.probe_distance / self.parameters.speed if motion != Twist() else 1e-3
         x, y, yaw = arc_poses((pose.x, pose.y, pose.yaw), motion.vx, 0.0, motion.wz, duration, duration)[-1].tolist()
-        return check.lethal_count(costmap, x, y, yaw), costmap.cost_at(x, y) or 0
+        touched = check.lethal_count(costmap, x, y, yaw) + check.outside_count(costmap, x, y, yaw)
+        cost = costmap.cost_at(x, y)
+        if cost == UNKNOWN:
+            return touched, self.parameters.free_cost - 1
+        return touched, OFF_MAP if cost is None else cost

@@ -1,12 +1,14 @@
 """Move away from the nearest obstacle: straight for an omnidirectional robot, else forward or back.
 
 When to use: the robot is not in a collision but so near to an obstacle that turning or planning fails. When not:
-between two obstacles at equal distance; it ends as soon as the clearance no longer grows.
+between two obstacles at equal distance. It ends (IMPASSABLE) as soon as a cell further on the clearance would not be
+larger than the largest so far.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -16,10 +18,11 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_costmap_nav.costmap import LETHAL
+from mbf_costmap_nav.footprint_check import arc_poses
 from mbf_costmap_nav.guarded_motion import GuardedMotionParameters, GuardedRecovery
 
 LEAST_GAIN = 0.2
-"""Metres of clearance a metre of motion must bring; below this the robot slides along the obstacle and stops."""
+"""Metres of clearance a metre of motion must bring; with less the robot slides along an obstacle or nears another."""
 
 
 class MoveAwayParameters(GuardedMotionParameters):
@@ -38,14 +41,17 @@ class MoveAwayRecovery(GuardedRecovery):
 
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Move until the clearance is reached or cannot be improved."""
-        stuck = False
+        stuck, best, probe = False, 0.0, self.costmap.snapshot().resolution
 
         def velocity(pose: Pose) -> Twist:
-            nonlocal stuck
+            nonlocal stuck, best
             offset = self._nearest_obstacle(pose)
-            command = self._away(offset)
-            gain = -(command.vx * offset[0] + command.vy * offset[1]) / max(math.hypot(*offset), 1e-6)
-            stuck = gain < LEAST_GAIN * self.parameters.speed
+            best, command = max(best, math.hypot(*offset)), self._away(offset)
+            duration = probe / self.parameters.speed
+            at = (pose.x, pose.y, pose.yaw)
+            x, y, _ = arc_poses(at, command.vx, command.vy, 0.0, duration, duration)[-1].tolist()
+            there = replace(pose, position=(x, y, pose.z))
+            stuck = math.hypot(*self._nearest_obstacle(there)) < best + LEAST_GAIN * probe
             return Twist() if stuck else command
 
         def finished(pose: Pose) -> bool:

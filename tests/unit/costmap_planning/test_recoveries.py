@@ -178,3 +178,37 @@ def test_move_away_sideways_needs_an_omnidirectional_robot(run):
     assert result.outcome == RecoveryOutcome.IMPASSABLE
     result, robot, _ = run(MoveAwayRecovery, wall, omnidirectional=True)
     assert result.success and robot.state[1] < -0.2
+
+
+def uniform(cost):
+    """5 m x 5 m at 0.05 m of one cost, around the origin."""
+    return Costmap(np.full((100, 100), cost, dtype=np.uint8), 0.05, -2.5, -2.5)
+
+
+def test_escape_does_not_take_the_end_of_the_map_for_a_way_out(run):
+    for cost in (253, 254):
+        result, robot, _ = run(EscapeRecovery, uniform(cost), start=(2.4, 0.0, 0.0))
+        assert result.outcome == RecoveryOutcome.IMPASSABLE
+        assert robot.state[0] < 2.5
+
+
+def test_escape_comes_back_onto_the_map(run):
+    result, robot, _ = run(EscapeRecovery, uniform(0), start=(2.6, 0.0, 0.0))
+    assert result.success and robot.state[0] + 0.2 < 2.5
+    result, _, _ = run(EscapeRecovery, uniform(0), start=(4.0, 0.0, 0.0))
+    assert result.outcome == RecoveryOutcome.IMPASSABLE and "off the map" in result.message
+
+
+@pytest.mark.parametrize("free_cost", [100, 253])
+def test_escape_sees_no_collision_on_unknown_ground(run, free_cost):
+    result, robot, _ = run(EscapeRecovery, uniform(255), free_cost=free_cost)
+    assert result.success and robot.state.tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("x", [-0.08, 0.0, 0.03])
+@pytest.mark.parametrize("yaw", [0.0, 0.3])
+def test_move_away_ends_between_two_obstacles_where_the_clearance_is_best(run, x, yaw):
+    walls = around((-0.55, -2.0, -0.5, 2.0), (0.5, -2.0, 0.55, 2.0))
+    result, robot, plugin = run(MoveAwayRecovery, walls, start=(x, 0.0, yaw), clearance=0.8)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE and "cannot move away" in result.message
+    assert abs(robot.state[0]) < 0.05 and plugin.clock.now() < 3.0
