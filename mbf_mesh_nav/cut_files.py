@@ -2,8 +2,8 @@
 
 A download that broke off, a full disk: the file is there, its text is legal up to its end, and the robot drives on
 half a map. PLY and OFF say in their header how much is to come, a binary STL too, a text STL ends with a word. OBJ
-says nothing of the kind: a cut one cannot be told from a whole one. Binary PLY, glTF and DAE need no check, their
-readers notice.
+says nothing of the kind: a cut one is told from a whole one only if its last line is too short. Binary PLY, glTF and
+DAE need no check, their readers notice.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import BinaryIO
 from mbf_mesh_nav.mesh_report import MeshError
 
 MAX_HEADER_LINES = 10_000
+LONGEST_LINE = 4096
 STL_HEADER_BYTES, STL_FACE_BYTES = 84, 50
 
 
@@ -29,7 +30,8 @@ def refuse_cut_file(path: Path) -> None:
     ValueError
         The header has no numbers where they belong.
     """
-    check = {".ply": _check_ply, ".off": _check_off, ".stl": _check_stl}.get(path.suffix.lower())
+    checks = {".ply": _check_ply, ".off": _check_off, ".stl": _check_stl, ".obj": _check_obj}
+    check = checks.get(path.suffix.lower())
     if check is not None:
         with path.open("rb") as file:
             check(path, file)
@@ -91,10 +93,18 @@ def _check_stl(path: Path, file: BinaryIO) -> None:
     expected = int.from_bytes(head[80:], "little")
     if len(head) == STL_HEADER_BYTES and size >= STL_HEADER_BYTES + STL_FACE_BYTES * expected:
         return
-    if not head.lstrip().lower().startswith(b"solid"):
-        found = max(size - STL_HEADER_BYTES, 0) // STL_FACE_BYTES
+    # Some binary files begin with "solid", too, but zeros follow, which no text has.
+    if head.lstrip().lower().startswith(b"solid") and b"\0" not in head + file.read(STL_FACE_BYTES):
+        file.seek(0)
+        _check_text_stl(path, file)
+    elif len(head) < STL_HEADER_BYTES:
+        raise MeshError(str(path), [f"the file is cut off after {size} bytes, within its header"])
+    else:
+        found = (size - STL_HEADER_BYTES) // STL_FACE_BYTES
         raise MeshError(str(path), [f"the file is cut off: expected {expected} faces, found {found}"])
-    file.seek(0)
+
+
+def _check_text_stl(path: Path, file: BinaryIO) -> None:
     begun = ended = 0
     last = b""
     for line in (line for line in file if line.strip()):
@@ -104,3 +114,12 @@ def _check_stl(path: Path, file: BinaryIO) -> None:
     if last != b"endsolid":
         text = f"the file is cut off: {begun} faces begin and {ended} end, and there is no endsolid after them"
         raise MeshError(str(path), [text])
+
+
+def _check_obj(path: Path, file: BinaryIO) -> None:
+    file.seek(max(os.fstat(file.fileno()).st_size - LONGEST_LINE, 0))
+    last = file.read().rpartition(b"\n")[2]
+    words = last.split()
+    if words[:1] in ([b"v"], [b"f"]) and len(words) < 4:
+        text = last.decode(errors="replace")
+        raise MeshError(str(path), [f"the file is cut off: its last line is '{text}', expected three numbers or more"])

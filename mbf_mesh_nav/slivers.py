@@ -19,7 +19,7 @@ from mbf_mesh_nav.kernels.topology import faces_across_edges, faces_of_vertices
 
 SAME_POINT_SHARE = 1e-9
 """Corners of a face without area closer than this, in lengths of its longest edge, are one point."""
-MAX_PASSES = 1000
+MAX_PASSES = 300
 """A pass flips once at a vertex, so a fan of slivers takes as many passes as it has faces."""
 
 

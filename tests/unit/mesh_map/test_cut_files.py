@@ -54,6 +54,28 @@ def test_a_text_stl_without_its_end_is_refused(tmp_path):
         read_mesh(file)
 
 
+def test_a_binary_stl_that_calls_itself_solid_is_counted_like_any_other(tmp_path):
+    file, content = tmp_path / "cut.stl", b"solid" + exported("stl")[5:]
+    file.write_bytes(content)
+    assert len(read_mesh(file)[1]) == len(FACES)
+    file.write_bytes(content[: len(content) // 2])
+    with pytest.raises(MeshError, match="expected 198 faces, found 98"):
+        read_mesh(file)
+    file.write_bytes(content[:40])
+    with pytest.raises(MeshError, match="after 40 bytes, within its header"):
+        read_mesh(file)
+
+
+@pytest.mark.parametrize("last", ["f 1 2", "f", "v 0.5 0"])
+def test_an_obj_that_ends_within_a_line_is_refused(tmp_path, last):
+    file = tmp_path / "cut.obj"
+    file.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n" + last)
+    with pytest.raises(MeshError, match=f"its last line is '{last}'"):
+        read_mesh(file)
+    file.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3")
+    assert len(read_mesh(file)[1]) == 1
+
+
 def test_missing_squares_are_missed_although_squares_make_two_faces_each(tmp_path):
     file = tmp_path / "squares.off"
     file.write_text(QUADS)
