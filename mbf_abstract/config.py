@@ -263,10 +263,26 @@ class _Validation:
         parameters = validate(plugin_class.Parameters, block, self.document, (declared.name,), self.findings)
         if parameters is None:
             return
+        self._inner_plugins(plugin_class, parameters, (declared.name,))
         options = declared.model_dump(exclude=set(PluginDeclaration.model_fields))
         line, name = self.document.line(path), declared.name
         spec = PluginSpec(kind, name, declared.type, plugin_class, parameters, options, line, declared.optional)
         self.plugins.append(spec)
+
+    def _inner_plugins(self, plugin_class: type[Plugin], parameters: PluginParameters, path: KeyPath) -> None:
+        """Check the plugins that stand in the block of another one, by the same registry and the same rules."""
+        for inner in plugin_class.inner_plugins:
+            type_name, block_path = getattr(parameters, inner.type_key), (*path, inner.block_key)
+            try:
+                inner_class = cast("type[Plugin]", self.registry.load(inner.kind, type_name))
+            except PluginError as error:
+                expected = f"a type of {inner.kind.value} that loads"
+                self._report((*path, inner.type_key), expected, repr(type_name), error.reason)
+                continue
+            block = getattr(parameters, inner.block_key)
+            checked = validate(inner_class.Parameters, block, self.document, block_path, self.findings)
+            if checked is not None:
+                self._inner_plugins(inner_class, checked, block_path)
 
     def _unknown_keys(self) -> None:
         known = [*_OWN_KEYS, *NavigationParameters.model_fields, *self.sections, *self.lines_of_names]

@@ -71,11 +71,29 @@ class PluginContext:
     relaxation: Relaxation = field(default_factory=Relaxation, kw_only=True)
 
 
+@dataclass(frozen=True)
+class InnerPlugin:
+    """A plugin that another one constructs and calls, as its parameters name it.
+
+    Attributes
+    ----------
+    kind : PluginKind
+    type_key, block_key : str
+        Parameters of the outer plugin that hold the type and the parameter block of the inner one.
+    """
+
+    kind: PluginKind
+    type_key: str
+    block_key: str
+
+
 class Plugin(ABC):
     """Common base of the four interfaces."""
 
     Parameters: ClassVar[type[PluginParameters]] = PluginParameters
     parameters: PluginParameters
+    inner_plugins: ClassVar[tuple[InnerPlugin, ...]] = ()
+    """What a configuration is checked for beside ``Parameters``: types that load, and legal blocks for them."""
     modelled_compute_time: float = 0.0
     """Seconds of virtual time one call of the main method is made to take on a SimClock."""
 

@@ -3,13 +3,13 @@
 When to use: controllers that start a path with a wide arc or back up (MPPI, DWA) on robots that can turn in place in
 tight rooms. When not: ``costmap.regulated_pure_pursuit``, which turns by itself, and car-like robots.
 
-The inner controller is constructed here, on the same context, from its own parameter block:
-``inner_type: "module:Class"`` and ``inner: {...}``; there is no reference to another configured plugin.
+The inner controller is constructed here, on the same context, from its own parameter block: ``inner_type`` is a type as
+in the list of controllers, ``inner: {...}`` its parameters; both are checked with the rest of the configuration. There
+is no reference to another configured plugin.
 """
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -17,17 +17,19 @@ from typing import Any, ClassVar
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult, InnerPlugin, PluginKind
+from mbf_abstract.registry import PluginRegistry
 from mbf_costmap_nav.footprint_check import arc_poses
+from mbf_costmap_nav.nav_core import wrap_nav_core
 from mbf_costmap_nav.path_handling import ControlCycle, PathFollower, to_base_frame
-from mbf_costmap_nav.plugins import CostmapContext, CostmapController
+from mbf_costmap_nav.plugins import CostmapContext
 
 
 class RotationShimParameters(PluginParameters):
     """Parameters of ``costmap.rotation_shim``."""
 
     inner_type: str = parameter(
-        "mbf_costmap_nav.controllers.mppi:MppiController", "Class of the controller that drives.", dynamic=False
+        "mppi", "Type of the controller that drives, as in the list of controllers.", dynamic=False
     )
     inner: dict[str, Any] = parameter({}, "Parameters of that controller.", dynamic=False)
     angular_dist_threshold: float = parameter(
@@ -45,13 +47,17 @@ class RotationShimController(PathFollower):
 
     Parameters: ClassVar[type[PluginParameters]] = RotationShimParameters
     parameters: RotationShimParameters
+    inner_plugins = (InnerPlugin(PluginKind.CONTROLLER, "inner_type", "inner"),)
 
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)
-        module, _, name = self.parameters.inner_type.partition(":")
-        inner_class: type[CostmapController] = getattr(importlib.import_module(module), name)
+        # What a configuration may name, its validation has checked by the server's registry.
+        registry = PluginRegistry("costmap", adapters=(wrap_nav_core,))
+        inner_class: Any = registry.load(PluginKind.CONTROLLER, self.parameters.inner_type)
         parameters = inner_class.Parameters.model_validate(self.parameters.inner)
-        self._inner = inner_class(replace(context, name=f"{self.name}.inner", parameters=parameters))
+        self._inner: AbstractController = inner_class(
+            replace(context, name=f"{self.name}.inner", parameters=parameters)
+        )
         self._aligning = False
 
     def set_plan(self, path: Path) -> bool:

@@ -8,9 +8,12 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.cancel import CancelToken
+from mbf_abstract.findings import ConfigError
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
+from mbf_abstract.registry import PluginError
+from mbf_abstract.server_factory import read_config
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
 from mbf_costmap_nav.costmap import Costmap
 from mbf_costmap_nav.kernels.line_cells import cost_along
@@ -136,3 +139,61 @@ def test_the_shim_aligns_again_for_a_new_path(shim):
 def test_the_shim_refuses_unknown_parameters_of_the_inner_controller(make_plugin):
     with pytest.raises(ValueError, match="no_such"):
         make_plugin(RotationShimController, FREE, inner={"no_such": 1})
+
+
+SHIM_CONFIG = """\
+backend: costmap
+controllers:
+  - {name: shim, type: rotation_shim}
+global_costmap: {}
+local_costmap: {}
+"""
+
+
+def findings_of(tmp_path, text):
+    """Line, key and text of all findings of a configuration."""
+    file = tmp_path / "nav.yaml"
+    file.write_text(SHIM_CONFIG + text)
+    try:
+        read_config(file)
+    except ConfigError as error:
+        return [(finding.line, finding.key, finding.text) for finding in error.findings]
+    return []
+
+
+@pytest.mark.parametrize("name", ["dwa", "costmap.dwa", "mbf_costmap_nav.controllers.dwa:DwaController"])
+def test_the_shim_takes_every_type_that_the_list_of_controllers_takes(make_plugin, tmp_path, name):
+    assert findings_of(tmp_path, f'shim:\n  inner_type: "{name}"\n  inner: {{max_vel_x: 0.3}}\n') == []
+    shim = make_plugin(RotationShimController, FREE, inner_type=name, inner={"max_vel_x": 0.3})
+    shim.set_plan(CORNER)
+    assert 0.0 < command_at(shim, 0.0).vx <= 0.3
+
+
+@pytest.mark.parametrize(
+    ("inner_type", "text"),
+    [
+        ("mbf_costmap_nav.planners.astar:AStarPlanner", "is no AbstractController"),
+        ("mbf_costmap_nav.controllers.mppi:Nope", "import failed"),
+        ("mpi", "did you mean 'mppi'"),
+    ],
+)
+def test_an_inner_type_that_is_no_controller_is_a_finding_with_its_line(make_plugin, tmp_path, inner_type, text):
+    ((line, key, message),) = findings_of(tmp_path, f'shim:\n  rotate_vel: 1.0\n  inner_type: "{inner_type}"\n')
+    assert (line, key) == (8, "shim.inner_type") and text in message
+    with pytest.raises(PluginError, match=text):
+        make_plugin(RotationShimController, FREE, inner_type=inner_type)
+
+
+def test_the_inner_block_is_checked_like_any_other(tmp_path):
+    ((line, key, message),) = findings_of(tmp_path, "shim:\n  inner:\n    vx_maxx: 1.0\n")
+    assert (line, key) == (8, "shim.inner.vx_maxx") and "did you mean 'vx_max'" in message
+    nested = "shim:\n  inner_type: rotation_shim\n  inner: {inner_type: dwa, inner: {max_vel_x: -1.0}}\n"
+    assert [key for _, key, _ in findings_of(tmp_path, nested)] == ["shim.inner.inner.max_vel_x"]
+
+
+def test_the_shim_is_no_way_around_the_refusal_of_module_types(tmp_path):
+    name = "mbf_costmap_nav.controllers.dwa:DwaController"
+    text = f'shim:\n  inner_type: "{name}"\nallow_module_types: false\n'
+    ((line, key, message),) = findings_of(tmp_path, text)
+    assert (line, key) == (7, "shim.inner_type") and "switched off" in message
+    assert findings_of(tmp_path, "allow_module_types: false\n") == []
