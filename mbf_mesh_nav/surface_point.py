@@ -52,8 +52,8 @@ def on_surface(
 ) -> SurfacePoint | None:
     """Return the surface point of a position at most ``reach`` [m] above or below it, None also past a border."""
     point = mesh_map.locate_one(position, reach)
-    if point is None:
-        return None
+    if point is None or point.distance <= BORDER_SLACK or min(point.barycentric.tolist()) > ON_EDGE:
+        return point  # too near, or inside a face: not past a border
     place = np.asarray(position, dtype=np.float64)[None]
     location = Location(
         np.array([point.face], dtype=np.int32), point.barycentric[None], point.point[None], np.array([point.distance])
