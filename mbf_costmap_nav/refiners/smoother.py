@@ -3,9 +3,10 @@
 When to use: behind a grid planner (A*, Theta*), before a controller that follows exactly. When not: paths of
 ``costmap.hybrid_astar``, which are drivable already - smoothing ignores headings and would break their curvature.
 
-The end poses stay. A path that drives backward somewhere is handed back unchanged. With ``max_curvature`` the pull to
-the original path is lowered until the largest curvature of the path is below it; if that fails the outcome is FAILURE
-and the message names the place.
+The end poses stay, and so do the heights along the path. A path in another frame than the costmap's is smoothed there
+and handed back in its own. A path that drives backward somewhere is handed back unchanged. With ``max_curvature`` the
+pull to the original path is lowered until the largest curvature of the path is below it; if that fails, or if the path
+runs through lethal cells before and after, the outcome is FAILURE and the message names the place.
 
 Formula: the gradient smoother of Dolgov et al. 2010 without its Voronoi term, with a hard limit of the cost instead.
 """
@@ -22,9 +23,10 @@ from mbf_abstract.geometry import Path
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RefineResult
-from mbf_costmap_nav.costmap import Costmap
+from mbf_abstract.transforms import TransformError
+from mbf_costmap_nav.costmap import LETHAL, Costmap
 from mbf_costmap_nav.kernels.smoothing import relax_path
-from mbf_costmap_nav.path_geometry import resample
+from mbf_costmap_nav.path_geometry import arc_lengths, resample
 from mbf_costmap_nav.path_handling import PathTracker
 from mbf_costmap_nav.plugins import CostmapRefiner
 
@@ -33,6 +35,8 @@ FloatArray = NDArray[np.float64]
 SOFTER = 0.25
 """Each further attempt for the curvature multiplies the pull to the original path by this."""
 ATTEMPTS = 6
+LETHAL_STEP = 0.1
+"""Distance [cells] of the places at which the result is looked up."""
 
 
 class SmootherParameters(PluginParameters):
@@ -57,29 +61,52 @@ class SmootherRefiner(CostmapRefiner):
 
     def apply_refinement(self, path: Path, cancel_token: CancelToken) -> RefineResult:
         """Smooth between the ends of the path."""
-        p = self.parameters
-        costmap = self.costmap.snapshot()
         if len(path) < 2:
             return RefineResult(RefinePathOutcome.SUCCESS, "nothing to smooth", path)
-        if not costmap.world_to_cells(path.positions)[1].all():
-            return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path leaves {costmap}")
         if PathTracker(path).reverse.any():
-            return RefineResult(
-                RefinePathOutcome.SUCCESS, "the path drives backward somewhere and is left as it is", path
-            )
-        points = resample(path.positions[:, :2], p.spacing)
+            text = "the path drives backward somewhere and is left as it is"
+            return RefineResult(RefinePathOutcome.SUCCESS, text, path)
+        costmap = self.costmap.snapshot()
+        try:
+            T_costmap_path = self.transforms.lookup(costmap.frame_id, path.frame_id)
+        except TransformError as error:
+            return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path cannot be laid on the costmap: {error}")
+        there = T_costmap_path.apply_to_path(path)
+        if not costmap.world_to_cells(there.positions)[1].all():
+            return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path leaves {costmap}")
+        points = resample(there.positions[:, :2], self.parameters.spacing)
+        smoothed = self._drivable(costmap, points, cancel_token)
+        if isinstance(smoothed, RefineResult):
+            return smoothed
+        heights = np.interp(arc_lengths(points), arc_lengths(there.positions[:, :2]), there.positions[:, 2])
+        flat = Path.from_points(np.column_stack([smoothed, np.zeros(len(smoothed))]))
+        positions = np.column_stack([smoothed, heights])
+        refined = T_costmap_path.inverse().apply_to_path(
+            Path(positions, flat.orientations, costmap.frame_id, path.stamp)
+        )
+        return RefineResult(RefinePathOutcome.SUCCESS, "", _with_ends_of(path, refined))
+
+    def _drivable(self, costmap: Costmap, points: FloatArray, token: CancelToken) -> FloatArray | RefineResult:
+        """Smoothed points (n, 2) [m] below the largest curvature and off lethal cells, or what is wrong."""
+        p = self.parameters
         data_weight = p.data_weight
         for _ in range(ATTEMPTS):
-            smoothed = self._smooth(costmap, points, data_weight, cancel_token)
-            if cancel_token.cancelled:
-                return RefineResult(RefinePathOutcome.CANCELED, cancel_token.reason)
+            smoothed = self._smooth(costmap, points, data_weight, token)
+            if token.cancelled:
+                return RefineResult(RefinePathOutcome.CANCELED, token.reason)
             curvature = curvatures(smoothed)
             if p.max_curvature == 0.0 or curvature.max() <= p.max_curvature:
-                return RefineResult(RefinePathOutcome.SUCCESS, "", self._path(path, smoothed))
+                break
             data_weight *= SOFTER
-        worst = int(np.argmax(curvature))
-        x, y = smoothed[worst]
-        text = f"curvature {curvature[worst]:.2f} 1/m at ({x:.2f}, {y:.2f}) stays above the limit {p.max_curvature:.2f}"
+        else:
+            worst = int(np.argmax(curvature))
+            place = f"{curvature[worst]:.2f} 1/m at ({smoothed[worst, 0]:.2f}, {smoothed[worst, 1]:.2f})"
+            text = f"curvature {place} stays above the limit {p.max_curvature:.2f}"
+            return RefineResult(RefinePathOutcome.FAILURE, text)
+        lethal = first_lethal(costmap, smoothed)
+        if lethal is None:
+            return smoothed
+        text = f"the path runs through a lethal cell at ({lethal[0]:.2f}, {lethal[1]:.2f}), smoothed or not"
         return RefineResult(RefinePathOutcome.FAILURE, text)
 
     def _smooth(self, costmap: Costmap, points: FloatArray, data_weight: float, token: CancelToken) -> FloatArray:
@@ -97,14 +124,23 @@ class SmootherRefiner(CostmapRefiner):
         )
         return np.asarray(cells * costmap.resolution + origin)
 
-    def _path(self, path: Path, smoothed: FloatArray) -> Path:
-        """Poses along the smoothed points; the first and last orientation of the given path stay."""
-        assert path.orientations is not None
-        flat = Path.from_points(np.column_stack([smoothed, np.zeros(len(smoothed))]))
-        assert flat.orientations is not None
-        orientations = flat.orientations.copy()
-        orientations[0], orientations[-1] = path.orientations[0], path.orientations[-1]
-        return Path(flat.positions, orientations, path.frame_id, path.stamp)
+
+def _with_ends_of(path: Path, refined: Path) -> Path:
+    """Give a refined path exactly the first and the last pose of the given one."""
+    assert path.orientations is not None and refined.orientations is not None
+    positions, orientations = refined.positions.copy(), refined.orientations.copy()
+    positions[[0, -1]], orientations[[0, -1]] = path.positions[[0, -1]], path.orientations[[0, -1]]
+    return Path(positions, orientations, path.frame_id, path.stamp)
+
+
+def first_lethal(costmap: Costmap, points: FloatArray) -> FloatArray | None:
+    """First place (2,) [m] of a polyline on a lethal cell; a corner that a line only touches does not count."""
+    fine = resample(points, LETHAL_STEP * costmap.resolution)
+    middles = 0.5 * (fine[1:] + fine[:-1])
+    cells, inside = costmap.world_to_cells(middles)
+    middles, cells = middles[inside], cells[inside]
+    hits = np.flatnonzero(costmap.cells[cells[:, 1], cells[:, 0]] == LETHAL)
+    return middles[hits[0]] if hits.size else None
 
 
 def curvatures(points: FloatArray) -> FloatArray:

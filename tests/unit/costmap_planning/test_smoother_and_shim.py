@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 from mbf_abstract.cancel import CancelToken
 from mbf_abstract.findings import ConfigError
-from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry import Path, Pose, Twist, quaternion_from_yaw
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_abstract.registry import PluginError
 from mbf_abstract.server_factory import read_config
+from mbf_abstract.transforms import Transform, TransformBuffer
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
 from mbf_costmap_nav.costmap import Costmap
 from mbf_costmap_nav.kernels.line_cells import cost_along
@@ -110,6 +111,47 @@ def test_a_path_with_reversing_is_left_alone(make_plugin):
     positions = np.array([[1, 1, 0], [2, 1, 0], [3, 1, 0], [2, 1, 0], [1, 1, 0]], dtype=float)
     path = Path(positions)
     assert smooth(make_plugin(SmootherRefiner, FREE), path).path is path
+
+
+def test_the_smoothed_path_keeps_its_heights(make_plugin):
+    path = Path.from_points([(1, 1, 5.0), (3, 1, 5.0), (3, 4, 6.5)])
+    heights = smooth(make_plugin(SmootherRefiner, FREE), path).path.positions[:, 2]
+    assert (heights[0], heights[-1]) == (5.0, 6.5)
+    assert heights.min() == 5.0 and (np.diff(heights) >= 0.0).all() and 0.0 < np.diff(heights).max() < 0.06
+
+
+@pytest.mark.parametrize("at", [(0.0, 0.0, 0.0), (100.0, -3.0, 0.0)])
+def test_a_path_in_another_frame_is_smoothed_on_the_map_and_handed_back_in_its_own(make_plugin, room, at):
+    plan = make_plugin(AStarPlanner, room).make_plan(PlanRequest(Pose.planar(1, 1), Pose.planar(7, 1, 1.0)))
+    T_map_far = Transform(at, quaternion_from_yaw(math.pi / 2), "map", "far", static=True)
+    transforms = TransformBuffer()
+    transforms.set(T_map_far)
+    smoother = make_plugin(SmootherRefiner, room, transforms=transforms)
+    expected, result = smooth(smoother, plan.path), smooth(smoother, T_map_far.inverse().apply_to_path(plan.path))
+    assert result.success and result.path.frame_id == "far"
+    back = T_map_far.apply_to_path(result.path)
+    assert back.positions == pytest.approx(expected.path.positions, abs=1e-9)
+    assert [p.yaw for p in back] == pytest.approx([p.yaw for p in expected.path], abs=1e-6)
+
+
+def test_a_path_in_a_frame_that_nobody_knows_is_refused(make_plugin):
+    path = Path.from_points([(1, 1, 0), (4, 1, 0)], frame_id="nowhere")
+    result = smooth(make_plugin(SmootherRefiner, FREE), path)
+    assert result.outcome == RefinePathOutcome.MAP_ERROR and "nowhere" in result.message
+
+
+def test_a_path_through_a_wall_is_a_failure_that_says_where(make_plugin):
+    cells = np.zeros((100, 100), dtype=np.uint8)
+    cells[:, 50] = 254
+    result = smooth(make_plugin(SmootherRefiner, cells, resolution=0.1), Path.from_points([(1, 3, 0), (9, 3, 0)]))
+    assert result.outcome == RefinePathOutcome.FAILURE and "lethal cell at (5.0" in result.message
+
+
+def test_a_line_that_only_touches_the_corners_of_lethal_cells_is_no_failure(make_plugin):
+    cells = np.zeros((10, 10), dtype=np.uint8)
+    cells[3, 4] = cells[4, 3] = 254
+    path = Path.from_points([(0.35, 0.35, 0), (0.45, 0.45, 0)])
+    assert smooth(make_plugin(SmootherRefiner, cells, resolution=0.1), path).success
 
 
 @pytest.fixture
