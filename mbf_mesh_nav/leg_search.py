@@ -132,10 +132,10 @@ def vertex_path_leg(
     chain = follow_predecessors(predecessors, int(corners[best]))
     if not rooted_at_goal:
         chain = chain[::-1]
-    positions = np.concatenate([[start.point], mesh_map.vertices[chain], [goal.point]])
-    normals = np.concatenate(
-        [mesh_map.face_normals[[start.face]], mesh_map.vertex_normals[chain], mesh_map.face_normals[[goal.face]]]
-    )
+    positions, normals = np.empty((len(chain) + 2, 3)), np.empty((len(chain) + 2, 3))
+    positions[0], positions[1:-1], positions[-1] = start.point, mesh_map.vertices.take(chain, axis=0), goal.point
+    normals[1:-1] = mesh_map.vertex_normals.take(chain, axis=0)
+    normals[0], normals[-1] = mesh_map.face_normals[start.face], mesh_map.face_normals[goal.face]
     return Leg(positions, normals, float(totals[best]))
 
 

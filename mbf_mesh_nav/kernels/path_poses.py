@@ -9,7 +9,7 @@ import numpy as np
 from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import BoolArray
 from mbf_mesh_nav.kernels.surface_walk import tangent
-from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, difference, norm, row
+from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, difference, dot, row
 
 
 @kernel
@@ -23,12 +23,14 @@ def distinct_points(positions: Float64Array, tolerance: float) -> BoolArray:
     tolerance : float
         Distance [m].
     """
-    last = len(positions) - 1
+    last, limit = len(positions) - 1, tolerance * tolerance
     keep = np.ones(len(positions), dtype=np.bool_)
+    end, before = row(positions, last), row(positions, 0)
     for index in range(1, last):
         point = row(positions, index)
-        to_end = norm(difference(row(positions, last), point))
-        keep[index] = to_end > tolerance and norm(difference(point, row(positions, index - 1))) > tolerance
+        to_end, step = difference(end, point), difference(point, before)
+        keep[index] = dot(to_end, to_end) > limit and dot(step, step) > limit
+        before = point
     return keep
 
 
