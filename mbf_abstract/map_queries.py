@@ -7,6 +7,7 @@ one counts.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
@@ -57,13 +58,18 @@ class PlaceQuery:
     Attributes
     ----------
     safety_dist : float
-        Distance [m] the robot's outline is grown by.
+        Distance [m] the robot's outline is grown by; not negative.
     lethal_cost_mult, inscrib_cost_mult, unknown_cost_mult : float
         Factors for the costs of such places.
     local : bool
         Ask the local map of a server that has two.
     use_padded_footprint : bool
         Use the outline with its configured padding.
+
+    Raises
+    ------
+    ValueError
+        The safety distance is negative or not finite.
     """
 
     safety_dist: float = 0.0
@@ -72,6 +78,10 @@ class PlaceQuery:
     unknown_cost_mult: float = 1.0
     local: bool = False
     use_padded_footprint: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.safety_dist < math.inf:
+            raise ValueError(f"safety_dist must be 0 m or more and finite, got {self.safety_dist}")
 
 
 class MapQueries(Protocol):

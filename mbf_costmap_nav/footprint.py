@@ -95,9 +95,18 @@ class Footprint:
         The sides move outwards by exactly ``distance`` and meet in corners; a corner sharper than ``MITRE_LIMIT`` is
         cut flat, still outside the rounded offset. A footprint that is not convex is replaced by its convex hull,
         which is larger and therefore safe. A point robot becomes a circle.
+
+        Raises
+        ------
+        ValueError
+            The distance is not finite, or shrinking by it leaves nothing.
         """
+        if not math.isfinite(distance):
+            raise ValueError(f"the distance of an offset must be finite, got {distance} m")
         if distance == 0.0:
             return self
+        if distance < 0.0:
+            return Footprint(_shrunk(self.vertices, -distance))
         if len(self.vertices) < 3:
             return Footprint.circle(distance / math.cos(math.pi / CIRCLE_POINTS))
         hull = _convex_hull(self.vertices)
@@ -171,8 +180,31 @@ def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
     return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
+def _shrunk(vertices: FloatArray, distance: float) -> FloatArray:
+    """What is left of the hull when each side moves inwards by ``distance`` [m]; sides may vanish on the way."""
+    hull = rest = _convex_hull(vertices) if len(vertices) >= 3 else np.zeros((0, 2))
+    sides = np.roll(hull, -1, axis=0) - hull
+    for vertex, side in zip(hull, sides, strict=True):
+        inwards = np.array([-side[1], side[0]]) / np.linalg.norm(side)
+        rest = _clipped(rest, (rest - vertex) @ inwards - distance)
+    if len(rest) < 3:
+        raise ValueError(f"shrinking the footprint by {distance:g} m leaves nothing of it")
+    return rest
+
+
+def _clipped(polygon: FloatArray, depths: FloatArray) -> FloatArray:
+    """Part of a convex polygon whose corners' ``depths`` are above 0 (one step of Sutherland and Hodgman 1974)."""
+    corners: list[FloatArray] = []
+    for a, b, depth_a, depth_b in zip(polygon, np.roll(polygon, -1, axis=0), depths, np.roll(depths, -1), strict=True):
+        if depth_a > 0.0:
+            corners.append(a)
+        if (depth_a > 0.0) != (depth_b > 0.0):
+            corners.append(a + (b - a) * (depth_a / (depth_a - depth_b)))
+    return np.array(corners).reshape(-1, 2)
+
+
 def _mitred_offset(hull: FloatArray, distance: float) -> FloatArray:
-    """Offset a counter-clockwise convex polygon, or a segment, by moving its sides."""
+    """Offset a counter-clockwise convex polygon, or a segment, outwards by moving its sides."""
     sides = np.roll(hull, -1, axis=0) - hull
     normals = np.column_stack([sides[:, 1], -sides[:, 0]]) / np.linalg.norm(sides, axis=1)[:, None]
     corners: list[FloatArray] = []
@@ -182,7 +214,7 @@ def _mitred_offset(hull: FloatArray, distance: float) -> FloatArray:
         # At the end of a segment the sides run back on themselves; outwards is then straight on.
         bisector = between / length if length > 1e-9 else np.array([-before[1], before[0]])
         half_turn_cosine = float(bisector @ before)
-        if distance < 0.0 or half_turn_cosine * MITRE_LIMIT >= 1.0:
+        if half_turn_cosine * MITRE_LIMIT >= 1.0:
             corners.append(vertex + bisector * (distance / half_turn_cosine))
             continue
         # Cut the corner by the line across the bisector that still touches the circle of the distance.

@@ -13,6 +13,7 @@ All functions work on a snapshot, so they hold no lock.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,8 @@ from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.kernels.free_pose import first_fitting_pose
 
 DEFAULT_ANGLE_INCREMENT = math.radians(5.0)
+FIRST_RING = 64
+"""Cells around a pose that are looked at first for one that fits."""
 NO_EXTRAS = PlaceQuery()
 STATE_OF_COST = {INSCRIBED: CellState.INSCRIBED, LETHAL: CellState.LETHAL, UNKNOWN: CellState.UNKNOWN}
 
@@ -126,7 +129,7 @@ def find_valid_pose(
     Parameters
     ----------
     dist_tolerance : float
-        Largest distance [m] of the position from the requested one.
+        Largest distance [m] of the position from the requested one; inf = anywhere on the map.
     angle_tolerance : float
         Largest turn [rad] from the requested heading.
     query : PlaceQuery
@@ -137,35 +140,60 @@ def find_valid_pose(
     Raises
     ------
     ValueError
-        The pose is in another frame, a tolerance is negative, or the increment not positive.
+        The pose is in another frame, a tolerance is negative or no number, or the increment not positive and finite.
     """
     _require_frame(costmap, pose.frame_id)
-    if dist_tolerance < 0.0 or angle_tolerance < 0.0 or angle_increment <= 0.0:
+    if not (dist_tolerance >= 0.0 and angle_tolerance >= 0.0 and 0.0 < angle_increment < math.inf):
         raise ValueError(f"tolerances {dist_tolerance}, {angle_tolerance}, increment {angle_increment} out of range")
-    candidates = _candidates(costmap, pose, dist_tolerance)
     turns = _turns(angle_tolerance, angle_increment)
     outline = footprint.offset(query.safety_dist)
     vertices = outline.vertices if len(outline.vertices) >= 3 else np.zeros((1, 2))
     lower_left = np.array([costmap.origin_x, costmap.origin_y])
-    which, turn, state, cost = first_fitting_pose(
-        costmap.cells, vertices / costmap.resolution, (candidates - lower_left) / costmap.resolution, pose.yaw + turns
-    )
-    if which < 0:
-        return PoseAnswer(CellState.LETHAL, float(LETHAL), None)
-    x, y = candidates[which].tolist()
-    orientation = pose.orientation if turn == 0 else Pose.planar(0.0, 0.0, pose.yaw + float(turns[turn])).orientation
-    found = Pose((x, y, pose.z), orientation, pose.frame_id, pose.stamp)
-    return PoseAnswer(CellState(state), float(cost), found)
+    second_best = PoseAnswer(CellState.LETHAL, float(LETHAL), None)
+    for candidates in _candidates(costmap, pose, dist_tolerance):
+        places = (candidates - lower_left) / costmap.resolution
+        which, turn, state, cost = first_fitting_pose(
+            costmap.cells, vertices / costmap.resolution, places, pose.yaw + turns
+        )
+        if which < 0:
+            continue
+        answer = PoseAnswer(CellState(state), float(cost), _turned(pose, candidates[which], float(turns[turn])))
+        if answer.state in (CellState.FREE, CellState.INSCRIBED):
+            return answer
+        second_best = answer if second_best.pose is None else second_best
+    return second_best
 
 
-def _candidates(costmap: Costmap, pose: Pose, dist_tolerance: float) -> NDArray[np.float64]:
-    """Positions (n, 2) [m] to try in order: the pose itself if on the map, then cell centres within the tolerance."""
-    reach = math.ceil(dist_tolerance / costmap.resolution) + 1
-    cells = cells_by_distance(costmap, costmap.world_to_cell_clamped(pose.x, pose.y), reach)
-    centres = costmap.cells_to_world(cells)
-    near = np.hypot(centres[:, 0] - pose.x, centres[:, 1] - pose.y) <= dist_tolerance
+def _turned(pose: Pose, place: NDArray[np.float64], turn: float) -> Pose:
+    """``pose`` moved to ``place`` (2,) [m] and turned by ``turn`` [rad]; without a turn its orientation as it is."""
+    x, y = place.tolist()
+    orientation = pose.orientation if turn == 0.0 else Pose.planar(0.0, 0.0, pose.yaw + turn).orientation
+    return Pose((x, y, pose.z), orientation, pose.frame_id, pose.stamp)
+
+
+def _candidates(costmap: Costmap, pose: Pose, dist_tolerance: float) -> Iterator[NDArray[np.float64]]:
+    """Positions (n, 2) [m] to try in order: the pose itself if on the map, then cell centres within the tolerance.
+
+    The centres come in rings, each twice as wide as the one before, so that a tolerance of the whole map costs no more
+    than what is needed of it.
+    """
     itself = np.array([[pose.x, pose.y]]) if costmap.contains(pose.x, pose.y) else np.zeros((0, 2))
-    return np.concatenate([itself, centres[near]])
+    center = costmap.world_to_cell_clamped(pose.x, pose.y)
+    # Cells are ranked by the distance from the pose's cell, or off the map from the nearest one, not from the pose.
+    span = costmap.width + costmap.height
+    last = span if dist_tolerance >= span * costmap.resolution else math.ceil(dist_tolerance / costmap.resolution) + 1
+    inner, outer = -1, min(FIRST_RING, last)
+    while True:
+        cells = cells_by_distance(costmap, center, outer)
+        squares = ((cells - center) ** 2).sum(axis=1)
+        # The corners of the last square may be nearer to the pose than the tolerance, as it is off its cell's centre.
+        ring = cells[(squares > inner * abs(inner)) & ((squares <= outer**2) | (outer == last))]
+        centres = costmap.cells_to_world(ring)
+        near = np.hypot(centres[:, 0] - pose.x, centres[:, 1] - pose.y) <= dist_tolerance
+        yield np.concatenate([itself if inner < 0 else itself[:0], centres[near]])
+        if outer == last:
+            return
+        inner, outer = outer, min(2 * outer, last)
 
 
 def cells_by_distance(costmap: Costmap, center: tuple[int, int], reach: int) -> NDArray[np.int64]:

@@ -218,3 +218,42 @@ def test_no_cell_nearer_than_the_one_found_fits(seed, place, yaw):
         assert math.dist(home, grid.world_to_cell(found.pose.x, found.pose.y)) == min(fitting)
     else:
         assert found.state not in (CellState.FREE, CellState.INSCRIBED)
+
+
+@pytest.mark.parametrize("x", [30.0, 199.5, 250.0])
+def test_an_endless_tolerance_looks_at_the_whole_map(x):
+    """Far beyond the first ring of cells, and from a place off the map."""
+    grid = Costmap(np.full((3, 200), 254, dtype=np.uint8), 1.0)
+    grid.cells[1, 2] = grid.cells[1, 10] = 0
+    for tolerance in (math.inf, 1e6, x - 10.5):
+        found = find_valid_pose(grid, Footprint([]), Pose.planar(x, 1.5), tolerance, math.inf)
+        assert found.state is CellState.FREE and (found.pose.x, found.pose.y) == (10.5, 1.5)
+    assert find_valid_pose(grid, Footprint([]), Pose.planar(x, 1.5), x - 11.0, 0.0).pose is None
+
+
+def test_a_place_that_fits_far_away_is_preferred_to_a_near_one_in_the_unknown():
+    grid = Costmap(np.full((1, 300), 254, dtype=np.uint8), 1.0)
+    grid.cells[0, 200:204], grid.cells[0, 202] = 0, 255
+    grid.cells[0, 10:12] = 0
+    wide = Footprint([(0.6, 0.2), (-0.6, 0.2), (-0.6, -0.2), (0.6, -0.2)])
+    found = find_valid_pose(grid, wide, Pose.planar(199.0, 0.5), math.inf, 0.0)
+    assert found.state is CellState.UNKNOWN and found.pose.x == 201.5
+    grid.cells[0, 10:13] = 0
+    assert find_valid_pose(grid, wide, Pose.planar(199.0, 0.5), math.inf, 0.0).pose.x == 11.5
+
+
+@pytest.mark.parametrize(
+    ("dist_tolerance", "angle_tolerance", "increment"),
+    [(math.nan, 0.0, 0.1), (-1.0, 0.0, 0.1), (1.0, math.nan, 0.1), (1.0, 0.1, math.nan), (1.0, 0.1, math.inf)],
+)
+def test_tolerances_that_are_no_numbers_are_misuse(costmap, dist_tolerance, angle_tolerance, increment):
+    with pytest.raises(ValueError, match="out of range"):
+        find_valid_pose(
+            costmap, UNIT_SQUARE, Pose.planar(5, 5), dist_tolerance, angle_tolerance, angle_increment=increment
+        )
+
+
+@pytest.mark.parametrize("safety_dist", [-0.1, math.nan, math.inf])
+def test_a_safety_distance_that_is_no_distance_is_misuse(safety_dist):
+    with pytest.raises(ValueError, match="safety_dist must be 0 m or more"):
+        PlaceQuery(safety_dist=safety_dist)
