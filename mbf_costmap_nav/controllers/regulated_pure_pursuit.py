@@ -24,6 +24,8 @@ from mbf_costmap_nav.footprint_check import arc_poses
 from mbf_costmap_nav.path_geometry import look_ahead_point
 from mbf_costmap_nav.path_handling import PATH_LENGTH_TOLERANCE, ControlCycle, PathFollower, to_base_frame
 
+DEFAULT_DECAY, LEAST_DECAY = 10.0, 1e-3
+"""1/m: of a map without an inflation layer, and of one whose costs do not fall at all."""
 SLOWEST = 0.01  # m/s; slower commands are looked ahead for as long as this one, to bound the work
 
 
@@ -43,8 +45,12 @@ class RegulatedPurePursuitParameters(PluginParameters):
         0.6, "Obstacles nearer than this slow down; 0 = off.", unit="m", ge=0.0, le=20.0
     )
     cost_scaling_gain: float = parameter(1.0, "Factor on the obstacle slow-down.", gt=0.0, le=1.0)
-    inflation_cost_scaling_factor: float = parameter(
-        10.0, "Decay of the inflation layer, to turn costs into distances.", unit="1/m", gt=0.0, le=1000.0
+    inflation_cost_scaling_factor: float | None = parameter(
+        None,
+        "Decay that turns costs into distances; absent = that of the costmap's inflation layer.",
+        unit="1/m",
+        gt=0.0,
+        le=1000.0,
     )
     approach_dist: float = parameter(0.6, "Slow down over this length before the end.", unit="m", ge=0.0, le=20.0)
     min_approach_vel: float = parameter(0.05, "Speed at the end of the approach.", unit="m/s", gt=0.0, le=5.0)
@@ -105,6 +111,15 @@ class RegulatedPurePursuitController(PathFollower):
         """Speed [m/s] on a free straight path."""
         return self.parameters.max_linear_vel
 
+    @property
+    def decay(self) -> float:
+        """Rate [1/m] at which costs fall with distance: as configured, or as the map's last inflation layer has it."""
+        if (given := self.parameters.inflation_cost_scaling_factor) is not None:
+            return given
+        layers = (layer.parameters for layer in self.costmap.layers.values() if layer.parameters.enabled)
+        factors = [float(p.cost_scaling_factor) for p in layers if hasattr(p, "cost_scaling_factor")]
+        return max(factors[-1], LEAST_DECAY) if factors else DEFAULT_DECAY
+
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """Find the carrot, choose between turning and driving, regulate the speed, look ahead for collisions."""
         cycle = self.begin_cycle(request)
@@ -153,9 +168,7 @@ class RegulatedPurePursuitController(PathFollower):
         if p.regulated_min_radius > 0.0 and abs(curvature) * p.regulated_min_radius > 1.0:
             in_curve *= 1.0 / (abs(curvature) * p.regulated_min_radius)
         if p.cost_scaling_dist > 0.0 and FREE < cost <= INSCRIBED:
-            clearance = (
-                self.costmap.inscribed_radius - math.log(cost / (INSCRIBED - 1)) / p.inflation_cost_scaling_factor
-            )
+            clearance = self.costmap.inscribed_radius - math.log(cost / (INSCRIBED - 1)) / self.decay
             if clearance < p.cost_scaling_dist:
                 near_obstacle *= p.cost_scaling_gain * max(clearance, 0.0) / p.cost_scaling_dist
         speed = max(min(in_curve, near_obstacle), min(p.regulated_min_speed, p.max_linear_vel))

@@ -10,6 +10,7 @@ from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.layer import LayerContext
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
@@ -212,3 +213,39 @@ def test_it_drives_a_path_with_a_change_of_direction(pursuit, closed_loop):
     robot, outcome, _ = closed_loop.follow(pursuit(), path, FREE_MAP, start=(0, 0, 0))
     assert outcome == 0
     assert max(state[0] for state in robot.trace) > 1.7 and abs(robot.state[2]) < 0.2
+
+
+def inflated_map(**inflation):
+    """10 m x 10 m with one inflation layer."""
+    layers = ({"name": "walls", "type": "static"}, {"name": "inflation", "type": "inflation"})
+    cells = np.zeros((200, 200), dtype=np.uint8)
+    cells[:, 150] = 254
+    parameters = CostmapParameters(resolution=0.05, robot_radius=0.2, max_age=0.0, layers=layers)
+    costmap = build_layered_costmap(parameters, {"inflation": inflation}, static_map=Costmap(cells, 0.05))
+    costmap.update(None, 0.0)
+    return costmap
+
+
+def test_the_decay_of_costs_is_that_of_the_inflation_layer_unless_it_is_given(make_plugin):
+    costmap = inflated_map(cost_scaling_factor=6.0)
+    controller = make_plugin(RegulatedPurePursuitController, FREE_MAP, costmap=costmap)
+    assert controller.decay == 6.0
+    layer = costmap.layer("inflation")
+    costmap.set_layer_parameters("inflation", layer.parameters.model_copy(update={"cost_scaling_factor": 3.0}))
+    assert controller.decay == 3.0
+    given = {"inflation_cost_scaling_factor": 8.0}
+    assert make_plugin(RegulatedPurePursuitController, FREE_MAP, costmap=costmap, **given).decay == 8.0
+    assert make_plugin(RegulatedPurePursuitController, FREE_MAP).decay == 10.0
+
+
+@pytest.mark.parametrize("factor", [2.0, 6.0])
+def test_the_slow_down_near_a_wall_is_by_the_distance_to_it_whatever_the_inflation_decays_by(make_plugin, factor):
+    costmap = inflated_map(cost_scaling_factor=factor, inflation_radius=1.0)
+    controller = make_plugin(RegulatedPurePursuitController, FREE_MAP, costmap=costmap, regulated_min_speed=0.0)
+    cost = costmap.snapshot().cost_at(7.5 - 0.375, 5.0)  # eight cells from the wall
+    assert controller.regulated_speed(0.0, cost, 10.0) == pytest.approx(0.5 * 0.4 / 0.6, rel=0.03)
+
+
+def test_a_map_whose_costs_do_not_decay_slows_nothing_down(make_plugin):
+    controller = make_plugin(RegulatedPurePursuitController, FREE_MAP, costmap=inflated_map(cost_scaling_factor=0.0))
+    assert controller.regulated_speed(0.0, 200, 10.0) == 0.5
