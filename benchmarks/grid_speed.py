@@ -181,7 +181,7 @@ class Suite:
             "navfn's potential": self.interpolated()[0],
             "Theta*": self.theta()[0],
         }
-        delay = max(cancel_delay(self, 0.05 * step) for step in range(1, 6))
+        delay = max(cancel_delay(self, after) for after in (0.002, 0.01, 0.03, 0.1, 0.2))
         self.results[f"ways_found_{self.size}"] = sum(status == FOUND for status in found.values())
         self.results[f"cancel_ms_{self.size}"] = delay
         names = ", ".join(name for name, status in found.items() if status == FOUND)
@@ -215,16 +215,22 @@ def rolling_local_map(repeats: int) -> float:
 
 
 def cancel_delay(suite: Suite, after: float) -> float:
-    """Wall-clock time [ms] from a cancel, ``after`` seconds into a full field, to the search's return; 0 if done."""
+    """Wall-clock time [ms] from a cancel, ``after`` seconds into preparing and searching a full field, to its end.
+
+    0 if it was done before.
+    """
     flag = np.zeros(1, dtype=np.uint8)
+
+    def field() -> int:
+        padded = pad_cells(suite.cells, 254, flag)
+        return search(padded, suite.stride, suite.table, suite.start, -1, 0.0, False, False, flag)[0]
+
     with ThreadPoolExecutor(1) as pool:
-        arguments = (suite.padded, suite.stride, suite.table, suite.start, -1, 0.0, False, False, flag)
-        running = pool.submit(search, *arguments)
+        running = pool.submit(field)
         sleep(after)
         begin = perf_counter()
         flag[0] = 1
-        status, _ = running.result()
-        return (perf_counter() - begin) * 1e3 if status == CANCELED else 0.0
+        return (perf_counter() - begin) * 1e3 if running.result() == CANCELED else 0.0
 
 
 def tcod_field(tcod: ModuleType, costs: np.ndarray) -> np.ndarray:

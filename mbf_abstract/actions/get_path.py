@@ -44,8 +44,9 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
         problem = self._plugins.problem(PluginKind.PLANNER, goal.planner)
         if problem:
             return GetPathOutcome.INVALID_PLUGIN, problem
-        if goal.dist_tolerance < 0.0 or goal.angle_tolerance < 0.0:
-            return GetPathOutcome.INVALID_GOAL, "tolerances must not be negative"
+        if not (goal.dist_tolerance >= 0.0 and goal.angle_tolerance >= 0.0):  # not a number is no tolerance either
+            text = f"tolerances must not be negative, got {goal.dist_tolerance} m and {goal.angle_tolerance} rad"
+            return GetPathOutcome.INVALID_GOAL, text
         problem = area_problem(goal.goal_area, self.runtime)
         return (GetPathOutcome.INVALID_GOAL, problem) if problem else None
 

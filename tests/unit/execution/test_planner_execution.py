@@ -235,6 +235,8 @@ def test_the_planner_sees_every_field_of_the_goal(make_bench):
     [
         ({"planner": "nobody"}, Outcome.INVALID_PLUGIN, "no planner named 'nobody'; loaded: planner"),
         ({"dist_tolerance": -1.0}, Outcome.INVALID_GOAL, "must not be negative"),
+        ({"dist_tolerance": float("nan")}, Outcome.INVALID_GOAL, "must not be negative, got nan m"),
+        ({"angle_tolerance": float("nan")}, Outcome.INVALID_GOAL, "must not be negative"),
         ({"concurrency_slot": 256}, Outcome.INTERNAL_ERROR, "0..255"),
     ],
 )
