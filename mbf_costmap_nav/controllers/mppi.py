@@ -4,9 +4,9 @@ When to use: the best of our controllers among obstacles; it swerves, backs up a
 a whole manoeuvre of ``time_steps``, not an arc. Differential, omnidirectional and Ackermann robots. When not: very
 small computers (a cycle of 2000 x 56 takes about 1 ms), or when the path must be followed to the centimetre.
 Known failure: two equally good ways around an obstacle can average to neither; the footprint check then falls back to
-the best single sample. And a car that looks back along its path (more than about 100 degrees off it) does not find onto it
-where half its turning circle is longer than the way it looks ahead, ``vx_max * time_steps * model_dt``: give it paths
-that begin with its heading, as ``costmap.hybrid_astar`` makes them.
+the best single sample. A car turns onto a path it looks away from by a right angle, slowly where its turning radius is
+larger than the way it looks ahead (``vx_max * time_steps * model_dt``); one that looks back along its path drives it
+backward and ends with the wrong heading. Give it paths that begin with its heading, as ``costmap.hybrid_astar`` does.
 
 Formula: information-theoretic MPPI (Williams et al. 2018, algorithm 2), with Nav2's structure of critics; the noise
 comes from a pool drawn once from the plugin's generator, so that a cycle draws only an index. Deviation: the noise is
