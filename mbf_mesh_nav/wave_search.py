@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.corners import build_corner_slots
-from mbf_mesh_nav.kernels.cvp import propagate_wave
+from mbf_mesh_nav.kernels.cvp import ALONG_EDGE, NO_BEND, propagate_wave
 from mbf_mesh_nav.kernels.descent import trace_descent
 from mbf_mesh_nav.kernels.wave_directions import wave_directions
 from mbf_mesh_nav.leg_search import LegQuery, seeded_arrays
@@ -28,13 +28,14 @@ class Wave:
     ----------
     distances : (V,) float32
         Weighted distance [m] to the goal, inf where the wave did not come.
-    predecessors, cut_records : (V,) int32
+    predecessors, cut_records, bends : (V,) int32
         See ``kernels.cvp.propagate_wave``.
     """
 
     distances: NDArray[np.float32]
     predecessors: NDArray[np.int32]
     cut_records: NDArray[np.int32]
+    bends: NDArray[np.int32]
 
 
 class WaveSearch:
@@ -97,6 +98,7 @@ class WaveSearch:
             wave.distances,
             wave.predecessors,
             wave.cut_records,
+            wave.bends,
         )
         corners = mesh_map.faces[goal.face]
         towards_goal = goal.point - mesh_map.vertices[corners]
@@ -113,7 +115,8 @@ class WaveSearch:
         distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal)
         if len(seeds) == 1:
             seeds = self._seed_around(query, int(seeds[0]), distances, predecessors)
-        cut_records = np.full(len(distances), -1, dtype=np.int32)
+        cut_records = np.full(len(distances), ALONG_EDGE, dtype=np.int32)
+        bends = np.full(len(distances), NO_BEND, dtype=np.int32)
         settled = propagate_wave(
             mesh_map.vertex_face_offsets,
             self._corner_ends,
@@ -122,13 +125,14 @@ class WaveSearch:
             distances,
             predecessors,
             cut_records,
+            bends,
             seeds,
             targets,
             overshoot,
             self._step,
             query.cancel_flag,
         )
-        return None if settled < 0 else Wave(distances, predecessors, cut_records)
+        return None if settled < 0 else Wave(distances, predecessors, cut_records, bends)
 
     def _gather_weights(self, snapshot: MeshSnapshot) -> None:
         self._weighted_for = snapshot

@@ -25,9 +25,9 @@ from mbf_mesh_nav.kernels.dijkstra import Int32Array
 
 Entries = NDArray[np.uint64]
 
-RING = 1024
+RING = 2048
 """Buckets; keys farther ahead wait in the last one and are sorted in again."""
-BUCKETS_PER_STEP: Any = np.float32(96)
+BUCKETS_PER_STEP: Any = np.float32(160)
 """Buckets that a step of the wave crosses; with so many, few entries share one."""
 EMPTY = -1
 _MASK: Any = Index(RING - 1)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
+from mbf_mesh_nav.kernels.cvp import NO_BEND
 from mbf_mesh_nav.kernels.dijkstra import Float32Array, Int32Array
 
 
@@ -26,6 +27,7 @@ def wave_directions(
     distances: Float32Array,
     predecessors: Int32Array,
     cut_records: Int32Array,
+    bends: Int32Array,
 ) -> Float32Array:
     """Return unit vectors (V, 3) float32 towards the source; zero at seeds and where the wave did not come.
 
@@ -46,7 +48,9 @@ def wave_directions(
             known = first
             if first == vertex:
                 known, to_known, to_free = second, to_free, to_known
-            share = _crossing_share(distances[base], distances[known], to_known, to_free, between)
+            bend = bends[vertex]
+            to_bend = distances[bend] if bend != NO_BEND else np.float32(0.0)
+            share = _crossing_share(distances[base] - to_bend, distances[known] - to_bend, to_known, to_free, between)
             x = vertices[base, 0] + share * (vertices[known, 0] - vertices[base, 0])
             y = vertices[base, 1] + share * (vertices[known, 1] - vertices[base, 1])
             z = vertices[base, 2] + share * (vertices[known, 2] - vertices[base, 2])

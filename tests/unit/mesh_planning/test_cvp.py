@@ -9,6 +9,7 @@ import trimesh
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
+from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.kernels.corners import build_corner_slots
 from mbf_mesh_nav.kernels.cvp import propagate_wave, unfolded_distance
 from mbf_mesh_nav.mesh_map import MeshMap
@@ -31,13 +32,14 @@ def wave_from_vertex(mesh_map, source, weights=None, blocked=None, step=0.5):
     distances[seeds] = np.linalg.norm(mesh_map.vertices[seeds] - mesh_map.vertices[source], axis=1)
     propagate_wave(
         mesh_map.vertex_face_offsets, mesh_map.neighbours[slots[:, :2]], weights[slots], blocked,
-        distances, predecessors, np.full(count, -1, np.int32), seeds, np.zeros(0, np.int32), 0.3,
+        distances, predecessors, np.full(count, -1, np.int32), np.full(count, -1, np.int32), seeds,
+        np.zeros(0, np.int32), 0.3,
         step, np.zeros(1, np.uint8),
     )  # fmt: skip
     return distances, predecessors, seeds
 
 
-def slow_wave(mesh_map, weights, seeds, distances):
+def slow_wave(mesh_map, weights, seeds, distances, step):
     """The twin: heapq, the rule with arc cosines, obtuse corners looked at again and behind, in float64."""
     count = len(mesh_map.vertices)
     starts = np.repeat(np.arange(count), np.diff(mesh_map.neighbour_offsets))
@@ -45,6 +47,8 @@ def slow_wave(mesh_map, weights, seeds, distances):
         pair: float(w) for *pair, w in zip(starts, mesh_map.neighbours, weights, strict=True) for pair in [(*pair,)]
     }
     u = {int(seed): float(distances[seed]) for seed in seeds}
+    bends = dict.fromkeys(u, -1)
+    near = 10.0 * step
     settled, queue = set(u), [(d, v) for v, d in u.items()]
     heapq.heapify(queue)
     while queue:
@@ -58,13 +62,19 @@ def slow_wave(mesh_map, weights, seeds, distances):
                 continue
             v3 = free[0]
             v1, v2 = (corner for corner in face if corner != v3)
-            along = min(u[v1] + length[v1, v3], u[v2] + length[v2, v3])
-            candidate = angle_rule(u[v1], u[v2], length[v1, v2], length[v1, v3], length[v2, v3])
-            if candidate < along and obtuse_corner(face, length) == v3 and two_fronts(mesh_map, length, u, v1, v2, v3):
-                candidate = along
+            along, corner = min((u[v1] + length[v1, v3], v1), (u[v2] + length[v2, v3], v2))
+            bend = bends[v1] if bends[v1] == bends[v2] else -1
+            to_bend = u[bend] if bend >= 0 else 0.0
+            sides = length[v1, v2], length[v1, v3], length[v2, v3]
+            across = across_the_side(u[v1] - to_bend, u[v2] - to_bend, *sides)
+            asked = across is not None and (to_bend + across < near or obtuse_corner(face, length) == v3)
+            if across is None or (asked and two_fronts(mesh_map, length, u, to_bend, v1, v2, v3)):
+                candidate, last_bend = along, corner
+            else:
+                candidate, last_bend = to_bend + across, bend
             candidate = max(candidate, min(u[v1], u[v2]))
             if candidate < u.get(v3, math.inf):
-                u[v3] = candidate
+                u[v3], bends[v3] = candidate, last_bend
                 if v3 not in settled:
                     heapq.heappush(queue, (candidate, v3))
     return np.array([u.get(v, math.inf) for v in range(count)])
@@ -78,14 +88,15 @@ def obtuse_corner(face, length):
     return None
 
 
-def two_fronts(mesh_map, length, u, v1, v2, v3):
+def two_fronts(mesh_map, length, u, to_bend, v1, v2, v3):
     """Whether the corner behind the side v1 v2 was reached much later than one front through that side would have."""
     shared = mesh_map.faces[(mesh_map.faces == v1).any(axis=1) & (mesh_map.faces == v2).any(axis=1)]
     behind = [corner for corner in shared.ravel().tolist() if corner not in (v1, v2, v3)]
     if not behind:
         return True
     c = length[v1, v2]
-    foretold = from_virtual_source(u[v1], u[v2], c, length[v1, behind[0]], length[v2, behind[0]], below=True)
+    ends = length[v1, behind[0]], length[v2, behind[0]]
+    foretold = to_bend + from_virtual_source(u[v1] - to_bend, u[v2] - to_bend, c, *ends, below=True)
     return u.get(behind[0], math.inf) - foretold >= 0.2 * c
 
 
@@ -96,15 +107,16 @@ def from_virtual_source(u1, u2, c, b, a, below=False):
     return math.hypot(p - sx, math.sqrt(max(b * b - p * p, 0)) * (-1 if below else 1) - sy)
 
 
-def angle_rule(u1, u2, c, b, a):
+def across_the_side(u1, u2, c, b, a):
+    """Distance of corner 3 if the straight line to it crosses side 12, by the angles at corner 3; else None."""
     if abs(c * c + u1 * u1 - u2 * u2) > 2.002 * c * u1 or abs(c * c + b * b - a * a) > 2.002 * c * b:
-        return min(u1 + b, u2 + a)  # no triangle has such sides
+        return None  # no triangle has such sides
     u = from_virtual_source(u1, u2, c, b, a)
     cos1, cos2 = (u * u + b * b - u1 * u1) / (2 * u * b), (a * a + u * u - u2 * u2) / (2 * a * u)
     if abs(cos1) > 1 or abs(cos2) > 1:
-        return min(u1 + b, u2 + a)
+        return None
     angle0, angle1, angle2 = math.acos((a * a + b * b - c * c) / (2 * a * b)), math.acos(cos1), math.acos(cos2)
-    return u if angle1 < angle0 and angle2 < angle0 else min(u1 + b, u2 + a)
+    return u if angle1 < angle0 and angle2 < angle0 else None
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -115,12 +127,36 @@ def test_the_wave_equals_its_slow_twin_on_rough_weighted_ground(seed):
     starts = np.repeat(np.arange(len(costs)), np.diff(mesh_map.neighbour_offsets))
     weights = (mesh_map.neighbour_lengths * (1 + (costs[starts] + costs[mesh_map.neighbours]) / 2)).astype(np.float32)
     fast, predecessors, seeds = wave_from_vertex(mesh_map, 90, weights)
-    slow = slow_wave(mesh_map, weights, seeds, np.linalg.norm(mesh_map.vertices - mesh_map.vertices[90], axis=1))
+    straight = np.linalg.norm(mesh_map.vertices - mesh_map.vertices[90], axis=1)
+    slow = slow_wave(mesh_map, weights, seeds, straight, 0.5)
     np.testing.assert_allclose(fast, slow, rtol=2e-5, atol=1e-6)
     led = np.setdiff1d(np.arange(len(fast)), seeds)
     assert (fast[predecessors[led]] < fast[led]).all()  # predecessors lead to the source, whatever the corners' angles
-    coarse, *_ = wave_from_vertex(mesh_map, 90, weights, step=1e-4)  # most of the queue waits beyond its ring
-    np.testing.assert_array_equal(coarse, fast)
+
+
+def test_the_field_does_not_depend_on_the_queues_buckets_but_near_the_source(shared_data):
+    mesh = trimesh.load(shared_data / "meshes/mesh_mppi/sphere.ply", process=False)
+    mesh_map = MeshMap.from_arrays(mesh.vertices, mesh.faces)
+    usual, *_ = wave_from_vertex(mesh_map, 0, step=0.1)
+    narrow, *_ = wave_from_vertex(mesh_map, 0, step=1e-4)  # most of the queue waits beyond its ring
+    np.testing.assert_allclose(narrow, usual, rtol=1e-3)
+
+
+def test_behind_a_corner_the_front_spreads_from_that_corner():
+    # A slit from the border to the middle: behind its tip the exact distance is that to the tip and on from there.
+    vertices, faces = heightfield_mesh(np.zeros((61, 61)), 0.1, 0.1)
+    slit = np.flatnonzero((abs(vertices[:, 0] - 3.0) < 0.01) & (vertices[:, 1] < 2.95))
+    copies = np.arange(len(vertices))
+    copies[slit] = len(vertices) + np.arange(len(slit))
+    on_the_right = vertices[faces].mean(axis=1)[:, 0] > 3.0
+    faces = np.where(on_the_right[:, None], copies[faces], faces)
+    mesh_map = MeshMap.from_arrays(np.vstack([vertices, vertices[slit]]), faces)
+    places = mesh_map.vertices[:, :2]
+    source = int(np.argmin(np.linalg.norm(places - (2.0, 1.0), axis=1)))
+    distances, *_ = wave_from_vertex(mesh_map, source, step=0.1)
+    hidden = (places[:, 0] > 3.1) & (places[:, 1] < 2.0)
+    exact = np.linalg.norm(places[source] - (3.0, 3.0)) + np.linalg.norm(places - (3.0, 3.0), axis=1)
+    assert (np.abs(distances - exact)[hidden] / exact[hidden]).max() < 0.005
 
 
 def test_a_front_enters_an_obtuse_corner_through_the_side_opposite_to_it():
