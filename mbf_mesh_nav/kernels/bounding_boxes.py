@@ -36,7 +36,7 @@ def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, NDAr
     starts = np.zeros(levels + 1, dtype=np.int64)
     for level in range(levels):
         starts[level + 1] = starts[level] + counts[level]
-    boxes = np.zeros((starts[levels], 6))
+    boxes = np.empty((starts[levels], 6), dtype=np.float64)
     for node in range(starts[levels]):
         for axis in range(3):
             boxes[node, axis] = np.inf
@@ -133,7 +133,7 @@ def closest_face(
             best_face, best, best_v, best_w = hint_face, squared, v, w
     nodes = np.empty(STACK_SIZE, dtype=np.uint64)
     depths = np.empty(STACK_SIZE, dtype=np.uint64)
-    bounds = np.empty(STACK_SIZE)
+    bounds = np.empty(STACK_SIZE, dtype=np.float64)
     face_count = Index(len(faces))
     nodes[0], depths[0] = Index(levels[-1] - 1), Index(len(levels) - 2)
     bounds[0] = squared_distance_to_box(boxes, nodes[0], x, y, z)
@@ -189,18 +189,16 @@ def closest_faces(
     ``order`` (n,) is the order to work them off; along a Morton curve each answer is a good hint for the next point.
     """
     count = points.shape[0]
-    found = np.full(count, -1, dtype=np.int32)
-    weights = np.full((count, 3), np.nan)
-    surface = np.full((count, 3), np.nan)
-    distances = np.full(count, np.inf)
+    found, distances = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.float64)
+    weights, surface = np.empty((count, 3), dtype=np.float64), np.empty((count, 3), dtype=np.float64)
     hint = Count(-1)
     for index in order:
         x, y, z = points[index, 0], points[index, 1], points[index, 2]
         face, distance, v, w, px, py, pz = closest_face(vertices, faces, boxes, levels, x, y, z, max_distance, hint)
         hint = face
-        if face < 0:
-            continue
         found[index], distances[index] = face, distance
-        weights[index, 0], weights[index, 1], weights[index, 2] = 1.0 - v - w, v, w
+        if face < 0:
+            v = px = py = pz = np.nan
+        weights[index, 0], weights[index, 1], weights[index, 2] = 1.0 - v - w, v, w if face >= 0 else np.nan
         surface[index, 0], surface[index, 1], surface[index, 2] = px, py, pz
     return found, weights, surface, distances

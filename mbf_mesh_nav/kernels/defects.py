@@ -18,7 +18,7 @@ def face_shapes(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
     The vector points where the face looks.
     """
-    shapes = np.zeros((faces.shape[0], 5))
+    shapes = np.zeros((faces.shape[0], 5), dtype=np.float64)
     for face in range(faces.shape[0]):
         a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
         ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])

@@ -55,7 +55,7 @@ def trace_descent(
         The face the way to each point lies in (or on an edge of); the start's own face first.
     """
     capacity = Count(256)
-    points = np.empty((capacity, 3))
+    points = np.empty((capacity, 3), dtype=np.float64)
     point_faces = np.empty(capacity, dtype=np.int32)
     count = Count(0)
     face, vertex, point = Count(start_face), Count(-1), start

@@ -39,13 +39,13 @@ def pull_taut(
         Start, one point on each crossed edge, goal.
     """
     portal_count = len(strip) - 1
-    portals = np.empty((portal_count, 2), np.int32)  # vertices at the left and right end
-    flat_portals = np.empty((portal_count + 1, 4))  # left x y, right x y
+    portals = np.empty((portal_count, 2), dtype=np.int32)  # vertices at the left and right end
+    flat_portals = np.empty((portal_count + 1, 4), dtype=np.float64)  # left x y, right x y
     apex, target = _unfold(vertices, faces, strip, start, goal, portals, flat_portals)
     _set_portal(flat_portals, portal_count, target, target)  # the goal is the last portal, of no width
 
-    bends = np.empty((portal_count + 2, 2))
-    bend_portals = np.empty(portal_count + 2, np.int64)
+    bends = np.empty((portal_count + 2, 2), dtype=np.float64)
+    bend_portals = np.empty(portal_count + 2, dtype=np.int32)
     bends[0, 0], bends[0, 1], bend_portals[0] = apex[0], apex[1], -1
     bend_count = 1
     left_end, right_end = _left(flat_portals, Count(0)), _right(flat_portals, Count(0))
@@ -79,7 +79,7 @@ def pull_taut(
             left_portal, right_portal = index, index
         index += 1
     bends[bend_count, 0], bends[bend_count, 1], bend_portals[bend_count] = target[0], target[1], portal_count
-    points = np.empty((portal_count + 2, 3))
+    points = np.empty((portal_count + 2, 3), dtype=np.float64)
     set_row(points, Count(0), start)
     set_row(points, Count(portal_count + 1), goal)
     _cross_portals(vertices, portals, flat_portals, bends, bend_portals, bend_count, points)

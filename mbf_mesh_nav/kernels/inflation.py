@@ -95,7 +95,11 @@ def spread(
     """
     count = len(vertices)
     state = np.zeros(count, dtype=np.uint8)
-    near, far, lowered = np.empty(count, np.int32), np.empty(count, np.int32), np.empty(count, np.int32)
+    near, far, lowered = (
+        np.empty(count, dtype=np.int32),
+        np.empty(count, dtype=np.int32),
+        np.empty(count, dtype=np.int32),
+    )
     near_size, far_size, lowered_size = Index(0), Index(0), Index(0)
     for vertex in start:
         if state[vertex] & _WAITING == 0:

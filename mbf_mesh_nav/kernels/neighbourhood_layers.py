@@ -89,7 +89,7 @@ def height_differences(
 @kernel
 def mean_edge_angles(normals: FloatArray, offsets: IntArray, neighbours: IntArray) -> FloatArray:
     """Mean angle [rad] between the normal of each vertex and those of its neighbours, (V,); 0 without neighbours."""
-    angles = np.zeros(offsets.shape[0] - 1)
+    angles = np.zeros(offsets.shape[0] - 1, dtype=np.float64)
     for vertex in range(offsets.shape[0] - 1):
         total = 0.0
         for entry in range(offsets[vertex], offsets[vertex + 1]):

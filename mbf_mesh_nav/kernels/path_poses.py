@@ -24,7 +24,8 @@ def distinct_points(positions: Float64Array, tolerance: float) -> BoolArray:
         Distance [m].
     """
     last, limit = len(positions) - 1, tolerance * tolerance
-    keep = np.ones(len(positions), dtype=np.bool_)
+    keep = np.empty(len(positions), dtype=np.bool_)
+    keep[0] = keep[last] = True
     end, before = row(positions, last), row(positions, 0)
     for index in range(1, last):
         point = row(positions, index)
@@ -43,7 +44,7 @@ def orientations_along(positions: Float64Array, normals: Float64Array) -> Float6
     positions, normals : (n, 3) float64
         Points of the path [m] and unit normals of the surface there.
     """
-    orientations = np.empty((len(positions), 4))
+    orientations = np.empty((len(positions), 4), dtype=np.float64)
     for index in range(len(positions)):
         up = row(normals, index)
         following = min(index + 1, len(positions) - 1)

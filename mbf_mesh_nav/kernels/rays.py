@@ -82,11 +82,9 @@ def first_hits(
         Directions of unit length.
     """
     count = origins.shape[0]
-    hit_faces = np.full(count, -1, dtype=np.int32)
-    hit_distances = np.full(count, np.inf)
-    nodes = np.empty(STACK_SIZE, dtype=np.int64)
-    depths = np.empty(STACK_SIZE, dtype=np.int64)
-    enters = np.empty(STACK_SIZE)
+    hit_faces, hit_distances = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.float64)
+    nodes, depths = np.empty(STACK_SIZE, dtype=np.int32), np.empty(STACK_SIZE, dtype=np.int32)
+    enters = np.empty(STACK_SIZE, dtype=np.float64)
     for index in range(count):
         origin, direction = row(origins, index), row(directions, index)
         x, y, z = origin[0], origin[1], origin[2]
@@ -123,6 +121,5 @@ def first_hits(
                     place -= 1
                 nodes[place], depths[place], enters[place] = child, depth - 1, enter
                 top += 1
-        if best_face >= 0:
-            hit_faces[index], hit_distances[index] = best_face, best
+        hit_faces[index], hit_distances[index] = best_face, best if best_face >= 0 else np.inf
     return hit_faces, hit_distances

@@ -104,11 +104,12 @@ def faces_across_edges(faces: IntArray, face_offsets: IntArray, incident: IntArr
 
     Of several faces at a non-manifold edge the first one is taken.
     """
-    across = np.full(faces.shape, -1, dtype=np.int32)
+    across = np.empty((faces.shape[0], 3), dtype=np.int32)
     for face in range(faces.shape[0]):
         for corner in range(3):
             start = faces[face, corner]
             end = faces[face, (corner + 1) % 3]
+            across[face, corner] = -1
             for position in range(face_offsets[start], face_offsets[start + 1]):
                 other = incident[position]
                 if other != face and (faces[other, 0] == end or faces[other, 1] == end or faces[other, 2] == end):
@@ -120,7 +121,7 @@ def faces_across_edges(faces: IntArray, face_offsets: IntArray, incident: IntArr
 @kernel
 def unit_face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Compute unit normals (F, 3), right-handed about the winding; (0, 0, 1) for a face without area."""
-    normals = np.zeros((faces.shape[0], 3))
+    normals = np.empty((faces.shape[0], 3), dtype=np.float64)
     for face in range(faces.shape[0]):
         a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
         ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
@@ -130,7 +131,7 @@ def unit_face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
         if length > 0.0:
             normals[face, 0], normals[face, 1], normals[face, 2] = nx / length, ny / length, nz / length
         else:
-            normals[face, 2] = 1.0
+            normals[face, 0], normals[face, 1], normals[face, 2] = 0.0, 0.0, 1.0
     return normals
 
 
@@ -138,7 +139,7 @@ def unit_face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 def unit_vertex_normals(face_normals: FloatArray, face_offsets: IntArray, incident: IntArray) -> FloatArray:
     """Unweighted mean of the incident unit face normals, renormalised; (0, 0, 1) where it vanishes."""
     vertex_count = face_offsets.shape[0] - 1
-    normals = np.zeros((vertex_count, 3))
+    normals = np.empty((vertex_count, 3), dtype=np.float64)
     for vertex in range(vertex_count):
         x = y = z = 0.0
         for position in range(face_offsets[vertex], face_offsets[vertex + 1]):
@@ -150,14 +151,14 @@ def unit_vertex_normals(face_normals: FloatArray, face_offsets: IntArray, incide
         if length > 1e-9:
             normals[vertex, 0], normals[vertex, 1], normals[vertex, 2] = x / length, y / length, z / length
         else:
-            normals[vertex, 2] = 1.0
+            normals[vertex, 0], normals[vertex, 1], normals[vertex, 2] = 0.0, 0.0, 1.0
     return normals
 
 
 @kernel
 def morton_codes(points: FloatArray, lower: FloatArray, cell: float) -> NDArray[np.uint64]:
     """Interleaved 21-bit cell indices of points (n, 3): close codes mean close points."""
-    codes = np.zeros(points.shape[0], dtype=np.uint64)
+    codes = np.empty(points.shape[0], dtype=np.uint64)
     for index in range(points.shape[0]):
         code = np.uint64(0)
         for axis in range(3):
