@@ -1,14 +1,16 @@
 """Moving the robot inside a recovery: slowly, with the footprint checked ahead, cancelable, stopped at the end.
 
 ``GuardedRecovery`` is the base of the recoveries that move. Its ``drive`` repeats one velocity until a condition holds
-and ends with IMPASSABLE before the footprint would meet an obstacle. A robot that already touches one may move as long
-as it touches no more than before, so backing out of a collision works and driving deeper into it does not.
+and ends with IMPASSABLE before the footprint would meet an obstacle or the end of the map. A robot that already touches
+one may move as long as it touches no more than before, so backing out of a collision works and driving deeper into it
+does not. Where the whole footprint lies on obstacles no direction is known to lead out, and only ``escape`` moves.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 
@@ -35,6 +37,9 @@ class GuardedRecovery(CostmapRecovery):
     """Base of the recoveries that move the robot: write ``recover`` and use ``drive``."""
 
     parameters: GuardedMotionParameters
+
+    leaves_collisions: ClassVar[bool] = False
+    """Whether the recovery itself chooses motions that lead out of a collision, however deep it is."""
 
     @abstractmethod
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
@@ -81,12 +86,18 @@ class GuardedRecovery(CostmapRecovery):
         return RecoveryResult(RecoveryOutcome.CANCELED, request.cancel_token.reason)
 
     def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
-        """Say where moving on would touch more lethal cells than now; empty if the way is free."""
+        """Say where moving on would touch more of obstacles and the end of the map than now; empty: the way is free."""
         costmap, pose = self.costmap.snapshot(), self.on_map(pose)
         check = FootprintCheck(self.costmap.footprint, costmap.resolution)
-        touched = check.lethal_count(costmap, pose.x, pose.y, pose.yaw)
+
+        def touched(x: float, y: float, yaw: float) -> int:
+            return check.lethal_count(costmap, x, y, yaw) + check.outside_count(costmap, x, y, yaw)
+
+        allowed = touched(pose.x, pose.y, pose.yaw)
+        if not self.leaves_collisions:
+            allowed = min(allowed, len(check.samples) - 1)
         for x, y, yaw in self._poses_ahead(pose, command, costmap):
-            if check.lethal_count(costmap, x, y, yaw) > touched:
+            if touched(x, y, yaw) > allowed:
                 return f"an obstacle is in the way: the footprint would touch it at ({x:.2f}, {y:.2f}, {yaw:.2f} rad)"
         return ""
 

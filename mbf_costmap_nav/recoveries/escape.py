@@ -40,6 +40,8 @@ class EscapeRecovery(GuardedRecovery):
     Parameters: ClassVar[type[PluginParameters]] = EscapeParameters
     parameters: EscapeParameters
 
+    leaves_collisions = True
+
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Creep down the cost until the robot is free."""
         start = request.motion.pose()

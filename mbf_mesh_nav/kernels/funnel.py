@@ -168,7 +168,7 @@ def _cross_portals(
     portals: Int32Array,
     flat_portals: Float64Array,
     bends: Float64Array,
-    bend_portals: NDArray[np.int64],
+    bend_portals: Int32Array,
     last_bend: int,
     points: Float64Array,
 ) -> None:

@@ -82,6 +82,20 @@ def test_a_robot_that_touches_a_wall_in_front_may_back_out(run):
     assert result.success and robot.state[0] < -0.25
 
 
+@pytest.mark.parametrize(("recovery", "speed"), [(BackUpRecovery, -1.0), (DriveOnHeadingRecovery, 1.0)])
+def test_no_recovery_drives_off_the_map(run, recovery, speed):
+    result, robot, _ = run(recovery, start=(4.6 * speed, 0.0, 0.0), distance=1.0)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    assert abs(robot.state[0]) < 5.0
+
+
+@pytest.mark.parametrize("recovery", [RotateRecovery, BackUpRecovery, DriveOnHeadingRecovery, MoveAwayRecovery])
+def test_wholly_on_obstacles_nothing_moves_but_escape(run, recovery):
+    result, robot, _ = run(recovery, around((-3.0, -3.0, 3.0, 3.0)))
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    assert robot.state[0] == robot.state[1] == robot.state[2] == 0.0
+
+
 TOUCHING = (0.15, -1.0, 0.3, 1.0)  # a wall into which the front of the robot at the origin reaches
 
 
