@@ -21,8 +21,9 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.kernels.search_cells import SearchRoom
 from mbf_costmap_nav.path_geometry import arc_lengths, resample
-from mbf_costmap_nav.plugins import CostmapPlanner
+from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 from mbf_costmap_nav.search_grid import Cell, GridPlannerParameters, SearchGrid
 
 NEAR_END = 0.75
@@ -51,6 +52,10 @@ class GridPlanner(CostmapPlanner):
     Parameters: ClassVar[type[PluginParameters]] = GridPlannerParameters
     parameters: GridPlannerParameters
 
+    def __init__(self, context: CostmapContext) -> None:
+        super().__init__(context)
+        self._room = SearchRoom()
+
     @property
     def pose_spacing(self) -> float:
         """Largest distance [m] of two poses of the path; 0 = as the search gives them."""
@@ -66,7 +71,7 @@ class GridPlanner(CostmapPlanner):
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Plan from the start over the via poses to the goal."""
         check_tolerance(request.dist_tolerance)
-        grid = SearchGrid.build(self.costmap.snapshot(), self.parameters, request.cancel_token)
+        grid = SearchGrid.build(self.costmap.snapshot(), self.parameters, request.cancel_token, self._room)
         poses = (request.start, *request.via, request.goal)
         failure = self._check_start(grid, request.start)
         pieces: list[NDArray[np.float64]] = []

@@ -18,6 +18,7 @@ from mbf_costmap_nav.costmap import LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.kernels.grid_search import pad_cells
 from mbf_costmap_nav.kernels.line_cells import cost_along
 from mbf_costmap_nav.kernels.nearest_cell import nearest_reached
+from mbf_costmap_nav.kernels.search_cells import SearchRoom
 
 Cell = tuple[int, int]
 
@@ -52,6 +53,8 @@ class SearchGrid:
         Traversal of each cost, 1 for free, inf for blocked.
     token : CancelToken
         Ends long answers early; what they say then means nothing.
+    room : SearchRoom
+        The planner's memory for ``grid_search.search``, of which the last one's result stands in it.
     """
 
     costmap: Costmap
@@ -59,12 +62,21 @@ class SearchGrid:
     stride: int
     table: NDArray[np.float32]
     token: CancelToken
+    room: SearchRoom
 
     @classmethod
-    def build(cls, costmap: Costmap, parameters: GridPlannerParameters, token: CancelToken) -> SearchGrid:
+    def build(
+        cls,
+        costmap: Costmap,
+        parameters: GridPlannerParameters,
+        token: CancelToken,
+        room: SearchRoom | None = None,
+    ) -> SearchGrid:
         """Prepare a snapshot by the costs a planner wants."""
         table = traversal_table(parameters.cost_factor, parameters.lethal_cost, parameters.allow_unknown)
-        return cls(costmap, pad_cells(costmap.cells, LETHAL, token.flag), costmap.width + 2, table, token)
+        return cls(
+            costmap, pad_cells(costmap.cells, LETHAL, token.flag), costmap.width + 2, table, token, room or SearchRoom()
+        )
 
     @property
     def geometry(self) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from hypothesis.extra import numpy as hnp
 from mbf_costmap_nav.kernels.grid_line import line_cost
 from mbf_costmap_nav.kernels.grid_path import trace_cells, trace_gradient
 from mbf_costmap_nav.kernels.grid_search import CANCELED, EXHAUSTED, FOUND, pad_cells, search
+from mbf_costmap_nav.kernels.search_cells import SearchRoom
 from mbf_costmap_nav.kernels.short_lines import TOUCHED, crossed_cells, trace_lines
 from mbf_costmap_nav.kernels.theta_star import theta_search
 from mbf_costmap_nav.search_grid import traversal_table
@@ -97,6 +98,19 @@ def test_where_neighbours_are_left_out_on_plain_ground_the_field_is_still_the_na
     goal = tuple(np.argwhere(np.isfinite(field))[data.draw(st.integers(0, int(np.isfinite(field).sum()) - 1))])
     status, g, _, _ = run(cells, start, goal, cut_corners=cut_corners)
     assert status == FOUND and g[goal] == pytest.approx(expected[goal], rel=1e-5)
+
+
+@settings(max_examples=30, deadline=None)
+@given(first=small_maps, second=small_maps)
+def test_a_room_that_has_been_searched_in_changes_no_later_search(first, second):
+    room, table = SearchRoom(), traversal_table(3.0, 253, False)
+    for cells in (first, second, first):
+        cells[0, 0] = 0
+        padded, stride = pad_cells(cells, 254), cells.shape[1] + 2
+        status, g = search(padded, stride, table, stride + 1, -1, 0.0, False, False, NO_CANCEL, room)
+        alone = search(padded, stride, table, stride + 1, -1, 0.0, False, False, NO_CANCEL)
+        assert status == alone[0]
+        np.testing.assert_array_equal(g, alone[1])
 
 
 def test_a_field_may_end_at_a_cell_that_has_its_final_value():
