@@ -13,7 +13,6 @@ from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from typing import Any, ClassVar, cast
 
-import numpy as np
 from octree import Column, OctreeMap, OctreeParameters
 
 from mbf_abstract.cancel import CancelToken
@@ -135,11 +134,9 @@ class OctreeServer(AbstractNavigationServer):
         return OctreeQueries(self.map, self.runtime.robot, self.runtime.transforms)
 
     def take_scan(self, scan: RangeScan) -> None:
-        """Put a scan into the octree."""
-        transforms, frame = self.runtime.transforms, self.map.frame_id
-        ends = transforms.transform_points(scan.ends, scan.frame_id, frame)
-        origin = transforms.transform_points(np.atleast_2d(scan.origin), scan.frame_id, frame)[0]
-        self.map.tree.insert(origin, ends, scan.hits)
+        """Put a scan into the octree, placed by the transform of its stamp."""
+        scan = scan.in_frame(self.map.frame_id, self.runtime.transforms)
+        self.map.tree.insert(scan.origin, scan.ends, scan.hits)
         self.map.last_scan = scan.stamp
         self.map.look()
 
