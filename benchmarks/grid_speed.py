@@ -28,7 +28,7 @@ from mbf_costmap_nav.costmap import CellBox
 from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.kernels.grid_search import CANCELED, FOUND, pad_cells, search
 from mbf_costmap_nav.kernels.inflation import inflate
-from mbf_costmap_nav.kernels.search_cells import SearchRoom
+from mbf_costmap_nav.kernels.search_cells import new_records
 from mbf_costmap_nav.kernels.theta_star import theta_search
 from mbf_costmap_nav.layers.inflation import cost_table
 from mbf_costmap_nav.search_grid import traversal_table
@@ -108,7 +108,7 @@ class Suite:
         self.cells = inflated(self.lethal)
         self.table = traversal_table(2.0, 253, False)
         self.padded, self.stride = pad_cells(self.cells, 254), size + 2
-        self.room = SearchRoom()  # kept from search to search, as planners do
+        self.records = new_records(self.padded.size)  # kept from search to search, as planners do
         self.start = (20 + 1) * self.stride + 20 + 1
         field = self.field()[1]
         self.goal = int(np.flatnonzero(np.isfinite(field))[-1])  # the reached cell nearest to the far corner
@@ -131,17 +131,17 @@ class Suite:
     def astar(self) -> tuple[int, np.ndarray]:
         """Run our A*."""
         return search(
-            self.padded, self.stride, self.table, self.start, self.goal, 1.0, False, False, NO_CANCEL, self.room
+            self.padded, self.stride, self.table, self.start, self.goal, 1.0, False, False, NO_CANCEL, self.records
         )
 
     def field(self) -> tuple[int, np.ndarray]:
         """Run our full field."""
-        return search(self.padded, self.stride, self.table, self.start, -1, 0.0, False, False, NO_CANCEL, self.room)
+        return search(self.padded, self.stride, self.table, self.start, -1, 0.0, False, False, NO_CANCEL, self.records)
 
     def interpolated(self) -> tuple[int, np.ndarray]:
         """Run navfn's potential up to the goal."""
         return search(
-            self.padded, self.stride, self.table, self.start, self.goal, 0.0, False, True, NO_CANCEL, self.room
+            self.padded, self.stride, self.table, self.start, self.goal, 0.0, False, True, NO_CANCEL, self.records
         )
 
     def theta(self) -> tuple[int, np.ndarray, np.ndarray]:

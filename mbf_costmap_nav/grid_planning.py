@@ -21,10 +21,9 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.kernels.search_cells import SearchRoom
 from mbf_costmap_nav.path_geometry import arc_lengths, resample
 from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
-from mbf_costmap_nav.search_grid import Cell, GridPlannerParameters, SearchGrid
+from mbf_costmap_nav.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchRoom
 
 NEAR_END = 0.75
 """Points this near [cells] to an exact start or goal are dropped: going there first would be a step back."""

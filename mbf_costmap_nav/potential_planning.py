@@ -57,5 +57,7 @@ def _from_nearest_end(
 def _spread(grid: SearchGrid, source: Cell, until: int, interpolated: bool) -> NDArray[np.float32] | None:
     """Field from ``source`` up to the padded index ``until``, or everywhere for -1; None when cancelled."""
     first, flag = grid.index(source), grid.token.flag
-    status, g = search(grid.cells, grid.stride, grid.table, first, until, 0.0, False, interpolated, flag, grid.room)
+    status, g = search(
+        grid.cells, grid.stride, grid.table, first, until, 0.0, False, interpolated, flag, grid.records()
+    )
     return None if status == CANCELED else g

@@ -18,7 +18,7 @@ from mbf_costmap_nav.costmap import LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.kernels.grid_search import pad_cells
 from mbf_costmap_nav.kernels.line_cells import cost_along
 from mbf_costmap_nav.kernels.nearest_cell import nearest_reached
-from mbf_costmap_nav.kernels.search_cells import SearchRoom
+from mbf_costmap_nav.kernels.search_cells import Records, new_records
 
 Cell = tuple[int, int]
 
@@ -36,6 +36,22 @@ class GridPlannerParameters(PluginParameters):
         253, "Cells of this cost and above are obstacles (unknown is asked apart).", ge=1, le=254
     )
     allow_unknown: bool = parameter(True, "Plan through unknown cells, counted like cost 252.")
+
+
+class SearchRoom:
+    """Memory of one planner's grid searches, kept from plan to plan.
+
+    Fresh pages from the system take a tenth of a search, and twice as long as the search after others used them.
+    """
+
+    def __init__(self) -> None:
+        self._records = new_records(0)
+
+    def records(self, count: int) -> Records:
+        """Return ``count`` records that hold anything, the same ones for the same count."""
+        if len(self._records) != count:
+            self._records = new_records(count)
+        return self._records
 
 
 @dataclass(frozen=True)
@@ -77,6 +93,10 @@ class SearchGrid:
         return cls(
             costmap, pad_cells(costmap.cells, LETHAL, token.flag), costmap.width + 2, table, token, room or SearchRoom()
         )
+
+    def records(self) -> Records:
+        """Return memory for a search on this grid; what stands in it is that of the last one."""
+        return self.room.records(self.cells.size)
 
     @property
     def geometry(self) -> NDArray[np.float64]:

@@ -117,15 +117,7 @@ class CostmapNavigationServer(AbstractNavigationServer):
         )
 
     def take_scan(self, scan: RangeScan) -> None:
-        """Feed a scan to every layer that listens to its source, placed by the transform at its stamp; see ScanIntake.
-
-        Raises
-        ------
-        TransformError
-            None of the maps that listen can place it.
-        ValueError
-            The stamp is not finite.
-        """
+        """Feed a scan to every layer that listens to its source, as ``ScanIntake.take``, whose errors it raises."""
         self._scans.take(scan)
 
     @property

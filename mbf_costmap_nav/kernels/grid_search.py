@@ -23,9 +23,9 @@ from mbf_costmap_nav.kernels.search_cells import (
     KEPT_BITS,
     SLOT_BITS,
     Records,
-    SearchRoom,
     natural_steps,
-    search_cells,
+    new_records,
+    write_records,
 )
 
 FOUND, EXHAUSTED, CANCELED = 0, 1, 2
@@ -77,7 +77,7 @@ def search(
     cut_corners: bool,
     interpolated: bool,
     cancel_flag: NDArray[np.uint8],
-    room: SearchRoom | None = None,
+    records: Records | None = None,
 ) -> tuple[int, NDArray[np.float32]]:
     """Settle cells around ``start`` until ``goal`` is settled, or everything reachable if it cannot be reached.
 
@@ -101,7 +101,7 @@ def search(
         which a heuristic settles one too late.
     cancel_flag : (1,) uint8
         Polled at every row of the preparation and at every bucket.
-    room : SearchRoom, optional
+    records : (n,) CELL, optional
         Memory to work in; what an earlier search in it returned is overwritten. Without it the search has its own.
 
     Returns
@@ -112,7 +112,8 @@ def search(
         Cost from the start in traversal times cells, inf where not reached. Exact for settled cells, an upper bound
         at the rim of the search. A view into the search's records, so not contiguous.
     """
-    records = search_cells(cells, stride, cancel_flag, room or SearchRoom())
+    records = new_records(cells.size) if records is None else records
+    write_records(cells, stride, cancel_flag, records)
     buckets = np.empty((RING, max(FIRST_ROOM, cells.size // CELLS_PER_ROOM)), dtype=np.int32)
     status = _search(
         records, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, buckets

@@ -42,28 +42,15 @@ _UNTOUCHED = np.uint64(int(NOWHERE << CAME_SHIFT) | int(IDLE)) << np.uint64(32) 
 """A record without its cost: waits nowhere, reached from nowhere, and g = inf (its bits)."""
 
 
-class SearchRoom:
-    """Memory of one planner's searches, kept from plan to plan.
-
-    Fresh pages from the system take a tenth of a search, and twice as long as the search after others used them.
-    """
-
-    def __init__(self) -> None:
-        self._records = np.empty(0, dtype=CELL)
-
-    def records(self, count: int) -> Records:
-        """Return ``count`` records that hold anything, the same ones for the same count."""
-        if len(self._records) != count:
-            # numpy's own array, not the kernel's: numpy asks the system for huge pages, and a wave touches many pages.
-            self._records = np.empty(count, dtype=CELL)
-        return self._records
+def new_records(count: int) -> Records:
+    """Memory for ``count`` records that hold anything."""
+    # numpy's own array, not the kernel's: numpy asks the system for huge pages, and a wave touches many pages at once.
+    return np.empty(count, dtype=CELL)
 
 
-def search_cells(cells: NDArray[np.uint8], stride: int, cancel_flag: NDArray[np.uint8], room: SearchRoom) -> Records:
-    """Records (n,) of a padded grid (n,) with rows of ``stride``, none of them reached; unfinished if cancelled."""
-    records = room.records(cells.size)
+def write_records(cells: NDArray[np.uint8], stride: int, cancel_flag: NDArray[np.uint8], records: Records) -> None:
+    """Fill the records (n,) of a padded grid (n,) with rows of ``stride``, none of them reached; stop if cancelled."""
     _fill(cells.reshape(-1, stride), records.view(np.uint64).reshape(-1, stride), cancel_flag)
-    return records
 
 
 @kernel

@@ -46,7 +46,7 @@ class AStarPlanner(GridPlanner):
             return plan_down_potential(grid, start, goal, tolerance, interpolated=True)
         cut, goal_cell = self.parameters.cut_corners, grid.cell_of(goal)
         first, last, flag = grid.index(grid.cell_of(start)), grid.index(goal_cell), grid.token.flag
-        status, g = search(grid.cells, grid.stride, grid.table, first, last, 1.0, cut, False, flag, grid.room)
+        status, g = search(grid.cells, grid.stride, grid.table, first, last, 1.0, cut, False, flag, grid.records())
         if status == CANCELED:
             return NO_LEG
         end = goal_cell if g[last] < float("inf") else grid.nearest_reached(g, goal, tolerance)

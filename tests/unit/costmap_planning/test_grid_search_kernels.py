@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as hnp
 from mbf_costmap_nav.kernels.grid_line import line_cost
 from mbf_costmap_nav.kernels.grid_path import trace_cells, trace_gradient
 from mbf_costmap_nav.kernels.grid_search import CANCELED, EXHAUSTED, FOUND, pad_cells, search
-from mbf_costmap_nav.kernels.search_cells import SearchRoom
+from mbf_costmap_nav.kernels.search_cells import new_records
 from mbf_costmap_nav.kernels.short_lines import TOUCHED, crossed_cells, trace_lines
 from mbf_costmap_nav.kernels.theta_star import theta_search
 from mbf_costmap_nav.search_grid import traversal_table
@@ -102,12 +102,12 @@ def test_where_neighbours_are_left_out_on_plain_ground_the_field_is_still_the_na
 
 @settings(max_examples=30, deadline=None)
 @given(first=small_maps, second=small_maps)
-def test_a_room_that_has_been_searched_in_changes_no_later_search(first, second):
-    room, table = SearchRoom(), traversal_table(3.0, 253, False)
+def test_memory_that_has_been_searched_in_changes_no_later_search(first, second):
+    table, memory = traversal_table(3.0, 253, False), new_records(14 * 14)
     for cells in (first, second, first):
         cells[0, 0] = 0
         padded, stride = pad_cells(cells, 254), cells.shape[1] + 2
-        status, g = search(padded, stride, table, stride + 1, -1, 0.0, False, False, NO_CANCEL, room)
+        status, g = search(padded, stride, table, stride + 1, -1, 0.0, False, False, NO_CANCEL, memory[: padded.size])
         alone = search(padded, stride, table, stride + 1, -1, 0.0, False, False, NO_CANCEL)
         assert status == alone[0]
         np.testing.assert_array_equal(g, alone[1])
