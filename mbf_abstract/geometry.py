@@ -259,6 +259,16 @@ class AckermannCommand:
 Command: TypeAlias = Twist | AckermannCommand
 
 
+def _refuse_wrong_pose(positions: FloatArray, orientations: FloatArray, squared_norms: FloatArray) -> None:
+    """Name the first pose of a path that is not finite, or else the first whose quaternion is not of unit length."""
+    infinite = ~(np.isfinite(positions).all(axis=1) & np.isfinite(orientations).all(axis=1))
+    if infinite.any():
+        i = int(np.argmax(infinite))
+        raise NonFiniteError(f"pose {i} of the path is not finite: {positions[i].tolist()} {orientations[i].tolist()}")
+    i = int(np.argmax(np.abs(squared_norms - 1.0) > QUATERNION_NORM_TOLERANCE))
+    raise ValueError(f"orientation of pose {i} has squared norm {squared_norms[i]:.6g}, expected 1")
+
+
 @dataclass(frozen=True, eq=False)
 class Path:
     """A sequence of poses in one frame, stored as two read-only arrays.
@@ -297,17 +307,11 @@ class Path:
             orientations = np.array(self.orientations, dtype=np.float64).reshape(-1, 4)
         if len(positions) != len(orientations):
             raise ValueError(f"{len(positions)} positions but {len(orientations)} orientations")
-        # Whole arrays first: which pose is wrong is looked for only if one is.
-        if not (np.isfinite(positions).all() and np.isfinite(orientations).all()):
-            i = int(np.flatnonzero(~np.isfinite(np.hstack([positions, orientations])).all(axis=1))[0])
-            raise NonFiniteError(
-                f"pose {i} of the path is not finite: {positions[i].tolist()} {orientations[i].tolist()}"
-            )
+        # Whole arrays first: which pose is wrong is looked for only if one may be.
         norms = np.einsum("ij,ij->i", orientations, orientations)
-        wrong = np.abs(norms - 1.0) > QUATERNION_NORM_TOLERANCE
-        if wrong.any():
-            i = int(np.argmax(wrong))
-            raise ValueError(f"orientation of pose {i} has squared norm {norms[i]:.6g}, expected 1")
+        is_unit = np.abs(norms - 1.0) <= QUATERNION_NORM_TOLERANCE
+        if not (is_unit.all() and np.isfinite(positions).all()):
+            _refuse_wrong_pose(positions, orientations, norms)
         positions.flags.writeable = False
         orientations.flags.writeable = False
         object.__setattr__(self, "positions", positions)

@@ -6,7 +6,7 @@ surface normals here as well, so a planner is only the choice of a kernel.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distances
-from mbf_mesh_nav.kernels.path_poses import distinct_points
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.path_cost import cost_along
@@ -125,18 +124,17 @@ def vertex_path_leg(
     if start.face == goal.face:
         return straight_leg(mesh_map, query)
     corners, offsets = corner_distances(mesh_map, query.blocked, start if rooted_at_goal else goal)
-    totals = distances[corners] + offsets
-    if not np.isfinite(totals).any():
+    total, best = min(zip((distances[corners] + offsets).tolist(), corners.tolist(), strict=True), default=(np.inf, -1))
+    if total == np.inf:
         return None
-    best = int(np.argmin(totals))
-    chain = follow_predecessors(predecessors, int(corners[best]))
+    chain = follow_predecessors(predecessors, best)
     if not rooted_at_goal:
         chain = chain[::-1]
     positions, normals = np.empty((len(chain) + 2, 3)), np.empty((len(chain) + 2, 3))
     positions[0], positions[1:-1], positions[-1] = start.point, mesh_map.vertices.take(chain, axis=0), goal.point
     normals[1:-1] = mesh_map.vertex_normals.take(chain, axis=0)
     normals[0], normals[-1] = mesh_map.face_normals[start.face], mesh_map.face_normals[goal.face]
-    return Leg(positions, normals, float(totals[best]))
+    return Leg(positions, normals, total)
 
 
 def straight_leg(mesh_map: MeshMap, query: LegQuery) -> Leg:
@@ -145,9 +143,3 @@ def straight_leg(mesh_map: MeshMap, query: LegQuery) -> Leg:
     point_faces = np.array([query.start.face, query.goal.face], dtype=np.int32)
     cost = cost_along(mesh_map, query.snapshot, positions, point_faces)
     return Leg(positions, mesh_map.face_normals[point_faces], cost)
-
-
-def drop_repeated_points(leg: Leg, tolerance: float = 1e-6) -> Leg:
-    """Remove inner points closer than ``tolerance`` [m] to the point before or to the last; both ends stay."""
-    keep = distinct_points(leg.positions, tolerance)
-    return leg if keep.all() else replace(leg, positions=leg.positions[keep], normals=leg.normals[keep])

@@ -21,8 +21,8 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_mesh_nav.kernels.path_poses import orientations_along
-from mbf_mesh_nav.leg_search import Leg, LegQuery, drop_repeated_points, spread_from
+from mbf_mesh_nav.kernels.path_poses import poses_along
+from mbf_mesh_nav.leg_search import Leg, LegQuery, spread_from
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.plugins import MeshPlanner
 from mbf_mesh_nav.snapshot import MeshSnapshot
@@ -33,6 +33,9 @@ from mbf_mesh_nav.surface_point import (
     position_text,
     surface_point_at_vertex,
 )
+
+SAME_POINT = 1e-6
+"""Points of a path so near [m] to each other are one."""
 
 
 class SurfacePlannerParameters(PluginParameters):
@@ -183,12 +186,11 @@ class SurfacePlanner(MeshPlanner):
         normals = np.concatenate([legs[0].normals[:1]] + [leg.normals[1:] for leg in legs])
         if goal_reached_exactly:
             positions[-1] = goal.position
-        whole = drop_repeated_points(Leg(positions, normals, 0.0))
         # Every pose looks to the next one and stands on the surface; the last one is as requested.
-        orientations = orientations_along(whole.positions, whole.normals)
+        positions, orientations = poses_along(positions, normals, SAME_POINT)
         orientations[-1] = goal.orientation
         guidance = tuple(leg.guidance for leg in legs if leg.guidance is not None) or None
-        return Path(whole.positions, orientations, self.mesh_map.frame_id, self.clock.now(), guidance)
+        return Path(positions, orientations, self.mesh_map.frame_id, self.clock.now(), guidance)
 
 
 def _named_poses(request: PlanRequest) -> list[tuple[str, Pose]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,7 @@ from mbf_mesh_nav.snapshot import MeshSnapshot
 BORDER_SLACK = 0.05
 """A position may be so far [m] past a border of the surface and count as on it: rounding, and the width of a wheel."""
 ON_EDGE = 1e-9
+INFINITELY_FAR = np.float32(np.inf)
 
 
 def nearest_corner(mesh_map: MeshMap, point: SurfacePoint) -> int:
@@ -65,11 +68,11 @@ def corner_distances(
     mesh_map: MeshMap, blocked: NDArray[np.bool_], point: SurfacePoint
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Free corners of the point's face (k,) int32 and their straight distances (k,) float32 [m] to the point."""
-    corners = mesh_map.faces[point.face]
-    corners = np.ascontiguousarray(corners[~blocked[corners]])
-    offsets = np.linalg.norm(mesh_map.vertices[corners] - point.point, axis=1).astype(np.float32)
+    corners = [corner for corner in mesh_map.faces[point.face].tolist() if not blocked[corner]]
+    place = point.point.tolist()
+    offsets = np.array([math.dist(mesh_map.vertices[corner].tolist(), place) for corner in corners], dtype=np.float32)
     # A hair longer than the line, so that rounding cannot make it shorter than a straight-line bound.
-    return corners, np.nextafter(offsets, np.float32(np.inf))
+    return np.array(corners, dtype=np.int32), np.nextafter(offsets, INFINITELY_FAR)
 
 
 def describe_blockage(mesh_map: MeshMap, snapshot: MeshSnapshot, vertex: int, cost_limit: float) -> str:

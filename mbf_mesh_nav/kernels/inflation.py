@@ -4,7 +4,8 @@ The distance of a vertex is the fixed point of "the least of what the edges and 
 offers the arrival of a straight wave front (Kimmel and Sethian 1998, with the acceptance test of mesh_navigation), an
 edge offers its length; the edge offers let an isolated lethal vertex spread, which mesh_navigation cannot. Since every
 offer exceeds what it is made from, the fixed point is unique: vertices may be worked off in any order, and a repair
-gives the same values as a new start.
+gives the same values as a new start. The order is first come, first served: the waves are only some rings wide, and a
+stack visits a fifth more.
 """
 
 from __future__ import annotations
@@ -14,15 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.near_far import after
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 CostArray = NDArray[np.float32]
 
 RIGHT_ANGLE_TOLERANCE = 1e-9
 _WAITING: Any = np.uint8(1)
-_LOWERED: Any = np.uint8(2)
+_TOUCHED: Any = np.uint8(2)
 
 
 @kernel
@@ -76,128 +79,117 @@ def face_offer(vertices: FloatArray, vertex: int, v1: int, d1: float, v2: int, d
 
 
 @kernel
-def spread(
+def repair_distances(
     vertices: FloatArray,
     faces: IntArray,
     face_offsets: IntArray,
     incident: IntArray,
+    neighbour_offsets: IntArray,
+    neighbours: IntArray,
     radius: float,
-    step: float,
-    start: IntArray,
+    lethal: BoolArray,
+    known_lethal: BoolArray,
+    changed: IntArray,
     distances: CostArray,
     sources: IntArray,
-) -> IntArray:
-    """Lower ``distances`` (V,) and set ``sources`` (V, 2) until no vertex has a better offer from within ``radius``.
+) -> tuple[IntArray, int]:
+    """Bring the distances up to date after some vertices became lethal or ceased to be; from scratch is a case of it.
 
-    Vertices to work off, at first ``start``, wait in a near list (below a threshold) or a far list; the threshold
-    grows by ``step`` [m]. One ring of vertices beyond the radius gets a distance, too. Returns the vertices whose
-    distance was lowered.
+    Parameters
+    ----------
+    vertices, faces : (V, 3) float64 [m], (F, 3) int32
+    face_offsets, incident : (V+1,), (3F,) int32
+        Faces at each vertex.
+    neighbour_offsets, neighbours : (V+1,), (2E,) int32
+    radius : float
+        Vertices farther [m] offer nothing, so one ring of vertices beyond it gets a distance, too.
+    lethal, known_lethal : (V,) bool
+        The flags now, and those the distances are of; the latter are brought up to date.
+    changed : (c,) int32
+        Vertices whose flags may differ.
+    distances, sources : (V,) float32 [m], (V, 2) int32
+        Distance to the nearest lethal vertex (inf where none is near) and the one or two vertices it was made from
+        (-1 without); changed in place.
+
+    Returns
+    -------
+    touched : (t,) int32
+        Vertices whose flag or distance changed, or may have; those whose flag did come first.
+    flips : int
+        Number of vertices whose flag changed.
     """
     count = len(vertices)
+    touched = np.empty(count, dtype=np.int32)
+    queue = np.empty(count + 1, dtype=np.int32)
     state = np.zeros(count, dtype=np.uint8)
-    near, far, lowered = (
-        np.empty(count, dtype=np.int32),
-        np.empty(count, dtype=np.int32),
-        np.empty(count, dtype=np.int32),
-    )
-    near_size, far_size, lowered_size = Index(0), Index(0), Index(0)
-    for vertex in start:
-        if state[vertex] & _WAITING == 0:
-            state[vertex] |= _WAITING
-            far[far_size] = vertex
-            far_size += ONE
-    while far_size > 0:
-        # The next threshold starts at the least waiting distance, so empty ranges cost nothing.
-        threshold = np.float32(np.inf)
-        for index in range(far_size):
-            threshold = min(threshold, distances[Index(far[index])])
-        threshold += np.float32(step)
-        kept = Index(0)
-        for index in range(far_size):
-            if distances[Index(far[index])] <= threshold:
-                near[near_size] = far[index]
-                near_size += ONE
-            else:
-                far[kept] = far[index]
-                kept += ONE
-        far_size = kept
-        # The near list is a stack of everything below the threshold.
-        while near_size > 0:
-            near_size -= ONE
-            vertex = Index(near[near_size])
-            state[vertex] &= ~_WAITING
-            reached = distances[vertex]
-            if reached > radius:
-                continue
-            for position in range(Index(face_offsets[vertex]), Index(face_offsets[vertex + ONE])):
-                face = Index(incident[position])
-                for corner in range(3):
-                    other = Index(faces[face, corner])
-                    if distances[other] <= reached:
-                        continue
-                    # Corners in the order of the winding, so that rounding does not depend on who came first.
-                    v1, v2 = Index(faces[face, (corner + 1) % 3]), Index(faces[face, (corner + 2) % 3])
-                    d1 = float(distances[v1]) if distances[v1] <= radius else np.inf
-                    d2 = float(distances[v2]) if distances[v2] <= radius else np.inf
-                    exact, first, second = face_offer(vertices, other, v1, d1, v2, d2)
-                    offer = np.float32(exact)
-                    if not offer < distances[other]:
-                        continue
-                    distances[other] = offer
-                    sources[other, 0], sources[other, 1] = first, second
-                    if state[other] & _LOWERED == 0:
-                        state[other] |= _LOWERED
-                        lowered[lowered_size] = other
-                        lowered_size += ONE
-                    if state[other] & _WAITING != 0:
-                        continue
-                    state[other] |= _WAITING
-                    if offer <= threshold:
-                        near[near_size] = other
-                        near_size += ONE
-                    else:
-                        far[far_size] = other
-                        far_size += ONE
-    return lowered[:lowered_size].copy()
-
-
-@kernel
-def forget_dependents(
-    offsets: IntArray, neighbours: IntArray, removed: IntArray, distances: CostArray, sources: IntArray
-) -> IntArray:
-    """Set to inf every distance that came, directly or not, from the ``removed`` seeds; return those vertices."""
-    forgotten = np.empty(distances.shape[0], dtype=np.int32)
-    size = 0
-    for index in range(removed.shape[0]):
-        distances[removed[index]] = np.inf
-        sources[removed[index], 0] = sources[removed[index], 1] = -1
-        forgotten[size] = removed[index]
-        size += 1
-    head = 0
-    while head < size:
-        vertex = forgotten[head]
-        head += 1
-        for entry in range(offsets[vertex], offsets[vertex + 1]):
-            other = neighbours[entry]
-            if sources[other, 0] == vertex or sources[other, 1] == vertex:
+    size, head, tail = Index(0), Index(0), Index(0)
+    # 1. New lethal vertices are at distance 0, former ones at none.
+    for changed_vertex in changed:
+        vertex = Index(changed_vertex)
+        if lethal[vertex] == known_lethal[vertex]:
+            continue
+        known_lethal[vertex] = lethal[vertex]
+        distances[vertex] = np.float32(0.0) if lethal[vertex] else np.float32(np.inf)
+        sources[vertex, 0] = sources[vertex, 1] = -1
+        state[vertex] = _TOUCHED
+        touched[size] = vertex
+        size += ONE
+    flips = size
+    # 2. Forget every distance that came, directly or not, from a former one.
+    reader = Index(0)
+    while reader < size:
+        vertex = Index(touched[reader])
+        reader += ONE
+        if lethal[vertex]:
+            continue
+        for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
+            other = Index(neighbours[slot])
+            if Index(sources[other, 0]) == vertex or Index(sources[other, 1]) == vertex:
                 distances[other] = np.inf
                 sources[other, 0] = sources[other, 1] = -1
-                forgotten[size] = other
-                size += 1
-    return forgotten[:size].copy()
-
-
-@kernel
-def finite_rim(offsets: IntArray, neighbours: IntArray, forgotten: IntArray, distances: CostArray) -> IntArray:
-    """Vertices with a distance next to forgotten ones: where a repair starts."""
-    size = 0
-    for index in range(forgotten.shape[0]):
-        size += offsets[forgotten[index] + 1] - offsets[forgotten[index]]
-    rim = np.empty(size, dtype=np.int32)
-    size = 0
-    for index in range(forgotten.shape[0]):
-        for entry in range(offsets[forgotten[index]], offsets[forgotten[index] + 1]):
-            if distances[neighbours[entry]] < np.inf:
-                rim[size] = neighbours[entry]
-                size += 1
-    return rim[:size].copy()
+                state[other] = _TOUCHED
+                touched[size] = other
+                size += ONE
+    # 3. Offers come from the rim of new lethal regions, and from what is known beside the forgotten.
+    for index in range(size):
+        vertex = Index(touched[index])
+        for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
+            other = Index(neighbours[slot])
+            offering = vertex if lethal[vertex] else other
+            offers = distances[other] > 0.0 if lethal[vertex] else distances[other] < np.inf
+            if offers and state[offering] & _WAITING == 0:
+                state[offering] |= _WAITING
+                queue[tail] = offering
+                tail = after(tail, queue)
+    # 4. Whoever was lowered offers to the faces around it, first come first served, until nothing is lowered.
+    while head != tail:
+        vertex = Index(queue[head])
+        head = after(head, queue)
+        state[vertex] &= ~_WAITING
+        reached = distances[vertex]
+        if reached > radius:
+            continue
+        for position in range(Index(face_offsets[vertex]), Index(face_offsets[vertex + ONE])):
+            face = Index(incident[position])
+            for corner in range(3):
+                other = Index(faces[face, corner])
+                if distances[other] <= reached:
+                    continue
+                # Corners in the order of the winding, so that rounding does not depend on who came first.
+                v1, v2 = Index(faces[face, (corner + 1) % 3]), Index(faces[face, (corner + 2) % 3])
+                d1 = float(distances[v1]) if distances[v1] <= radius else np.inf
+                d2 = float(distances[v2]) if distances[v2] <= radius else np.inf
+                exact, first, second = face_offer(vertices, other, v1, d1, v2, d2)
+                offer = np.float32(exact)
+                if not offer < distances[other]:
+                    continue
+                distances[other] = offer
+                sources[other, 0], sources[other, 1] = first, second
+                if state[other] & _TOUCHED == 0:
+                    touched[size] = other
+                    size += ONE
+                if state[other] & _WAITING == 0:
+                    queue[tail] = other
+                    tail = after(tail, queue)
+                state[other] = _TOUCHED | _WAITING
+    return touched[:size].copy(), Count(flips)

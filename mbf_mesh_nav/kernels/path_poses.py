@@ -6,52 +6,46 @@ import math
 
 import numpy as np
 
-from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
-from mbf_mesh_nav.kernels.dijkstra import BoolArray
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.surface_walk import tangent
-from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, difference, dot, row
+from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, difference, dot, row, set_row
 
 
 @kernel
-def distinct_points(positions: Float64Array, tolerance: float) -> BoolArray:
-    """Mask (n,) of the points to keep: both ends, and what is farther than this from the point before and the last.
+def poses_along(positions: Float64Array, normals: Float64Array, tolerance: float) -> tuple[Float64Array, Float64Array]:
+    """Positions (m, 3) and quaternions (m, 4), x y z w: each pose stands on its normal and looks to the next one.
 
-    Parameters
-    ----------
-    positions : (n, 3) float64
-        At least two points of the path [m].
-    tolerance : float
-        Distance [m].
-    """
-    last, limit = len(positions) - 1, tolerance * tolerance
-    keep = np.empty(len(positions), dtype=np.bool_)
-    keep[0] = keep[last] = True
-    end, before = row(positions, last), row(positions, 0)
-    for index in range(1, last):
-        point = row(positions, index)
-        to_end, step = difference(end, point), difference(point, before)
-        keep[index] = dot(to_end, to_end) > limit and dot(step, step) > limit
-        before = point
-    return keep
-
-
-@kernel
-def orientations_along(positions: Float64Array, normals: Float64Array) -> Float64Array:
-    """Quaternions (n, 4), x y z w: each pose stands on its normal and looks to the next one, the last any way.
+    Both ends are kept, and of the points between what is farther than ``tolerance`` from the point before and from
+    the last one. The last pose looks any way.
 
     Parameters
     ----------
     positions, normals : (n, 3) float64
-        Points of the path [m] and unit normals of the surface there.
+        At least two points of the path [m] and unit normals of the surface there.
+    tolerance : float
+        Distance [m].
     """
-    orientations = np.empty((len(positions), 4), dtype=np.float64)
+    last, limit, count = len(positions) - 1, tolerance * tolerance, Count(0)
+    kept = np.empty(len(positions), dtype=np.int32)
+    end, before = row(positions, last), row(positions, Count(0))
     for index in range(len(positions)):
-        up = row(normals, index)
-        following = min(index + 1, len(positions) - 1)
-        ahead = tangent(difference(row(positions, following), row(positions, index)), up)
+        point = row(positions, index)
+        to_end, step = difference(end, point), difference(point, before)
+        between = dot(to_end, to_end) > limit and dot(step, step) > limit
+        if between or index == 0 or index == last:
+            kept[count] = index
+            count += 1
+        before = point
+    points = np.empty((count, 3), dtype=np.float64)
+    orientations = np.empty((count, 4), dtype=np.float64)
+    for place in range(count):
+        point, up = row(positions, Count(kept[place])), row(normals, Count(kept[place]))
+        following = row(positions, Count(kept[min(place + 1, count - 1)]))
+        ahead = tangent(difference(following, point), up)
         x, y, z, w = _quaternion(ahead, cross(up, ahead), up)
-        orientations[index, 0], orientations[index, 1], orientations[index, 2], orientations[index, 3] = x, y, z, w
-    return orientations
+        set_row(points, place, point)
+        orientations[place, 0], orientations[place, 1], orientations[place, 2], orientations[place, 3] = x, y, z, w
+    return points, orientations
 
 
 @inner_kernel

@@ -7,10 +7,15 @@ point a search from scratch reaches. (The idea of Ramalingam and Reps, 1996, wit
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
 from mbf_mesh_nav.kernels.dijkstra import BoolArray, Float32Array, Int32Array
+
+_RESET: Any = np.uint8(1)
+_SEED: Any = np.uint8(2)
 
 
 @kernel
@@ -21,6 +26,7 @@ def forget_changed_ways(
     distances: Float32Array,
     predecessors: Int32Array,
     roots: Int32Array,
+    root_distances: Float32Array,
     changed: Int32Array,
 ) -> Int32Array:
     """Reset, in place, all vertices whose way leads over a changed vertex; return the seeds of the repair.
@@ -32,7 +38,7 @@ def forget_changed_ways(
         The new blocked vertices.
     distances, predecessors : (V,) float32, (V,) int32
         The old field; reset vertices get inf and -1.
-    roots : (r,) int32
+    roots, root_distances : (r,) int32, (r,) float32
         Seeds of the field, a few, which keep their distance.
     changed : (c,) int32
         Vertices whose cost or flag changed, i.e. at which the weight of any edge may have changed.
@@ -40,54 +46,44 @@ def forget_changed_ways(
     Returns
     -------
     seeds : (s,) int32
-        Reached vertices beside reset ones, and the roots among the changed.
+        Reached vertices beside reset ones, and the roots among those.
     """
-    stack = np.empty(len(distances), dtype=np.int32)
     reset = np.empty(len(distances), dtype=np.int32)
-    was_reset = np.zeros(len(distances), dtype=np.bool_)
-    depth = 0
-    for vertex in changed:
-        if not was_reset[vertex]:
-            was_reset[vertex] = True
-            stack[depth] = vertex
-            depth += 1
+    seeds = np.empty(len(distances), dtype=np.int32)
+    state = np.zeros(len(distances), dtype=np.uint8)
+    count, seed_count, reader = Index(0), Index(0), Index(0)
+    for changed_vertex in changed:
+        vertex = Index(changed_vertex)
+        if state[vertex] == 0:
+            state[vertex] = _RESET
+            reset[count] = vertex
+            count += ONE
     # 1. Reset the changed vertices and everything behind them.
-    count = 0
-    while depth > 0:
-        depth -= 1
-        vertex = stack[depth]
-        reset[count] = vertex
-        count += 1
-        for slot in range(neighbour_offsets[vertex], neighbour_offsets[vertex + 1]):
-            child = neighbours[slot]
-            if predecessors[child] == vertex and not was_reset[child]:
-                was_reset[child] = True
-                stack[depth] = child
-                depth += 1
-        if not _is_among(roots, vertex):
-            distances[vertex] = np.inf
-            predecessors[vertex] = -1
+    while reader < count:
+        vertex = Index(reset[reader])
+        reader += ONE
+        distances[vertex] = np.inf
+        predecessors[vertex] = -1
+        for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
+            child = Index(neighbours[slot])
+            if Index(predecessors[child]) == vertex and state[child] == 0:
+                state[child] = _RESET
+                reset[count] = child
+                count += ONE
+    for index in range(len(roots)):
+        root = Index(roots[index])
+        if state[root] == _RESET and not blocked[root]:
+            distances[root] = root_distances[index]
+            state[root] = _SEED
+            seeds[seed_count] = root
+            seed_count += ONE
     # 2. The wave starts again from what is intact around them.
-    seed_count = 0
-    is_seed = np.zeros(len(distances), dtype=np.bool_)
     for index in range(count):
-        vertex = reset[index]
-        if _is_among(roots, vertex) and not blocked[vertex] and not is_seed[vertex]:
-            is_seed[vertex] = True
-            stack[seed_count] = vertex
-            seed_count += 1
-        for slot in range(neighbour_offsets[vertex], neighbour_offsets[vertex + 1]):
-            other = neighbours[slot]
-            if distances[other] < np.inf and not is_seed[other]:
-                is_seed[other] = True
-                stack[seed_count] = other
-                seed_count += 1
-    return stack[:seed_count].copy()
-
-
-@inner_kernel
-def _is_among(roots: Int32Array, vertex: int) -> bool:
-    for root in roots:
-        if root == vertex:
-            return True
-    return False
+        vertex = Index(reset[index])
+        for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
+            other = Index(neighbours[slot])
+            if state[other] == 0 and distances[other] < np.inf:
+                state[other] = _SEED
+                seeds[seed_count] = other
+                seed_count += ONE
+    return seeds[:seed_count].copy()

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.kernels.inflation import finite_rim, forget_dependents, spread
+from mbf_mesh_nav.kernels.inflation import repair_distances
 from mbf_mesh_nav.layer import (
-    NOTHING_CHANGED,
     CostArray,
     IntArray,
     LayerContext,
@@ -26,9 +25,6 @@ from mbf_mesh_nav.layer import (
     LethalArray,
     MeshLayer,
 )
-
-THRESHOLD_STEP = 1.5
-"""Growth of the work list's threshold in mean edge lengths; the time is flat around it."""
 
 
 class InflationParameters(LayerParameters):
@@ -65,41 +61,24 @@ class InflationLayer(MeshLayer):
 
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
-        lengths = self.topology.neighbour_lengths
-        self._step = THRESHOLD_STEP * float(lengths.mean()) if len(lengths) else 1.0
         self._forget_all()
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Distances from scratch, costs from distances, lethal as the input."""
-        lethal = self.inputs[0].lethal.copy()
-        seeds = np.flatnonzero(lethal).astype(np.int32)
         self._forget_all()
-        self.distances[seeds] = 0.0
-        self._spread(seeds)
+        lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)  # becomes that of the input
+        self._repair(np.flatnonzero(self.inputs[0].lethal).astype(np.int32), lethal)
         return self.cost_of_distance(self.distances), lethal
 
     def update_from_inputs(self, changed: IntArray) -> IntArray:
         """Repair the distances around the vertices whose lethal flag changed."""
-        lethal = self.inputs[0].lethal
-        flipped = changed[lethal[changed] != self._lethal[changed]]
-        if len(flipped) == 0:
-            return NOTHING_CHANGED
-        mesh = self.topology
-        graph = (mesh.neighbour_offsets, mesh.neighbours)
-        added, removed = flipped[lethal[flipped]], flipped[~lethal[flipped]]
-        forgotten = forget_dependents(*graph, removed, self.distances, self._sources)
-        self.distances[added] = 0.0
-        self._sources[added] = -1
-        lowered = self._spread(np.concatenate([added, finite_rim(*graph, forgotten, self.distances)]))
-        self._lethal[flipped] = lethal[flipped]
-        is_touched = np.zeros(mesh.vertex_count, dtype=np.bool_)
-        is_touched[added] = is_touched[forgotten] = is_touched[lowered] = True
-        touched = np.flatnonzero(is_touched).astype(np.int32)
-        self._costs[flipped] = np.nan  # differs from everything: a new flag is a change even if the cost is the same
+        touched, flips = self._repair(changed, self._lethal)
         costs = self.cost_of_distance(self.distances[touched])
         differs = costs != self._costs[touched]
+        differs[:flips] = True  # a new flag is a change even if the cost is the same
         moved: IntArray = touched[differs]
         self._costs[moved] = costs[differs]
+        moved.sort()
         return moved
 
     def cost_of_distance(self, distances: NDArray[np.float32]) -> CostArray:
@@ -115,16 +94,19 @@ class InflationLayer(MeshLayer):
         self.distances = np.full(self.topology.vertex_count, np.inf, dtype=np.float32)
         self._sources = np.full((self.topology.vertex_count, 2), -1, dtype=np.int32)
 
-    def _spread(self, start: IntArray) -> IntArray:
+    def _repair(self, changed: IntArray, known_lethal: LethalArray) -> tuple[IntArray, int]:
         mesh = self.topology
-        return spread(
+        return repair_distances(
             mesh.vertices,
             mesh.faces,
             mesh.vertex_face_offsets,
             mesh.vertex_faces,
+            mesh.neighbour_offsets,
+            mesh.neighbours,
             self.parameters.inflation_radius,
-            self._step,
-            start,
+            self.inputs[0].lethal,
+            known_lethal,
+            changed,
             self.distances,
             self._sources,
         )

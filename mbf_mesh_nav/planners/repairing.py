@@ -32,10 +32,11 @@ from mbf_mesh_nav.surface_point import corner_distances
 class RememberedWave:
     """A finished field and what it was computed for."""
 
-    goal: tuple[float, ...]
+    goal: list[float]
     cost_limit: float
     version: int
     roots: NDArray[np.int32]
+    root_distances: NDArray[np.float32]
     distances: NDArray[np.float32]
     predecessors: NDArray[np.int32]
 
@@ -76,15 +77,17 @@ class RepairingPlanner(SurfacePlanner):
     def _changes_since(self, wave: RememberedWave, query: LegQuery) -> NDArray[np.int32] | None:
         """Vertices that changed since the wave; None if it leads elsewhere, or nobody remembers what changed."""
         roots, _ = corner_distances(self.mesh_map, query.blocked, query.goal)
-        same_source = wave.goal == tuple(query.goal.point) and np.array_equal(wave.roots, roots)
+        same_source = wave.goal == query.goal.point.tolist() and wave.roots.tolist() == roots.tolist()
         if not same_source or wave.cost_limit != self.parameters.cost_limit:
             return None
         return self.mesh_map.changes_between(wave.version, query.snapshot.version)
 
     def _new_wave(self, query: LegQuery) -> RememberedWave:
         distances, predecessors, seeds = seeded_arrays(self.mesh_map, query.blocked, query.goal)
-        goal, version = tuple(query.goal.point), query.snapshot.version
-        return RememberedWave(goal, self.parameters.cost_limit, version, seeds, distances, predecessors)
+        goal, version = query.goal.point.tolist(), query.snapshot.version
+        return RememberedWave(
+            goal, self.parameters.cost_limit, version, seeds, distances[seeds], distances, predecessors
+        )
 
     def _forget(self, changed: NDArray[np.int32], wave: RememberedWave, query: LegQuery) -> NDArray[np.int32]:
         """Forget what hung on changed vertices; return the seeds of the repair."""
@@ -95,5 +98,6 @@ class RepairingPlanner(SurfacePlanner):
             wave.distances,
             wave.predecessors,
             wave.roots,
+            wave.root_distances,
             changed,
         )
