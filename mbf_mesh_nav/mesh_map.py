@@ -195,11 +195,13 @@ class MeshMap:
         """
         count = self.topology.vertex_count
         with self._lock:
-            costs = np.zeros(count, np.float32) if default_layer is None else layers[default_layer].costs
+            shown = None if default_layer is None else layers[default_layer]
             self.layers = layers
             self.default_layer = default_layer
             self.edge_cost_factor = edge_cost_factor
-            lethal = np.zeros(count, np.bool_) if default_layer is None else layers[default_layer].lethal
+            costs = np.zeros(count, np.float32) if shown is None else shown.costs
+            lethal = np.zeros(count, np.bool_) if shown is None else shown.lethal
+            costs.flags.writeable = lethal.flags.writeable = False  # as those of a layer: kernels know one type
             self._changes.clear()
             self._snapshot = self._snapshots.begin(costs, lethal, edge_cost_factor)
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbf_mesh_nav.kernels.edge_weights import set_edge_weights
+from mbf_mesh_nav.kernels.edge_weights import show_changes
 from mbf_mesh_nav.kernels.forbidden_ground import LETHAL_HARDNESS
 from mbf_mesh_nav.layer import CostArray, IntArray, LethalArray
 from mbf_mesh_nav.topology import MeshTopology
@@ -95,7 +95,7 @@ class SnapshotSeries:
         self._edge_cost_factor = edge_cost_factor
         weights = np.zeros(len(self._topology.neighbours), np.float32)
         self._current, self._spare = _Arrays(costs.copy(), lethal.copy(), weights), None
-        return self._published(np.arange(len(costs), dtype=np.int32))
+        return self._published(costs, lethal, np.arange(len(costs), dtype=np.int32))
 
     def follow(self, costs: CostArray, lethal: LethalArray, changed: IntArray) -> MeshSnapshot:
         """Make the snapshot that differs from the last one at the ``changed`` vertices (k,) only."""
@@ -104,14 +104,14 @@ class SnapshotSeries:
             arrays, outdated = last.copy(), changed
         else:
             outdated = np.concatenate([self._missed, changed])
-        arrays.costs[outdated], arrays.lethal[outdated] = costs[outdated], lethal[outdated]
         self._current, self._spare, self._missed = arrays, last, changed
-        return self._published(outdated)
+        return self._published(costs, lethal, outdated)
 
-    def _published(self, outdated: IntArray) -> MeshSnapshot:
-        """Bring the weights of the edges at ``outdated`` vertices up to date and show the current arrays."""
+    def _published(self, costs: CostArray, lethal: LethalArray, outdated: IntArray) -> MeshSnapshot:
+        """Bring the current arrays up to date at the ``outdated`` vertices and show them."""
         mesh, now = self._topology, self._current
         graph = (mesh.neighbour_offsets, mesh.neighbours, mesh.neighbour_lengths)
-        set_edge_weights(*graph, now.costs, now.lethal, float(self._edge_cost_factor), outdated, now.edge_weights)
+        factor = float(self._edge_cost_factor)
+        show_changes(*graph, costs, lethal, factor, outdated, now.costs, now.lethal, now.edge_weights)
         self._version += 1
         return MeshSnapshot(self._version, now.costs.view(), now.lethal.view(), now.edge_weights.view())

@@ -21,10 +21,11 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
+from mbf_mesh_nav.blocked_vertices import BlockedVertices
 from mbf_mesh_nav.kernels.path_poses import poses_along
 from mbf_mesh_nav.leg_search import Leg, LegQuery, spread_from
 from mbf_mesh_nav.locate import SurfacePoint
-from mbf_mesh_nav.plugins import MeshPlanner
+from mbf_mesh_nav.plugins import MeshContext, MeshPlanner
 from mbf_mesh_nav.snapshot import MeshSnapshot
 from mbf_mesh_nav.surface_point import (
     describe_blockage,
@@ -59,6 +60,10 @@ class SurfacePlanner(MeshPlanner):
     way: ClassVar[str] = "along edges"
     """What a way of this planner consists of, for messages."""
 
+    def __init__(self, context: MeshContext) -> None:
+        super().__init__(context)
+        self._blocked_vertices = BlockedVertices(context.mesh_map)
+
     @abstractmethod
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Return the best leg, None if there is none (or the search was cancelled)."""
@@ -77,7 +82,7 @@ class SurfacePlanner(MeshPlanner):
         """Plan from start over the via points to the goal; see ``AbstractPlanner``."""
         # 1. Which vertices are free?
         snapshot = self.mesh_map.snapshot()
-        blocked = snapshot.blocked(self.parameters.cost_limit)
+        blocked = self._blocked_vertices.at(snapshot, self.parameters.cost_limit)
 
         # 2. Where on the surface is everything? Only a problem of the goal can be mended by a tolerance.
         stops, problem = self._locate_stops(request, snapshot, blocked)

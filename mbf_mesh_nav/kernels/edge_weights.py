@@ -1,4 +1,4 @@
-"""Weights of the mesh edges from lengths and vertex costs, the numbers graph planners search on."""
+"""What a snapshot of a mesh map shows, brought up to date: vertex costs, flags, and the weights of the edges."""
 
 from __future__ import annotations
 
@@ -14,17 +14,19 @@ _UNCHANGED, _WAITING, _WRITTEN = 0, 1, 2
 
 
 @kernel
-def set_edge_weights(
+def show_changes(
     offsets: IntArray,
     neighbours: IntArray,
     lengths: CostArray,
-    costs: CostArray,
-    lethal: NDArray[np.bool_],
+    new_costs: CostArray,
+    new_lethal: NDArray[np.bool_],
     edge_cost_factor: float,
     changed: IntArray,
+    costs: CostArray,
+    lethal: NDArray[np.bool_],
     weights: CostArray,
 ) -> None:
-    """Write the weights of all edges at the ``changed`` vertices, in both directions.
+    """Take over costs and flags of the ``changed`` vertices, write the weights of all edges at them, both directions.
 
     ``w = L + factor * L * (c_i + c_j) / 2``, infinite if an end is lethal or has an infinite or NaN cost
     (mesh_navigation's rule; adding keeps ``w >= L``, so a straight-line bound stays admissible). A vertex may be named
@@ -32,7 +34,9 @@ def set_edge_weights(
     """
     state = np.zeros(costs.shape[0], dtype=np.uint8)
     for index in range(changed.shape[0]):
-        state[Index(changed[index])] = _WAITING
+        vertex = Index(changed[index])
+        costs[vertex], lethal[vertex] = new_costs[vertex], new_lethal[vertex]
+        state[vertex] = _WAITING
     for index in range(changed.shape[0]):
         vertex = Index(changed[index])
         if state[vertex] == _WRITTEN:

@@ -102,13 +102,13 @@ def repair_distances(
         Faces at each vertex.
     neighbour_offsets, neighbours : (V+1,), (2E,) int32
     radius : float
-        Vertices farther [m] offer nothing, so one ring of vertices beyond it gets a distance, too.
+        Vertices farther [m] get no distance.
     lethal, known_lethal : (V,) bool
         The flags now, and those the distances are of; the latter are brought up to date.
     changed : (c,) int32
         Vertices whose flags may differ.
     distances, sources : (V,) float32 [m], (V, 2) int32
-        Distance to the nearest lethal vertex (inf where none is near) and the one or two vertices it was made from
+        Distance to the nearest lethal vertex (inf beyond the radius) and the one or two vertices it was made from
         (-1 without); changed in place.
 
     Returns
@@ -118,7 +118,7 @@ def repair_distances(
     flips : int
         Number of vertices whose flag changed.
     """
-    count = len(vertices)
+    count, reach = len(vertices), np.float32(radius)
     touched = np.empty(count, dtype=np.int32)
     queue = np.empty(count + 1, dtype=np.int32)
     state = np.zeros(count, dtype=np.uint8)
@@ -167,8 +167,6 @@ def repair_distances(
         head = after(head, queue)
         state[vertex] &= ~_WAITING
         reached = distances[vertex]
-        if reached > radius:
-            continue
         for position in range(Index(face_offsets[vertex]), Index(face_offsets[vertex + ONE])):
             face = Index(incident[position])
             for corner in range(3):
@@ -177,11 +175,9 @@ def repair_distances(
                     continue
                 # Corners in the order of the winding, so that rounding does not depend on who came first.
                 v1, v2 = Index(faces[face, (corner + 1) % 3]), Index(faces[face, (corner + 2) % 3])
-                d1 = float(distances[v1]) if distances[v1] <= radius else np.inf
-                d2 = float(distances[v2]) if distances[v2] <= radius else np.inf
-                exact, first, second = face_offer(vertices, other, v1, d1, v2, d2)
+                exact, first, second = face_offer(vertices, other, v1, distances[v1], v2, distances[v2])
                 offer = np.float32(exact)
-                if not offer < distances[other]:
+                if offer > reach or not offer < distances[other]:
                     continue
                 distances[other] = offer
                 sources[other, 0], sources[other, 1] = first, second

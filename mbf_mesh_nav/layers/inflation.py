@@ -52,7 +52,7 @@ class InflationLayer(MeshLayer):
     Attributes
     ----------
     distances : (V,) float32
-        Geodesic distance [m] to the nearest lethal vertex, inf where farther than the inflation radius and a ring.
+        Geodesic distance [m] to the nearest lethal vertex, inf beyond the inflation radius.
     """
 
     Parameters = InflationParameters
@@ -67,8 +67,10 @@ class InflationLayer(MeshLayer):
         """Distances from scratch, costs from distances, lethal as the input."""
         self._forget_all()
         lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)  # becomes that of the input
-        self._repair(np.flatnonzero(self.inputs[0].lethal).astype(np.int32), lethal)
-        return self.cost_of_distance(self.distances), lethal
+        reached, _ = self._repair(np.flatnonzero(self.inputs[0].lethal).astype(np.int32), lethal)
+        costs = np.zeros(self.topology.vertex_count, dtype=np.float32)
+        costs[reached] = self.cost_of_distance(self.distances[reached])
+        return costs, lethal
 
     def update_from_inputs(self, changed: IntArray) -> IntArray:
         """Repair the distances around the vertices whose lethal flag changed."""

@@ -88,6 +88,7 @@ def test_distances_equal_those_of_a_heap(seed, radius):
     _, inflation = chain(mesh, lethal, inflation_radius=radius)
 
     expected = naive_distances(mesh, lethal, radius)
+    expected[expected > radius] = np.inf
     np.testing.assert_allclose(inflation.distances, expected, rtol=1e-5)
 
 
@@ -115,7 +116,7 @@ def test_isolated_lethal_vertex_spreads():
     mesh = MeshMap.from_heights(np.zeros((21, 21)), 0.1, 0.1)
     lethal = np.linalg.norm(mesh.vertices - [1.0, 1.0, 0.0], axis=1) < 0.01
 
-    _, inflation = chain(mesh, lethal, inflation_radius=0.55)
+    _, inflation = chain(mesh, lethal, inflation_radius=0.7)
 
     true = np.linalg.norm(mesh.vertices[:, :2] - 1.0, axis=1)
     near = true < 0.5
@@ -127,7 +128,7 @@ def test_isolated_lethal_vertex_spreads():
 def test_distance_of_a_straight_wall_is_exact():
     mesh = MeshMap.from_heights(np.zeros((9, 40)), 0.1, 0.1)
 
-    _, inflation = chain(mesh, mesh.vertices[:, 0] < 0.05, inflation_radius=2.0)
+    _, inflation = chain(mesh, mesh.vertices[:, 0] < 0.05, inflation_radius=2.05)
 
     np.testing.assert_allclose(
         inflation.distances[mesh.vertices[:, 0] <= 2.0], mesh.vertices[mesh.vertices[:, 0] <= 2.0, 0], atol=1e-5
