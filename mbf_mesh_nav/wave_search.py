@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,14 @@ class Wave:
     bends: NDArray[np.int32]
 
 
+class _Weights(NamedTuple):
+    """Weights of a snapshot in the order in which a wave reads them, and the typical one [m]."""
+
+    snapshot: MeshSnapshot
+    of_corners: NDArray[np.float32]
+    step: float
+
+
 class WaveSearch:
     """Waves over one mesh; keeps the corner records of the mesh and their weights at the last snapshot."""
 
@@ -51,7 +60,7 @@ class WaveSearch:
             mesh_map.neighbours,
         )
         self._corner_ends = mesh_map.neighbours[self._corner_slots[:, :2]]
-        self._gather_weights(mesh_map.snapshot())
+        self._weighted = self._gathered(mesh_map.snapshot())
 
     def spread(self, query: LegQuery, overshoot: float) -> Wave | None:
         """Spread a wave from the goal until it is ``overshoot`` [m] past the start; None: not reached, or cancelled."""
@@ -94,7 +103,7 @@ class WaveSearch:
             mesh_map.faces,
             mesh_map.vertex_faces,
             self._corner_ends,
-            self._corner_weights,
+            self._weights_at(query.snapshot).of_corners,
             wave.distances,
             wave.predecessors,
             wave.cut_records,
@@ -110,8 +119,7 @@ class WaveSearch:
     def _propagated(self, query: LegQuery, targets: NDArray[np.int32], overshoot: float) -> Wave | None:
         """Run the kernel from the goal of a query; None if cancelled."""
         mesh_map = self._mesh_map
-        if query.snapshot is not self._weighted_for:
-            self._gather_weights(query.snapshot)
+        weights = self._weights_at(query.snapshot)
         distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal)
         if len(seeds) == 1:
             seeds = self._seed_around(query, int(seeds[0]), distances, predecessors)
@@ -120,7 +128,7 @@ class WaveSearch:
         settled = propagate_wave(
             mesh_map.vertex_face_offsets,
             self._corner_ends,
-            self._corner_weights,
+            weights.of_corners,
             query.blocked,
             distances,
             predecessors,
@@ -129,17 +137,23 @@ class WaveSearch:
             seeds,
             targets,
             overshoot,
-            self._step,
+            weights.step,
             query.cancel_flag,
         )
         return None if settled < 0 else Wave(distances, predecessors, cut_records, bends)
 
-    def _gather_weights(self, snapshot: MeshSnapshot) -> None:
-        self._weighted_for = snapshot
-        self._corner_weights = snapshot.edge_weights[self._corner_slots]
+    def _weights_at(self, snapshot: MeshSnapshot) -> _Weights:
+        """Weights at a snapshot; those of the last one asked for are kept. Several threads may ask."""
+        weighted = self._weighted
+        if weighted.snapshot is not snapshot:
+            self._weighted = weighted = self._gathered(snapshot)
+        return weighted
+
+    def _gathered(self, snapshot: MeshSnapshot) -> _Weights:
         sample = snapshot.edge_weights[::STEP_SAMPLE]
         sample = sample[np.isfinite(sample)]
-        self._step = float(sample.mean()) if len(sample) else self._mesh_map.topology.mean_edge_length
+        step = float(sample.mean()) if len(sample) else self._mesh_map.topology.mean_edge_length
+        return _Weights(snapshot, snapshot.edge_weights[self._corner_slots], step)
 
     def _seed_around(
         self, query: LegQuery, center: int, distances: NDArray[np.float32], predecessors: NDArray[np.int32]
