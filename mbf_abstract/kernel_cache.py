@@ -18,7 +18,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 from numba.core.caching import IndexDataCacheFile
 
 
@@ -35,8 +35,10 @@ def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
     Returns
     -------
     dispatcher
-        numba's stand-in for the function.
+        numba's stand-in for the function; the function itself where NUMBA_DISABLE_JIT asks for that, to debug it.
     """
+    if config.DISABLE_JIT:
+        return function
     dispatcher = njit(cache=True, nogil=True, **options)(function)
     cache = dispatcher._cache
     stamp = _sources(Path(inspect.getfile(function)).parent)

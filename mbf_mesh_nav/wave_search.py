@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.corners import build_corner_slots
-from mbf_mesh_nav.kernels.cvp import ALONG_EDGE, NO_BEND, propagate_wave
+from mbf_mesh_nav.kernels.cvp import ALONG_EDGE, propagate_wave
 from mbf_mesh_nav.kernels.descent import trace_descent
+from mbf_mesh_nav.kernels.fronts import NO_BEND
 from mbf_mesh_nav.kernels.wave_directions import wave_directions
 from mbf_mesh_nav.leg_search import LegQuery, seeded_arrays
 from mbf_mesh_nav.mesh_map import MeshMap

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
-from mbf_mesh_nav.kernels.cvp import NO_BEND
 from mbf_mesh_nav.kernels.dijkstra import Float32Array, Int32Array
+from mbf_mesh_nav.kernels.fronts import NO_BEND
 
 
 @kernel
@@ -42,18 +42,22 @@ def wave_directions(
         if record >= 0:
             # The face is (base, first, second); the free corner of the record is this vertex, the other one was known.
             first, second = corner_ends[record]
-            to_known, to_free, between = corner_weights[record]
+            to_known, to_end, to_other = corner_weights[record]
             face = faces[vertex_faces[record]]
-            base = face[0] + face[1] + face[2] - first - second
-            known = first
+            end = face[0] + face[1] + face[2] - first - second
+            other = first
             if first == vertex:
-                known, to_known, to_free = second, to_free, to_known
+                other, to_known, to_end = second, to_end, to_known
+            # The front that came to this vertex passed one end of the side or both.
             bend = bends[vertex]
+            if bends[end] != bend and end != bend:
+                end, other, to_end, to_other = other, end, to_other, to_end
             to_bend = distances[bend] if bend != NO_BEND else np.float32(0.0)
-            share = _crossing_share(distances[base] - to_bend, distances[known] - to_bend, to_known, to_free, between)
-            x = vertices[base, 0] + share * (vertices[known, 0] - vertices[base, 0])
-            y = vertices[base, 1] + share * (vertices[known, 1] - vertices[base, 1])
-            z = vertices[base, 2] + share * (vertices[known, 2] - vertices[base, 2])
+            u, u_end = distances[vertex] - to_bend, distances[end] - to_bend
+            share = _crossing_share(u, u_end, to_known, to_end, to_other)
+            x = vertices[end, 0] + share * (vertices[other, 0] - vertices[end, 0])
+            y = vertices[end, 1] + share * (vertices[other, 1] - vertices[end, 1])
+            z = vertices[end, 2] + share * (vertices[other, 2] - vertices[end, 2])
         dx, dy, dz = x - vertices[vertex, 0], y - vertices[vertex, 1], z - vertices[vertex, 2]
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         directions[vertex, 0] = dx / length
@@ -63,13 +67,23 @@ def wave_directions(
 
 
 @inner_kernel
-def _crossing_share(u1: float, u2: float, c: float, b: float, a: float) -> float:
-    """Where the ray to corner 3 crosses side 12, as a share of the side from corner 1; see ``unfolded_distance``."""
-    source_x = (c * c + (u1 - u2) * (u1 + u2)) / (2.0 * c)
+def _crossing_share(u: float, u_end: float, c: float, b: float, a: float) -> float:
+    """Where the way from a corner to the front's centre crosses the opposite side, as a share of it from one end.
+
+    Parameters
+    ----------
+    u, u_end : float
+        Distances from the centre to the corner and to that end.
+    c, b, a : float
+        The side; lengths from the corner to that end and to the other one.
+    """
     corner_x = (c * c + (b - a) * (b + a)) / (2.0 * c)
-    source_depth = math.sqrt(max(u1 * u1 - source_x * source_x, 0.0))
     corner_height = math.sqrt(max(b * b - corner_x * corner_x, 0.0))
-    if source_depth + corner_height <= 0.0:
-        return 0.0
-    crossing = source_x + (corner_x - source_x) * source_depth / (source_depth + corner_height)
-    return min(max(crossing / c, 0.0), 1.0)
+    # The angle at the corner between the end and the centre; the ray is turned by it from the one towards the other.
+    cosine = min(max((b * b + (u - u_end) * (u + u_end)) / (2.0 * b * u), -1.0), 1.0)
+    sine = math.sqrt(1.0 - cosine * cosine)
+    ray_x = (corner_height * sine - corner_x * cosine) / b
+    ray_depth = (corner_height * cosine + corner_x * sine) / b
+    if ray_depth <= 0.0:
+        return 1.0
+    return min(max((corner_x + ray_x * corner_height / ray_depth) / c, 0.0), 1.0)

@@ -11,7 +11,8 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.kernels.corners import build_corner_slots
-from mbf_mesh_nav.kernels.cvp import propagate_wave, unfolded_distance
+from mbf_mesh_nav.kernels.cvp import propagate_wave
+from mbf_mesh_nav.kernels.fronts import unfolded_distance
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.vector_field import VectorField
@@ -48,7 +49,6 @@ def slow_wave(mesh_map, weights, seeds, distances, step):
     }
     u = {int(seed): float(distances[seed]) for seed in seeds}
     bends = dict.fromkeys(u, -1)
-    near = 10.0 * step
     settled, queue = set(u), [(d, v) for v, d in u.items()]
     heapq.heapify(queue)
     while queue:
@@ -58,20 +58,18 @@ def slow_wave(mesh_map, weights, seeds, distances, step):
         settled.add(v)
         for face in mesh_map.faces[(mesh_map.faces == v).any(axis=1)].tolist():
             free = [corner for corner in face if corner not in settled] or [obtuse_corner(face, length)]
-            if len(free) != 1 or free[0] in (None, v, *seeds):
+            if len(free) != 1 or free[0] in (None, v):
                 continue
             v3 = free[0]
             v1, v2 = (corner for corner in face if corner != v3)
-            along, corner = min((u[v1] + length[v1, v3], v1), (u[v2] + length[v2, v3], v2))
-            bend = bends[v1] if bends[v1] == bends[v2] else -1
-            to_bend = u[bend] if bend >= 0 else 0.0
-            sides = length[v1, v2], length[v1, v3], length[v2, v3]
-            across = across_the_side(u[v1] - to_bend, u[v2] - to_bend, *sides)
-            asked = across is not None and (to_bend + across < near or obtuse_corner(face, length) == v3)
-            if across is None or (asked and two_fronts(mesh_map, length, u, to_bend, v1, v2, v3)):
-                candidate, last_bend = along, corner
-            else:
-                candidate, last_bend = to_bend + across, bend
+            known = v2 if v1 == v else v1
+            if v not in seeds and u[known] + length[known, v] < u[v]:
+                u[v], bends[v] = u[known] + length[known, v], known
+                heapq.heappush(queue, (u[v], v))
+                break
+            if v3 in seeds:
+                continue
+            candidate, last_bend = offer(mesh_map, length, u, bends, v1, v2, v3, 10.0 * step)
             candidate = max(candidate, min(u[v1], u[v2]))
             if candidate < u.get(v3, math.inf):
                 u[v3], bends[v3] = candidate, last_bend
@@ -88,16 +86,66 @@ def obtuse_corner(face, length):
     return None
 
 
-def two_fronts(mesh_map, length, u, to_bend, v1, v2, v3):
-    """Whether the corner behind the side v1 v2 was reached much later than one front through that side would have."""
+def offer(mesh_map, length, u, bends, v1, v2, v3, near):
+    """What the face v1 v2 v3 offers v3: a distance and its last bend."""
+    along = min((u[v1] + length[v1, v3], v1), (u[v2] + length[v2, v3], v2))
+    one_bend = bends[v1] == bends[v2]
+    to_bend = u.get(bends[v1], 0.0) if one_bend else 0.0
+    sides = length[v1, v2], length[v1, v3], length[v2, v3]
+    across = across_the_side(u[v1] - to_bend, u[v2] - to_bend, *sides)
+    if across is None:
+        return along
+    virtual = to_bend + across
+    if virtual >= u.get(v3, math.inf):
+        return virtual, -1
+    if one_bend and virtual >= near and obtuse_corner([v1, v2, v3], length) != v3:
+        return virtual, bends[v1]
+    # Two fronts may meet: ask the corner behind the side.
     shared = mesh_map.faces[(mesh_map.faces == v1).any(axis=1) & (mesh_map.faces == v2).any(axis=1)]
-    behind = [corner for corner in shared.ravel().tolist() if corner not in (v1, v2, v3)]
-    if not behind:
-        return True
-    c = length[v1, v2]
-    ends = length[v1, behind[0]], length[v2, behind[0]]
-    foretold = to_bend + from_virtual_source(u[v1] - to_bend, u[v2] - to_bend, c, *ends, below=True)
-    return u.get(behind[0], math.inf) - foretold >= 0.2 * c
+    behind = next((corner for corner in shared.ravel().tolist() if corner not in (v1, v2, v3)), None)
+    if behind not in u:
+        return along
+    ends = length[v1, behind], length[v2, behind]
+    foretold = to_bend + from_virtual_source(u[v1] - to_bend, u[v2] - to_bend, sides[0], *ends, below=True)
+    if one_bend and u[behind] - foretold < 0.1 * sides[0]:
+        return virtual, bends[v1]
+    ways = [along]
+    for end, other in ((v1, v2), (v2, v1)):
+        if behind != bends[end] and bends[behind] != bends[end]:
+            continue
+        to_center = u.get(bends[end], 0.0)
+        radius = length[end, behind] if behind == bends[end] else u[end] - to_center
+        passing = (0.001 if behind == bends[other] else 0.3) * sides[0]
+        way = by_own_front(radius, u[behind] - to_center, length, end, other, behind, v3, passing)
+        if way is not None:
+            ways.append((to_center + way, bends[end]))
+    best = min(ways)
+    if one_bend or (best != along and best[0] <= virtual):
+        return best
+    return (virtual, -1) if best == along else ((virtual + best[0]) / 2.0, best[1])
+
+
+def apex(c, b, a, below=False):
+    """Corner of a triangle over the side from 0 to c, ``b`` from 0 and ``a`` from c, as a complex number."""
+    x = (b * b + c * c - a * a) / (2 * c)
+    return complex(x, math.sqrt(max(b * b - x * x, 0)) * (-1 if below else 1))
+
+
+def by_own_front(radius, radius_behind, length, end, other, behind, v3, passing):
+    """Length of the line to v3 from a centre off ``other``, with distances from ``end`` and ``behind``; or None."""
+    c, b = length[end, other], length[end, behind]
+    corner_behind, corner = apex(c, b, length[other, behind], below=True), apex(c, length[end, v3], length[other, v3])
+    towards = (b * b + radius**2 - radius_behind**2) / (2 * b)
+    if abs(towards) > 1.001 * radius:
+        return None
+    aside = math.sqrt(max(radius**2 - towards**2, 0.0))
+    center = corner_behind / b * complex(towards, -aside)  # of both, the one on the right of the way to ``behind``
+    if center.imag >= 0.0:
+        return None
+    crossing = center.real - center.imag * (corner - center).real / (corner - center).imag
+    ray = (corner - center) / abs(corner - center)
+    past = ((corner_behind - center) * ray.conjugate()).imag  # left of the ray, where ``end`` is
+    return abs(corner - center) if 0.0 < crossing < c and past <= passing else None
 
 
 def from_virtual_source(u1, u2, c, b, a, below=False):
