@@ -11,6 +11,7 @@ source of each kernel in it.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import inspect
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from numba import config, njit
+from numba.core import event
 from numba.core.caching import IndexDataCacheFile
 
 
@@ -54,3 +56,31 @@ def _sources(folder: Path) -> bytes:
     for file in sorted(folder.glob("*.py")):
         digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.digest()
+
+
+class _CollectorPause(event.Listener):  # type: ignore[misc]
+    """Python's search for cyclic garbage waits while numba compiles: it cost a tenth of every compilation.
+
+    The compiler makes some hundred thousand objects and keeps them until it is done, so the collector searches them,
+    and all others of the process, again and again in vain. numba tells of start and end while it holds its lock, so one
+    count of the compilations within each other is right for all threads.
+    """
+
+    depth = 0
+    was_enabled = False
+
+    def on_start(self, _event: event.Event) -> None:
+        """A compilation begins, perhaps within another one."""
+        if self.depth == 0:
+            self.was_enabled = gc.isenabled()
+            gc.disable()
+        self.depth += 1
+
+    def on_end(self, _event: event.Event) -> None:
+        """A compilation has ended, or failed."""
+        self.depth -= 1
+        if self.depth == 0 and self.was_enabled:
+            gc.enable()
+
+
+event.register("numba:compile", _CollectorPause())

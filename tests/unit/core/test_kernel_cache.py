@@ -1,9 +1,15 @@
 """Machine code on disk: used again by the next process, and made anew when a kernel of another file has changed."""
 
+import gc
 import os
 import subprocess
 import sys
 from pathlib import Path
+
+import numba
+import pytest
+
+from mbf_abstract.kernel_cache import compile_lazily
 
 DECORATOR = "from mbf_abstract.kernel_cache import compile_lazily as kernel\n"
 STEP = DECORATOR + "@kernel\ndef step(x):\n    return x + {}\n"
@@ -34,3 +40,17 @@ def test_a_kernel_is_compiled_anew_only_when_a_kernel_it_calls_from_another_file
     assert call_in_a_process_of_its_own(tmp_path) == (20, 1)
     (kernels / "step.py").write_text(STEP.format(2))
     assert call_in_a_process_of_its_own(tmp_path) == (30, 0)
+
+
+def test_the_garbage_collector_pauses_for_a_compilation_and_goes_on_after_one_that_failed():
+    during = []
+
+    @numba.extending.overload(call_in_a_process_of_its_own)
+    def note_the_collector(_value):
+        during.append(gc.isenabled())
+
+    failing = compile_lazily(lambda value: call_in_a_process_of_its_own(value))
+    with pytest.raises(numba.TypingError):
+        failing(1)
+    assert during and not any(during)
+    assert gc.isenabled()
