@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.vectors import difference, dot, triangle
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -22,9 +23,9 @@ STACK_SIZE = 128
 
 
 @kernel
-def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, NDArray[np.int64]]:
+def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """Boxes (N, 6) as min x y z, max x y z, leaves first, and the start of every level (levels + 1,)."""
-    counts = np.zeros(32, dtype=np.int64)
+    counts = np.zeros(32, dtype=np.int32)
     levels = 0
     size = faces.shape[0]
     while True:
@@ -33,11 +34,12 @@ def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, NDAr
         levels += 1
         if size <= 1:
             break
-    starts = np.zeros(levels + 1, dtype=np.int64)
+    starts = np.zeros(levels + 1, dtype=np.int32)
     for level in range(levels):
         starts[level + 1] = starts[level] + counts[level]
-    boxes = np.empty((starts[levels], 6), dtype=np.float64)
-    for node in range(starts[levels]):
+    node_count = Count(starts[levels])
+    boxes = np.empty((node_count, 6), dtype=np.float64)
+    for node in range(node_count):
         for axis in range(3):
             boxes[node, axis] = np.inf
             boxes[node, axis + 3] = -np.inf
@@ -66,9 +68,9 @@ def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, NDAr
 @inner_kernel
 def squared_distance_to_box(boxes: FloatArray, node: int, x: float, y: float, z: float) -> float:
     """Squared distance [m^2] from a point to a box, 0 inside."""
-    dx = max(boxes[node, 0] - x, 0.0, x - boxes[node, 3])
-    dy = max(boxes[node, 1] - y, 0.0, y - boxes[node, 4])
-    dz = max(boxes[node, 2] - z, 0.0, z - boxes[node, 5])
+    dx = max(max(boxes[node, 0] - x, 0.0), x - boxes[node, 3])
+    dy = max(max(boxes[node, 1] - y, 0.0), y - boxes[node, 4])
+    dz = max(max(boxes[node, 2] - z, 0.0), z - boxes[node, 5])
     squared: float = dx * dx + dy * dy + dz * dz
     return squared
 
@@ -81,12 +83,10 @@ def closest_on_face(
 
     Region by region after Ericson, Real-Time Collision Detection (2005), section 5.1.5.
     """
-    a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
-    ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
-    wx, wy, wz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
-    px, py, pz = x - vertices[a, 0], y - vertices[a, 1], z - vertices[a, 2]
-    d1, d2 = ux * px + uy * py + uz * pz, wx * px + wy * py + wz * pz
-    uu, uw, ww = ux * ux + uy * uy + uz * uz, ux * wx + uy * wy + uz * wz, wx * wx + wy * wy + wz * wz
+    a, b, c = triangle(vertices, faces, face)
+    to_b, to_c, to_point = difference(b, a), difference(c, a), difference((x, y, z), a)
+    d1, d2 = dot(to_b, to_point), dot(to_c, to_point)
+    uu, uw, ww = dot(to_b, to_b), dot(to_b, to_c), dot(to_c, to_c)
     d3, d4 = d1 - uu, d2 - uw
     d5, d6 = d1 - uw, d2 - ww
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
@@ -106,7 +106,9 @@ def closest_on_face(
         v = 1.0 - w
     else:  # inside
         v, w = vb / (va + vb + vc), vc / (va + vb + vc)
-    rx, ry, rz = px - v * ux - w * wx, py - v * uy - w * wy, pz - v * uz - w * wz
+    rx = to_point[0] - v * to_b[0] - w * to_c[0]
+    ry = to_point[1] - v * to_b[1] - w * to_c[1]
+    rz = to_point[2] - v * to_b[2] - w * to_c[2]
     return rx * rx + ry * ry + rz * rz, v, w
 
 
@@ -115,7 +117,7 @@ def closest_face(
     vertices: FloatArray,
     faces: IntArray,
     boxes: FloatArray,
-    levels: NDArray[np.int64],
+    levels: IntArray,
     x: float,
     y: float,
     z: float,
@@ -166,11 +168,13 @@ def closest_face(
             top += ONE
     if best_face < 0:
         return -1, np.inf, 0.0, 0.0, 0.0, 0.0, 0.0
-    a, b, c = faces[best_face, 0], faces[best_face, 1], faces[best_face, 2]
-    u = 1.0 - best_v - best_w
-    nearest_x = u * vertices[a, 0] + best_v * vertices[b, 0] + best_w * vertices[c, 0]
-    nearest_y = u * vertices[a, 1] + best_v * vertices[b, 1] + best_w * vertices[c, 1]
-    nearest_z = u * vertices[a, 2] + best_v * vertices[b, 2] + best_w * vertices[c, 2]
+    a, b, c = triangle(vertices, faces, Index(best_face))
+    weights = (1.0 - best_v - best_w, best_v, best_w)
+    nearest_x, nearest_y, nearest_z = (
+        dot(weights, (a[0], b[0], c[0])),
+        dot(weights, (a[1], b[1], c[1])),
+        dot(weights, (a[2], b[2], c[2])),
+    )
     return best_face, np.sqrt(best), best_v, best_w, nearest_x, nearest_y, nearest_z
 
 
@@ -179,7 +183,7 @@ def closest_faces(
     vertices: FloatArray,
     faces: IntArray,
     boxes: FloatArray,
-    levels: NDArray[np.int64],
+    levels: IntArray,
     points: FloatArray,
     order: NDArray[np.int64],
     max_distance: float,
@@ -192,7 +196,8 @@ def closest_faces(
     found, distances = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.float64)
     weights, surface = np.empty((count, 3), dtype=np.float64), np.empty((count, 3), dtype=np.float64)
     hint = Count(-1)
-    for index in order:
+    for position in range(count):
+        index = Index(order[position])
         x, y, z = points[index, 0], points[index, 1], points[index, 2]
         face, distance, v, w, px, py, pz = closest_face(vertices, faces, boxes, levels, x, y, z, max_distance, hint)
         hint = face

@@ -1,9 +1,11 @@
 """The one way kernels are compiled: lazily, cached on disk, without the interpreter lock, types kept for mypy.
 
-Three habits keep compilation short: indices and counters start as ``Index(0)`` or ``Count(0)`` (a plain 0 passed on
+Five habits keep compilation short: indices and counters start as ``Index(0)`` or ``Count(0)`` (a plain 0 passed on
 to another kernel makes numba compile that one for the literal first), rows of arrays are copied by loops (slices and
-array expressions bring in their error messages' string formatting), and arrays handed in are of one kind
-everywhere (read-only and writable ones are different types).
+array expressions bring in their error messages' string formatting), arrays handed in are of one kind everywhere
+(read-only and writable ones are different types), new arrays are ``np.empty`` with ``dtype=`` unless they are not
+filled anyway (``np.zeros`` compiles three more functions per type of array), and points are vectors of ``vectors.py``
+(a call is typed and lowered once, three components are three times the work).
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ def build_corner_slots(
     neighbours: Int32Array,
 ) -> Int32Array:
     """Corner records (3F, 3) int32, aligned with ``vertex_faces``: slots of v->a, v->b, a->b; (v, a, b) is ccw."""
-    slots = np.zeros((len(vertex_faces), 3), dtype=np.int32)
+    slots = np.empty((len(vertex_faces), 3), dtype=np.int32)
     for vertex in range(len(vertex_face_offsets) - 1):
         for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
             face = faces[vertex_faces[record]]

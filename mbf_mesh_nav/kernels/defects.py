@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.vectors import cross, difference, dot, norm, triangle
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -18,19 +19,15 @@ def face_shapes(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
     The vector points where the face looks.
     """
-    shapes = np.zeros((faces.shape[0], 5), dtype=np.float64)
+    shapes = np.empty((faces.shape[0], 5), dtype=np.float64)
     for face in range(faces.shape[0]):
-        a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
-        ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
-        wx, wy, wz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
-        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        shapes[face, 0], shapes[face, 1], shapes[face, 2] = 0.5 * nx, 0.5 * ny, 0.5 * nz
-        shapes[face, 3] = 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
-        shapes[face, 4] = max(
-            ux * ux + uy * uy + uz * uz,
-            wx * wx + wy * wy + wz * wz,
-            (ux - wx) ** 2 + (uy - wy) ** 2 + (uz - wz) ** 2,
-        )
+        a, b, c = triangle(vertices, faces, Index(face))
+        ab, ac, cb = difference(b, a), difference(c, a), difference(b, c)
+        doubled = cross(ab, ac)
+        for axis in range(3):
+            shapes[face, axis] = 0.5 * doubled[axis]
+        shapes[face, 3] = 0.5 * norm(doubled)
+        shapes[face, 4] = max(max(dot(ab, ab), dot(ac, ac)), dot(cb, cb))
     return shapes
 
 

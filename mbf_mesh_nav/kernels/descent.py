@@ -113,7 +113,7 @@ def _note(points: Float64Array, point_faces: Int32Array, count: int, point: Vect
 
 @inner_kernel
 def _grown(points: Float64Array, point_faces: Int32Array, capacity: int) -> tuple[Float64Array, Int32Array]:
-    more_points, more_faces = np.empty((capacity, 3)), np.empty(capacity, dtype=np.int32)
+    more_points, more_faces = np.empty((capacity, 3), dtype=np.float64), np.empty(capacity, dtype=np.int32)
     for i in range(len(points)):
         set_row(more_points, i, row(points, i))
         more_faces[i] = point_faces[i]

@@ -136,10 +136,10 @@ def settle_footprints(
     pitch = np.empty((count, heading_count), dtype=np.float32)
     bump = np.empty((count, heading_count), dtype=np.float32)
     radius = 0.5 * np.hypot(wheelbase, track)
-    ring = np.zeros(4 * heading_count, dtype=np.float64)
-    wheels = np.zeros(4 * heading_count, dtype=np.float64)
+    ring = np.empty(4 * heading_count, dtype=np.float64)
+    wheels = np.empty(4 * heading_count, dtype=np.float64)
     seen = np.full(count, -1, dtype=np.int32)
-    members = np.zeros(count, dtype=np.int32)
+    members = np.empty(count, dtype=np.int32)
     upward = (0.0, 0.0, 1.0)
     for vertex in range(count):
         for heading in range(heading_count):

@@ -69,7 +69,7 @@ def score_rollouts(
     collided : (n,) bool
     """
     sequence_count, step_count, _ = controls.shape
-    scores = np.zeros(sequence_count, dtype=np.float64)
+    scores = np.empty(sequence_count, dtype=np.float64)
     collided = np.zeros(sequence_count, dtype=np.bool_)
     sin_roll, sin_pitch = math.sin(tilt_limits[0]), math.sin(tilt_limits[1])
     for sequence in range(sequence_count):

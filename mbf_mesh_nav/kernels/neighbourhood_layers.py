@@ -6,11 +6,13 @@ of v; a vertex on the storey above is near but not connected, hence not in it. v
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
-from mbf_mesh_nav.kernels.vectors import Vector, row
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.vectors import Vector, difference, dot, row
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -38,6 +40,7 @@ def collect_neighbourhood(
     infinite limit make it a sphere.
     """
     seen[centre] = centre
+    middle = row(vertices, centre)
     size = 0
     head = -1
     while head < size:
@@ -48,11 +51,9 @@ def collect_neighbourhood(
             if seen[other] == centre:
                 continue
             seen[other] = centre
-            dx = vertices[other, 0] - vertices[centre, 0]
-            dy = vertices[other, 1] - vertices[centre, 1]
-            dz = vertices[other, 2] - vertices[centre, 2]
-            along = dx * normal[0] + dy * normal[1] + dz * normal[2]
-            squared = dx * dx + dy * dy + dz * dz - along * along
+            offset = difference(row(vertices, Count(other)), middle)
+            along = dot(offset, normal)
+            squared = dot(offset, offset) - along * along
             if squared < radius * radius and abs(along) <= along_limit:
                 members[size] = other
                 size += 1
@@ -70,17 +71,15 @@ def height_differences(
 ) -> CostArray:
     """Greatest minus least height along the own normal over v and N_r(v), metric across the normal, (V,) [m]."""
     count = vertices.shape[0]
-    differences = np.zeros(count, dtype=np.float32)
+    differences = np.empty(count, dtype=np.float32)
     seen = np.full(count, -1, dtype=np.int32)
-    members = np.zeros(count, dtype=np.int32)
+    members = np.empty(count, dtype=np.int32)
     for vertex in range(count):
-        normal = row(normals, vertex)
+        foot, normal = row(vertices, vertex), row(normals, vertex)
         size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, normal, along_limit, seen, members)
         lowest = highest = 0.0
         for index in range(size):
-            height = 0.0
-            for axis in range(3):
-                height += normal[axis] * (vertices[members[index], axis] - vertices[vertex, axis])
+            height = dot(normal, difference(row(vertices, Count(members[index])), foot))
             lowest, highest = min(lowest, height), max(highest, height)
         differences[vertex] = highest - lowest
     return differences
@@ -89,17 +88,15 @@ def height_differences(
 @kernel
 def mean_edge_angles(normals: FloatArray, offsets: IntArray, neighbours: IntArray) -> FloatArray:
     """Mean angle [rad] between the normal of each vertex and those of its neighbours, (V,); 0 without neighbours."""
-    angles = np.zeros(offsets.shape[0] - 1, dtype=np.float64)
+    angles = np.empty(offsets.shape[0] - 1, dtype=np.float64)
     for vertex in range(offsets.shape[0] - 1):
-        total = 0.0
+        total, normal = 0.0, row(normals, vertex)
         for entry in range(offsets[vertex], offsets[vertex + 1]):
-            other = neighbours[entry]
-            cosine = 0.0
-            for axis in range(3):
-                cosine += normals[vertex, axis] * normals[other, axis]
-            total += np.arccos(min(max(cosine, -1.0), 1.0))
-        if offsets[vertex + 1] > offsets[vertex]:
-            angles[vertex] = total / (offsets[vertex + 1] - offsets[vertex])
+            other = Count(neighbours[entry])
+            cosine = dot(normal, row(normals, other))
+            total += math.acos(min(max(cosine, -1.0), 1.0))
+        degree = offsets[vertex + 1] - offsets[vertex]
+        angles[vertex] = total / degree if degree > 0 else 0.0
     return angles
 
 
@@ -109,9 +106,9 @@ def neighbourhood_means(
 ) -> CostArray:
     """Mean of ``values`` over v and N_r(v), metric of the sphere, (V,)."""
     count = vertices.shape[0]
-    means = np.zeros(count, dtype=np.float32)
+    means = np.empty(count, dtype=np.float32)
     seen = np.full(count, -1, dtype=np.int32)
-    members = np.zeros(count, dtype=np.int32)
+    members = np.empty(count, dtype=np.int32)
     for vertex in range(count):
         size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, _SPHERE, np.inf, seen, members)
         total = values[vertex]
@@ -132,9 +129,9 @@ def normal_tip_distances(
 ) -> CostArray:
     """Mean distance [m] of the tips of unit normals planted on v and on the members of N_r(v), (V,)."""
     count = vertices.shape[0]
-    distances = np.zeros(count, dtype=np.float32)
+    distances = np.empty(count, dtype=np.float32)
     seen = np.full(count, -1, dtype=np.int32)
-    members = np.zeros(count, dtype=np.int32)
+    members = np.empty(count, dtype=np.int32)
     for vertex in range(count):
         size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, _SPHERE, np.inf, seen, members)
         total = 0.0

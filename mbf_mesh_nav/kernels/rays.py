@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.bounding_boxes import BRANCHES, STACK_SIZE
-from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
-from mbf_mesh_nav.kernels.vectors import Vector, row
+from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.vectors import Vector, cross, difference, dot, row, triangle
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -16,23 +16,17 @@ FloatArray = NDArray[np.float64]
 @inner_kernel
 def distance_to_triangle(vertices: FloatArray, faces: IntArray, face: int, origin: Vector, direction: Vector) -> float:
     """Distance along a ray to a triangle, both sides count, inf without a hit (Moeller and Trumbore 1997)."""
-    a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
-    ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
-    wx, wy, wz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
-    px = direction[1] * wz - direction[2] * wy
-    py = direction[2] * wx - direction[0] * wz
-    pz = direction[0] * wy - direction[1] * wx
-    determinant = ux * px + uy * py + uz * pz
+    a, b, c = triangle(vertices, faces, Index(face))
+    to_b, to_c, to_origin = difference(b, a), difference(c, a), difference(origin, a)
+    p, q = cross(direction, to_c), cross(to_origin, to_b)
+    determinant = dot(to_b, p)
     if determinant == 0.0:
         return np.inf
-    tx, ty, tz = (origin[0] - vertices[a, 0], origin[1] - vertices[a, 1], origin[2] - vertices[a, 2])
-    v = (tx * px + ty * py + tz * pz) / determinant
-    qx, qy, qz = ty * uz - tz * uy, tz * ux - tx * uz, tx * uy - ty * ux
-    w = (direction[0] * qx + direction[1] * qy + direction[2] * qz) / determinant
+    v, w = dot(to_origin, p) / determinant, dot(direction, q) / determinant
     # Some tolerance, so that no ray slips through the edge between two faces.
     if v < -1e-12 or w < -1e-12 or v + w > 1.0 + 1e-12:
         return np.inf
-    distance = (wx * qx + wy * qy + wz * qz) / determinant
+    distance = dot(to_c, q) / determinant
     return distance if distance >= 0.0 else np.inf
 
 
@@ -69,7 +63,7 @@ def first_hits(
     vertices: FloatArray,
     faces: IntArray,
     boxes: FloatArray,
-    levels: NDArray[np.int64],
+    levels: IntArray,
     origins: FloatArray,
     directions: FloatArray,
     max_distance: float,
@@ -94,8 +88,9 @@ def first_hits(
             inverse_component(direction[2]),
         )
         best_face, best = -1, max_distance
-        nodes[0], depths[0] = levels[-1] - 1, levels.shape[0] - 2
-        enters[0] = distance_to_box(boxes, nodes[0], x, y, z, ix, iy, iz, best)
+        root = levels[-1] - 1
+        nodes[0], depths[0] = root, levels.shape[0] - 2
+        enters[0] = distance_to_box(boxes, root, x, y, z, ix, iy, iz, best)
         top = 1 if enters[0] < np.inf else 0
         while top > 0:
             top -= 1
@@ -111,7 +106,8 @@ def first_hits(
                 continue
             # Children on the stack with the one entered first on top.
             base = top
-            for child in range(levels[depth - 1] + first, min(levels[depth - 1] + first + BRANCHES, levels[depth])):
+            first += levels[depth - 1]
+            for child in range(first, min(first + BRANCHES, Count(levels[depth]))):
                 enter = distance_to_box(boxes, child, x, y, z, ix, iy, iz, best)
                 if enter == np.inf:
                     continue

@@ -20,7 +20,7 @@ def vertices_in_disc(
     Being connected, they lie on one storey.
     """
     seen = np.zeros(vertices.shape[0], dtype=np.bool_)
-    members = np.zeros(vertices.shape[0], dtype=np.int32)
+    members = np.empty(vertices.shape[0], dtype=np.int32)
     members[0] = start
     seen[start] = True
     size, head = 1, 0

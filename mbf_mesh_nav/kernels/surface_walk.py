@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import Count, kernel
 from mbf_mesh_nav.kernels.dijkstra import Int32Array
 from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, dot, row
 
@@ -76,8 +76,7 @@ def walk(
         nearest, exit_side = np.inf, -1
         exit_edge = (0.0, 0.0, 0.0)
         for side in range(3):
-            a = row(vertices, faces[face, side])
-            b = row(vertices, faces[face, (side + 1) % 3])
+            a, b = row(vertices, Count(faces[face, side])), row(vertices, Count(faces[face, (side + 1) % 3]))
             edge = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
             inward = cross(normal, edge)
             rate = dot(direction, inward)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import Index, kernel
+from mbf_mesh_nav.kernels.vectors import cross, difference, norm, set_row, triangle
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -20,8 +21,10 @@ def faces_of_vertices(faces: IntArray, vertex_count: int) -> tuple[IntArray, Int
             offsets[faces[face, corner] + 1] += 1
     for vertex in range(vertex_count):
         offsets[vertex + 1] += offsets[vertex]
-    cursor = offsets[:-1].copy()
-    incident = np.zeros(3 * faces.shape[0], dtype=np.int32)
+    cursor = np.empty(vertex_count, dtype=np.int32)
+    for vertex in range(vertex_count):
+        cursor[vertex] = offsets[vertex]
+    incident = np.empty(3 * faces.shape[0], dtype=np.int32)
     for face in range(faces.shape[0]):
         for corner in range(3):
             vertex = faces[face, corner]
@@ -35,7 +38,7 @@ def neighbours_of_vertices(faces: IntArray, face_offsets: IntArray, incident: In
     """Neighbours of every vertex over mesh edges as CSR, ascending and without repetition."""
     vertex_count = face_offsets.shape[0] - 1
     offsets = np.zeros(vertex_count + 1, dtype=np.int32)
-    neighbours = np.zeros(2 * incident.shape[0], dtype=np.int32)
+    neighbours = np.empty(2 * incident.shape[0], dtype=np.int32)
     filled = 0
     for vertex in range(vertex_count):
         first = filled
@@ -69,10 +72,10 @@ def edges_of_neighbours(
     vertices are reached exactly in list order: one cursor per vertex replaces a search.
     """
     vertex_count = offsets.shape[0] - 1
-    edges = np.zeros((neighbours.shape[0] // 2, 2), dtype=np.int32)
-    edge_ids = np.zeros(neighbours.shape[0], dtype=np.int32)
-    lengths = np.zeros(neighbours.shape[0], dtype=np.float32)
-    cursor = np.zeros(vertex_count, dtype=np.int32)
+    edges = np.empty((neighbours.shape[0] // 2, 2), dtype=np.int32)
+    edge_ids = np.empty(neighbours.shape[0], dtype=np.int32)
+    lengths = np.empty(neighbours.shape[0], dtype=np.float32)
+    cursor = np.empty(vertex_count, dtype=np.int32)
     edge_count = 0
     for vertex in range(vertex_count):
         cursor[vertex] = offsets[vertex + 1]
@@ -123,15 +126,10 @@ def unit_face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Compute unit normals (F, 3), right-handed about the winding; (0, 0, 1) for a face without area."""
     normals = np.empty((faces.shape[0], 3), dtype=np.float64)
     for face in range(faces.shape[0]):
-        a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
-        ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
-        wx, wy, wz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
-        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        length = np.sqrt(nx * nx + ny * ny + nz * nz)
-        if length > 0.0:
-            normals[face, 0], normals[face, 1], normals[face, 2] = nx / length, ny / length, nz / length
-        else:
-            normals[face, 0], normals[face, 1], normals[face, 2] = 0.0, 0.0, 1.0
+        a, b, c = triangle(vertices, faces, Index(face))
+        x, y, z = cross(difference(b, a), difference(c, a))
+        length = norm((x, y, z))
+        set_row(normals, face, (x / length, y / length, z / length) if length > 0.0 else (0.0, 0.0, 1.0))
     return normals
 
 
@@ -147,11 +145,8 @@ def unit_vertex_normals(face_normals: FloatArray, face_offsets: IntArray, incide
             x += face_normals[face, 0]
             y += face_normals[face, 1]
             z += face_normals[face, 2]
-        length = np.sqrt(x * x + y * y + z * z)
-        if length > 1e-9:
-            normals[vertex, 0], normals[vertex, 1], normals[vertex, 2] = x / length, y / length, z / length
-        else:
-            normals[vertex, 0], normals[vertex, 1], normals[vertex, 2] = 0.0, 0.0, 1.0
+        length = norm((x, y, z))
+        set_row(normals, vertex, (x / length, y / length, z / length) if length > 1e-9 else (0.0, 0.0, 1.0))
     return normals
 
 

@@ -33,9 +33,10 @@ def wave_directions(
 
     The inputs are those and the results of ``cvp.propagate_wave``.
     """
-    directions = np.zeros((len(distances), 3), dtype=np.float32)
+    directions = np.empty((len(distances), 3), dtype=np.float32)
     for vertex in range(len(distances)):
         if predecessors[vertex] < 0:
+            directions[vertex, 0] = directions[vertex, 1] = directions[vertex, 2] = 0.0
             continue
         x, y, z = vertices[predecessors[vertex]]
         record = cut_records[vertex]
