@@ -10,9 +10,9 @@ Used by every controller and recovery that looks ahead. Planners do not use it: 
 
 from __future__ import annotations
 
-from mbf_mesh_nav.kernels.compiled import kernel
+from mbf_mesh_nav.kernels.compiled import Index, kernel
 from mbf_mesh_nav.kernels.dijkstra import Float32Array, Int32Array
-from mbf_mesh_nav.kernels.vectors import Float64Array, Vector
+from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, difference, dot, triangle
 
 LETHAL_HARDNESS = 4.0
 """Hardness of a lethal vertex; twice that of any that is forbidden by its cost."""
@@ -34,15 +34,14 @@ def hardness_at(vertices: Float64Array, faces: Int32Array, hardness: Float32Arra
     if hardness[a] == 0.0 and hardness[b] == 0.0 and hardness[c] == 0.0:
         return 0.0
     # Barycentric coordinates by dot products (Ericson, Real-Time Collision Detection, section 3.4).
-    aa, ab, bb, ap, bp = 0.0, 0.0, 0.0, 0.0, 0.0
-    for axis in range(3):
-        along_b, along_c = vertices[b, axis] - vertices[a, axis], vertices[c, axis] - vertices[a, axis]
-        offset = point[axis] - vertices[a, axis]
-        aa += along_b * along_b
-        ab += along_b * along_c
-        bb += along_c * along_c
-        ap += offset * along_b
-        bp += offset * along_c
+    corner_a, corner_b, corner_c = triangle(vertices, faces, Index(face))
+    along_b, along_c, offset = (
+        difference(corner_b, corner_a),
+        difference(corner_c, corner_a),
+        difference(point, corner_a),
+    )
+    aa, ab, bb = dot(along_b, along_b), dot(along_b, along_c), dot(along_c, along_c)
+    ap, bp = dot(offset, along_b), dot(offset, along_c)
     area = aa * bb - ab * ab
     share_b = (bb * ap - ab * bp) / area if area > 0.0 else 0.0
     share_c = (aa * bp - ab * ap) / area if area > 0.0 else 0.0

@@ -17,7 +17,7 @@ from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import BoolArray, Float32Array, Int32Array
 from mbf_mesh_nav.kernels.forbidden_ground import hardness_at, may_enter
 from mbf_mesh_nav.kernels.surface_walk import turned, walk
-from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, dot, row
+from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, difference, dot, norm, row
 
 PATH, COST, TILT, TURN, GOAL, HEADING = range(6)
 """Positions of the critics in the weights array."""
@@ -108,8 +108,8 @@ def score_rollouts(
         score /= step_count
         score += weights[GOAL] * (remaining[nearest] + math.sqrt(_squared_distance(path_points, nearest, point)))
         target = row(path_points, min(nearest + 3, len(path_points) - 1))
-        ahead = (target[0] - point[0], target[1] - point[1], target[2] - point[2])
-        length = math.sqrt(dot(ahead, ahead))
+        ahead = difference(target, point)
+        length = norm(ahead)
         if length > 0.1:
             score += weights[HEADING] * (1.0 - dot(ahead, direction) / length)
         scores[sequence] = score
@@ -118,5 +118,5 @@ def score_rollouts(
 
 @inner_kernel
 def _squared_distance(points: Float64Array, index: int, point: Vector) -> float:
-    dx, dy, dz = points[index, 0] - point[0], points[index, 1] - point[1], points[index, 2] - point[2]
-    return float(dx * dx + dy * dy + dz * dz)
+    offset = difference(row(points, index), point)
+    return dot(offset, offset)

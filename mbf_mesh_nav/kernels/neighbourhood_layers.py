@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
-from mbf_mesh_nav.kernels.vectors import Vector, difference, dot, row
+from mbf_mesh_nav.kernels.vectors import Vector, difference, dot, norm, row
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -134,14 +134,15 @@ def normal_tip_distances(
     members = np.empty(count, dtype=np.int32)
     for vertex in range(count):
         size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, _SPHERE, np.inf, seen, members)
-        total = 0.0
+        total, tip = 0.0, _tip(vertices, normals, vertex)
         for index in range(size):
-            other = members[index]
-            squared = 0.0
-            for axis in range(3):
-                tip = vertices[vertex, axis] + normals[vertex, axis]
-                difference = vertices[other, axis] + normals[other, axis] - tip
-                squared += difference * difference
-            total += np.sqrt(squared)
+            total += norm(difference(_tip(vertices, normals, Count(members[index])), tip))
         distances[vertex] = total / size if size > 0 else without_neighbours
     return distances
+
+
+@inner_kernel
+def _tip(vertices: FloatArray, normals: FloatArray, vertex: int) -> Vector:
+    """Where the unit normal planted on a vertex ends."""
+    foot, normal = row(vertices, vertex), row(normals, vertex)
+    return foot[0] + normal[0], foot[1] + normal[1], foot[2] + normal[2]

@@ -32,10 +32,8 @@ def vertices_in_disc(
             if seen[other]:
                 continue
             seen[other] = True
-            squared = 0.0
-            for axis in range(3):
-                squared += (vertices[other, axis] - centre[axis]) ** 2
-            if squared <= radius * radius:
+            dx, dy, dz = vertices[other, 0] - centre[0], vertices[other, 1] - centre[1], vertices[other, 2] - centre[2]
+            if dx * dx + dy * dy + dz * dz <= radius * radius:
                 members[size] = other
                 size += 1
     return members[:size].copy()

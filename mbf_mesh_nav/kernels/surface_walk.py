@@ -12,7 +12,7 @@ import numpy as np
 
 from mbf_mesh_nav.kernels.compiled import Count, kernel
 from mbf_mesh_nav.kernels.dijkstra import Int32Array
-from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, dot, row
+from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, difference, dot, row
 
 _MAX_CROSSINGS = 200
 
@@ -77,11 +77,11 @@ def walk(
         exit_edge = (0.0, 0.0, 0.0)
         for side in range(3):
             a, b = row(vertices, Count(faces[face, side])), row(vertices, Count(faces[face, (side + 1) % 3]))
-            edge = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+            edge = difference(b, a)
             inward = cross(normal, edge)
             rate = dot(direction, inward)
             if rate < 0.0:
-                height = dot((point[0] - a[0], point[1] - a[1], point[2] - a[2]), inward)
+                height = dot(difference(point, a), inward)
                 ahead = max(-height / rate, 0.0)
                 if ahead < nearest:
                     nearest, exit_side, exit_edge = ahead, side, edge
@@ -90,7 +90,7 @@ def walk(
         left_to_walk -= step
         if nearest >= left_to_walk + step or exit_side < 0:
             break
-        following = face_neighbours[face, exit_side]
+        following = Count(face_neighbours[face, exit_side])
         if following < 0:
             break
         # Unfold: keep the part along the edge, carry the part across it over into the next face.

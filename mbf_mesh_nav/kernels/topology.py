@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import Index, kernel
-from mbf_mesh_nav.kernels.vectors import cross, difference, norm, set_row, triangle
+from mbf_mesh_nav.kernels.compiled import Count, Index, kernel
+from mbf_mesh_nav.kernels.vectors import cross, difference, norm, row, set_row, triangle
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -89,11 +89,7 @@ def edges_of_neighbours(
                 continue
             if cursor[vertex] == offsets[vertex + 1]:
                 cursor[vertex] = entry
-            squared = 0.0
-            for axis in range(3):
-                difference = vertices[vertex, axis] - vertices[other, axis]
-                squared += difference * difference
-            lengths[entry] = np.float32(np.sqrt(squared))
+            lengths[entry] = norm(difference(row(vertices, vertex), row(vertices, Count(other))))
             edge_ids[entry] = edge_count
             edges[edge_count, 0] = vertex
             edges[edge_count, 1] = other
@@ -141,10 +137,8 @@ def unit_vertex_normals(face_normals: FloatArray, face_offsets: IntArray, incide
     for vertex in range(vertex_count):
         x = y = z = 0.0
         for position in range(face_offsets[vertex], face_offsets[vertex + 1]):
-            face = incident[position]
-            x += face_normals[face, 0]
-            y += face_normals[face, 1]
-            z += face_normals[face, 2]
+            normal = row(face_normals, Count(incident[position]))
+            x, y, z = x + normal[0], y + normal[1], z + normal[2]
         length = norm((x, y, z))
         set_row(normals, vertex, (x / length, y / length, z / length) if length > 1e-9 else (0.0, 0.0, 1.0))
     return normals

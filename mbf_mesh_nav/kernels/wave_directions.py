@@ -12,9 +12,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import Float32Array, Int32Array
 from mbf_mesh_nav.kernels.fronts import NO_BEND
+from mbf_mesh_nav.kernels.vectors import between, difference, norm, row
 
 
 @kernel
@@ -38,32 +39,28 @@ def wave_directions(
         if predecessors[vertex] < 0:
             directions[vertex, 0] = directions[vertex, 1] = directions[vertex, 2] = 0.0
             continue
-        x, y, z = vertices[predecessors[vertex]]
+        crossing = row(vertices, Count(predecessors[vertex]))
         record = cut_records[vertex]
         if record >= 0:
             # The face is (base, first, second); the free corner of the record is this vertex, the other one was known.
-            first, second = corner_ends[record]
-            to_known, to_end, to_other = corner_weights[record]
-            face = faces[vertex_faces[record]]
-            end = face[0] + face[1] + face[2] - first - second
-            other = first
+            first, second = corner_ends[record, 0], corner_ends[record, 1]
+            side, to_end, to_other = corner_weights[record, 0], corner_weights[record, 1], corner_weights[record, 2]
+            face = vertex_faces[record]
+            end = Count(faces[face, 0]) + faces[face, 1] + faces[face, 2] - first - second
+            other = Count(first)
             if first == vertex:
-                other, to_known, to_end = second, to_end, to_known
+                other, side, to_end = Count(second), to_end, side
             # The front that came to this vertex passed one end of the side or both.
             bend = bends[vertex]
             if bends[end] != bend and end != bend:
                 end, other, to_end, to_other = other, end, to_other, to_end
             to_bend = distances[bend] if bend != NO_BEND else np.float32(0.0)
-            u, u_end = distances[vertex] - to_bend, distances[end] - to_bend
-            share = _crossing_share(u, u_end, to_known, to_end, to_other)
-            x = vertices[end, 0] + share * (vertices[other, 0] - vertices[end, 0])
-            y = vertices[end, 1] + share * (vertices[other, 1] - vertices[end, 1])
-            z = vertices[end, 2] + share * (vertices[other, 2] - vertices[end, 2])
-        dx, dy, dz = x - vertices[vertex, 0], y - vertices[vertex, 1], z - vertices[vertex, 2]
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        directions[vertex, 0] = dx / length
-        directions[vertex, 1] = dy / length
-        directions[vertex, 2] = dz / length
+            share = _crossing_share(distances[vertex] - to_bend, distances[end] - to_bend, side, to_end, to_other)
+            crossing = between(row(vertices, end), row(vertices, other), share)
+        way = difference(crossing, row(vertices, vertex))
+        length = norm(way)
+        for axis in range(3):
+            directions[vertex, axis] = way[axis] / length
     return directions
 
 
