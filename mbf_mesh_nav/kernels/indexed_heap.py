@@ -5,10 +5,9 @@ key" into a constant-time look-up, so no vertex is ever queued twice. Use it whe
 fast marching); a plain shortest-path field is faster with the near/far lists of ``dijkstra.py``.
 
 The heap is two arrays owned by the caller: ``heap`` (n,) uint64 and ``positions`` (n,) int32, which tells where an item
-sits (negative: not queued). Items are of type ``Index``. An entry is key and item in one number: the bits of a float32
-that is not negative order like an integer, so they fill the upper half and the item the lower one. One comparison then
-orders by key and, among equal keys, by item, which makes the order of settling the same everywhere. Functions return
-the new size.
+sits (negative: not queued). Items are of type ``Index``. An entry is key and item in one number, see
+``bucket_queue.entry_of``: one comparison orders by key and, among equal keys, by item, which makes the order of
+settling the same everywhere. Functions return the new size.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.kernels.bucket_queue import entry_of, item_of, key_of
 from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
 
 HeapArray = NDArray[np.uint64]
@@ -25,14 +25,12 @@ Int32Array = NDArray[np.int32]
 
 _TWO: Any = Index(2)
 _THREE: Any = Index(3)
-_ITEM_BITS: Any = Index(32)
-_ITEM_MASK: Any = Index(0xFFFFFFFF)
 
 
 @kernel
 def push_or_decrease(heap: HeapArray, positions: Int32Array, size: int, item: int, key: np.float32) -> int:
     """Queue ``item`` with ``key`` >= 0, or lower its key if it is queued already; return the new size."""
-    entry = (Index(np.float32(key).view(np.uint32)) << _ITEM_BITS) | item
+    entry = entry_of(np.float32(key), item)
     position = positions[item]
     slot = Index(position)
     if position < 0:
@@ -44,7 +42,7 @@ def push_or_decrease(heap: HeapArray, positions: Int32Array, size: int, item: in
         if above <= entry:
             break
         heap[slot] = above
-        positions[above & _ITEM_MASK] = slot
+        positions[item_of(above)] = slot
         slot = parent
     heap[slot] = entry
     positions[item] = slot
@@ -54,19 +52,19 @@ def push_or_decrease(heap: HeapArray, positions: Int32Array, size: int, item: in
 @kernel
 def top_item(heap: HeapArray) -> int:
     """Return the item with the lowest key."""
-    return heap[0] & _ITEM_MASK  # type: ignore[no-any-return]
+    return item_of(heap[0])
 
 
 @kernel
 def top_key(heap: HeapArray) -> np.float32:
     """Return the lowest key."""
-    return np.uint32(heap[0] >> _ITEM_BITS).view(np.float32)
+    return key_of(heap[0])
 
 
 @kernel
 def remove_top(heap: HeapArray, positions: Int32Array, size: int) -> int:
     """Take the item with the lowest key off the heap; return the new size."""
-    positions[heap[0] & _ITEM_MASK] = -1
+    positions[item_of(heap[0])] = -1
     size -= 1
     if size == 0:
         return size
@@ -83,7 +81,7 @@ def remove_top(heap: HeapArray, positions: Int32Array, size: int) -> int:
         left_child, right_child = first if a < b else first + ONE, first + _TWO if c < d else first + _THREE
         child = left_child if left < right else right_child
         heap[slot] = least
-        positions[least & _ITEM_MASK] = slot
+        positions[item_of(least)] = slot
         slot = child
         first = (slot << _TWO) + ONE
     else:  # at a leaf, or at the one node with fewer than four children, which are leaves
@@ -93,8 +91,8 @@ def remove_top(heap: HeapArray, positions: Int32Array, size: int) -> int:
                 child = other
         if first < end and heap[child] < entry:
             heap[slot] = heap[child]
-            positions[heap[slot] & _ITEM_MASK] = slot
+            positions[item_of(heap[slot])] = slot
             slot = child
     heap[slot] = entry
-    positions[entry & _ITEM_MASK] = slot
+    positions[item_of(entry)] = slot
     return size
