@@ -168,7 +168,7 @@ class MPPIController(MeshController):
             self.parameters.max_lin_velocity,
             max(braking_speed(projection.remaining, self.parameters.max_deceleration), 0.1),
         )
-        controls = self._sample(max_speed)
+        controls = self._sample(max_speed, projection.remaining)
         scores, collided = self._score(controls, spot, pose, projection)
         scores = np.where(collided, scores + _COLLISION_SCORE, scores)
         weights = np.exp(-(scores - scores.min()) / self.parameters.temperature)
@@ -186,8 +186,12 @@ class MPPIController(MeshController):
         stuck = stands and (collided.mean() > 0.5 or self._idle_cycles > _IDLE_CYCLES)
         return None if stuck or bool(collided.all()) else blended
 
-    def _sample(self, max_speed: float) -> NDArray[np.float64]:
-        """Motions (samples, horizon_steps, 2) around the last one; the first is that one, the second stands still."""
+    def _sample(self, max_speed: float, remaining: float) -> NDArray[np.float64]:
+        """Motions (samples, horizon_steps, 2) around the last one; the first is that one, the second stands still.
+
+        No robot that can turn where it stands goes on past the goal, ``remaining`` [m] of path ahead: motions that run
+        beyond it would speak for creeping there.
+        """
         p = self.parameters
         held = -(-p.horizon_steps // _NOISE_HOLD)
         # Two parts: one that changes, and one that lasts; only lasting turns lead round an obstacle.
@@ -198,6 +202,10 @@ class MPPIController(MeshController):
         controls = self._nominal + noise
         controls[1] = 0.0
         np.clip(controls[..., 0], p.min_lin_velocity, max_speed, out=controls[..., 0])
+        if p.motion_model == "differential":
+            before = np.cumsum(controls[..., 0], axis=1) - controls[..., 0]
+            room = np.maximum(remaining / p.step_time - before, 0.0)
+            np.minimum(controls[..., 0], room, out=controls[..., 0])
         turn_limit = p.max_ang_velocity if p.motion_model == "differential" else p.max_steering_angle
         np.clip(controls[..., 1], -turn_limit, turn_limit, out=controls[..., 1])
         return np.asarray(controls)

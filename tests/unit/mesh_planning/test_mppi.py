@@ -29,6 +29,16 @@ def test_it_drives_a_plan_over_hills_to_the_goal_pose(make_plugin, hills, drive,
     assert controller.is_goal_reached(poses[-1], 0.15, 0.2), poses[-1]
 
 
+@pytest.mark.parametrize("seed", [4, 6])
+def test_it_does_not_stand_still_just_short_of_the_goal_whatever_it_samples(make_plugin, hills, drive, pose_on, seed):
+    plan = make_plugin(CVPPlanner, hills).make_plan(PlanRequest(Pose.planar(0.8, 0.8), Pose.planar(5.0, 4.6, 1.0)))
+    controller = make_plugin(MPPIController, hills)
+    controller.rng = np.random.default_rng(seed)
+    controller.set_plan(plan.path)
+    poses = drive(controller, hills, pose_on(hills, (0.8, 0.8, 0), (-0.3, 1, 0)), 16.0)
+    assert controller.is_goal_reached(poses[-1], 0.1, 0.2), poses[-1]
+
+
 def test_it_goes_round_an_obstacle_that_appeared_after_planning(make_plugin, plain, paint, drive, pose_on):
     mesh_map = plain(spacing=0.1)
     controller = make_plugin(MPPIController, mesh_map)
