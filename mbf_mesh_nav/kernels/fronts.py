@@ -210,9 +210,10 @@ def distance_where_fronts_meet(
         )
         if distance < best:
             best, side, last_bend = distance, 0, front
-    # 4. Beside a bend the fronts before and behind it differ little, so their virtual source is a fair guess.
-    if bend != own_bend and side != 0:
+    # 4. Beside a bend the fronts before and behind it differ little, so their virtual source is a fair guess; but not
+    #    alone if another one is known, or if it foretells the corner before an end of the side that it comes through.
+    if bend == own_bend or best <= virtual:
+        return best, side, last_bend
+    if side != 0 and virtual >= max(distances[vertex], distances[known]):
         return virtual, 0, NO_BEND
-    if bend != own_bend and virtual < best:
-        return _HALF * (virtual + best), 0, last_bend
-    return best, side, last_bend
+    return _HALF * (virtual + best), 0, last_bend

@@ -122,7 +122,9 @@ def offer(mesh_map, length, u, bends, v1, v2, v3, near):
     best = min(ways)
     if one_bend or (best != along and best[0] <= virtual):
         return best
-    return (virtual, -1) if best == along else ((virtual + best[0]) / 2.0, best[1])
+    if best == along:
+        return (virtual if virtual >= max(u[v1], u[v2]) else (virtual + along[0]) / 2.0), -1
+    return (virtual + best[0]) / 2.0, best[1]
 
 
 def apex(c, b, a, below=False):
