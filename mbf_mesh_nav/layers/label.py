@@ -1,7 +1,7 @@
 """Label: costs by kind of ground, drawn as labelled polygons.
 
 When to use: lawn costs more than path, mud is forbidden. When not: shapes known from the mesh itself. Where regions
-overlap the last one in the list counts.
+overlap the last one in the list counts. Forbidden regions are closed as those of ``keep_out`` are.
 """
 
 from __future__ import annotations
@@ -46,10 +46,14 @@ class LabelLayer(MeshLayer):
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost of the last region that holds the vertex, ``default_cost`` outside."""
-        costs = np.full(self.topology.vertex_count, self.parameters.default_cost, dtype=np.float32)
-        lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)
+        mesh = self.topology
+        costs = np.full(mesh.vertex_count, self.parameters.default_cost, dtype=np.float32)
+        lethal = np.zeros(mesh.vertex_count, dtype=np.bool_)
         for region in self.parameters.regions:
-            inside = region.mask(self.topology.vertices)
+            forbidden = region.label in self.parameters.lethal_labels
+            # What must not be entered is closed between the vertices too; a cost there would reach beyond its ground.
+            closed = region.closed_mask(mesh.vertices, mesh.edges, mesh.faces) if forbidden else None
+            inside = region.mask(mesh.vertices) if closed is None else closed
             costs[inside] = self.parameters.label_costs.get(region.label, 1.0)
-            lethal[inside] = region.label in self.parameters.lethal_labels
+            lethal[inside] = forbidden
         return costs, lethal

@@ -9,6 +9,11 @@ from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.kernels.polygons import inside_polygon
 from mbf_mesh_nav.layer import FloatArray, IntArray, LethalArray
 
+ON_OUTLINE = 1e-6
+"""A vertex this near [m] to a side of a polygon lies on it."""
+CORNER_SHARE = 1e-6
+"""How far from its corner, in lengths of the side, a polygon is asked where it leads."""
+
 
 class Region(ParameterModel):
     """A polygon on one storey."""
@@ -38,11 +43,11 @@ class Region(ParameterModel):
     def closed_mask(self, vertices: FloatArray, edges: IntArray, faces: IntArray) -> LethalArray:
         """Like ``mask``, and what closes the region between vertices: no edge between others passes through it.
 
-        Both ends of an edge (E, 2) that crosses the outline without an end inside are added, and the corners of a face
-        (F, 3) that has a corner of the polygon in its middle.
+        All vertices on the outline are added, both ends of an edge (E, 2) that crosses the outline without an end
+        inside, and the corners of a face (F, 3) into which a corner of the polygon leads.
         """
-        mask = self.mask(vertices)
         outline = np.array(self.polygon, dtype=np.float64)
+        mask = self.mask(vertices) | (_on_outline(vertices, outline) & self._within_heights(vertices))
         low, high = outline.min(axis=0), outline.max(axis=0)
         flat, at_height = vertices[:, :2], self._within_heights(vertices)
         outside = edges[~mask[edges].any(axis=1) & at_height[edges].any(axis=1)]
@@ -52,7 +57,7 @@ class Region(ParameterModel):
             crossing = _segments_cross(flat[outside[:, 0]], flat[outside[:, 1]], begin, end)
             mask[outside[crossing].ravel()] = True
         around = faces[~mask[faces].any(axis=1) & at_height[faces].any(axis=1)]
-        for corner in outline:
+        for corner in np.concatenate([outline, *_beside_corners(outline)]):
             a, b, c = (flat[around[:, k]] for k in range(3))
             sides = [_side_of(p, q, corner) for p, q in ((a, b), (b, c), (c, a))]
             covers = np.all([side > 0.0 for side in sides], axis=0) | np.all([side < 0.0 for side in sides], axis=0)
@@ -67,6 +72,25 @@ def _side_of(p: FloatArray, q: FloatArray, point: FloatArray) -> FloatArray:
     """Positive where a point lies to the left of the line from p to q, all (..., 2)."""
     along, to_point = q - p, point - p
     return np.asarray(along[..., 0] * to_point[..., 1] - along[..., 1] * to_point[..., 0])
+
+
+def _on_outline(vertices: FloatArray, outline: FloatArray) -> LethalArray:
+    """Mask (V,) of the vertices (V, 3) that lie, seen from above, on a side of the polygon ``outline`` (n, 2)."""
+    flat, mask = vertices[:, :2], np.zeros(len(vertices), dtype=np.bool_)
+    for begin, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        side = end - begin
+        share = np.clip((flat - begin) @ side / max(float(side @ side), 1e-30), 0.0, 1.0)
+        mask |= np.linalg.norm(flat - begin - share[:, None] * side, axis=1) <= ON_OUTLINE
+    return mask
+
+
+def _beside_corners(outline: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points (n, 2) on the sides of a polygon, a hair after and before its corners.
+
+    A corner may lie on an edge of the mesh: these tell which faces the polygon reaches into from there.
+    """
+    sides = np.roll(outline, -1, axis=0) - outline
+    return outline + CORNER_SHARE * sides, outline + (1.0 - CORNER_SHARE) * sides
 
 
 def _segments_cross(p: FloatArray, q: FloatArray, begin: FloatArray, end: FloatArray) -> LethalArray:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.kernels.polygons import inside_polygon
 from mbf_mesh_nav.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.layers.border import BorderLayer
 from mbf_mesh_nav.layers.clearance import ClearanceLayer
@@ -212,6 +213,36 @@ def test_a_keep_out_region_inside_one_face_closes_that_face():
     layer = computed(mesh, KeepOutLayer, regions=[{"polygon": [(0.2, 0.2), (0.3, 0.2), (0.25, 0.3)]}])
     closed = mesh.faces[mesh.locate([[0.25, 0.23, 0.0]]).faces[0]]
     assert set(np.flatnonzero(layer.lethal)) == set(closed.tolist())
+
+
+@pytest.mark.parametrize(
+    "polygon",
+    [
+        [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)],
+        [(2.0, 1.0), (1.0, 2.0), (2.0, 2.0)],
+        [(1.5, 1.0), (1.5, 1.5), (1.0, 1.5)],
+    ],
+    ids=["cell", "face", "corners on edges"],
+)
+def test_a_keep_out_region_drawn_along_the_edges_of_the_mesh_leaves_no_face_of_it_free(polygon):
+    mesh = MeshMap.from_heights(np.zeros((5, 5)), 1.0, 1.0)
+    layer = computed(mesh, KeepOutLayer, regions=[{"polygon": polygon}])
+    free = mesh.faces[~layer.lethal[mesh.faces].any(axis=1)]
+    shares = np.random.default_rng(0).dirichlet((1.0, 1.0, 1.0), 200)
+    inside = inside_polygon(np.einsum("ks,fsc->fkc", shares, mesh.vertices[free]).reshape(-1, 3), np.array(polygon))
+    assert len(free) > 0 and not inside.any()
+
+
+def test_a_forbidden_label_closes_a_strip_that_runs_between_the_vertices():
+    mesh = MeshMap.from_heights(np.zeros((5, 5)), 1.0, 1.0)
+    strip = {"polygon": ((2.4, -1.0), (2.6, -1.0), (2.6, 9.0), (2.4, 9.0)), "label": "mud"}
+    forbidden = computed(mesh, LabelLayer, regions=[strip], lethal_labels=["mud"])
+    costly = computed(mesh, LabelLayer, regions=[strip], label_costs={"mud": 0.5})
+    crossing = (mesh.vertices[mesh.edges][:, :, 0] < 2.5).any(axis=1) & (mesh.vertices[mesh.edges][:, :, 0] > 2.5).any(
+        axis=1
+    )
+    assert forbidden.lethal[mesh.edges[crossing]].any(axis=1).all()
+    assert not costly.lethal.any() and not costly.costs.any()
 
 
 def test_a_region_whose_heights_are_exchanged_is_refused():
