@@ -124,13 +124,16 @@ def load_builtin_layer(type_name: str) -> type[MeshLayer]:
     Raises
     ------
     LayerGraphError
-        No such type, or the class is no ``MeshLayer``.
+        No such type, it cannot be imported, or the class is no ``MeshLayer``.
     """
     target = LAYER_TYPES.get(type_name, type_name)
     if ":" not in target:
         raise LayerGraphError(f"unknown layer type '{type_name}', the types are: {', '.join(LAYER_TYPES)}")
     module, _, name = target.partition(":")
-    layer_class = getattr(importlib.import_module(module), name)
+    try:
+        layer_class = getattr(importlib.import_module(module), name)
+    except Exception as error:  # whatever the import of a user's module raises
+        raise LayerGraphError(f"layer type '{type_name}' cannot be loaded: {type(error).__name__}: {error}") from error
     if not (isinstance(layer_class, type) and issubclass(layer_class, MeshLayer)):
         raise LayerGraphError(f"layer type '{type_name}' is no MeshLayer")
     return layer_class

@@ -4,7 +4,7 @@ The robot is a disc of its inscribed radius, grown by the safety distance, lying
 are the vertices below it that are connected to the place it stands on, so the storeys above and below do not count.
 
 - OUTSIDE: no surface within ``SURFACE_DISTANCE`` above or below the position, or past a border.
-- LETHAL: the disc (of a point: the nearest vertex) touches a lethal vertex or one of infinite cost.
+- LETHAL: the disc (of a point: the nearest vertex) touches a lethal vertex or one whose cost is infinite or NaN.
 - INSCRIBED: of a point only: a robot standing there would touch one.
 
 Deviation from the costmap's answers: a disc has no heading, hence ``angle_tolerance`` never matters.
@@ -66,7 +66,15 @@ def check_path(
     skip_poses: int = 0,
     path_cells_only: bool = False,
 ) -> PathAnswer:
-    """Worst state and summed cost over every ``skip_poses + 1``-th pose; ends at a state of at least ``return_on``."""
+    """Worst state and summed cost over every ``skip_poses + 1``-th pose; ends at a state of at least ``return_on``.
+
+    Raises
+    ------
+    ValueError
+        ``skip_poses`` is negative.
+    """
+    if skip_poses < 0:
+        raise ValueError(f"skip_poses must not be negative, got {skip_poses}")
     state, cost, index = CellState.FREE, 0.0, 0
     for index in range(0, len(path), skip_poses + 1):
         answer = check_point(mesh_map, path[index]) if path_cells_only else check_pose(mesh_map, path[index], query)
@@ -79,8 +87,15 @@ def check_path(
 def find_valid_pose(mesh_map: MeshMap, pose: Pose, dist_tolerance: float, query: PlaceQuery) -> PoseAnswer:
     """Nearest pose within ``dist_tolerance`` [m] where the disc fits: the pose itself, else a vertex near it.
 
-    Near a pose on the surface only vertices of the same storey count.
+    Near a pose on the surface only vertices of the same storey count; a tolerance of inf means anywhere on it.
+
+    Raises
+    ------
+    ValueError
+        The tolerance is negative or no number.
     """
+    if not dist_tolerance >= 0.0:
+        raise ValueError(f"dist_tolerance must not be negative, got {dist_tolerance}")
     first = check_pose(mesh_map, pose, query)
     if first.state < CellState.LETHAL:
         return PoseAnswer(first.state, first.cost, pose)
@@ -109,4 +124,4 @@ def _disc(mesh_map: MeshMap, place: SurfacePoint, radius: float) -> IntArray:
 
 
 def _blocked(snapshot: MeshSnapshot, vertices: IntArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    return np.asarray(snapshot.lethal[vertices] | np.isinf(snapshot.costs[vertices]))
+    return np.asarray(snapshot.lethal[vertices] | ~np.isfinite(snapshot.costs[vertices]))

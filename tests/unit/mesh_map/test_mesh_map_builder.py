@@ -143,6 +143,15 @@ def test_layer_class_can_be_named_by_module():
         build_mesh_map(wrong, vertices=VERTICES, faces=FACES)
 
 
+@pytest.mark.parametrize("path", ["no_such_module:Layer", f"{RoughnessLayer.__module__}:NoSuchLayer", ":Layer"])
+def test_a_layer_class_that_cannot_be_loaded_is_named_beside_the_other_findings(path):
+    parameters = MeshMapParameters(layers=[{"name": "mine", "type": path}], default_layer="other")
+
+    with pytest.raises(LayerGraphError, match="default_layer 'other' is no layer") as error:
+        build_mesh_map(parameters, vertices=VERTICES, faces=FACES)
+    assert f"layer 'mine': layer type '{path}' cannot be loaded" in str(error.value)
+
+
 def test_cached_layer_is_reused_for_the_same_mesh_and_parameters_only(tmp_path, monkeypatch):
     parameters = MeshMapParameters(layers=[{"name": "rough", "type": "roughness"}], cache_dir=str(tmp_path))
 

@@ -7,6 +7,7 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.map_queries import CellState, PlaceQuery
 from mbf_abstract.transforms import TransformBuffer
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.layer import MeshLayer
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.queries import MeshQueries
@@ -116,3 +117,35 @@ def test_pose_that_fits_is_returned_as_it_is_and_none_where_nothing_fits(queries
     blocked = queries.find_valid_pose(Pose.planar(2.0, 1.0), 0.1, 0.0)
     assert (blocked.state, blocked.pose) == (CellState.LETHAL, None)
     assert queries.find_valid_pose(Pose.planar(9.0, 1.0), 0.1, 0.0).state == CellState.OUTSIDE
+
+
+class PartlyUnknownGround(MeshLayer):
+    """A layer that has no number for the surroundings of (1, 1)."""
+
+    def compute(self) -> tuple[np.ndarray, np.ndarray]:
+        near = np.linalg.norm(self.topology.vertices - [1.0, 1.0, 0.0], axis=1) < 0.15
+        return np.where(near, np.nan, 0.0).astype(np.float32), np.zeros(len(near), dtype=np.bool_)
+
+
+def test_ground_of_unknown_cost_is_no_place_for_a_robot():
+    vertices, faces = heightfield_mesh(np.zeros((21, 21)), 0.1, 0.1)
+    parameters = MeshMapParameters(layers=[{"name": "partly", "type": "partly"}], inscribed_radius=0.25)
+    mesh = build_mesh_map(parameters, vertices=vertices, faces=faces, load_layer=lambda _: PartlyUnknownGround)
+    queries = MeshQueries(mesh, StandingRobot(Pose.planar(0.5, 0.5)), TransformBuffer())
+
+    assert queries.check_point(Pose.planar(1.0, 1.0)).state == CellState.LETHAL
+    assert queries.check_pose(Pose.planar(1.2, 1.0)).state == CellState.LETHAL
+    found = queries.find_valid_pose(Pose.planar(1.0, 1.0), 1.0, 0.0)
+    assert found.pose is not None and np.hypot(found.pose.x - 1.0, found.pose.y - 1.0) > 0.3
+
+
+@pytest.mark.parametrize("skipped", [-1, -2])
+def test_a_path_of_which_less_than_no_pose_is_skipped_is_misuse(queries: MeshQueries, skipped: int):
+    with pytest.raises(ValueError, match=f"skip_poses must not be negative, got {skipped}"):
+        queries.check_path(Path.from_poses([Pose.planar(1.0, 1.0), Pose.planar(2.0, 1.0)]), skip_poses=skipped)
+
+
+@pytest.mark.parametrize("tolerance", [-0.1, float("nan")])
+def test_a_tolerance_that_is_negative_or_no_number_is_misuse(queries: MeshQueries, tolerance: float):
+    with pytest.raises(ValueError, match="dist_tolerance must not be negative"):
+        queries.find_valid_pose(Pose.planar(2.0, 1.0), tolerance, 0.0)
