@@ -3,12 +3,14 @@
 For a robot that stands in an inflated or lethal area (a new obstacle, a pushed robot), where every planner answers
 BLOCKED_START. It crosses costly ground on purpose, so it is slow, short (``max_distance``) and measures distance on the
 surface, never across a gap or to another storey. Lethal ground it crosses only where the robot stands on it, and does
-not know what that really is: order it after ``mesh.clear_layers`` and ``mesh.back_up``.
+not know what that really is: order it after ``mesh.clear_layers`` and ``mesh.back_up``. Where something
+appears on its way while it drives, it looks for another way and stops if there is none.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +19,14 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_mesh_nav.goal_approach import arc_to, clamp
+from mbf_mesh_nav.goal_approach import arc_to, clamp, ground_distance
 from mbf_mesh_nav.guarded_motion import reports_lost_pose, run_guarded
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distances
 from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, seeded_arrays, threshold_step
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.path_progress import PathProgress
 from mbf_mesh_nav.plugins import MeshRecovery
+from mbf_mesh_nav.snapshot import MeshSnapshot
 
 
 class EscapeParameters(PluginParameters):
@@ -37,6 +40,26 @@ class EscapeParameters(PluginParameters):
     time_limit: float = parameter(40.0, "Longest run.", unit="s", gt=0.0)
 
 
+@dataclass(frozen=True)
+class WayOut:
+    """A way to safe ground.
+
+    Attributes
+    ----------
+    vertices : (n,) int32
+        Over which it leads, from the robot on.
+    progress : PathProgress
+        Of the robot along the polyline from where it stood over these vertices.
+    """
+
+    vertices: NDArray[np.int32]
+    progress: PathProgress
+
+    def is_closed(self, lethal: NDArray[np.bool_], travelled: float) -> bool:
+        """Whether a vertex farther ahead than ``travelled`` [m] is among the ``lethal`` ones (V,)."""
+        return bool(lethal[self.vertices[self.progress.arc_lengths[1:] > travelled]].any())
+
+
 class EscapeRecovery(MeshRecovery):
     """Drives to the nearest safe ground."""
 
@@ -46,42 +69,52 @@ class EscapeRecovery(MeshRecovery):
     @reports_lost_pose
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
         """Find the nearest free vertex, drive there; a free start is a success at once."""
-        p = self.parameters
-        spot = self.mesh_map.locate_one(request.motion.pose().position, 1.0)
+        p, mesh_map, flag = self.parameters, self.mesh_map, request.cancel_token.flag
+        spot = mesh_map.locate_one(request.motion.pose().position, 1.0)
         if spot is None:
             return RecoveryResult(RecoveryOutcome.FAILURE, "the robot is more than 1 m from the surface")
-        blocked = self.mesh_map.snapshot().blocked(p.cost_limit)
-        if not blocked[self.mesh_map.faces[spot.face]].any():
+        snapshot = mesh_map.snapshot()
+        if not snapshot.blocked(p.cost_limit)[mesh_map.faces[spot.face]].any():
             return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on safe ground")
-        way = self._way_to_safety(spot, blocked, request)
-        if way is None:
-            message = f"no safe ground within {p.max_distance:g} m over the surface"
-            return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)
-        progress = PathProgress(Path.from_points(way, frame_id=self.mesh_map.frame_id), window=1.0)
+        # Over lethal ground the way leads only if the robot stands on it: then over that patch.
+        own_patch = np.isfinite(self._spread(spot, ~_lethal(snapshot), flag)[0])
+        way = self._way_to_safety(spot, own_patch, request)
 
         def step(pose: Pose) -> Twist | RecoveryResult:
-            position = np.asarray(pose.position)
-            if np.linalg.norm(way[-1] - position) <= p.reach:
-                return RecoveryResult(RecoveryOutcome.SUCCESS, f"reached safe ground after {progress.length:.2f} m")
-            bearing, curvature = arc_to(pose, progress.point_at(progress.update(position).travelled + 0.3))
-            if abs(bearing) > 0.6:
-                return Twist.planar(wz=math.copysign(p.yaw_rate, bearing))
-            return Twist.planar(vx=p.speed, wz=clamp(p.speed * curvature, p.yaw_rate))
+            nonlocal way
+            travelled = way.progress.update(np.asarray(pose.position)).travelled if way is not None else 0.0
+            if way is not None and way.is_closed(_lethal(mesh_map.snapshot()) & ~own_patch, travelled):
+                here = mesh_map.locate_one(pose.position, 1.0)
+                way = None if here is None else self._way_to_safety(here, own_patch, request)
+                travelled = 0.0
+            if way is None:
+                message = f"no safe ground within {p.max_distance:g} m over the surface"
+                return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)
+            return self._drive(pose, way.progress, travelled)
 
         return run_guarded(request, self.clock, p.time_limit, step)
 
-    def _way_to_safety(
-        self, spot: SurfacePoint, blocked: NDArray[np.bool_], request: RecoveryRequest
-    ) -> NDArray[np.float64] | None:
-        """Points (n, 3) over the mesh to the nearest vertex around which no face is forbidden.
+    def _drive(self, pose: Pose, progress: PathProgress, travelled: float) -> Twist | RecoveryResult:
+        """Pursue the way from ``travelled`` [m] on, or say that its end is reached."""
+        p = self.parameters
+        x, y, z = progress.positions[-1].tolist()
+        if ground_distance(pose, Pose((x, y, z), frame_id=pose.frame_id)) <= p.reach:
+            return RecoveryResult(RecoveryOutcome.SUCCESS, f"reached safe ground after {progress.length:.2f} m")
+        bearing, curvature = arc_to(pose, progress.point_at(travelled + 0.3))
+        if abs(bearing) > 0.6:
+            return Twist.planar(wz=math.copysign(p.yaw_rate, bearing))
+        return Twist.planar(vx=p.speed, wz=clamp(p.speed * curvature, p.yaw_rate))
 
-        The way leads over costly ground, and over lethal ground only if the robot stands on it: then over that patch.
+    def _way_to_safety(
+        self, spot: SurfacePoint, own_patch: NDArray[np.bool_], request: RecoveryRequest
+    ) -> WayOut | None:
+        """Way over the mesh to the nearest vertex around which no face is forbidden, on the map of now.
+
+        It leads over costly ground, and of lethal vertices (V,) only over those of ``own_patch``.
         """
-        mesh_map, flag = self.mesh_map, request.cancel_token.flag
-        snapshot = mesh_map.snapshot()
-        lethal = snapshot.lethal | np.isposinf(snapshot.costs)
-        own_patch, _ = self._spread(spot, ~lethal, flag)
-        distances, predecessors = self._spread(spot, lethal & np.isinf(own_patch), flag)
+        mesh_map, snapshot = self.mesh_map, self.mesh_map.snapshot()
+        blocked = snapshot.blocked(self.parameters.cost_limit)
+        distances, predecessors = self._spread(spot, _lethal(snapshot) & ~own_patch, request.cancel_token.flag)
         beside_blocked = blocked[mesh_map.edges].any(axis=1)
         safe = ~blocked
         safe[mesh_map.edges[beside_blocked].ravel()] = False
@@ -90,7 +123,8 @@ class EscapeRecovery(MeshRecovery):
         if not candidates[nearest] <= self.parameters.max_distance:
             return None
         chain = follow_predecessors(predecessors, nearest)[::-1]
-        return np.concatenate([[spot.point], mesh_map.vertices[chain]])
+        points = np.concatenate([[spot.point], mesh_map.vertices[chain]])
+        return WayOut(chain, PathProgress(Path.from_points(points, frame_id=mesh_map.frame_id), window=1.0))
 
     def _spread(
         self, spot: SurfacePoint, closed: NDArray[np.bool_], flag: NDArray[np.uint8]
@@ -102,3 +136,8 @@ class EscapeRecovery(MeshRecovery):
         step = threshold_step(mesh_map)
         propagate_distances(*graph, distances, predecessors, seeds, step, NO_TARGETS, NO_OFFSETS, flag)
         return distances, predecessors
+
+
+def _lethal(snapshot: MeshSnapshot) -> NDArray[np.bool_]:
+    """Vertices (V,) that no robot may touch, whatever the cost limit."""
+    return np.asarray(snapshot.lethal | np.isposinf(snapshot.costs))

@@ -1,6 +1,7 @@
 """Recoveries on meshes: what they do on free and on forbidden ground, and that every way out ends with zero."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -72,10 +73,11 @@ def run(make_plugin, pose_on):
         motion=None,
         token=None,
         track=(),
+        motion_class=SimulatedMotion,
         **params,
     ):
         recovery = make_plugin(recovery_class, mesh_map, robot=TrackedRobot(track), **params)
-        simulated = SimulatedMotion(mesh_map, pose_on, recovery.clock, position, heading, **(motion or {}))
+        simulated = motion_class(mesh_map, pose_on, recovery.clock, position, heading, **(motion or {}))
         result = recovery.run_behavior(RecoveryRequest(simulated, token or CancelToken()))
         assert not simulated.commands or simulated.commands[-1] == Twist()
         return result, simulated
@@ -192,6 +194,41 @@ def test_escaping_leaves_a_lethal_disc_by_the_shortest_way(run, plain, paint):
     assert result.success and "safe ground" in result.message
     result, _ = run(EscapeRecovery, mesh_map, (2.6, 3.0, 0.0), max_distance=0.2)
     assert result.outcome == RecoveryOutcome.IMPASSABLE
+
+
+@pytest.mark.parametrize("gap", [True, False], ids=["way round", "no way"])
+def test_escaping_does_not_drive_into_what_appears_on_its_way(run, plain, paint, gap):
+    mesh_map = plain(spacing=0.1)
+    costly = np.where(np.hypot(*(mesh_map.vertices[:, :2] - 3.0).T) < 1.2, 0.95, 0.0).astype(np.float32)
+    paint(mesh_map, lambda v: costly)
+    x, y = mesh_map.vertices[:, 0], mesh_map.vertices[:, 1]
+    wall = (np.abs(x - 4.1) < 0.11) & (np.abs(y - 3.0) < 0.55) if gap else np.abs(np.hypot(x - 3.7, y - 3) - 0.45) < 0.1
+
+    class AppearingWall(SimulatedMotion):
+        def sleep(self, seconds):
+            if len(self.commands) == 3:
+                costs = np.where(wall, np.inf, costly).astype(np.float32)
+                self.mesh_map.apply(lambda layer: layer.replace(costs, np.isinf(costs)))
+            spot = self.mesh_map.locate_one(self.current.position)
+            assert not self.mesh_map.snapshot().lethal[self.mesh_map.faces[spot.face]].all()
+            return super().sleep(seconds)
+
+    result, motion = run(EscapeRecovery, mesh_map, (3.7, 3.0, 0.0), motion_class=AppearingWall, max_distance=3.0)
+    assert result.outcome == (RecoveryOutcome.SUCCESS if gap else RecoveryOutcome.IMPASSABLE), result.message
+    assert (np.hypot(motion.current.x - 3.0, motion.current.y - 3.0) > 1.1) == gap
+    assert gap or np.hypot(motion.current.x - 3.7, motion.current.y - 3.0) < 0.4
+
+
+def test_a_robot_whose_frame_is_above_the_ground_ends_its_escape_at_safe_ground(run, plain, paint):
+    mesh_map = paint(plain(spacing=0.1), lambda v: np.where(np.hypot(v[:, 0] - 3, v[:, 1] - 3) < 0.8, np.inf, 0.0))
+
+    class HighFrame(SimulatedMotion):
+        def pose(self):
+            return replace(self.current, position=(self.current.x, self.current.y, self.current.z + 0.4))
+
+    result, motion = run(EscapeRecovery, mesh_map, (2.6, 3.0, 0.0), motion_class=HighFrame)
+    assert result.success, result.message
+    assert 1.9 < motion.current.x < 2.25
 
 
 @pytest.mark.parametrize("recovery_class", MOVING)
