@@ -19,7 +19,15 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_mesh_nav.goal_approach import ArrivalLatch, arc_to, braking_speed, clamp, heading_error, is_at_goal
+from mbf_mesh_nav.goal_approach import (
+    ArrivalLatch,
+    arc_to,
+    braking_speed,
+    clamp,
+    heading_error,
+    in_robot_frame,
+    is_at_goal,
+)
 from mbf_mesh_nav.kernels.forbidden_ground import LETHAL_HARDNESS, may_enter
 from mbf_mesh_nav.path_progress import PathProgress, PathProjection
 from mbf_mesh_nav.plugins import MeshController
@@ -133,8 +141,9 @@ class PathFollower(MeshController):
         if abs(bearing) > p.turn_in_place_angle:
             return self._command(0.0, p.turn_gain * bearing)
         slope_factor = 1.0 - (1.0 - p.slope_speed_factor) * min(slope / p.slow_slope, 1.0)
-        # A robot that ran past the goal has no path left, but still the way back to it.
-        left = max(projection.remaining, float(np.linalg.norm(target - pose.position)))
+        # A robot that ran past the goal has no path left, but still the way back to it; how high its frame is above
+        # the ground does not count.
+        left = max(projection.remaining, math.hypot(*in_robot_frame(pose, target)[:2]))
         speed = min(
             p.max_lin_velocity * slope_factor,
             math.sqrt(p.max_lateral_acceleration / max(abs(curvature), 1e-6)),

@@ -50,6 +50,15 @@ def test_it_slows_down_towards_the_goal(make_plugin, plain):
     assert speeds == sorted(speeds, reverse=True) and speeds[-1] < 0.4 * speeds[0]
 
 
+def test_a_frame_above_the_ground_does_not_keep_it_from_slowing_down(make_plugin, plain):
+    def speed_before_the_goal(height):
+        follower = make_plugin(PathFollower, plain())
+        follower.set_plan(line(0.5, 5.5))
+        return command_at(follower, Pose.planar(5.4, 3.0, z=height)).command.vx
+
+    assert speed_before_the_goal(0.5) == pytest.approx(speed_before_the_goal(0.0))
+
+
 def test_at_the_goal_it_turns_to_the_final_heading(make_plugin, plain):
     follower = make_plugin(PathFollower, plain())
     follower.set_plan(Path.from_points([(1, 3, 0), (2, 3, 0)], Pose.planar(0, 0, 1.5).orientation))
