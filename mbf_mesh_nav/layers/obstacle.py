@@ -80,9 +80,10 @@ class Hits(NamedTuple):
         """Return some of the rows."""
         return Hits(*[column[rows] for column in self])
 
-    def before(self, older: Hits) -> Hits:
-        """Add older hits, but for those of faces that the same sensor has marked anew."""
+    def joined_with(self, older: Hits) -> Hits:
+        """Add hits that were there before; of those of one sensor in one face the newest stays."""
         both = Hits(*[np.concatenate([new, old]) for new, old in zip(self, older, strict=True)])
+        both = both.where(np.argsort(-both.stamps, kind="stable"))  # clouds may come late
         sensor_count = int(both.sources.max(initial=0)) + 1
         _, newest = np.unique(both.faces.astype(np.int64) * sensor_count + both.sources, return_index=True)
         return both.where(newest)
@@ -100,21 +101,23 @@ class ObstacleLayer(MeshLayer):
         self._hits = Hits.none()
 
     def compute(self) -> tuple[CostArray, LethalArray]:
-        """Cost inf and lethal at the corners of the marked faces."""
+        """Cost inf and lethal at the corners of the marked faces; forget those of sensors not listened to any more."""
+        unheard = [number for number, name in enumerate(self._last_heard) if not self._listens_to(name)]
+        self._hits = self._hits.where(~np.isin(self._hits.sources, unheard))
         lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)
         lethal[self.topology.faces[self._hits.faces]] = True
         return np.where(lethal, np.inf, 0.0).astype(np.float32), lethal
 
     def insert_scan(self, scan: RangeScan) -> IntArray:
         """Mark the faces below what was hit, forget what is too old or seen through."""
-        if self.parameters.sources and scan.source not in self.parameters.sources:
+        if not self._listens_to(scan.source):
             return NOTHING_CHANGED
         self._last_heard[scan.source] = scan.stamp
         sensor = list(self._last_heard).index(scan.source)
         kept = self._hits.where(self._still_valid(scan, sensor))
         faces, points = self._project(scan)
         seen = Hits(faces, points, np.full(len(faces), scan.stamp), np.full(len(faces), sensor, dtype=np.int32))
-        return self._change(seen.before(kept))
+        return self._change(seen.joined_with(kept))
 
     def expire(self, now: float) -> IntArray:
         """Forget hits older than ``decay_time``; with 0 they stay until the next cloud."""
@@ -138,6 +141,9 @@ class ObstacleLayer(MeshLayer):
         ages = [now - self._last_heard.get(source, -np.inf) for source in sources]
         return limit == 0.0 or (bool(ages) and -MAX_STAMP_LEAD <= min(ages) and max(ages) <= limit)
 
+    def _listens_to(self, source: str) -> bool:
+        return not self.parameters.sources or source in self.parameters.sources
+
     def _project(self, scan: RangeScan) -> tuple[IntArray, FloatArray]:
         """Faces (k,) below the points that are obstacles, and those points (k, 3)."""
         settings, points = self.parameters, scan.points
@@ -148,10 +154,14 @@ class ObstacleLayer(MeshLayer):
         return faces[faces >= 0], near[faces >= 0]
 
     def _still_valid(self, scan: RangeScan, sensor: int) -> NDArray[np.bool_]:
-        """Mask of the kept hits that this scan neither outdates nor sees through."""
+        """Mask of the kept hits that this scan neither outdates nor sees through.
+
+        A scan that comes late, from a slow sensor, knows nothing of what another saw after its stamp.
+        """
         valid = (scan.stamp - self._hits.stamps < self.parameters.decay_time) | (self._hits.sources != sensor)
         if self.parameters.clearing and len(scan.ends) and valid.any():
-            valid &= ~RangeImage(scan.ends, scan.origin).sees_through(self._hits.points)
+            seen_through = RangeImage(scan.ends, scan.origin).sees_through(self._hits.points)
+            valid &= ~(seen_through & (self._hits.stamps <= scan.stamp))
         return np.asarray(valid, dtype=np.bool_)
 
     def _change(self, hits: Hits) -> IntArray:

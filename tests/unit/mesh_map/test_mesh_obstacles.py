@@ -269,6 +269,43 @@ def test_one_sensor_does_not_make_another_ones_obstacles_forgotten():
     assert not (mesh.snapshot().lethal & seen).any(), "its own next cloud replaces what it had seen"
 
 
+def test_a_late_scan_does_not_clear_what_another_sensor_saw_after_it():
+    mesh = floor_map(decay_time=5.0)
+    hit, origin = np.array([[2.05, 2.02, 0.4]]), np.array(SENSOR)
+    beyond = origin + 2.0 * (hit - origin)
+    mesh.insert_scan(RangeScan("lidar", "map", origin, hit, np.array([True]), 10.0))
+
+    mesh.insert_scan(RangeScan("camera", "map", origin, beyond, np.array([False]), 9.8))
+    assert mesh.snapshot().lethal.sum() == 3
+
+    mesh.insert_scan(RangeScan("camera", "map", origin, beyond, np.array([False]), 10.1))
+    assert not mesh.snapshot().lethal.any()
+
+
+def test_a_late_cloud_of_the_same_sensor_does_not_make_a_hit_older_than_it_is():
+    mesh = floor_map(decay_time=1.0, clearing=False)
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 10.0)
+    mesh.insert_points(post(2.0, 2.0), SENSOR, 9.5)
+
+    mesh.update(10.9)
+    assert mesh.snapshot().lethal.any()
+    mesh.update(11.1)
+    assert not mesh.snapshot().lethal.any()
+
+
+def test_obstacles_of_a_sensor_that_is_no_longer_listened_to_are_forgotten():
+    mesh = floor_map(sources=("lidar", "camera"))
+    for name, x in (("lidar", 1.05), ("camera", 3.05)):
+        hit = np.array([[x, 2.02, 0.4]])
+        mesh.insert_scan(RangeScan(name, "map", np.array(SENSOR), hit, np.array([True]), 1.0))
+    assert mesh.snapshot().lethal.sum() == 6
+
+    layer = mesh.layers["seen"]
+    mesh.set_layer_parameters("seen", layer.parameters.model_copy(update={"sources": ("lidar",)}))
+
+    assert mesh.vertices[mesh.snapshot().lethal][:, 0].max() < 1.5 and mesh.snapshot().lethal.sum() == 3
+
+
 def test_a_silent_sensor_is_noticed_while_another_speaks():
     mesh = floor_map(expected_update_rate=0.5)
     mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0, "front")
