@@ -20,7 +20,7 @@ from mbf_abstract.plugins import PlanResult
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors
 from mbf_mesh_nav.kernels.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
 from mbf_mesh_nav.layers.tilt import TiltLayer, heading_index
-from mbf_mesh_nav.leg_search import Leg, LegQuery, straight_leg
+from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, Leg, LegQuery, straight_leg
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.surface_planner import SurfacePlanner, SurfacePlannerParameters
@@ -28,6 +28,8 @@ from mbf_mesh_nav.surface_point import corner_distances, nearest_corner
 
 AT_ONE_PLACE = 1e-6
 """Start and goal this near [m] have no direction between them."""
+CANCELLED = -2
+"""What ``search_with_heading`` answers instead of a state."""
 
 
 class HeadingAStarParameters(SurfacePlannerParameters):
@@ -62,13 +64,45 @@ class HeadingAStarPlanner(SurfacePlanner):
         allowed, roll = self._tilt()
         if query.start.face == query.goal.face and self._may_drive_straight(query, allowed):
             return straight_leg(mesh_map, query)
+        targets = corner_distances(mesh_map, query.blocked, query.goal)
+        best, cost, _, predecessors = self._search(query, allowed, roll, *targets)
+        if best < 0:
+            self._tilt_at_ends = self._describe_ends(query, allowed)
+            return None
+        chain = follow_predecessors(predecessors, best)[::-1] // HEADINGS
+        positions = np.concatenate([[query.start.point], mesh_map.vertices[chain], [query.goal.point]])
+        ends = mesh_map.face_normals[[query.start.face]], mesh_map.face_normals[[query.goal.face]]
+        normals = np.concatenate([ends[0], mesh_map.vertex_normals[chain], ends[1]])
+        return Leg(positions, normals, cost)
+
+    def reach(self, query: LegQuery) -> NDArray[np.float32] | None:
+        """As for every planner; here to where the robot may also turn to the heading of the goal."""
+        allowed, roll = self._tilt()
+        best, _, distances, _ = self._search(query, allowed, roll, NO_TARGETS, NO_OFFSETS)
+        if best == CANCELLED:
+            return None
+        by_heading = distances.reshape(-1, HEADINGS)
+        if query.goal_pose is None:
+            return np.asarray(by_heading.min(axis=1))
+        may_turn = may_turn_to(allowed, heading_index(query.goal_pose.yaw))
+        return np.asarray(np.where(may_turn, by_heading, np.float32(np.inf)).min(axis=1))
+
+    def _search(
+        self,
+        query: LegQuery,
+        allowed: NDArray[np.bool_],
+        roll: NDArray[np.float32],
+        targets: NDArray[np.int32],
+        target_offsets: NDArray[np.float32],
+    ) -> tuple[int, float, NDArray[np.float32], NDArray[np.int32]]:
+        """Run the kernel: best target state, its cost, distances and predecessors (16 V,) of all states it came to."""
+        mesh_map = self.mesh_map
         distances = np.full(HEADINGS * len(mesh_map.vertices), np.inf, dtype=np.float32)
         predecessors = np.full(len(distances), -1, dtype=np.int32)
         heading = 0 if query.start_pose is None else heading_index(query.start_pose.yaw)
         corners, offsets = corner_distances(mesh_map, query.blocked, query.start)
         seeds = corners * np.int32(HEADINGS) + np.int32(heading)
         distances[seeds] = offsets
-        targets, target_offsets = corner_distances(mesh_map, query.blocked, query.goal)
         best, cost = search_with_heading(
             mesh_map.vertices,
             mesh_map.neighbour_offsets,
@@ -89,14 +123,7 @@ class HeadingAStarPlanner(SurfacePlanner):
             -1 if query.goal_pose is None else heading_index(query.goal_pose.yaw),
             query.cancel_flag,
         )
-        if best < 0:
-            self._tilt_at_ends = self._describe_ends(query, allowed)
-            return None
-        chain = follow_predecessors(predecessors, best)[::-1] // HEADINGS
-        positions = np.concatenate([[query.start.point], mesh_map.vertices[chain], [query.goal.point]])
-        ends = mesh_map.face_normals[[query.start.face]], mesh_map.face_normals[[query.goal.face]]
-        normals = np.concatenate([ends[0], mesh_map.vertex_normals[chain], ends[1]])
-        return Leg(positions, normals, cost)
+        return best, cost, distances, predecessors
 
     def _no_path(self, start: SurfacePoint, goal: SurfacePoint, blocked: NDArray[np.bool_]) -> PlanResult:
         """Name the tilt where it, and not a blocked vertex, closes the way."""
@@ -133,3 +160,16 @@ class HeadingAStarPlanner(SurfacePlanner):
         pitch, roll = np.arctan2(-along, normals[:, 2:]), np.arctan2(-across, normals[:, 2:])
         allowed = (np.abs(roll) <= self.parameters.max_roll) & (np.abs(pitch) <= self.parameters.max_pitch)
         return allowed, roll.astype(np.float32)
+
+
+def may_turn_to(allowed: NDArray[np.bool_], heading: int) -> NDArray[np.bool_]:
+    """From which headings (V, 16) the robot may turn on the spot to ``heading``: all on the short way ``allowed``."""
+    may_turn = np.ones_like(allowed)
+    for away in range(1, HEADINGS // 2 + 1):
+        for side in (1, -1):
+            passed = (heading + side * (away - 1)) % HEADINGS
+            following = allowed[:, passed] & may_turn[:, passed]
+            # Half a turn goes left, as in the kernel.
+            if away < HEADINGS // 2 or side == -1:
+                may_turn[:, (heading + side * away) % HEADINGS] = following
+    return may_turn

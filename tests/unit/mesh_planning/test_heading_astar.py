@@ -12,7 +12,7 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_mesh_nav.kernels.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
 from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
+from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner, may_turn_to
 
 
 def passed_headings(heading, new):
@@ -107,6 +107,23 @@ def test_a_goal_heading_that_tilts_too_far_is_refused_and_named(make_plugin, rid
     result = planner.make_plan(PlanRequest(Pose.planar(2.0, 4.0, 1.57, z=0.4), goal))
     assert result.outcome == GetPathOutcome.NO_PATH_FOUND
     assert "tilt forbids the heading 0.00 rad at the goal" in result.message
+
+
+def test_a_tolerance_ends_at_the_nearest_place_the_tilt_lets_the_robot_stand_at_with_its_heading(make_plugin, ridge):
+    planner = make_plugin(HeadingAStarPlanner, ridge, max_roll=0.2, max_pitch=0.5)
+    # Half a metre up a flank, looking along it; the plain before it ends at y = 3.
+    start, goal = Pose.planar(2.0, 1.0, 1.57), Pose.planar(2.0, 3.5, 0.0, z=0.2)
+    assert not planner.make_plan(PlanRequest(start, goal, dist_tolerance=0.3)).success
+    result = planner.make_plan(PlanRequest(start, goal, dist_tolerance=1.5))
+    assert result.success, result.message
+    assert result.path[-1].position == pytest.approx((2.0, 3.0, 0.0))
+
+
+@pytest.mark.parametrize("heading", [0, 5, 15])
+def test_turning_to_a_heading_passes_the_same_headings_as_in_the_search(heading):
+    allowed = np.random.default_rng(heading).random((200, 16)) < 0.8
+    naive = [[all(row[h] for h in passed_headings(begin, heading)) for begin in range(16)] for row in allowed]
+    np.testing.assert_array_equal(may_turn_to(allowed, heading), naive)
 
 
 def test_turning_costs_make_paths_with_fewer_turns(make_plugin, hills):
