@@ -118,6 +118,21 @@ def test_it_tells_what_it_means_to_drive_next_with_the_turns_of_a_car_as_yaw_rat
         assert (np.abs(motion.velocities[:, 2]) <= limit + 1e-9).all()
 
 
+def test_a_wall_thinner_than_a_step_is_not_jumped_over(make_plugin, plain, paint):
+    mesh_map = paint(plain(spacing=0.1), lambda v: np.where(np.abs(v[:, 0] - 3.0) < 0.06, np.inf, 0.0))
+    controller = make_plugin(MPPIController, mesh_map, step_time=0.5, horizon_steps=8, max_lin_velocity=2.0)
+    controller.set_plan(straight_path())
+    pose = Pose.planar(1.0, 3.0)
+    for _ in range(200):
+        result = controller.compute_velocity_commands(ControlRequest(pose, Twist()))
+        if not result.success:
+            break
+        yaw = pose.yaw + 0.05 * result.command.wz
+        step = 0.05 * result.command.vx * np.array([np.cos(yaw), np.sin(yaw)])
+        pose = Pose.planar(pose.x + step[0], pose.y + step[1], yaw)
+    assert 2.0 < pose.x < 2.95
+
+
 def test_walled_in_on_all_sides_it_finds_no_valid_command(make_plugin, plain, paint):
     def ring(v):
         distance = np.hypot(v[:, 0] - 1.0, v[:, 1] - 1.0)
