@@ -15,10 +15,13 @@ from mbf_mesh_nav.checked_mesh import CheckedMesh, IntArray
 from mbf_mesh_nav.mesh_report import MeshError
 
 
-def densify(mesh: CheckedMesh, max_edge_length: float, max_faces: int = 20_000_000) -> CheckedMesh:
+def densify(
+    mesh: CheckedMesh, max_edge_length: float, max_faces: int = 20_000_000, file: str = "arrays"
+) -> CheckedMesh:
     """Split all edges longer than ``max_edge_length`` [m] at their middle, until there is none.
 
-    New vertices come after the old ones and have source -1; new faces keep the source of the face they split.
+    New vertices come after the old ones and have source -1; new faces keep the source of the face they split. ``file``
+    is named in the error.
 
     Raises
     ------
@@ -26,7 +29,7 @@ def densify(mesh: CheckedMesh, max_edge_length: float, max_faces: int = 20_000_0
         The length is not positive or the result would have more than ``max_faces`` faces.
     """
     if max_edge_length <= 0.0:
-        raise MeshError("densify", [f"the maximal edge length must be positive, got {max_edge_length}"])
+        raise MeshError(file, [f"densify: the maximal edge length must be positive, got {max_edge_length}"])
     vertices, faces = mesh.vertices, mesh.faces
     face_source = mesh.face_source
     while True:
@@ -36,8 +39,8 @@ def densify(mesh: CheckedMesh, max_edge_length: float, max_faces: int = 20_000_0
         if not long.any():
             break
         if len(faces) + int(long[edge_of_corner].sum()) > max_faces:
-            text = f"edges of at most {max_edge_length} m need more than {max_faces} faces"
-            raise MeshError("densify", [text])
+            text = f"densify: edges of at most {max_edge_length:g} m need more than {max_faces} faces"
+            raise MeshError(file, [text])
         middle = np.where(long, len(vertices) + np.cumsum(long) - 1, -1).astype(np.int32)
         vertices = np.vstack([vertices, vertices[edges[long]].mean(axis=1)])
         faces, parents = _split(faces, middle[edge_of_corner])

@@ -31,17 +31,23 @@ def dependency_order(inputs: Mapping[str, Sequence[str]]) -> list[str]:
     LayerGraphError
         An input is not the name of a layer, or layers wait for each other; every finding is named.
     """
-    unknown = [f"{name} reads unknown layer '{read}'" for name in inputs for read in inputs[name] if read not in inputs]
-    if unknown:
-        raise LayerGraphError(f"{'; '.join(unknown)}; the layers are: {', '.join(inputs)}")
+    findings = [
+        f"{name} reads unknown layer '{read}'" for name in inputs for read in inputs[name] if read not in inputs
+    ]
+    if findings:
+        findings.append(f"the layers are: {', '.join(inputs)}")
+    known = {name: [read for read in reads if read in inputs] for name, reads in inputs.items()}
     order: list[str] = []
     waiting = list(inputs)
     while waiting:
-        ready = [name for name in waiting if all(read in order for read in inputs[name])]
+        ready = [name for name in waiting if all(read in order for read in known[name])]
         if not ready:
-            raise LayerGraphError(f"layers read each other in a circle: {' -> '.join(_cycle(inputs, waiting[0]))}")
+            findings.append(f"layers read each other in a circle: {' -> '.join(_cycle(known, waiting[0]))}")
+            break
         order += ready
         waiting = [name for name in waiting if name not in ready]
+    if findings:
+        raise LayerGraphError("; ".join(findings))
     return order
 
 

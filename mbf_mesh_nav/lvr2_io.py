@@ -180,7 +180,7 @@ def _geometry(file: h5py.File, path: Path, part: str) -> Any:
     file.visititems(visit)
     chosen = [part] if part else list(found)
     if len(chosen) != 1 or chosen[0] not in found:
-        wanted = f"no mesh '{part}'" if part else "which mesh?"
+        wanted = f"no mesh '{part}'." if part else "which mesh?"
         raise MeshError(str(path), [f"{wanted} The meshes in it are: {', '.join(found) or 'none'}"])
     geometry = found[chosen[0]]
     wrong = [text for name, kinds in GEOMETRY_CHANNELS.items() if (text := _wrong_channel(geometry, name, kinds))]

@@ -106,9 +106,9 @@ class MeshMapParameters(ParameterModel):
     def _repairs_are_known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         known = {*REPAIRS, KEEP_APART}
         if unknown := [name for name in names if name not in known]:
-            raise ValueError(f"unknown repairs: {', '.join(unknown)}; the repairs are: {', '.join(REPAIRS)}")
+            raise ValueError(f"names of repairs ({', '.join(REPAIRS)}), not {', '.join(unknown)}")
         if {JOIN, KEEP_APART} <= set(names):
-            raise ValueError(f"{JOIN} and {KEEP_APART} exclude each other")
+            raise ValueError(f"either {JOIN} or {KEEP_APART}")
         return names
 
     def repairs_for(self, file: str) -> tuple[str, ...]:
@@ -202,7 +202,7 @@ def build_mesh_map(
     repair = parameters.repairs_for(file)
     mesh, report = checked_mesh(vertices, faces, repair, file or "arrays", parameters.join_distance)
     if parameters.densify > 0.0:
-        mesh = densify(mesh, parameters.densify)
+        mesh = densify(mesh, parameters.densify, file=file or "arrays")
     topology = build_topology(mesh.vertices, mesh.faces, mesh.vertex_source, mesh.face_source, mesh.input_to_vertex)
     mesh_map = MeshMap(topology, frame_id, report, parameters.inscribed_radius)
     if plan:

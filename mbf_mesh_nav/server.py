@@ -25,6 +25,7 @@ from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.server import AbstractNavigationServer
+from mbf_mesh_nav.layer_graph import LayerGraphError
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh_io import known_endings
 from mbf_mesh_nav.mesh_map import MeshMap
@@ -150,12 +151,15 @@ class MeshNavigationServer(AbstractNavigationServer):
         parameters = cast(MeshMapParameters, section.parameters)
         file = config.path.parent / (mesh_file or parameters.mesh_file)
         layer_classes: dict[str, Any] = {layer.type_name: layer.layer_class for layer in section.layers}
-        return build_mesh_map(
-            parameters.model_copy(update={"mesh_file": str(file)}),
-            {layer.name: cast(Any, layer.parameters) for layer in section.layers},
-            frame_id=config.parameters.global_frame,
-            load_layer=layer_classes.__getitem__,
-        )
+        try:
+            return build_mesh_map(
+                parameters.model_copy(update={"mesh_file": str(file)}),
+                {layer.name: cast(Any, layer.parameters) for layer in section.layers},
+                frame_id=config.parameters.global_frame,
+                load_layer=layer_classes.__getitem__,
+            )
+        except LayerGraphError as error:
+            raise LayerGraphError(f"{config.path}: mesh_map: {error}") from error
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the mesh map."""

@@ -32,9 +32,11 @@ class LabelParameters(LayerParameters):
     def _labels_are_known(self) -> LabelParameters:
         known = {*self.label_costs, *self.lethal_labels}
         if unknown := sorted({region.label for region in self.regions} - known):
-            raise ValueError(f"labels without a cost: {', '.join(unknown)}; known are: {', '.join(sorted(known))}")
+            raise ValueError(
+                f"a cost for every label, not for {', '.join(sorted(known)) or 'none'} only: {', '.join(unknown)}"
+            )
         if negative := [label for label, cost in self.label_costs.items() if cost < 0.0]:
-            raise ValueError(f"label costs must not be negative: {', '.join(negative)}")
+            raise ValueError(f"label costs of at least 0, not those of {', '.join(negative)}")
         return self
 
 

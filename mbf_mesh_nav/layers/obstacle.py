@@ -59,7 +59,7 @@ class ObstacleParameters(LayerParameters):
     @classmethod
     def _points_somewhere(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
         if axis == (0.0, 0.0, 0.0):
-            raise ValueError("the axis must have a direction")
+            raise ValueError("an axis that has a direction")
         return axis
 
 

@@ -26,13 +26,13 @@ class Region(ParameterModel):
     @classmethod
     def _has_an_inside(cls, polygon: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
         if len(polygon) < 3:
-            raise ValueError(f"a polygon needs at least 3 corners, got {len(polygon)}")
+            raise ValueError(f"a polygon of at least 3 corners, not of {len(polygon)}")
         return polygon
 
     @model_validator(mode="after")
     def _has_a_height(self) -> Region:
         if self.z_min > self.z_max:
-            raise ValueError(f"z_min {self.z_min:g} m is above z_max {self.z_max:g} m: the region is empty")
+            raise ValueError(f"a range of heights: z_min {self.z_min:g} m is above z_max {self.z_max:g} m")
         return self
 
     def mask(self, vertices: FloatArray) -> LethalArray:

@@ -48,8 +48,8 @@ class TiltParameters(LayerParameters):
     def _stands_on_its_wheels(self) -> TiltParameters:
         if abs(self.center_of_mass_x) >= self.wheelbase / 2.0:
             raise ValueError(
-                f"center_of_mass_x {self.center_of_mass_x:g} m is not between the wheels of a wheelbase of "
-                f"{self.wheelbase:g} m: the robot would tip over on flat ground"
+                f"a centre of mass between the wheels; center_of_mass_x {self.center_of_mass_x:g} m is not between the "
+                f"wheels of a wheelbase of {self.wheelbase:g} m: the robot would tip over on flat ground"
             )
         return self
 

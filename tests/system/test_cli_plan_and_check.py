@@ -141,6 +141,17 @@ def test_check_finds_a_missing_map_file_of_a_configuration_without_mistakes(hill
     assert mbf("check", bad, "--no-load").exit_code == 0
 
 
+def test_check_names_the_file_whose_layers_make_no_map(hill, tmp_path):
+    file = tmp_path / "circle.yaml"
+    layers = "[{name: a, type: mean, inputs: [b]}, {name: b, type: mean, inputs: [a]}]"
+    file.write_text(f"backend: mesh\nmesh_map: {{mesh_file: {hill}, layers: {layers}}}\n")
+
+    result = mbf("check", file)
+
+    assert result.exit_code == 2
+    assert f"{file}: mesh_map: layers read each other in a circle: a -> b -> a" in result.output.replace("\n", "")
+
+
 def test_plugins_lists_planners_of_both_maps():
     result = mbf("plugins", "--kind", "planners", "--json")
 

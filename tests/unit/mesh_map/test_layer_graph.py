@@ -68,6 +68,11 @@ def test_all_unknown_inputs_are_named():
         dependency_order({"a": ["x"], "b": ["y", "a"]})
 
 
+def test_a_circle_is_named_beside_unknown_inputs():
+    with pytest.raises(LayerGraphError, match=r"a reads unknown layer 'x'.*circle: b -> c -> b"):
+        dependency_order({"a": ["x"], "b": ["c"], "c": ["b", "a"]})
+
+
 @pytest.mark.parametrize(
     ("inputs", "circle"),
     [

@@ -63,7 +63,7 @@ def test_hdf5_without_or_with_another_mesh_names_what_is_there(tmp_path):
         handle["a/geometry/face_indices"] = np.zeros((1, 4), np.uint32)
         handle["a"].attrs["IO"] = "PointIO"
 
-    with pytest.raises(MeshError, match="no mesh 'b' The meshes in it are: a"):
+    with pytest.raises(MeshError, match=r"no mesh 'b'\. The meshes in it are: a"):
         read_mesh(file, "b")
     with pytest.raises(MeshError, match=r"expected \(n, 3\).*expected 'MeshIO'"):
         read_mesh(file)

@@ -162,7 +162,7 @@ def test_points_are_projected_along_the_configured_axis():
     slanted.insert_points([[2.0, 2.0, 0.6]], SENSOR, 1.0)
 
     np.testing.assert_allclose(slanted.vertices[slanted.layers["seen"].lethal][:, 0].mean(), 2.6, atol=0.2)
-    with pytest.raises(LayerGraphError, match="must have a direction"):
+    with pytest.raises(LayerGraphError, match="an axis that has a direction"):
         floor_map(down_axis=(0.0, 0.0, 0.0))
 
 
