@@ -20,6 +20,7 @@ TRIMESH_FORMATS = frozenset({".ply", ".obj", ".stl", ".off", ".dae", ".gltf", ".
 HDF5_FORMATS = frozenset({".h5", ".hdf5"})
 SPLIT_CORNERS = frozenset({".stl", ".obj", ".dae", ".gltf", ".glb"})
 """Formats whose files, or readers, give faces, materials, parts or seams of a texture corners of their own."""
+OBJ_PARTS = {"split_objects": True, "group_material": False}
 MAX_FILE_BYTES = 4 * 2**30
 MAX_FACES = 30_000_000
 
@@ -34,8 +35,9 @@ def read_mesh(file: str | Path, part: str = "", max_faces: int = MAX_FACES) -> M
     file : path
         The ending decides the format.
     part : str
-        Which part of the file: a path of node names through a scene graph ("building/floor_2"), or the group of an
-        HDF5 file. "" and "/" mean everything, joined (HDF5: the only mesh in the file). Elevation models have none.
+        Which part of the file: a path of node names through a scene graph ("building/floor_2"), the name of an OBJ
+        file's object, or the group of an HDF5 file. "" and "/" mean everything, joined (HDF5: the only mesh in the
+        file). Elevation models have none.
     max_faces : int
         Larger meshes are refused before anything is built from them.
 
@@ -92,8 +94,9 @@ def _read_with_trimesh(path: Path, part: str) -> MeshArrays:
 def _read_scene(path: Path, part: str) -> MeshArrays:
     import trimesh
 
-    # Texture coordinates would split the vertices of a PLY and so renumber them.
-    options = {"fix_texture": False} if path.suffix.lower() == ".ply" else {}
+    # Texture coordinates would split the vertices of a PLY and so renumber them. The objects of an OBJ file come as one
+    # mesh, or one for each material, unless asked for.
+    options = {".ply": {"fix_texture": False}, ".obj": OBJ_PARTS if part else {}}.get(path.suffix.lower(), {})
     scene = trimesh.load_scene(str(path), process=False, **options)
     if not scene.graph.nodes_geometry:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)

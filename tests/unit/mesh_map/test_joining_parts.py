@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh_io import read_mesh
+from mbf_mesh_nav.mesh_report import MeshError
 from mbf_mesh_nav.repair import checked_mesh
 
 rotation_matrix = trimesh.transformations.rotation_matrix
@@ -22,6 +23,18 @@ def scene_of(*transforms: np.ndarray) -> trimesh.Scene:
     for number, transform in enumerate(transforms):
         scene.add_geometry(tile, node_name=f"tile{number}", geom_name="tile", transform=transform)
     return scene
+
+
+def test_a_part_of_an_obj_file_is_one_of_its_objects_and_not_all_of_them(tmp_path):
+    file = tmp_path / "rooms.obj"
+    rooms = [f"o {name}\nv {x} 0 0\nv {x + 1} 0 0\nv {x} 1 0\n" for name, x in (("hall", 0), ("lab", 5))]
+    file.write_text(f"{rooms[0]}f 1 2 3\n{rooms[1]}f 4 5 6\n")
+
+    assert read_mesh(file, "lab")[0][:, 0].min() == 5.0 and len(read_mesh(file, "lab")[1]) == 1
+    assert read_mesh(file, "hall")[0][:, 0].max() == 1.0
+    assert len(read_mesh(file)[1]) == 2
+    with pytest.raises(MeshError, match="no part 'attic', the parts are: hall, lab"):
+        read_mesh(file, "attic")
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3])
