@@ -14,14 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw, quaternion_multiply
+from mbf_mesh_nav.locate import Location
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.path_progress import PathProgress
+from mbf_mesh_nav.surface_point import beyond_border
 
 _SMALL_CORNER = 0.2  # [rad] between the path's end and the goal's heading: driven without an approach
 _SMALL_TURN = 1.2  # [rad] between the robot's heading and the path's begin: steered into without a curve
 _LEAVING = (1.0, 2.0, 3.0, 4.0, 6.0)  # turning radii before the goal at which the curve may leave the path
 _STRAIGHT = 0.3  # [m] straight ahead at the end, to settle in
 _SPACING = 0.1  # [m]
+_LONGEST_STEP = 3.0 * _SPACING  # [m] between neighbouring points put onto one surface; more is a leap
 _SIDES = {"L": 1.0, "S": 0.0, "R": -1.0}
 
 
@@ -69,14 +72,21 @@ def with_final_approach(
         leaves_at = max(progress.length - distance, 0.0)
         curve = _curve_to_goal(path, progress, leaves_at, turning_radius)
         spots = mesh_map.locate(curve, distance + turning_radius)
-        fits = (spots.faces >= 0).all() and not blocked[mesh_map.faces[spots.faces]].any()
         length = leaves_at + _SPACING * len(curve)
-        if fits and length < best_length:
+        if _fits(mesh_map, blocked, curve, spots) and length < best_length:
             kept = path.positions[progress.arc_lengths < leaves_at]
             positions = np.concatenate([kept, spots.points, path.positions[-1:]])
             best = Path.from_points(positions, path[-1].orientation, frame_id=path.frame_id, stamp=path.stamp)
             best_length = length
     return best
+
+
+def _fits(mesh_map: MeshMap, blocked: NDArray[np.bool_], curve: NDArray[np.float64], spots: Location) -> bool:
+    """Whether a curve (n, 3) lies over free ground all along: past no border, and not with a part on another storey."""
+    if (spots.faces < 0).any() or blocked[mesh_map.faces[spots.faces]].any():
+        return False
+    steps = np.linalg.norm(np.diff(spots.points, axis=0), axis=1)
+    return not beyond_border(mesh_map, curve, spots).any() and bool((steps <= _LONGEST_STEP).all())
 
 
 def _corner_at_goal(path: Path) -> float:

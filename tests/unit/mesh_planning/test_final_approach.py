@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_mesh_nav.final_approach import dubins_curve, with_final_approach, with_first_turn
+from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh_map import MeshMap
 
 PLACES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-math.pi, math.pi))
 
@@ -52,6 +54,26 @@ def test_a_curve_that_does_not_fit_between_walls_is_not_taken(plain, paint):
     blocked = corridor.snapshot().lethal
     assert with_final_approach(path, corridor, blocked, 0.7) is path
     assert with_final_approach(path, corridor, np.zeros_like(blocked), 0.7) is not path
+
+
+def test_a_curve_leads_neither_past_the_border_nor_across_a_hole():
+    heights = np.zeros((31, 31))
+    heights[8:23, 22:28] = np.nan
+    for ground, goal_x in ((MeshMap.from_heights(np.zeros((31, 31)), 0.2, 0.2), 5.6), (_over_a_floor(heights), 4.1)):
+        points = [(x, 3.0, 0.0) for x in np.linspace(1.0, goal_x, 40)]
+        path = Path.from_points(points, Pose.planar(0.0, 0.0, math.pi).orientation)
+        bent = with_final_approach(path, ground, ground.snapshot().lethal, 0.7)
+        spots = ground.locate(bent.positions)
+        assert np.linalg.norm(np.diff(bent.positions, axis=0), axis=1).max() < 0.35
+        assert not ground.topology.border_vertices[ground.faces[spots.faces]].all(axis=1).any()
+        assert np.abs(bent.positions[:, 2]).max() < 1e-9
+
+
+def _over_a_floor(heights):
+    """A surface with 0.2 m between its samples, and 0.5 m below it another one without holes."""
+    vertices, faces = heightfield_mesh(heights, 0.2, 0.2)
+    below, below_faces = heightfield_mesh(np.full(heights.shape, -0.5), 0.2, 0.2)
+    return MeshMap.from_arrays(np.vstack([vertices, below]), np.vstack([faces, below_faces + len(vertices)]))
 
 
 def test_a_path_that_begins_behind_the_car_is_joined_on_a_curve_and_keeps_its_end(plain):
