@@ -1,14 +1,18 @@
-"""Computed layers kept in files, found again by mesh, layer type and parameters.
+"""Computed layers kept in files, found again by mesh, layer type, parameters and the code that computes them.
 
-mesh_navigation finds a stored layer by its name alone and so takes one made with another radius; here the file name
-is a digest of everything the values depend on. Files are written beside and renamed, so a broken run leaves no half
-file; a file that cannot be read is computed anew. Nothing here raises: a cache that cannot be used costs time, no map.
+mesh_navigation finds a stored layer by its name alone and so takes one made with another radius; here the file name is
+a digest of what the values depend on, so that neither another radius nor another formula after an upgrade finds them.
+What a layer class of yours imports from elsewhere is not part of it: empty the folder then. Files are written beside
+and renamed, so a broken run leaves no half file; a file that cannot be read is computed anew. Nothing here raises: a
+cache that cannot be used costs time, no map.
 """
 
 from __future__ import annotations
 
 import hashlib
+import inspect
 import os
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +38,8 @@ class LayerCache:
     def file_of(self, layer: MeshLayer) -> Path:
         """File that holds, or would hold, the values of a layer with its present parameters."""
         layer_class = type(layer)
-        identity = f"{self.mesh_digest} {layer_class.__module__}:{layer_class.__qualname__} "
+        names = f"{layer_class.__module__}:{layer_class.__qualname__}"
+        identity = f"{self.mesh_digest} {names} {_digest_of_code(layer_class)} "
         digest = hashlib.sha256((identity + layer.parameters.model_dump_json()).encode()).hexdigest()
         return self.folder / f"{layer_class.__name__}-{digest[:32]}.npz"
 
@@ -51,15 +56,27 @@ class LayerCache:
 
     def store(self, layer: MeshLayer) -> str:
         """Keep the present values of a layer; why that was not possible, or ""."""
-        target = self.file_of(layer)
-        unfinished = target.with_suffix(f".{os.getpid()}.npz")
         try:
+            target = self.file_of(layer)
+            unfinished = target.with_suffix(f".{os.getpid()}.npz")
             self.folder.mkdir(parents=True, exist_ok=True)
             try:
                 np.savez(unfinished, costs=layer.costs, lethal=layer.lethal)
                 unfinished.replace(target)
             finally:
                 unfinished.unlink(missing_ok=True)
-        except OSError as error:
-            return f"{type(error).__name__}: {error.strerror or error}"
+        except (OSError, TypeError) as error:  # the latter for a class typed into an interpreter: it has no file
+            return f"{type(error).__name__}: {getattr(error, 'strerror', None) or error}"
         return ""
+
+
+@lru_cache
+def _digest_of_code(layer_class: type[MeshLayer]) -> str:
+    """Digest of the files a layer class is written in, of the kernels and of the normals they work on."""
+    package = Path(__file__).parent
+    files = {*package.glob("kernels/*.py"), package / "topology.py"}
+    files |= {Path(inspect.getfile(one)) for one in layer_class.__mro__ if issubclass(one, MeshLayer)}
+    digest = hashlib.sha256()
+    for file in sorted(files):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    return digest.hexdigest()

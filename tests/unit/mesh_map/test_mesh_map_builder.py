@@ -1,5 +1,8 @@
 """Building a map from a configuration: all findings at once, cache, coarse-mesh warning, files in and out."""
 
+import importlib
+import sys
+
 import numpy as np
 import pytest
 import trimesh
@@ -150,6 +153,26 @@ def test_a_layer_class_that_cannot_be_loaded_is_named_beside_the_other_findings(
     with pytest.raises(LayerGraphError, match="default_layer 'other' is no layer") as error:
         build_mesh_map(parameters, vertices=VERTICES, faces=FACES)
     assert f"layer 'mine': layer type '{path}' cannot be loaded" in str(error.value)
+
+
+def test_a_cached_layer_is_computed_anew_when_its_code_has_changed(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    code = (
+        "import numpy as np\nfrom mbf_mesh_nav.layer import MeshLayer\n\n\nclass Flat(MeshLayer):\n"
+        "    cacheable = True\n\n    def compute(self):\n"
+        "        return np.full(self.topology.vertex_count, {cost}, np.float32), self._lethal\n"
+    )
+    parameters = MeshMapParameters(
+        layers=[{"name": "flat", "type": "flat_layer:Flat"}], cache_dir=str(tmp_path / "cache")
+    )
+    costs = []
+    for cost in (0.25, 0.75):
+        (tmp_path / "flat_layer.py").write_text(code.format(cost=cost))
+        monkeypatch.delitem(sys.modules, "flat_layer", raising=False)
+        importlib.invalidate_caches()
+        costs.append(build_mesh_map(parameters, vertices=VERTICES, faces=FACES).layers["flat"].costs[0])
+    assert costs == [0.25, 0.75]
 
 
 def test_cached_layer_is_reused_for_the_same_mesh_and_parameters_only(tmp_path, monkeypatch):
