@@ -99,7 +99,9 @@ class MeshMapParameters(ParameterModel):
         unit="m",
         ge=0.0,
     )
-    cache_dir: str = parameter("", "Folder for computed layers; empty = no cache.", dynamic=False)
+    cache_dir: str = parameter(
+        "", "Folder for computed layers, relative to the configuration; empty = no cache.", dynamic=False
+    )
 
     @field_validator("repair")
     @classmethod

@@ -149,11 +149,14 @@ class MeshNavigationServer(AbstractNavigationServer):
         """Read the mesh, the configured one without ``mesh_file``, and compute its layers."""
         section = config.sections["mesh_map"]
         parameters = cast(MeshMapParameters, section.parameters)
-        file = config.path.parent / (mesh_file or parameters.mesh_file)
+        folder = config.path.parent
+        places = {"mesh_file": str(folder / Path(mesh_file or parameters.mesh_file).expanduser())}
+        if parameters.cache_dir:
+            places["cache_dir"] = str(folder / Path(parameters.cache_dir).expanduser())
         layer_classes: dict[str, Any] = {layer.type_name: layer.layer_class for layer in section.layers}
         try:
             return build_mesh_map(
-                parameters.model_copy(update={"mesh_file": str(file)}),
+                parameters.model_copy(update=places),
                 {layer.name: cast(Any, layer.parameters) for layer in section.layers},
                 frame_id=config.parameters.global_frame,
                 load_layer=layer_classes.__getitem__,

@@ -141,6 +141,19 @@ def test_check_finds_a_missing_map_file_of_a_configuration_without_mistakes(hill
     assert mbf("check", bad, "--no-load").exit_code == 0
 
 
+def test_cached_layers_lie_beside_the_configuration_wherever_it_is_read_from(hill, tmp_path, monkeypatch):
+    (tmp_path / "elsewhere").mkdir()
+    file = tmp_path / "robot.yaml"
+    layers = "[{name: rough, type: roughness}]"
+    file.write_text(f"backend: mesh\nmesh_map: {{mesh_file: {hill}, cache_dir: cache, layers: {layers}}}\n")
+
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert mbf("check", file).exit_code == 0
+
+    assert len(list((tmp_path / "cache").glob("RoughnessLayer-*.npz"))) == 1
+    assert not list((tmp_path / "elsewhere").iterdir())
+
+
 def test_check_names_the_file_whose_layers_make_no_map(hill, tmp_path):
     file = tmp_path / "circle.yaml"
     layers = "[{name: a, type: mean, inputs: [b]}, {name: b, type: mean, inputs: [a]}]"
