@@ -10,6 +10,8 @@ FloatArray = NDArray[np.float64]
 BIN_ANGLE = np.radians(1.0)
 COLUMNS = round(2.0 * np.pi / BIN_ANGLE)
 ROWS = round(np.pi / BIN_ANGLE) + 1
+NO_RANGE = 1e-6
+"""A point this near [m] to its sensor stands for a ray without an answer; so do many drivers write it."""
 
 
 class RangeImage:
@@ -18,14 +20,15 @@ class RangeImage:
     Parameters
     ----------
     points : (n, 3) float64
-        Where the rays of one cloud ended [m].
+        Where the rays of one cloud ended [m]; those at the sensor itself have no direction and say nothing.
     sensor_origin : (3,) float64
     """
 
     def __init__(self, points: FloatArray, sensor_origin: FloatArray) -> None:
         self.sensor_origin = sensor_origin
         self._ranges = np.full((ROWS, COLUMNS), np.inf)
-        rows, columns, distances = self._bins(points)
+        away = np.linalg.norm(points - sensor_origin, axis=1) > NO_RANGE
+        rows, columns, distances = self._bins(points[away])
         np.minimum.at(self._ranges, (rows, columns), distances)
 
     def sees_through(self, points: FloatArray, margin: float = 0.1) -> NDArray[np.bool_]:

@@ -32,7 +32,7 @@ from mbf_mesh_nav.layer import (
     LethalArray,
     MeshLayer,
 )
-from mbf_mesh_nav.range_image import RangeImage
+from mbf_mesh_nav.range_image import NO_RANGE, RangeImage
 
 
 class ObstacleParameters(LayerParameters):
@@ -42,6 +42,9 @@ class ObstacleParameters(LayerParameters):
         (), "Names of the sensors it listens to, each of which must speak; without any: all that speak."
     )
     robot_height: float = parameter(1.0, "Points higher above the surface are no obstacle.", unit="m", gt=0.0)
+    min_obstacle_dist: float = parameter(
+        0.0, "Points no farther from the sensor are ignored, such as those of the robot itself.", unit="m", ge=0.0
+    )
     max_obstacle_dist: float = parameter(
         np.inf, "Points farther from the sensor are ignored.", unit="m", gt=0.0, allow_inf=True
     )
@@ -147,7 +150,9 @@ class ObstacleLayer(MeshLayer):
     def _project(self, scan: RangeScan) -> tuple[IntArray, FloatArray]:
         """Faces (k,) below the points that are obstacles, and those points (k, 3)."""
         settings, points = self.parameters, scan.points
-        near = points[np.linalg.norm(points - scan.origin, axis=1) <= settings.max_obstacle_dist]
+        distances = np.linalg.norm(points - scan.origin, axis=1)
+        least = max(settings.min_obstacle_dist, NO_RANGE)
+        near = points[(distances > least) & (distances <= settings.max_obstacle_dist)]
         near = near[self.locator.locate(near, settings.ground_tolerance).faces < 0]
         down = np.array(settings.down_axis) / np.linalg.norm(settings.down_axis)
         faces, _ = self.locator.cast_rays(near, down, settings.robot_height)

@@ -101,6 +101,24 @@ def test_points_beyond_the_range_limit_are_ignored():
     assert mesh.layers["seen"].lethal.any()
 
 
+def test_points_at_the_sensor_itself_mark_nothing_and_keep_nothing_from_being_cleared():
+    mesh = floor_map(decay_time=5.0)
+    nothing = np.tile(SENSOR, (20, 1))
+    mesh.insert_points(nothing, SENSOR, 1.0)
+    assert not mesh.snapshot().lethal.any()
+
+    hit, origin = np.array([[2.0, 2.0, 0.5]]), np.array(SENSOR)
+    mesh.insert_points(hit, SENSOR, 2.0)
+    mesh.insert_points(np.vstack([nothing, origin + 2.0 * (hit - origin)]), SENSOR, 3.0)
+    assert mesh.vertices[mesh.layers["seen"].lethal][:, 0].min() > 3.5
+
+
+def test_points_of_the_robot_itself_are_ignored_up_to_the_least_distance():
+    mesh = floor_map(min_obstacle_dist=0.5)
+    mesh.insert_points(np.vstack([post(0.4, 2.0, 0.4, 0.6), post(2.0, 2.0, 0.4, 0.6)]), SENSOR, 1.0)
+    assert mesh.vertices[mesh.layers["seen"].lethal][:, 0].min() > 1.5
+
+
 def test_without_decay_only_the_newest_cloud_counts():
     mesh = floor_map()
     mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0)
