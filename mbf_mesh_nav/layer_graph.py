@@ -3,6 +3,9 @@
 An event (a point cloud, an expiry, a changed parameter) changes some vertices of one or more layers. The graph then
 visits every layer once, inputs first, and hands it the union of what its inputs changed; a layer below a diamond is
 therefore computed once, not once per path.
+
+A layer that raises ends the pass. What had changed by then is not lost: the next pass hands it on, and begins by
+computing the layer that raised anew. Until one comes through, ``problem`` says that the layers are not up to date.
 """
 
 from __future__ import annotations
@@ -71,10 +74,18 @@ class LayerGraph(Mapping[str, MeshLayer]):
     ----------
     layers : sequence of MeshLayer
         Inputs before the layers that read them, computed or not.
+
+    Attributes
+    ----------
+    problem : str
+        Which layer raised what in the last pass, "" if none did.
     """
 
     def __init__(self, layers: Sequence[MeshLayer] = ()) -> None:
         self._layers = {layer.name: layer for layer in layers}
+        self.problem = ""
+        self._interrupted = ""  # name of the layer that raised
+        self._owed: dict[str, IntArray] = {}  # what passes changed that did not come through
 
     def __getitem__(self, name: str) -> MeshLayer:
         return self._layers[name]
@@ -97,16 +108,32 @@ class LayerGraph(Mapping[str, MeshLayer]):
         -------
         dict
             Changed vertices, ascending int32, for every layer that changed.
+
+        Raises
+        ------
+        Exception
+            Whatever a layer raises; see the module's text.
         """
-        changed: dict[str, IntArray] = {}
+        changed = dict(self._owed)
         for name, layer in self._layers.items():
             from_inputs = union_of([changed[read.name] for read in layer.inputs if read.name in changed])
-            own = union_of(
-                [layer.update_from_inputs(from_inputs) if len(from_inputs) else NOTHING_CHANGED, event(layer)]
-            )
+            try:
+                own = union_of([changed.get(name, NOTHING_CHANGED), self._follow(layer, from_inputs), event(layer)])
+            except Exception as error:
+                self.problem = f"layer '{name}' raised {type(error).__name__}: {error}"
+                self._interrupted, self._owed = name, changed
+                raise
             if len(own):
                 changed[name] = own
+        self.problem, self._interrupted, self._owed = "", "", {}
         return changed
+
+    def _follow(self, layer: MeshLayer, from_inputs: IntArray) -> IntArray:
+        """Let a layer react to what its inputs changed; one that raised the last time starts over."""
+        if layer.name == self._interrupted:
+            layer.recompute()
+            return np.arange(len(layer.costs), dtype=np.int32)
+        return layer.update_from_inputs(from_inputs) if len(from_inputs) else NOTHING_CHANGED
 
     def set_parameters(self, name: str, parameters: LayerParameters) -> dict[str, IntArray]:
         """Change a layer's parameters at run time and recompute what depends on them; returns what changed.
@@ -119,27 +146,22 @@ class LayerGraph(Mapping[str, MeshLayer]):
         TypeError
             The parameters are those of another type of layer.
         Exception
-            Whatever the layer raises that cannot compute with them; it keeps the old ones and their values.
+            Whatever the layer, or one that reads it, raises that cannot compute with them; it keeps the old ones.
         """
         layer = self._layers[name]
         old = layer.parameters
         if not isinstance(parameters, type(old)):
             raise TypeError(f"layer '{name}' takes {type(old).__name__}, got {type(parameters).__name__}")
-        weight_changed = old.combination_weight != parameters.combination_weight
-
-        def event(visited: MeshLayer) -> IntArray:
-            if visited is not layer:
-                return NOTHING_CHANGED
-            layer.parameters = parameters
-            try:
-                changed = layer.recompute()
-            except Exception:
-                layer.parameters = old
-                layer.recompute()
-                raise
-            return np.arange(len(layer.costs), dtype=np.int32) if weight_changed else changed
-
-        return self.apply(event)
+        layer.parameters = parameters
+        try:
+            changed = layer.recompute()
+            if old.combination_weight != parameters.combination_weight:
+                changed = np.arange(len(layer.costs), dtype=np.int32)
+            return self.apply(lambda visited: changed if visited is layer else NOTHING_CHANGED)
+        except Exception:
+            layer.parameters = old
+            layer.recompute()
+            raise
 
 
 def union_of(sets: Sequence[IntArray]) -> IntArray:

@@ -232,7 +232,9 @@ class MeshNavigationServer(AbstractNavigationServer):
         self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "mesh_map", edge_cost_factor=edge_cost_factor)
 
     def map_problem(self) -> str:
-        """Name the obstacle layer whose sensor is silent, if there is one."""
+        """Name the layer that raised, or the obstacle layer whose sensor is silent, if there is one."""
+        if self.mesh_map.layers.problem:
+            return f"the mesh map is not up to date: {self.mesh_map.layers.problem}"
         now = self.runtime.clock.now()
         silent = [name for name, layer in self.mesh_map.layers.items() if not layer.is_current(now)]
         return f"no recent sensor data for layer {', '.join(silent)}" if silent else ""

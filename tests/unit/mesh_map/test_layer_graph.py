@@ -5,6 +5,7 @@ import pytest
 
 from mbf_mesh_nav.layer import NOTHING_CHANGED, IntArray, LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.layer_graph import LayerGraph, LayerGraphError, dependency_order
+from mbf_mesh_nav.layers.border import BorderLayer
 from mbf_mesh_nav.layers.max_combination import MaxCombinationLayer
 from mbf_mesh_nav.layers.mean import MeanLayer
 from mbf_mesh_nav.layers.weighted_sum import WeightedSumLayer
@@ -84,6 +85,50 @@ def test_a_circle_is_named_beside_unknown_inputs():
 def test_circle_is_refused_and_spelled_out(inputs, circle):
     with pytest.raises(LayerGraphError, match=circle):
         dependency_order(inputs)
+
+
+class FailingLayer(MaxCombinationLayer):
+    """Raises while the test wants it to."""
+
+    fails = False
+
+    def update_from_inputs(self, changed):
+        if self.fails:
+            raise RuntimeError("no idea")
+        return super().update_from_inputs(changed)
+
+
+def test_what_changed_before_a_layer_raised_is_handed_on_by_the_next_pass():
+    top = make(GivenLayer, "top")
+    failing = make(FailingLayer, "failing", top)
+    below, beside = make(MaxCombinationLayer, "below", failing), make(MaxCombinationLayer, "beside", top)
+    graph = LayerGraph([top, failing, below, beside])
+    failing.fails = True
+    with pytest.raises(RuntimeError, match="no idea"):
+        graph.apply(event_of(top, lambda: top.give(0.7, [3])))
+    assert graph.problem == "layer 'failing' raised RuntimeError: no idea"
+
+    failing.fails = False
+    changed = graph.apply(lambda layer: NOTHING_CHANGED)
+
+    assert graph.problem == ""
+    for layer in (failing, below, beside):
+        np.testing.assert_array_equal(layer.costs, top.costs)
+        assert layer.lethal[3]
+        np.testing.assert_array_equal(changed[layer.name], EVERYTHING)
+    assert graph.apply(lambda layer: NOTHING_CHANGED) == {}
+
+
+def test_parameters_that_a_layer_further_down_cannot_take_are_put_back():
+    top = make(BorderLayer, "top", border_cost=0.9)
+    failing = make(FailingLayer, "failing", top)
+    graph = LayerGraph([top, failing])
+    usual, costs = top.parameters, top.costs.copy()
+    failing.fails = True
+    with pytest.raises(RuntimeError, match="no idea"):
+        graph.set_parameters("top", BorderLayer.Parameters(border_cost=2.0))
+    assert top.parameters == usual
+    np.testing.assert_array_equal(top.costs, costs)
 
 
 def test_layer_below_a_diamond_is_updated_once_per_event():

@@ -142,3 +142,17 @@ def test_a_layer_parameter_that_is_not_legal_changes_nothing(navigator, layer, c
     with pytest.raises(error, match=text):
         navigator.server.set_layer_parameters(layer, **changes)
     assert navigator.server.mesh_map.snapshot() is before
+
+
+def test_no_controller_drives_on_a_map_whose_layers_did_not_come_through(navigator):
+    server = navigator.server
+
+    def raises(layer):
+        raise RuntimeError("no idea")
+
+    with pytest.raises(RuntimeError):
+        server.mesh_map.apply(raises)
+    assert server.map_problem() == "the mesh map is not up to date: layer 'slopes' raised RuntimeError: no idea"
+
+    server.mesh_map.clear()
+    assert server.map_problem() == ""
