@@ -35,7 +35,10 @@ CANCELLED = -2
 class HeadingAStarParameters(SurfacePlannerParameters):
     """Parameters of ``mesh.heading_astar``."""
 
-    tilt_layer: str = parameter("tilt", "Layer of type tilt to use; if the map has none, normals and limits are used.")
+    tilt_layer: str = parameter(
+        "tilt",
+        "Layer of type tilt to use; empty, or if a map has none of the usual name: normals and the limits below.",
+    )
     max_roll: float = parameter(0.35, "Greatest slope across the heading (without a layer).", unit="rad", gt=0.0)
     max_pitch: float = parameter(0.5, "Greatest slope along the heading (without a layer).", unit="rad", gt=0.0)
     roll_cost: float = parameter(1.0, "Extra length per length and rad of roll.", unit="1/rad", ge=0.0)
@@ -53,10 +56,21 @@ class HeadingAStarPlanner(SurfacePlanner):
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
         mesh_map = self.mesh_map
+        self._refuse_other_layers(self.parameters.tilt_layer)
         starts = np.repeat(np.arange(len(mesh_map.vertices)), np.diff(mesh_map.neighbour_offsets))
         steps = mesh_map.vertices[mesh_map.neighbours] - mesh_map.vertices[starts]
         headings = np.rint(np.arctan2(steps[:, 1], steps[:, 0]) / HEADING_STEP).astype(np.int64)
         self._edge_headings = (headings % HEADINGS).astype(np.uint8)
+
+    def _refuse_other_layers(self, name: str) -> None:
+        """A layer that was named on purpose, but is none of tilts, would leave slopes to the defaults unnoticed."""
+        layers = self.mesh_map.layers
+        usual = HeadingAStarParameters.model_fields["tilt_layer"].default
+        if name and not isinstance(layers.get(name), TiltLayer) and (name in layers or name != usual):
+            tilts = ", ".join(key for key, layer in layers.items() if isinstance(layer, TiltLayer)) or "none"
+            raise ValueError(
+                f"tilt_layer: expected the name of a layer of type tilt (of the map: {tilts}), got '{name}'"
+            )
 
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Search from the start's corners, with the robot's heading, to the goal's corners."""

@@ -126,6 +126,15 @@ def test_turning_to_a_heading_passes_the_same_headings_as_in_the_search(heading)
     np.testing.assert_array_equal(may_turn_to(allowed, heading), naive)
 
 
+def test_a_tilt_layer_that_is_none_is_refused_when_the_planner_is_made(make_plugin, plain, paint):
+    mesh_map = paint(plain(), lambda v: np.zeros(len(v)))
+    for name in ("painted", "tlit"):
+        with pytest.raises(ValueError, match=f"a layer of type tilt .of the map: none., got '{name}'"):
+            make_plugin(HeadingAStarPlanner, mesh_map, tilt_layer=name)
+    for name in ("tilt", ""):
+        make_plugin(HeadingAStarPlanner, mesh_map, tilt_layer=name)
+
+
 def test_turning_costs_make_paths_with_fewer_turns(make_plugin, hills):
     def turns(turning_cost):
         planner = make_plugin(HeadingAStarPlanner, hills, turning_cost=turning_cost, max_roll=1.0, max_pitch=1.0)
