@@ -81,8 +81,8 @@ class MeshNavigationServer(AbstractNavigationServer):
     def swap_mesh(self, mesh_file: Path | str) -> None:
         """Drive on another mesh from now on, e.g. after the lift; its layers are those of the configuration.
 
-        Sensed obstacles and changes of layer parameters at run time are gone with the old map; plugins keep their
-        parameters.
+        Sensed obstacles and changes of parameters of map and layers at run time are gone with the old map; plugins keep
+        theirs.
 
         Parameters
         ----------
@@ -227,9 +227,23 @@ class MeshNavigationServer(AbstractNavigationServer):
         self.runtime.events.emit(EventKind.PARAMETER_CHANGED, f"mesh_map.{layer}", **changes)
 
     def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
-        """Change how much costs lengthen edges; ValueError if it is negative or not finite."""
+        """Change how much costs lengthen edges; ValueError if the configuration would not take it."""
+        self._check_parameters(edge_cost_factor=edge_cost_factor)
         self.mesh_map.set_edge_cost_factor(edge_cost_factor)
         self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "mesh_map", edge_cost_factor=edge_cost_factor)
+
+    def set_inscribed_radius(self, inscribed_radius: float) -> None:
+        """Change the radius [m] of the disc that stands for the robot in queries, e.g. when it lifts a load.
+
+        Inflation layers have radii of their own, see ``set_layer_parameters``. ValueError if the configuration would
+        not take it.
+        """
+        self._check_parameters(inscribed_radius=inscribed_radius)
+        self.mesh_map.inscribed_radius = inscribed_radius
+        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "mesh_map", inscribed_radius=inscribed_radius)
+
+    def _check_parameters(self, **changes: float) -> None:
+        with_changes(cast(MeshMapParameters, self.config.sections["mesh_map"].parameters), changes)
 
     def map_problem(self) -> str:
         """Name the layer that raised, or the obstacle layer whose sensor is silent, if there is one."""

@@ -156,3 +156,19 @@ def test_no_controller_drives_on_a_map_whose_layers_did_not_come_through(navigat
 
     server.mesh_map.clear()
     assert server.map_problem() == ""
+
+
+def test_the_disc_of_queries_and_the_edge_cost_factor_change_at_run_time_within_their_ranges(navigator):
+    server, beside = navigator.server, Pose.planar(2.0, 2.0)
+    server.mesh_map.apply(lambda layer: layer.replace(np.full_like(layer.costs, 0.1), np.zeros_like(layer.lethal)))
+    narrow = server.queries.check_pose(beside).cost
+    server.set_inscribed_radius(0.6)
+    assert server.queries.check_pose(beside).cost > 2.0 * narrow > 0.0
+    for change in (
+        lambda: server.set_inscribed_radius(-0.1),
+        lambda: server.set_inscribed_radius(float("nan")),
+        lambda: server.set_edge_cost_factor(101.0),
+    ):
+        with pytest.raises(ValueError):
+            change()
+    assert server.mesh_map.inscribed_radius == 0.6 and server.mesh_map.edge_cost_factor == 0.0
