@@ -103,7 +103,17 @@ class MeshLayer(ABC):
         return self.replace(costs, lethal)
 
     def replace(self, costs: CostArray, lethal: LethalArray) -> IntArray:
-        """Take over new values and return the vertices that changed, ascending."""
+        """Take over new values and return the vertices that changed, ascending.
+
+        Raises
+        ------
+        ValueError
+            There is not one value for each vertex.
+        """
+        expected = (self.topology.vertex_count,)
+        for what, values in (("costs", costs), ("lethal flags", lethal)):
+            if np.shape(values) != expected:
+                raise ValueError(f"layer '{self.name}' gives {what} of shape {np.shape(values)}, expected {expected}")
         changed = np.flatnonzero((costs != self._costs) | (lethal != self._lethal)).astype(np.int32)
         self._costs, self._lethal = costs, lethal
         return changed

@@ -87,6 +87,16 @@ def test_circle_is_refused_and_spelled_out(inputs, circle):
         dependency_order(inputs)
 
 
+def test_values_of_a_layer_are_refused_unless_there_is_one_for_each_vertex():
+    layer = make(GivenLayer, "mine")
+    layer.give(0.5)
+    with pytest.raises(ValueError, match=r"layer 'mine' gives costs of shape \(20, 1\), expected \(20,\)"):
+        layer.replace(np.zeros((20, 1)), np.zeros(20, dtype=np.bool_))
+    with pytest.raises(ValueError, match=r"layer 'mine' gives lethal flags of shape \(2,\), expected \(20,\)"):
+        layer.replace(np.zeros(20), np.array([3, 4]))
+    assert (layer.costs == 0.5).all()
+
+
 class FailingLayer(MaxCombinationLayer):
     """Raises while the test wants it to."""
 
