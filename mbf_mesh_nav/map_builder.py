@@ -294,6 +294,9 @@ def _warn_if_coarse(mesh_map: MeshMap) -> None:
     limits = {"half the inscribed radius": 0.5 * mesh_map.inscribed_radius}
     for name, layer in mesh_map.layers.items():
         limits[f"the radius of layer '{name}'"] = float(getattr(layer.parameters, "radius", 0.0))
+        if mesh_map.inscribed_radius == 0.0:  # then that of an inflation is all that is known of the robot
+            inscribed = float(getattr(layer.parameters, "inscribed_radius", 0.0))
+            limits[f"half the inscribed radius of layer '{name}'"] = 0.5 * inscribed
     for what, limit in limits.items():
         if 0.0 < limit < mean_edge:
             text = (

@@ -234,6 +234,15 @@ def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_map_loads(tmp_p
     assert set(mesh.layers) == {"rough", "height"}
 
 
+def test_a_robot_of_whose_size_only_an_inflation_knows_is_told_that_the_mesh_is_too_coarse_for_it():
+    layers = [{"name": "border", "type": "border"}, {"name": "near", "type": "inflation", "inputs": ["border"]}]
+    blocks = {"near": {"inscribed_radius": 0.15}}
+    unknown = build_mesh_map(MeshMapParameters(layers=layers), blocks, vertices=VERTICES, faces=FACES)
+    assert "half the inscribed radius of layer 'near' (0.075 m)" in unknown.report["coarse"].text
+    known = MeshMapParameters(layers=layers, inscribed_radius=0.4)
+    assert "coarse" not in build_mesh_map(known, blocks, vertices=VERTICES, faces=FACES).report
+
+
 def test_layers_whose_radius_is_shorter_than_the_edges_are_reported_by_name():
     vertices, faces = heightfield_mesh(np.zeros((9, 9)), 0.5, 0.5)
     layers = [{"name": "near", "type": "roughness"}, {"name": "far", "type": "roughness"}]
