@@ -147,6 +147,8 @@ def write_lvr2_map(path: Path, mesh_map: MeshMap, part: str = "mesh", layout: st
     Vertices that densifying or a repair added follow after them; merged and dropped ones are not in the file.
     Parameters and errors as in ``write_lvr2_mesh``.
     """
+    if "vertex_normals" in mesh_map.layers:
+        raise MeshError(str(path), ["a layer is called 'vertex_normals': the file has the normals under that name"])
     source = mesh_map.internal_to_input.astype(np.int64)
     order = np.argsort(np.where(source >= 0, source, np.iinfo(np.int64).max), kind="stable")
     position = np.argsort(order)

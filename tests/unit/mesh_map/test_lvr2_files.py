@@ -45,6 +45,14 @@ def test_map_is_saved_with_its_layers_in_the_callers_numbering(tmp_path):
     np.testing.assert_array_equal(stored, mesh.to_input_order(mesh.layers["rough"].costs).astype(np.float32))
 
 
+def test_a_layer_whose_costs_the_normals_would_replace_is_refused(tmp_path):
+    parameters = MeshMapParameters(layers=[{"name": "vertex_normals", "type": "roughness"}])
+    mesh = build_mesh_map(parameters, vertices=VERTICES, faces=FACES)
+    with pytest.raises(MeshError, match="a layer is called 'vertex_normals'"):
+        write_lvr2_map(tmp_path / "map.h5", mesh)
+    assert not list(tmp_path.iterdir())
+
+
 def test_old_layout_is_read(tmp_path):
     file = tmp_path / "old.h5"
     with h5py.File(file, "w") as handle:
