@@ -72,8 +72,13 @@ class SurfaceLocator:
             Positions [m].
         max_distance : float
             Limit [m]; farther away there is no face.
+
+        Raises
+        ------
+        ValueError
+            The points do not have three coordinates each.
         """
-        queries = np.array(points, dtype=np.float64).reshape(-1, 3)
+        queries = _rows(points)
         order = np.arange(len(queries)) if len(queries) < SORT_FROM else _locality_order(queries)
         return Location(*closest_faces(*self._tree, queries, order, float(max_distance)))
 
@@ -110,10 +115,18 @@ class SurfaceLocator:
         distances : (n,) float64
             Along the ray [m], inf without a hit.
         """
-        starts = np.array(origins, dtype=np.float64).reshape(-1, 3)  # copies are writable, one type for the kernel
+        starts = _rows(origins)
         headings = np.empty(starts.shape)
         headings[:] = directions
         return first_hits(*self._tree, starts, headings, float(max_distance))
+
+
+def _rows(points: ArrayLike) -> FloatArray:
+    """Copy of points as (n, 3), writable: one type for the kernels. Without a look, columns would pass for rows."""
+    rows = np.array(points, dtype=np.float64)
+    if rows.size and rows.shape[-1] != 3:
+        raise ValueError(f"points must be an array (n, 3) of coordinates, got one of shape {rows.shape}")
+    return rows.reshape(-1, 3)
 
 
 def _locality_order(points: FloatArray) -> NDArray[np.int64]:

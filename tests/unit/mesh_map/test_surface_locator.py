@@ -152,3 +152,12 @@ def test_queries_do_not_depend_on_scale_and_offset(scale, offset):
     expected, found = plain.locate(queries), moved.locate(queries * scale + offset)
 
     np.testing.assert_allclose(found.distances, expected.distances * scale, atol=1e-10)
+
+
+def test_points_given_as_columns_are_refused_instead_of_taken_for_others():
+    mesh = MeshMap.from_heights(np.zeros((4, 5)), 1.0, 1.0)
+    columns = np.zeros((3, 6))
+    for question in (lambda: mesh.locate(columns), lambda: mesh.locator.cast_rays(columns, [0.0, 0.0, -1.0])):
+        with pytest.raises(ValueError, match=r"an array \(n, 3\) of coordinates, got one of shape \(3, 6\)"):
+            question()
+    assert len(mesh.locate([]).faces) == 0 and len(mesh.locate([1.0, 1.0, 0.0]).faces) == 1
