@@ -291,8 +291,8 @@ class MeshMap:
         self.apply(lambda layer: layer.clear())
 
     def is_current(self, now: float) -> bool:
-        """Whether every obstacle layer got data within its expected update rate at ``now`` [s]."""
-        return all(layer.is_current(now) for layer in self.layers.values())
+        """Whether all layers are up to date and those of obstacles got data in time, at ``now`` [s]."""
+        return not self.layers.problem and all(layer.is_current(now) for layer in self.layers.values())
 
     def apply(self, event: Callable[[MeshLayer], IntArray]) -> None:
         """Give an event to every layer, see ``LayerGraph.apply``, and show plugins the map that follows."""

@@ -4,7 +4,8 @@ Strengths: reads the map of *now*, so it drives round obstacles seen after plann
 motion model (differential or Ackermann). Known failure: a local method with a horizon of ``horizon_steps * step_time``;
 out of a pocket deeper than that only a new plan leads. An Ackermann robot cannot mend its heading
 where it stands; it comes in on a curve along the goal's heading, if there is room for one.
-Cost: about 3 ms a cycle with 400 samples of 30 steps; so many times more as a step is longer than the mesh's edges.
+Cost: about 3 ms a cycle with 400 samples of 30 steps; so many times more as a step is longer than half
+an edge of the mesh.
 
 Method: Williams et al., "Information theoretic MPC for model-based reinforcement learning", ICRA 2017, algorithm 2,
 with noise that partly lasts and partly changes, and a last check that the blended motion itself is free.
@@ -33,9 +34,7 @@ from mbf_mesh_nav.plugins import MeshContext, MeshController
 from mbf_mesh_nav.snapshot import MeshSnapshot
 
 _NOISE_HOLD = 3  # steps a noise value is kept for: explores further than independent noise of the same size
-_LEAST_STRIDE = (
-    0.05  # [m] between two looks at the ground; on finer meshes only obstacles without inflation are so thin
-)
+_LEAST_STRIDE = 0.05  # [m] between two looks at the ground; only obstacles without inflation are thinner
 _PATH_SPACING = 0.1  # [m] between the samples of the path ahead
 _COLLISION_SCORE = 1e6
 _ROOM_TO_STEER = 1.2  # radius of the approach to the goal, in least turning radii
@@ -256,10 +255,13 @@ class MPPIController(MeshController):
         )
 
     def _pieces_of_a_step(self) -> int:
-        """Into how many pieces a step is cut, so that none leads from one side of a thin wall to the other."""
+        """Into how many pieces a step is cut, so that none leads from one side of a thin wall to the other.
+
+        Forbidden is the ground half an edge on both sides of a row of lethal vertices.
+        """
         p = self.parameters
         stride = max(p.max_lin_velocity, -p.min_lin_velocity) * p.step_time
-        return math.ceil(stride / max(self.mesh_map.topology.mean_edge_length, _LEAST_STRIDE))
+        return math.ceil(stride / max(0.5 * self.mesh_map.topology.mean_edge_length, _LEAST_STRIDE))
 
     def _blocked(self) -> NDArray[np.bool_]:
         """Vertices (V,) no curve may come near."""

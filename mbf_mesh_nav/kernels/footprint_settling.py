@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.compiled import inner_kernel, kernel
-from mbf_mesh_nav.kernels.neighbourhood_layers import collect_neighbourhood
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -101,6 +100,42 @@ def wheel_directions(heading_count: int, wheelbase: float, track: float) -> tupl
     return wheels[order], order
 
 
+@inner_kernel
+def vertices_below_the_belly(
+    vertices: FloatArray,
+    offsets: IntArray,
+    neighbours: IntArray,
+    centre: int,
+    radius: float,
+    seen: IntArray,
+    members: IntArray,
+) -> int:
+    """Write the vertices the belly could touch into ``members`` and return their number.
+
+    They lie within ``radius`` of the centre, seen from above, and are connected there by vertices at most so much
+    higher or lower. The top of a post is one of them, however high; the storey it may carry is not. ``seen`` (V,) holds
+    the last centre that saw a vertex.
+    """
+    seen[centre] = centre
+    size = Count(0)
+    reader = Count(-1)
+    while reader < size:
+        vertex = Count(centre) if reader < 0 else Count(members[reader])
+        reader += 1
+        if abs(vertices[vertex, 2] - vertices[centre, 2]) > radius:
+            continue
+        for entry in range(offsets[vertex], offsets[vertex + 1]):
+            other = Count(neighbours[entry])
+            if seen[other] == centre:
+                continue
+            seen[other] = centre
+            dx, dy = vertices[other, 0] - vertices[centre, 0], vertices[other, 1] - vertices[centre, 1]
+            if dx * dx + dy * dy < radius * radius:
+                members[size] = other
+                size += 1
+    return int(size)
+
+
 @kernel
 def settle_footprints(
     vertices: FloatArray,
@@ -140,7 +175,6 @@ def settle_footprints(
     wheels = np.empty(4 * heading_count, dtype=np.float64)
     seen = np.full(count, -1, dtype=np.int32)
     members = np.empty(count, dtype=np.int32)
-    upward = (0.0, 0.0, 1.0)
     for vertex in range(count):
         for heading in range(heading_count):
             roll[vertex, heading] = pitch[vertex, heading] = bump[vertex, heading] = np.inf
@@ -151,8 +185,7 @@ def settle_footprints(
         wheel_heights(vertices, faces, face_normals, face_neighbours, start_face, centre, wheel_angles, radius, ring)
         for index in range(len(wheel_order)):
             wheels[wheel_order[index]] = ring[index]
-        # The vertices the belly could touch; neither a storey above nor one below is connected within the radius.
-        size = collect_neighbourhood(vertices, offsets, neighbours, vertex, radius, upward, radius, seen, members)
+        size = vertices_below_the_belly(vertices, offsets, neighbours, vertex, radius, seen, members)
         for heading in range(heading_count):
             front_left, rear_left = wheels[4 * heading], wheels[4 * heading + 1]
             rear_right, front_right = wheels[4 * heading + 2], wheels[4 * heading + 3]

@@ -3,7 +3,8 @@
 An obstacle that appears beside a robot forbids the ground it stands on. It has to get away from there, but a rule
 that only asks whether it stood on forbidden ground before lets it drive on through the obstacle. So ground has a
 *hardness*, see ``MeshSnapshot.hardness``, interpolated within a face: from forbidden ground a step leads to free
-ground, or to forbidden ground no harder, and never into what is wholly lethal.
+ground, or to forbidden ground no harder, and never into what is wholly lethal. Where the nearest corner of the face is
+free, the ground is: so do planners see it, and a path of theirs can be driven.
 
 Used by every controller and recovery that looks ahead. Planners do not use it: they answer BLOCKED_START.
 """
@@ -29,7 +30,7 @@ def may_enter(before: float, now: float) -> bool:
 
 @kernel
 def hardness_at(vertices: Float64Array, faces: Int32Array, hardness: Float32Array, face: int, point: Vector) -> float:
-    """Hardness of a point [m] in a face, interpolated between those (V,) of its corners; 0 only if all are free."""
+    """Hardness of a point [m] in a face, between those (V,) of its corners; 0 where the nearest of them is free."""
     a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
     if hardness[a] == 0.0 and hardness[b] == 0.0 and hardness[c] == 0.0:
         return 0.0
@@ -45,5 +46,9 @@ def hardness_at(vertices: Float64Array, faces: Int32Array, hardness: Float32Arra
     area = aa * bb - ab * ab
     share_b = (bb * ap - ab * bp) / area if area > 0.0 else 0.0
     share_c = (aa * bp - ab * ap) / area if area > 0.0 else 0.0
-    mixed = (1.0 - share_b - share_c) * hardness[a] + share_b * hardness[b] + share_c * hardness[c]
+    share_a = 1.0 - share_b - share_c
+    nearest = a if share_a >= max(share_b, share_c) else (b if share_b >= share_c else c)
+    if hardness[nearest] == 0.0:
+        return 0.0
+    mixed = share_a * hardness[a] + share_b * hardness[b] + share_c * hardness[c]
     return float(max(mixed, 1e-6))

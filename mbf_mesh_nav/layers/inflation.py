@@ -40,8 +40,8 @@ class InflationParameters(LayerParameters):
     def _reaches_the_robot(self) -> InflationParameters:
         if self.inflation_radius < self.inscribed_radius:
             raise ValueError(
-                f"inflation_radius {self.inflation_radius:g} m is less than inscribed_radius "
-                f"{self.inscribed_radius:g} m: ground the robot's body touches would be free"
+                f"inflation_radius of at least inscribed_radius, {self.inscribed_radius:g} m: else ground the "
+                f"robot's body touches would be free, got {self.inflation_radius:g} m"
             )
         return self
 
@@ -86,7 +86,8 @@ class InflationLayer(MeshLayer):
     def cost_of_distance(self, distances: NDArray[np.float32]) -> CostArray:
         """Costs (n,) of distances (n,) [m] to the nearest lethal vertex."""
         settings = self.parameters
-        decay = np.exp(-settings.cost_scaling_factor * (distances - settings.inscribed_radius))
+        beyond = np.maximum(distances - np.float32(settings.inscribed_radius), 0.0)
+        decay = np.exp(-settings.cost_scaling_factor * beyond)
         costs = np.where(distances <= settings.inscribed_radius, 1.0, decay) * settings.inscribed_value
         costs[distances > settings.inflation_radius] = 0.0
         costs[distances == 0.0] = settings.lethal_value

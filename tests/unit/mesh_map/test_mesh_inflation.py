@@ -159,5 +159,5 @@ def test_costs_follow_new_parameters_at_run_time():
 
 
 def test_an_inflation_narrower_than_the_robot_is_refused():
-    with pytest.raises(ValueError, match="is less than inscribed_radius 1 m"):
+    with pytest.raises(ValueError, match="at least inscribed_radius, 1 m"):
         InflationParameters(inflation_radius=0.4, inscribed_radius=1.0)

@@ -164,3 +164,12 @@ def test_the_share_of_headings_that_is_needed_decides_what_is_lethal_and_what_it
 def test_a_centre_of_mass_beyond_the_wheels_is_refused():
     with pytest.raises(ValueError, match="would tip over on flat ground"):
         TiltLayer.Parameters(wheelbase=0.5, center_of_mass_x=-0.25)
+
+
+@pytest.mark.parametrize("height", [0.2, 0.35, 1.0, 5.0])
+def test_no_robot_stands_over_a_post_however_high_it_is(height):
+    heights = np.zeros((41, 41))
+    heights[20, 20] = height
+    layer = computed(MeshMap.from_heights(heights, 0.1, 0.1))
+    for sample in (20 * 41 + 21, 21 * 41 + 21):  # beside it and off its corner, with the post below the belly
+        assert layer.lethal[layer.topology.input_to_internal[sample]]
