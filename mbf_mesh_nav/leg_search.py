@@ -74,8 +74,10 @@ def spread_from(
     finished : bool
         False if cancelled.
     """
-    distances, predecessors, seeds = seeded_arrays(mesh_map, blocked, source)
-    targets, offsets = (NO_TARGETS, NO_OFFSETS) if target is None else corner_distances(mesh_map, blocked, target)
+    distances, predecessors, seeds = seeded_arrays(mesh_map, blocked, source, snapshot.costs)
+    targets, offsets = NO_TARGETS, NO_OFFSETS
+    if target is not None:
+        targets, offsets = corner_distances(mesh_map, blocked, target, snapshot.costs)
     finished = propagate_distances(
         mesh_map.neighbour_offsets,
         mesh_map.neighbours,
@@ -93,13 +95,19 @@ def spread_from(
 
 
 def seeded_arrays(
-    mesh_map: MeshMap, blocked: NDArray[np.bool_], source: SurfacePoint
+    mesh_map: MeshMap,
+    blocked: NDArray[np.bool_],
+    source: SurfacePoint,
+    costs: NDArray[np.float32] | None = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
-    """Start state of a search from a surface point: distances (V,), predecessors (V,), seed vertices."""
+    """Start state of a search from a surface point: distances (V,), predecessors (V,), seed vertices.
+
+    ``costs`` (V,) weigh the ways to the seeds, see ``corner_distances``.
+    """
     vertex_count = len(mesh_map.vertices)
     distances = np.full(vertex_count, np.inf, dtype=np.float32)
     predecessors = np.full(vertex_count, -1, dtype=np.int32)
-    seeds, offsets = corner_distances(mesh_map, blocked, source)
+    seeds, offsets = corner_distances(mesh_map, blocked, source, costs)
     distances[seeds] = offsets
     return distances, predecessors, seeds
 
@@ -123,7 +131,9 @@ def vertex_path_leg(
     start, goal = query.start, query.goal
     if start.face == goal.face:
         return straight_leg(mesh_map, query)
-    corners, offsets = corner_distances(mesh_map, query.blocked, start if rooted_at_goal else goal)
+    corners, offsets = corner_distances(
+        mesh_map, query.blocked, start if rooted_at_goal else goal, query.snapshot.costs
+    )
     total, best = min(zip((distances[corners] + offsets).tolist(), corners.tolist(), strict=True), default=(np.inf, -1))
     if total == np.inf:
         return None

@@ -65,14 +65,33 @@ def on_surface(
 
 
 def corner_distances(
-    mesh_map: MeshMap, blocked: NDArray[np.bool_], point: SurfacePoint
+    mesh_map: MeshMap, blocked: NDArray[np.bool_], point: SurfacePoint, costs: NDArray[np.float32] | None = None
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Free corners of the point's face (k,) int32 and their straight distances (k,) float32 [m] to the point."""
-    corners = [corner for corner in mesh_map.faces[point.face].tolist() if not blocked[corner]]
+    """Free corners of the point's face (k,) int32 and how far the point is from them (k,) float32 [m].
+
+    With ``costs`` (V,) the straight lines are weighted like edges, by the mean of the costs at both ends; corners of
+    infinite cost do not count for the point's own. At a vertex that makes a line the edge.
+    """
+    face = mesh_map.faces[point.face].tolist()
+    corners = [corner for corner in face if not blocked[corner]]
     place = point.point.tolist()
-    offsets = np.array([math.dist(mesh_map.vertices[corner].tolist(), place) for corner in corners], dtype=np.float32)
+    lengths = [math.dist(mesh_map.vertices[corner].tolist(), place) for corner in corners]
+    if costs is not None and mesh_map.edge_cost_factor > 0.0:
+        at_point, factor = _cost_at(point, costs[face].tolist()), mesh_map.edge_cost_factor
+        lengths = [
+            length * (1.0 + factor * 0.5 * (at_point + float(costs[corner])))
+            for length, corner in zip(lengths, corners, strict=True)
+        ]
     # A hair longer than the line, so that rounding cannot make it shorter than a straight-line bound.
-    return np.array(corners, dtype=np.int32), np.nextafter(offsets, INFINITELY_FAR)
+    return np.array(corners, dtype=np.int32), np.nextafter(np.array(lengths, dtype=np.float32), INFINITELY_FAR)
+
+
+def _cost_at(point: SurfacePoint, corner_costs: list[float]) -> float:
+    """Interpolate the cost at a point between the corners of its face that have a finite one."""
+    shares, costs = point.barycentric.copy(), np.array(corner_costs)
+    shares[~np.isfinite(costs)] = 0.0
+    mixed = float(shares @ np.nan_to_num(costs, nan=0.0, posinf=0.0))
+    return mixed / max(float(shares.sum()), ON_EDGE)
 
 
 def describe_blockage(mesh_map: MeshMap, snapshot: MeshSnapshot, vertex: int, cost_limit: float) -> str:

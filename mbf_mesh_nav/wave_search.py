@@ -121,7 +121,7 @@ class WaveSearch:
         """Run the kernel from the goal of a query; None if cancelled."""
         mesh_map = self._mesh_map
         weights = self._weights_at(query.snapshot)
-        distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal)
+        distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal, query.snapshot.costs)
         if len(seeds) == 1:
             seeds = self._seed_around(query, int(seeds[0]), distances, predecessors)
         cut_records = np.full(len(distances), ALONG_EDGE, dtype=np.int32)

@@ -76,14 +76,19 @@ class RepairingPlanner(SurfacePlanner):
 
     def _changes_since(self, wave: RememberedWave, query: LegQuery) -> NDArray[np.int32] | None:
         """Vertices that changed since the wave; None if it leads elsewhere, or nobody remembers what changed."""
-        roots, _ = corner_distances(self.mesh_map, query.blocked, query.goal)
-        same_source = wave.goal == query.goal.point.tolist() and wave.roots.tolist() == roots.tolist()
+        roots, offsets = corner_distances(self.mesh_map, query.blocked, query.goal, query.snapshot.costs)
+        same_source = (
+            wave.goal == query.goal.point.tolist()
+            and wave.roots.tolist() == roots.tolist()
+            and wave.root_distances.tolist() == offsets.tolist()
+        )
         if not same_source or wave.cost_limit != self.parameters.cost_limit:
             return None
         return self.mesh_map.changes_between(wave.version, query.snapshot.version)
 
     def _new_wave(self, query: LegQuery) -> RememberedWave:
-        distances, predecessors, seeds = seeded_arrays(self.mesh_map, query.blocked, query.goal)
+        costs = query.snapshot.costs
+        distances, predecessors, seeds = seeded_arrays(self.mesh_map, query.blocked, query.goal, costs)
         goal, version = query.goal.point.tolist(), query.snapshot.version
         return RememberedWave(
             goal, self.parameters.cost_limit, version, seeds, distances[seeds], distances, predecessors

@@ -1,5 +1,6 @@
 """What every planner on meshes promises: outcomes, exact ends, tolerance, via points, cancel."""
 
+import networkx
 import numpy as np
 import pytest
 
@@ -41,6 +42,23 @@ def test_the_path_starts_on_the_surface_and_ends_with_the_goal_pose(planner_clas
     assert result.path[-1].angle_to(goal) < 1e-6
     straight = np.linalg.norm(result.path.positions[-1] - first)
     assert straight <= result.path.length <= 1.5 * straight
+
+
+@pytest.mark.parametrize("graph_planner", [DijkstraPlanner, AStarPlanner, RepairingPlanner])
+def test_a_plan_between_vertices_costs_what_networkx_finds(graph_planner, make_plugin, paint):
+    rng = np.random.default_rng(3)
+    mesh_map = MeshMap.from_heights(rng.uniform(0.0, 0.1, (9, 9)), 0.3, 0.3)
+    paint(mesh_map, lambda v: np.where(rng.random(len(v)) < 0.1, np.inf, rng.random(len(v))), edge_cost_factor=2.0)
+    graph = mesh_map.vertex_graph()
+    planner = make_plugin(graph_planner, mesh_map)
+    ends = [name for name in graph if graph.degree(name) and np.isfinite(graph.nodes[name]["cost"])]
+    for _ in range(20):
+        start, goal = (int(name) for name in rng.choice(ends, 2, replace=False))
+        poses = (Pose(tuple(graph.nodes[name]["position"])) for name in (start, goal))
+        result = planner.make_plan(PlanRequest(*poses))
+        assert result.success == networkx.has_path(graph, start, goal)
+        if result.success:
+            assert result.cost == pytest.approx(networkx.dijkstra_path_length(graph, start, goal), rel=1e-5)
 
 
 def test_start_and_goal_in_one_face_give_two_poses(planner_class, make_plugin, plain):
