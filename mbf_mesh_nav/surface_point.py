@@ -77,7 +77,7 @@ def corner_distances(
     place = point.point.tolist()
     lengths = [math.dist(mesh_map.vertices[corner].tolist(), place) for corner in corners]
     if costs is not None and mesh_map.edge_cost_factor > 0.0:
-        at_point, factor = _cost_at(point, costs[face].tolist()), mesh_map.edge_cost_factor
+        at_point, factor = _cost_at(point, [float(costs[corner]) for corner in face]), mesh_map.edge_cost_factor
         lengths = [
             length * (1.0 + factor * 0.5 * (at_point + float(costs[corner])))
             for length, corner in zip(lengths, corners, strict=True)
@@ -88,10 +88,12 @@ def corner_distances(
 
 def _cost_at(point: SurfacePoint, corner_costs: list[float]) -> float:
     """Interpolate the cost at a point between the corners of its face that have a finite one."""
-    shares, costs = point.barycentric.copy(), np.array(corner_costs)
-    shares[~np.isfinite(costs)] = 0.0
-    mixed = float(shares @ np.nan_to_num(costs, nan=0.0, posinf=0.0))
-    return mixed / max(float(shares.sum()), ON_EDGE)
+    mixed = known = 0.0
+    for share, cost in zip(point.barycentric.tolist(), corner_costs, strict=True):
+        if math.isfinite(cost):
+            mixed += share * cost
+            known += share
+    return mixed / max(known, ON_EDGE)
 
 
 def describe_blockage(mesh_map: MeshMap, snapshot: MeshSnapshot, vertex: int, cost_limit: float) -> str:

@@ -12,11 +12,10 @@ Cost: linear in the vertices within the radius; an update in the vertices whose 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.kernels.inflation import repair_distances
+from mbf_mesh_nav.kernels.inflation import repair_distances, set_fading_costs
 from mbf_mesh_nav.layer import (
     CostArray,
     IntArray,
@@ -66,50 +65,43 @@ class InflationLayer(MeshLayer):
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Distances from scratch, costs from distances, lethal as the input."""
         self._forget_all()
-        lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)  # becomes that of the input
-        reached, _ = self._repair(np.flatnonzero(self.inputs[0].lethal).astype(np.int32), lethal)
-        costs = np.zeros(self.topology.vertex_count, dtype=np.float32)
-        costs[reached] = self.cost_of_distance(self.distances[reached])
+        count = self.topology.vertex_count
+        costs, lethal = np.zeros(count, dtype=np.float32), np.zeros(count, dtype=np.bool_)
+        self._repair(np.flatnonzero(self.inputs[0].lethal).astype(np.int32), costs, lethal)
         return costs, lethal
 
     def update_from_inputs(self, changed: IntArray) -> IntArray:
-        """Repair the distances around the vertices whose lethal flag changed."""
-        touched, flips = self._repair(changed, self._lethal)
-        costs = self.cost_of_distance(self.distances[touched])
-        differs = costs != self._costs[touched]
-        differs[:flips] = True  # a new flag is a change even if the cost is the same
-        moved: IntArray = touched[differs]
-        self._costs[moved] = costs[differs]
-        moved.sort()
-        return moved
-
-    def cost_of_distance(self, distances: NDArray[np.float32]) -> CostArray:
-        """Costs (n,) of distances (n,) [m] to the nearest lethal vertex."""
-        settings = self.parameters
-        beyond = np.maximum(distances - np.float32(settings.inscribed_radius), 0.0)
-        decay = np.exp(-settings.cost_scaling_factor * beyond)
-        costs = np.where(distances <= settings.inscribed_radius, 1.0, decay) * settings.inscribed_value
-        costs[distances > settings.inflation_radius] = 0.0
-        costs[distances == 0.0] = settings.lethal_value
-        return costs.astype(np.float32)
+        """Repair the distances around the vertices whose lethal flag changed, and the costs."""
+        return np.sort(self._repair(changed, self._costs, self._lethal))
 
     def _forget_all(self) -> None:
         self.distances = np.full(self.topology.vertex_count, np.inf, dtype=np.float32)
         self._sources = np.full((self.topology.vertex_count, 2), -1, dtype=np.int32)
 
-    def _repair(self, changed: IntArray, known_lethal: LethalArray) -> tuple[IntArray, int]:
-        mesh = self.topology
-        return repair_distances(
+    def _repair(self, changed: IntArray, costs: CostArray, known_lethal: LethalArray) -> IntArray:
+        """Bring distances, costs and flags up to date in place; a flag that changed is a change at any cost."""
+        mesh, settings = self.topology, self.parameters
+        touched, flips = repair_distances(
             mesh.vertices,
             mesh.faces,
             mesh.vertex_face_offsets,
             mesh.vertex_faces,
             mesh.neighbour_offsets,
             mesh.neighbours,
-            self.parameters.inflation_radius,
+            settings.inflation_radius,
             self.inputs[0].lethal,
             known_lethal,
             changed,
             self.distances,
             self._sources,
+        )
+        return set_fading_costs(
+            self.distances,
+            touched,
+            flips,
+            settings.inscribed_radius,
+            settings.lethal_value,
+            settings.inscribed_value,
+            settings.cost_scaling_factor,
+            costs,
         )

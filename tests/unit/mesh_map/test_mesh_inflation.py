@@ -65,18 +65,28 @@ def test_wave_front_reaches_the_third_corner_of_an_isosceles_triangle_at_its_leg
     np.testing.assert_allclose(mesh.to_input_order(inflation.costs), [1.0, 0.9, 0.9], rtol=1e-6)
 
 
-def test_fading_is_flat_up_to_the_inscribed_radius_and_ends_at_the_inflation_radius():
+def naive_cost(distance: float, layer: InflationLayer) -> float:
+    """The rule of mesh_navigation for one vertex."""
+    settings_ = layer.parameters
+    if distance == 0.0:
+        return settings_.lethal_value
+    if distance > settings_.inflation_radius:
+        return 0.0
+    beyond = max(distance - settings_.inscribed_radius, 0.0)
+    return settings_.inscribed_value * np.exp(-settings_.cost_scaling_factor * beyond)
+
+
+def test_costs_are_flat_up_to_the_inscribed_radius_then_fade_and_end_at_the_inflation_radius():
     mesh = bumpy(0)
+    lethal = np.arange(len(mesh.vertices)) == 20
     _, layer = chain(
-        mesh, np.zeros(len(mesh.vertices), bool), inscribed_radius=0.5, inflation_radius=1.5, inscribed_value=0.9
+        mesh, lethal, inscribed_radius=0.3, inflation_radius=0.7, inscribed_value=0.9, cost_scaling_factor=2.0
     )
 
-    costs = layer.cost_of_distance(np.array([0.0, 0.2, 0.5, 0.6, 1.5, 2.0], np.float32))
+    expected = [naive_cost(distance, layer) for distance in layer.distances]
 
-    assert costs[:3].tolist() == pytest.approx([1.0, 0.9, 0.9])
-    assert costs[3] == pytest.approx(0.9 * np.exp(-0.1))
-    assert costs[4] == pytest.approx(0.9 * np.exp(-1.0))
-    assert costs[5] == 0.0
+    np.testing.assert_allclose(layer.costs, expected, rtol=1e-5)
+    assert {0.0, 1.0} < set(layer.costs.tolist()) and (layer.costs == np.float32(0.9)).sum() > 3
 
 
 @settings(deadline=None, max_examples=25)
