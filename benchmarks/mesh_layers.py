@@ -116,11 +116,10 @@ def report_memory(mesh_map: MeshMap) -> dict[str, float]:
     names = ("vertices", "faces", "neighbour_offsets", "neighbours", "vertex_face_offsets", "vertex_faces")
     graph = [getattr(topology, name) for name in names]
     graph += [snapshot.costs, snapshot.lethal, snapshot.edge_weights]
-    wave = [array for array in vars(WaveSearch(mesh_map)).values() if isinstance(array, np.ndarray)]
     layers = [array for layer in mesh_map.layers.values() for array in vars(layer).values()]
     figures = {
         "planning_mb": sum(array.nbytes for array in graph) / 1e6,
-        "wave_mb": sum(array.nbytes for array in wave) / 1e6,
+        "wave_mb": WaveSearch(mesh_map).nbytes / 1e6,
         "layers_mb": sum(array.nbytes for array in layers if isinstance(array, np.ndarray)) / 1e6,
         "resident_mb": resident,
     }

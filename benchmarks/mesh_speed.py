@@ -144,7 +144,7 @@ def measure_astar(mesh_map: MeshMap, peer: Callable[[], object], pairs: int) -> 
     return float(np.median(ratios[1:]))  # the first one compiles
 
 
-def measure_potpourri3d(terrain: Terrain, mesh_map: MeshMap) -> float | None:
+def measure_potpourri3d(terrain: Terrain, mesh_map: MeshMap, rounds: int) -> float | None:
     """Our full wave over potpourri3d's fast marching, both without costs."""
     try:
         import potpourri3d
@@ -154,7 +154,7 @@ def measure_potpourri3d(terrain: Terrain, mesh_map: MeshMap) -> float | None:
     bare = MeshMap(mesh_map.topology)
     query, search = corner_query(bare), WaveSearch(bare)
     peer = lambda: solver.compute_distance([[(0, [])]])  # noqa: E731 - one more task of the table
-    return ratio_to(peer, lambda: search.spread(query, overshoot=1e9), 3)
+    return ratio_to(peer, lambda: search.spread(query, overshoot=1e9), rounds)
 
 
 def inflated_map(terrain: Terrain, mesh_map: MeshMap) -> tuple[MeshMap, MeshLayer, InflationLayer]:
@@ -244,7 +244,7 @@ def measure(size: str, quick: bool) -> dict[str, float]:
     figures["astar"] = measure_astar(mesh_map, scipy_dijkstra, 20 if quick or size == "1M" else 50)
     figures |= measure_pose_queries(mesh_map)
     figures |= measure_repair(terrain, mesh_map)
-    potpourri3d_ratio = measure_potpourri3d(terrain, mesh_map)
+    potpourri3d_ratio = measure_potpourri3d(terrain, mesh_map, 3 if size == "1M" else 21)
     if potpourri3d_ratio is not None:
         figures["cvp_potpourri3d"] = potpourri3d_ratio
     mixed = shuffled(terrain)

@@ -157,8 +157,11 @@ class MeshMap:
     def changes_between(self, old_version: int, new_version: int) -> IntArray | None:
         """Vertices whose cost or flag may differ between two snapshots; None if that is not remembered.
 
-        The last ``REMEMBERED_CHANGES`` changes of the layers are; new layers or a new edge cost factor begin anew.
+        Nor is it if the first is the newer one. The last ``REMEMBERED_CHANGES`` changes of the layers are; new layers
+        or a new edge cost factor begin anew.
         """
+        if old_version > new_version:
+            return None
         with self._lock:
             steps = [self._changes.get(version) for version in range(old_version + 1, new_version + 1)]
         known = [changed for changed in steps if changed is not None]

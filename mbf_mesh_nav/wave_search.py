@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.corners import build_corner_slots
+from mbf_mesh_nav.kernels.corners import build_corner_ends, write_corner_weights
 from mbf_mesh_nav.kernels.cvp import ALONG_EDGE, propagate_wave
 from mbf_mesh_nav.kernels.descent import trace_descent
 from mbf_mesh_nav.kernels.fronts import NO_BEND
@@ -41,27 +41,25 @@ class Wave:
 
 
 class _Weights(NamedTuple):
-    """Weights of a snapshot in the order in which a wave reads them, and the typical one [m]."""
+    """Weights of corner records at one version of the map, and the typical weight [m] of an edge."""
 
-    snapshot: MeshSnapshot
+    version: int
     of_corners: NDArray[np.float32]
     step: float
 
 
 class WaveSearch:
-    """Waves over one mesh; keeps the corner records of the mesh and their weights at the last snapshot."""
+    """Waves over one mesh; keeps the corner records of the mesh and their weights. Several threads may use it."""
 
     def __init__(self, mesh_map: MeshMap) -> None:
         self._mesh_map = mesh_map
-        self._corner_slots = build_corner_slots(
-            mesh_map.faces,
-            mesh_map.vertex_face_offsets,
-            mesh_map.vertex_faces,
-            mesh_map.neighbour_offsets,
-            mesh_map.neighbours,
-        )
-        self._corner_ends = mesh_map.neighbours[self._corner_slots[:, :2]]
-        self._weighted = self._gathered(mesh_map.snapshot())
+        self._corner_ends = build_corner_ends(mesh_map.faces, mesh_map.vertex_face_offsets, mesh_map.vertex_faces)
+        self._weights: _Weights | None = self._gathered(mesh_map.snapshot())
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the corner records and their weights."""
+        return self._corner_ends.nbytes + (self._weights.of_corners.nbytes if self._weights is not None else 0)
 
     def spread(self, query: LegQuery, overshoot: float) -> Wave | None:
         """Spread a wave from the goal until it is ``overshoot`` [m] past the start; None: not reached, or cancelled."""
@@ -99,17 +97,19 @@ class WaveSearch:
     def field(self, query: LegQuery, wave: Wave) -> VectorField:
         """Directions towards the goal wherever the wave came."""
         mesh_map, goal = self._mesh_map, query.goal
+        weights = self._take_weights(query.snapshot)
         directions = wave_directions(
             mesh_map.vertices,
             mesh_map.faces,
             mesh_map.vertex_faces,
             self._corner_ends,
-            self._weights_at(query.snapshot).of_corners,
+            weights.of_corners,
             wave.distances,
             wave.predecessors,
             wave.cut_records,
             wave.bends,
         )
+        self._weights = weights
         corners = mesh_map.faces[goal.face]
         towards_goal = goal.point - mesh_map.vertices[corners]
         directions[corners] = towards_goal / np.maximum(np.linalg.norm(towards_goal, axis=1, keepdims=True), 1e-9)
@@ -120,7 +120,7 @@ class WaveSearch:
     def _propagated(self, query: LegQuery, targets: NDArray[np.int32], overshoot: float) -> Wave | None:
         """Run the kernel from the goal of a query; None if cancelled."""
         mesh_map = self._mesh_map
-        weights = self._weights_at(query.snapshot)
+        weights = self._take_weights(query.snapshot)
         distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal, query.snapshot.costs)
         if len(seeds) == 1:
             seeds = self._seed_around(query, int(seeds[0]), distances, predecessors)
@@ -141,20 +141,42 @@ class WaveSearch:
             weights.step,
             query.cancel_flag,
         )
+        self._weights = weights
         return None if settled < 0 else Wave(distances, predecessors, cut_records, bends)
 
-    def _weights_at(self, snapshot: MeshSnapshot) -> _Weights:
-        """Weights at a snapshot; those of the last one asked for are kept. Several threads may ask."""
-        weighted = self._weighted
-        if weighted.snapshot is not snapshot:
-            self._weighted = weighted = self._gathered(snapshot)
-        return weighted
+    def _take_weights(self, snapshot: MeshSnapshot) -> _Weights:
+        """Take the weights, brought up to date for a snapshot; give them back after use.
+
+        Another thread that comes meanwhile finds none and gathers its own.
+        """
+        weights, self._weights = self._weights, None
+        changed = None
+        if weights is not None:
+            changed = self._mesh_map.changes_between(weights.version, snapshot.version)
+        if weights is None or changed is None:
+            return self._gathered(snapshot)
+        return self._written(snapshot, changed, weights.of_corners)
 
     def _gathered(self, snapshot: MeshSnapshot) -> _Weights:
+        of_corners = np.empty((len(self._corner_ends), 3), dtype=np.float32)
+        return self._written(snapshot, np.arange(len(snapshot.costs), dtype=np.int32), of_corners)
+
+    def _written(self, snapshot: MeshSnapshot, changed: NDArray[np.int32], of_corners: NDArray[np.float32]) -> _Weights:
+        """Bring weights (3F, 3) up to date at the changed vertices."""
+        mesh_map = self._mesh_map
+        write_corner_weights(
+            mesh_map.vertex_face_offsets,
+            self._corner_ends,
+            mesh_map.neighbour_offsets,
+            mesh_map.neighbours,
+            snapshot.edge_weights,
+            changed,
+            of_corners,
+        )
         sample = snapshot.edge_weights[::STEP_SAMPLE]
         sample = sample[np.isfinite(sample)]
         step = float(sample.mean()) if len(sample) else self._mesh_map.topology.mean_edge_length
-        return _Weights(snapshot, snapshot.edge_weights[self._corner_slots], step)
+        return _Weights(snapshot.version, of_corners, step)
 
     def _seed_around(
         self, query: LegQuery, center: int, distances: NDArray[np.float32], predecessors: NDArray[np.int32]

@@ -1,46 +1,65 @@
-"""Corner records: for every (vertex, incident face) where its three edge weights stand in the CSR arrays.
+"""Corner records: for every (vertex, incident face) the two other corners and the weights of the three edges.
 
-A wave that unfolds triangles needs, at each incident face of a vertex, the two other corners and three edge weights.
-The record is three slots into ``neighbours`` and ``edge_weights``: towards the first other corner (counter-clockwise),
-towards the second, and the edge between those two. It depends on the mesh alone. ``neighbours[slots[:, :2]]`` are the
-records' ends and ``edge_weights[slots]`` their weights: with these two gathered the wave reads 20 bytes a record, one
-after the other, and never searches for a face or an edge. New costs need the weights gathered again, a tenth of a wave.
+A wave that unfolds triangles needs them at each incident face of a vertex. Written one after the other they are 20
+bytes a record, and the wave never searches for a face or an edge. The ends depend on the mesh alone; the weights
+follow the map's costs, at the price of what changed.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
-from mbf_mesh_nav.kernels.dijkstra import Int32Array
+from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.dijkstra import Float32Array, Int32Array
 
 
 @kernel
-def build_corner_slots(
-    faces: Int32Array,
+def build_corner_ends(faces: Int32Array, vertex_face_offsets: Int32Array, vertex_faces: Int32Array) -> Int32Array:
+    """Other corners (3F, 2) int32 of the records, aligned with ``vertex_faces``: (v, first, second) is ccw."""
+    ends = np.empty((len(vertex_faces), 2), dtype=np.int32)
+    for vertex in range(len(vertex_face_offsets) - 1):
+        for record in range(Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + 1])):
+            face = Index(vertex_faces[record])
+            corner = 0
+            while faces[face, corner] != vertex:
+                corner += 1
+            ends[record, 0], ends[record, 1] = faces[face, (corner + 1) % 3], faces[face, (corner + 2) % 3]
+    return ends
+
+
+@kernel
+def write_corner_weights(
     vertex_face_offsets: Int32Array,
-    vertex_faces: Int32Array,
+    corner_ends: Int32Array,
     neighbour_offsets: Int32Array,
     neighbours: Int32Array,
-) -> Int32Array:
-    """Corner records (3F, 3) int32, aligned with ``vertex_faces``: slots of v->a, v->b, a->b; (v, a, b) is ccw."""
-    slots = np.empty((len(vertex_faces), 3), dtype=np.int32)
-    for vertex in range(len(vertex_face_offsets) - 1):
-        for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
-            face = faces[vertex_faces[record]]
-            corner = 0
-            while face[corner] != vertex:
-                corner += 1
-            first, second = face[(corner + 1) % 3], face[(corner + 2) % 3]
-            slots[record, 0] = _slot(neighbour_offsets, neighbours, Count(vertex), Count(first))
-            slots[record, 1] = _slot(neighbour_offsets, neighbours, Count(vertex), Count(second))
-            slots[record, 2] = _slot(neighbour_offsets, neighbours, Count(first), Count(second))
-    return slots
+    edge_weights: Float32Array,
+    changed: Int32Array,
+    corner_weights: Float32Array,
+) -> None:
+    """Write the weights of all records that have an edge at one of the ``changed`` vertices (c,).
+
+    A record's weights (3F, 3) are those of its edges to the first and to the second other corner, and between these.
+    """
+    is_written = np.zeros(len(neighbour_offsets), dtype=np.bool_)
+    for changed_vertex in changed:
+        center = Index(changed_vertex)
+        for slot in range(Index(neighbour_offsets[center]), Index(neighbour_offsets[center + ONE]) + ONE):
+            # Its neighbours, and at last itself.
+            vertex = Index(neighbours[slot]) if slot < Index(neighbour_offsets[center + ONE]) else center
+            if is_written[vertex]:
+                continue
+            is_written[vertex] = True
+            for record in range(Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + ONE])):
+                first, second = Index(corner_ends[record, 0]), Index(corner_ends[record, 1])
+                corner_weights[record, 0] = edge_weights[_slot(neighbour_offsets, neighbours, vertex, first)]
+                corner_weights[record, 1] = edge_weights[_slot(neighbour_offsets, neighbours, vertex, second)]
+                corner_weights[record, 2] = edge_weights[_slot(neighbour_offsets, neighbours, first, second)]
 
 
 @inner_kernel
 def _slot(neighbour_offsets: Int32Array, neighbours: Int32Array, vertex: int, other: int) -> int:
-    slot = neighbour_offsets[vertex]
-    while neighbours[slot] != other:
-        slot += 1
-    return int(slot)
+    slot = Index(neighbour_offsets[vertex])
+    while Index(neighbours[slot]) != other:
+        slot += ONE
+    return slot  # type: ignore[no-any-return]

@@ -10,7 +10,7 @@ import trimesh
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.kernels.corners import build_corner_slots
+from mbf_mesh_nav.kernels.corners import build_corner_ends, write_corner_weights
 from mbf_mesh_nav.kernels.cvp import propagate_wave
 from mbf_mesh_nav.kernels.fronts import unfolded_distance
 from mbf_mesh_nav.mesh_map import MeshMap
@@ -21,18 +21,20 @@ from mbf_mesh_nav.vector_field import VectorField
 def wave_from_vertex(mesh_map, source, weights=None, blocked=None, step=0.5):
     """Wave of the kernel (distances, predecessors, seeds), seeded with the straight distances of one vertex's ring."""
     count = len(mesh_map.vertices)
-    slots = build_corner_slots(
-        mesh_map.faces, mesh_map.vertex_face_offsets, mesh_map.vertex_faces,
-        mesh_map.neighbour_offsets, mesh_map.neighbours,
-    )  # fmt: skip
+    ends = build_corner_ends(mesh_map.faces, mesh_map.vertex_face_offsets, mesh_map.vertex_faces)
     weights = mesh_map.neighbour_lengths if weights is None else weights
+    corner_weights = np.empty((len(ends), 3), np.float32)
+    write_corner_weights(
+        mesh_map.vertex_face_offsets, ends, mesh_map.neighbour_offsets, mesh_map.neighbours, weights,
+        np.arange(count, dtype=np.int32), corner_weights,
+    )  # fmt: skip
     blocked = np.zeros(count, bool) if blocked is None else blocked
     distances, predecessors = np.full(count, np.inf, np.float32), np.full(count, -1, np.int32)
     ring = mesh_map.neighbours[mesh_map.neighbour_offsets[source] : mesh_map.neighbour_offsets[source + 1]]
     seeds = np.concatenate([[source], ring]).astype(np.int32)
     distances[seeds] = np.linalg.norm(mesh_map.vertices[seeds] - mesh_map.vertices[source], axis=1)
     propagate_wave(
-        mesh_map.vertex_face_offsets, mesh_map.neighbours[slots[:, :2]], weights[slots], blocked,
+        mesh_map.vertex_face_offsets, ends, corner_weights, blocked,
         distances, predecessors, np.full(count, -1, np.int32), np.full(count, -1, np.int32), seeds,
         np.zeros(0, np.int32), 0.3,
         step, np.zeros(1, np.uint8),

@@ -1,8 +1,12 @@
 """Waves over a mesh whose costs change between two of them."""
 
 import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from mbf_mesh_nav.layer import NOTHING_CHANGED
 from mbf_mesh_nav.leg_search import LegQuery
+from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.surface_point import surface_point_at_vertex
 from mbf_mesh_nav.wave_search import WaveSearch
 
@@ -14,13 +18,39 @@ def query_between_corners(mesh_map):
     return LegQuery(start, goal, snapshot, snapshot.blocked(1.0), np.zeros(1, np.uint8))
 
 
+def change_some_costs(mesh_map, rng):
+    layer = mesh_map.layers["painted"]
+    costs = np.where(rng.random(len(layer.costs)) < 0.1, rng.random(len(layer.costs)), layer.costs).astype(np.float32)
+    changed = layer.replace(costs, layer.lethal.copy())
+    mesh_map.apply(lambda visited: changed if visited is layer else NOTHING_CHANGED)
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.integers(0, 10_000))
+def test_after_any_changes_of_costs_the_wave_equals_that_of_a_new_search(paint, seed):
+    rng = np.random.default_rng(seed)
+    mesh_map = MeshMap.from_heights(np.zeros((11, 11)), 0.2, 0.2)
+    paint(mesh_map, lambda v: rng.random(len(v)), edge_cost_factor=2.0)
+    search = WaveSearch(mesh_map)
+    for _ in range(4):
+        for _ in range(rng.integers(3)):
+            change_some_costs(mesh_map, rng)
+        if rng.random() < 0.2:
+            mesh_map.set_edge_cost_factor(1.0)  # what changed is not remembered
+        query = query_between_corners(mesh_map)
+
+        wave = search.spread(query, 100.0)
+
+        np.testing.assert_array_equal(wave.distances, WaveSearch(mesh_map).spread(query, 100.0).distances)
+
+
 def test_a_field_is_read_with_the_weights_its_wave_was_spread_on(plain, paint):
-    # Two threads may plan with one planner: between wave and field of one the other asks for other weights.
+    # Two threads may plan with one planner: between wave and field of one the other asks for newer weights.
     mesh_map = paint(plain(), lambda v: 0.9 * (np.abs(v[:, 0] - 3.0) < 1.0), edge_cost_factor=3.0)
     search, query = WaveSearch(mesh_map), query_between_corners(mesh_map)
     wave = search.spread(query, 100.0)
     expected = WaveSearch(mesh_map).field(query, wave)
-    paint(mesh_map, lambda v: 0.9 * (np.abs(v[:, 1] - 3.0) < 1.0), edge_cost_factor=3.0)
+    change_some_costs(mesh_map, np.random.default_rng(0))
     other = search.spread(query_between_corners(mesh_map), 100.0)
 
     field = search.field(query, wave)
