@@ -70,7 +70,6 @@ class MeshMap:
         self.neighbour_offsets = topology.neighbour_offsets
         self.neighbours = topology.neighbours
         self.neighbour_lengths = topology.neighbour_lengths
-        self.neighbour_edges = topology.neighbour_edges
         self.vertex_face_offsets = topology.vertex_face_offsets
         self.vertex_faces = topology.vertex_faces
         self.face_neighbours = topology.face_neighbours

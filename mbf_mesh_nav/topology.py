@@ -36,9 +36,9 @@ class MeshTopology:
         Unit normals; a vertex has the unweighted mean of its faces'.
     edges : (E, 2) int32
         Undirected edges, smaller vertex first.
-    neighbour_offsets, neighbours, neighbour_lengths, neighbour_edges
+    neighbour_offsets, neighbours, neighbour_lengths
         CSR graph: entries ``neighbour_offsets[v]`` to ``neighbour_offsets[v+1]`` hold the vertices next to ``v``
-        (int32, ascending), the edge lengths [m] (float32) and the edge numbers (int32).
+        (int32, ascending) and the edge lengths [m] (float32).
     vertex_face_offsets, vertex_faces : (V+1,), (3F,) int32
         CSR of the faces around every vertex.
     face_neighbours : (F, 3) int32
@@ -59,7 +59,6 @@ class MeshTopology:
     neighbour_offsets: IntArray
     neighbours: IntArray
     neighbour_lengths: NDArray[np.float32]
-    neighbour_edges: IntArray
     vertex_face_offsets: IntArray
     vertex_faces: IntArray
     face_neighbours: IntArray
@@ -124,7 +123,7 @@ def build_topology(
 
     face_offsets, incident = kernels.faces_of_vertices(sorted_faces, len(sorted_vertices))
     offsets, neighbours = kernels.neighbours_of_vertices(sorted_faces, face_offsets, incident)
-    edges, edge_ids, lengths = kernels.edges_of_neighbours(sorted_vertices, offsets, neighbours)
+    edges, lengths = kernels.edges_of_neighbours(sorted_vertices, offsets, neighbours)
     graph = csr_array(
         (np.ones(len(neighbours), dtype=np.int8), neighbours, offsets), shape=(len(vertices), len(vertices))
     )
@@ -139,7 +138,6 @@ def build_topology(
         neighbour_offsets=offsets,
         neighbours=neighbours,
         neighbour_lengths=lengths,
-        neighbour_edges=edge_ids,
         vertex_face_offsets=face_offsets,
         vertex_faces=incident,
         face_neighbours=kernels.faces_across_edges(sorted_faces, face_offsets, incident),

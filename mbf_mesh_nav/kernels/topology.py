@@ -65,15 +65,14 @@ def neighbours_of_vertices(faces: IntArray, face_offsets: IntArray, incident: In
 @kernel
 def edges_of_neighbours(
     vertices: FloatArray, offsets: IntArray, neighbours: IntArray
-) -> tuple[IntArray, IntArray, NDArray[np.float32]]:
-    """Enumerate the undirected edges: edges (E, 2) with i < j, and edge id and length per CSR entry.
+) -> tuple[IntArray, NDArray[np.float32]]:
+    """Enumerate the undirected edges: edges (E, 2) with i < j, and the length per CSR entry.
 
     Vertices are visited in ascending order and every list is ascending, so the entries of ``u`` that point to larger
     vertices are reached exactly in list order: one cursor per vertex replaces a search.
     """
     vertex_count = offsets.shape[0] - 1
     edges = np.empty((neighbours.shape[0] // 2, 2), dtype=np.int32)
-    edge_ids = np.empty(neighbours.shape[0], dtype=np.int32)
     lengths = np.empty(neighbours.shape[0], dtype=np.float32)
     cursor = np.empty(vertex_count, dtype=np.int32)
     edge_count = 0
@@ -84,17 +83,15 @@ def edges_of_neighbours(
             if other < vertex:
                 twin = cursor[other]
                 cursor[other] += 1
-                edge_ids[entry] = edge_ids[twin]
                 lengths[entry] = lengths[twin]
                 continue
             if cursor[vertex] == offsets[vertex + 1]:
                 cursor[vertex] = entry
             lengths[entry] = norm(difference(row(vertices, vertex), row(vertices, Count(other))))
-            edge_ids[entry] = edge_count
             edges[edge_count, 0] = vertex
             edges[edge_count, 1] = other
             edge_count += 1
-    return edges, edge_ids, lengths
+    return edges, lengths
 
 
 @kernel

@@ -42,7 +42,7 @@ planner_max_retries: 0
 """,
 }
 MESH_ARRAYS = (
-    "vertices faces vertex_normals face_normals edges neighbour_offsets neighbours neighbour_lengths neighbour_edges "
+    "vertices faces vertex_normals face_normals edges neighbour_offsets neighbours neighbour_lengths "
     "vertex_face_offsets vertex_faces face_neighbours components input_to_internal internal_to_input"
 ).split()
 

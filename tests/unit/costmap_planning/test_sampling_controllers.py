@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
@@ -92,7 +92,10 @@ def test_map_costs_equal_single_look_ups(seed, disc):
     for t in range(1, 12, 2):
         for n in range(7):
             x, y, yaw = poses[:, t, n].astype(float)
-            cost = grid.cost_at(x + disc * math.cos(yaw), y + disc * math.sin(yaw))
+            place = x + disc * math.cos(yaw), y + disc * math.sin(yaw)
+            # The kernel counts in float32: on the border of a cell rounding decides.
+            assume(all(abs(value / 0.1 - round(value / 0.1)) > 1e-4 for value in place))
+            cost = grid.cost_at(*place)
             expected[n] += 0.0 if cost is None else VALUE_OF_COST[cost]
     np.testing.assert_allclose(total, expected, rtol=1e-4)
 
