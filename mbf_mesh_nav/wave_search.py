@@ -18,6 +18,8 @@ from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.snapshot import MeshSnapshot
 from mbf_mesh_nav.vector_field import VectorField
 
+NEVER = np.zeros(1, dtype=np.uint8)
+"""The flag of what is not cancelled."""
 STEP_SAMPLE = 64
 """The typical weight of an edge is the mean of one in so many."""
 
@@ -54,7 +56,7 @@ class WaveSearch:
     def __init__(self, mesh_map: MeshMap) -> None:
         self._mesh_map = mesh_map
         self._corner_ends = build_corner_ends(mesh_map.faces, mesh_map.vertex_face_offsets, mesh_map.vertex_faces)
-        self._weights: _Weights | None = self._gathered(mesh_map.snapshot())
+        self._weights: _Weights | None = self._gathered(mesh_map.snapshot(), NEVER)
 
     @property
     def nbytes(self) -> int:
@@ -94,10 +96,12 @@ class WaveSearch:
             4 * len(mesh_map.faces),
         )
 
-    def field(self, query: LegQuery, wave: Wave) -> VectorField:
-        """Directions towards the goal wherever the wave came."""
+    def field(self, query: LegQuery, wave: Wave) -> VectorField | None:
+        """Directions towards the goal wherever the wave came; None if cancelled."""
         mesh_map, goal = self._mesh_map, query.goal
-        weights = self._take_weights(query.snapshot)
+        weights = self._take_weights(query)
+        if weights is None:
+            return None
         directions = wave_directions(
             mesh_map.vertices,
             mesh_map.faces,
@@ -120,7 +124,9 @@ class WaveSearch:
     def _propagated(self, query: LegQuery, targets: NDArray[np.int32], overshoot: float) -> Wave | None:
         """Run the kernel from the goal of a query; None if cancelled."""
         mesh_map = self._mesh_map
-        weights = self._take_weights(query.snapshot)
+        weights = self._take_weights(query)
+        if weights is None:
+            return None
         distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal, query.snapshot.costs)
         if len(seeds) == 1:
             seeds = self._seed_around(query, int(seeds[0]), distances, predecessors)
@@ -144,27 +150,36 @@ class WaveSearch:
         self._weights = weights
         return None if settled < 0 else Wave(distances, predecessors, cut_records, bends)
 
-    def _take_weights(self, snapshot: MeshSnapshot) -> _Weights:
-        """Take the weights, brought up to date for a snapshot; give them back after use.
+    def _take_weights(self, query: LegQuery) -> _Weights | None:
+        """Take the weights, brought up to date for a query; give them back after use. None if cancelled meanwhile.
 
-        Another thread that comes meanwhile finds none and gathers its own.
+        Another thread that comes in between finds none and gathers its own.
         """
         weights, self._weights = self._weights, None
-        changed = None
-        if weights is not None:
-            changed = self._mesh_map.changes_between(weights.version, snapshot.version)
-        if weights is None or changed is None:
-            return self._gathered(snapshot)
-        return self._written(snapshot, changed, weights.of_corners)
+        if weights is None:
+            return self._gathered(query.snapshot, query.cancel_flag)
+        if weights.version == query.snapshot.version:
+            return weights
+        changed = self._mesh_map.changes_between(weights.version, query.snapshot.version)
+        if changed is None:
+            return self._gathered(query.snapshot, query.cancel_flag)
+        return self._written(query.snapshot, changed, weights.of_corners, query.cancel_flag)
 
-    def _gathered(self, snapshot: MeshSnapshot) -> _Weights:
+    def _gathered(self, snapshot: MeshSnapshot, cancel_flag: NDArray[np.uint8]) -> _Weights | None:
         of_corners = np.empty((len(self._corner_ends), 3), dtype=np.float32)
-        return self._written(snapshot, np.arange(len(snapshot.costs), dtype=np.int32), of_corners)
+        everything = np.arange(len(snapshot.costs), dtype=np.int32)
+        return self._written(snapshot, everything, of_corners, cancel_flag)
 
-    def _written(self, snapshot: MeshSnapshot, changed: NDArray[np.int32], of_corners: NDArray[np.float32]) -> _Weights:
+    def _written(
+        self,
+        snapshot: MeshSnapshot,
+        changed: NDArray[np.int32],
+        of_corners: NDArray[np.float32],
+        cancel_flag: NDArray[np.uint8],
+    ) -> _Weights | None:
         """Bring weights (3F, 3) up to date at the changed vertices."""
         mesh_map = self._mesh_map
-        write_corner_weights(
+        finished = write_corner_weights(
             mesh_map.vertex_face_offsets,
             self._corner_ends,
             mesh_map.neighbour_offsets,
@@ -172,11 +187,12 @@ class WaveSearch:
             snapshot.edge_weights,
             changed,
             of_corners,
+            cancel_flag,
         )
         sample = snapshot.edge_weights[::STEP_SAMPLE]
         sample = sample[np.isfinite(sample)]
-        step = float(sample.mean()) if len(sample) else self._mesh_map.topology.mean_edge_length
-        return _Weights(snapshot.version, of_corners, step)
+        step = float(sample.mean()) if len(sample) else mesh_map.topology.mean_edge_length
+        return _Weights(snapshot.version, of_corners, step) if finished else None
 
     def _seed_around(
         self, query: LegQuery, center: int, distances: NDArray[np.float32], predecessors: NDArray[np.int32]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
-from mbf_mesh_nav.kernels.dijkstra import Float32Array, Int32Array
+from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, FlagArray, Float32Array, Int32Array
 
 
 @kernel
@@ -36,14 +36,18 @@ def write_corner_weights(
     edge_weights: Float32Array,
     changed: Int32Array,
     corner_weights: Float32Array,
-) -> None:
+    cancel_flag: FlagArray,
+) -> bool:
     """Write the weights of all records that have an edge at one of the ``changed`` vertices (c,).
 
     A record's weights (3F, 3) are those of its edges to the first and to the second other corner, and between these.
+    ``cancel_flag`` (1,) is polled; returns False if it ended the call, and the weights are good for nothing then.
     """
     is_written = np.zeros(len(neighbour_offsets), dtype=np.bool_)
-    for changed_vertex in changed:
-        center = Index(changed_vertex)
+    for place in range(len(changed)):
+        if place % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
+            return False
+        center = Index(changed[place])
         for slot in range(Index(neighbour_offsets[center]), Index(neighbour_offsets[center + ONE]) + ONE):
             # Its neighbours, and at last itself.
             vertex = Index(neighbours[slot]) if slot < Index(neighbour_offsets[center + ONE]) else center
@@ -55,11 +59,13 @@ def write_corner_weights(
                 corner_weights[record, 0] = edge_weights[_slot(neighbour_offsets, neighbours, vertex, first)]
                 corner_weights[record, 1] = edge_weights[_slot(neighbour_offsets, neighbours, vertex, second)]
                 corner_weights[record, 2] = edge_weights[_slot(neighbour_offsets, neighbours, first, second)]
+    return True
 
 
 @inner_kernel
 def _slot(neighbour_offsets: Int32Array, neighbours: Int32Array, vertex: int, other: int) -> int:
+    """Where ``other`` stands in the ascending list of a vertex: after all that are less. Without a branch to guess."""
     slot = Index(neighbour_offsets[vertex])
-    while Index(neighbours[slot]) != other:
-        slot += ONE
+    for entry in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
+        slot += Index(Index(neighbours[entry]) < other)
     return slot  # type: ignore[no-any-return]

@@ -26,7 +26,7 @@ def wave_from_vertex(mesh_map, source, weights=None, blocked=None, step=0.5):
     corner_weights = np.empty((len(ends), 3), np.float32)
     write_corner_weights(
         mesh_map.vertex_face_offsets, ends, mesh_map.neighbour_offsets, mesh_map.neighbours, weights,
-        np.arange(count, dtype=np.int32), corner_weights,
+        np.arange(count, dtype=np.int32), corner_weights, np.zeros(1, np.uint8),
     )  # fmt: skip
     blocked = np.zeros(count, bool) if blocked is None else blocked
     distances, predecessors = np.full(count, np.inf, np.float32), np.full(count, -1, np.int32)
