@@ -170,7 +170,8 @@ class MPPIController(MeshController):
             self.parameters.max_lin_velocity,
             max(braking_speed(projection.remaining, self.parameters.max_deceleration), 0.1),
         )
-        controls = self._sample(max_speed, projection.remaining)
+        # A robot beside its goal or past it has no path ahead of it, but still a way to go.
+        controls = self._sample(max_speed, max(projection.remaining, self._distance_to_goal(pose)))
         scores, collided = self._score(controls, spot, pose, projection)
         scores = np.where(collided, scores + _COLLISION_SCORE, scores)
         weights = np.exp(-(scores - scores.min()) / self.parameters.temperature)
@@ -182,17 +183,20 @@ class MPPIController(MeshController):
         # where none leads nearer, as for a car that has passed its goal; a cycle or two of it are chance.
         travel, turn = np.abs(blended.sum(axis=0)) * self.parameters.step_time
         stands = travel < _STANDSTILL and turn < _STANDSTILL
-        assert self._goal is not None
-        has_far_to_go = ground_distance(pose, self._goal) > _STANDSTILL + self.parameters.goal_distance
+        has_far_to_go = self._distance_to_goal(pose) > _STANDSTILL + self.parameters.goal_distance
         self._idle_cycles = self._idle_cycles + 1 if stands and has_far_to_go else 0
         stuck = stands and (collided.mean() > 0.5 or self._idle_cycles > _IDLE_CYCLES)
         return None if stuck or bool(collided.all()) else blended
 
+    def _distance_to_goal(self, pose: Pose) -> float:
+        assert self._goal is not None
+        return ground_distance(pose, self._goal)
+
     def _sample(self, max_speed: float, remaining: float) -> NDArray[np.float64]:
         """Motions (samples, horizon_steps, 2) around the last one; the first is that one, the second stands still.
 
-        No robot that can turn where it stands goes on past the goal, ``remaining`` [m] of path ahead: motions that run
-        beyond it would speak for creeping there.
+        No robot that can turn where it stands goes on past the goal, ``remaining`` [m] away: motions that run beyond it
+        would speak for creeping there.
         """
         p = self.parameters
         held = -(-p.horizon_steps // _NOISE_HOLD)

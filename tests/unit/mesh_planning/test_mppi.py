@@ -39,6 +39,17 @@ def test_it_does_not_stand_still_just_short_of_the_goal_whatever_it_samples(make
     assert controller.is_goal_reached(poses[-1], 0.1, 0.2), poses[-1]
 
 
+@pytest.mark.parametrize("beside_goal", [(4.4, 3.6), (4.9, 3.0)])
+def test_a_robot_that_got_beside_its_goal_or_past_it_still_drives_to_it(
+    make_plugin, plain, drive, pose_on, beside_goal
+):
+    mesh_map = plain()
+    controller = make_plugin(MPPIController, mesh_map)
+    controller.set_plan(Path.from_points([(x, 3.0, 0.0) for x in np.linspace(3.8, 4.4, 7)]))
+    poses = drive(controller, mesh_map, pose_on(mesh_map, (*beside_goal, 0), (1, 0, 0)), 20.0)
+    assert controller.is_goal_reached(poses[-1], 0.15, 0.3), poses[-1]
+
+
 def test_it_goes_round_an_obstacle_that_appeared_after_planning(make_plugin, plain, paint, drive, pose_on):
     mesh_map = plain(spacing=0.1)
     controller = make_plugin(MPPIController, mesh_map)
