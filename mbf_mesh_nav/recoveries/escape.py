@@ -3,8 +3,8 @@
 For a robot that stands in an inflated or lethal area (a new obstacle, a pushed robot), where every planner answers
 BLOCKED_START. It crosses costly ground on purpose, so it is slow, short (``max_distance``) and measures distance on the
 surface, never across a gap or to another storey. Lethal ground it crosses only where the robot stands on it, and does
-not know what that really is: order it after ``mesh.clear_layers`` and ``mesh.back_up``. Where something
-appears on its way while it drives, it looks for another way and stops if there is none.
+not know what that really is: order it after ``mesh.clear_layers`` and ``mesh.back_up``. Where something appears on its
+way while it drives, or the end of the way is safe no more, it looks for another way and stops if there is none.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.path_progress import PathProgress
 from mbf_mesh_nav.plugins import MeshRecovery
 from mbf_mesh_nav.snapshot import MeshSnapshot
+from mbf_mesh_nav.surface_point import nearest_corner
 
 
 class EscapeParameters(PluginParameters):
@@ -55,9 +56,10 @@ class WayOut:
     vertices: NDArray[np.int32]
     progress: PathProgress
 
-    def is_closed(self, lethal: NDArray[np.bool_], travelled: float) -> bool:
-        """Whether a vertex farther ahead than ``travelled`` [m] is among the ``lethal`` ones (V,)."""
-        return bool(lethal[self.vertices[self.progress.arc_lengths[1:] > travelled]].any())
+    def is_open(self, lethal: NDArray[np.bool_], blocked: NDArray[np.bool_], travelled: float) -> bool:
+        """Whether no vertex farther ahead than ``travelled`` [m] is ``lethal`` (V,), nor the end ``blocked`` (V,)."""
+        ahead = self.vertices[self.progress.arc_lengths[1:] > travelled]
+        return not (lethal[ahead].any() or blocked[self.vertices[-1]])
 
 
 class EscapeRecovery(MeshRecovery):
@@ -76,14 +78,14 @@ class EscapeRecovery(MeshRecovery):
         snapshot = mesh_map.snapshot()
         if not snapshot.blocked(p.cost_limit)[mesh_map.faces[spot.face]].any():
             return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on safe ground")
-        # Over lethal ground the way leads only if the robot stands on it: then over that patch.
-        own_patch = np.isfinite(self._spread(spot, ~_lethal(snapshot), flag)[0])
+        own_patch = self._patch_below(spot, snapshot, flag)
         way = self._way_to_safety(spot, own_patch, request)
 
         def step(pose: Pose) -> Twist | RecoveryResult:
             nonlocal way
             travelled = way.progress.update(np.asarray(pose.position)).travelled if way is not None else 0.0
-            if way is not None and way.is_closed(_lethal(mesh_map.snapshot()) & ~own_patch, travelled):
+            now = mesh_map.snapshot()
+            if way is not None and not way.is_open(_lethal(now) & ~own_patch, now.blocked(p.cost_limit), travelled):
                 here = mesh_map.locate_one(pose.position, 1.0)
                 way = None if here is None else self._way_to_safety(here, own_patch, request)
                 travelled = 0.0
@@ -104,6 +106,13 @@ class EscapeRecovery(MeshRecovery):
         if abs(bearing) > 0.6:
             return Twist.planar(wz=math.copysign(p.yaw_rate, bearing))
         return Twist.planar(vx=p.speed, wz=clamp(p.speed * curvature, p.yaw_rate))
+
+    def _patch_below(self, spot: SurfacePoint, snapshot: MeshSnapshot, flag: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        """Lethal vertices (V,) that hang together with the one the robot stands on; none if it stands beside them."""
+        lethal = _lethal(snapshot)
+        if not lethal[nearest_corner(self.mesh_map, spot)]:
+            return np.zeros_like(lethal)
+        return np.isfinite(self._spread(spot, ~lethal, flag)[0])
 
     def _way_to_safety(
         self, spot: SurfacePoint, own_patch: NDArray[np.bool_], request: RecoveryRequest

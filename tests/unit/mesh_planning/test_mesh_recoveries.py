@@ -219,6 +219,34 @@ def test_escaping_does_not_drive_into_what_appears_on_its_way(run, plain, paint,
     assert gap or np.hypot(motion.current.x - 3.7, motion.current.y - 3.0) < 0.4
 
 
+def test_escaping_ends_where_it_is_safe_even_if_the_end_of_the_way_becomes_forbidden_meanwhile(run, plain, paint):
+    mesh_map = plain(spacing=0.1)
+    around = np.hypot(*(mesh_map.vertices[:, :2] - 3.0).T)
+    paint(mesh_map, lambda v: np.where(around < 0.8, 0.95, 0.0))
+
+    class SpreadingInflation(SimulatedMotion):
+        def sleep(self, seconds):
+            if len(self.commands) == 3:
+                costs = np.where(around < 1.5, 0.95, 0.0).astype(np.float32)
+                self.mesh_map.apply(lambda layer: layer.replace(costs, np.zeros(len(costs), dtype=np.bool_)))
+            return super().sleep(seconds)
+
+    result, motion = run(EscapeRecovery, mesh_map, (3.5, 3.0, 0.0), motion_class=SpreadingInflation)
+    assert result.success, result.message
+    assert np.hypot(motion.current.x - 3.0, motion.current.y - 3.0) > 1.5
+
+
+def test_a_robot_beside_a_thin_wall_does_not_escape_through_it(run, plain, paint):
+    def wall_with_a_wide_forbidden_strip(v):
+        strip = np.where((v[:, 0] > 1.55) & (v[:, 0] < 3.25), 0.95, 0.0)
+        return np.where(np.abs(v[:, 0] - 3.0) < 0.05, np.inf, strip)
+
+    mesh_map = paint(plain(spacing=0.1), wall_with_a_wide_forbidden_strip)
+    result, motion = run(EscapeRecovery, mesh_map, (2.93, 3.03, 0.0), (-1, 0, 0))
+    assert result.success, result.message
+    assert motion.current.x < 1.65
+
+
 def test_a_robot_whose_frame_is_above_the_ground_ends_its_escape_at_safe_ground(run, plain, paint):
     mesh_map = paint(plain(spacing=0.1), lambda v: np.where(np.hypot(v[:, 0] - 3, v[:, 1] - 3) < 0.8, np.inf, 0.0))
 
