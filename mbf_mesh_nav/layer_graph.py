@@ -5,7 +5,8 @@ visits every layer once, inputs first, and hands it the union of what its inputs
 therefore computed once, not once per path.
 
 A layer that raises ends the pass. What had changed by then is not lost: the next pass hands it on, and begins by
-computing the layer that raised anew. Until one comes through, ``problem`` says that the layers are not up to date.
+computing every layer anew that raised since the last one that came through. Until then ``problem`` says that the layers
+are not up to date.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ class LayerGraph(Mapping[str, MeshLayer]):
     def __init__(self, layers: Sequence[MeshLayer] = ()) -> None:
         self._layers = {layer.name: layer for layer in layers}
         self.problem = ""
-        self._interrupted = ""  # name of the layer that raised
+        self._interrupted: set[str] = set()  # names of the layers that raised in passes that did not come through
         self._owed: dict[str, IntArray] = {}  # what passes changed that did not come through
 
     def __getitem__(self, name: str) -> MeshLayer:
@@ -121,16 +122,17 @@ class LayerGraph(Mapping[str, MeshLayer]):
                 own = union_of([changed.get(name, NOTHING_CHANGED), self._follow(layer, from_inputs), event(layer)])
             except Exception as error:
                 self.problem = f"layer '{name}' raised {type(error).__name__}: {error}"
-                self._interrupted, self._owed = name, changed
+                self._interrupted.add(name)
+                self._owed = changed
                 raise
             if len(own):
                 changed[name] = own
-        self.problem, self._interrupted, self._owed = "", "", {}
+        self.problem, self._interrupted, self._owed = "", set(), {}
         return changed
 
     def _follow(self, layer: MeshLayer, from_inputs: IntArray) -> IntArray:
-        """Let a layer react to what its inputs changed; one that raised the last time starts over."""
-        if layer.name == self._interrupted:
+        """Let a layer react to what its inputs changed; one that raised starts over."""
+        if layer.name in self._interrupted:
             layer.recompute()
             return np.arange(len(layer.costs), dtype=np.int32)
         return layer.update_from_inputs(from_inputs) if len(from_inputs) else NOTHING_CHANGED
@@ -160,7 +162,10 @@ class LayerGraph(Mapping[str, MeshLayer]):
             return self.apply(lambda visited: changed if visited is layer else NOTHING_CHANGED)
         except Exception:
             layer.parameters = old
-            layer.recompute()
+            # Not always what the new ones had changed: inputs may have changed in the same pass.
+            restored = layer.recompute()
+            if len(restored):
+                self._owed[name] = union_of([self._owed.get(name, NOTHING_CHANGED), restored])
             raise
 
 

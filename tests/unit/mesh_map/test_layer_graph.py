@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.layer import NOTHING_CHANGED, IntArray, LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.layer_graph import LayerGraph, LayerGraphError, dependency_order
 from mbf_mesh_nav.layers.border import BorderLayer
@@ -127,6 +128,67 @@ def test_what_changed_before_a_layer_raised_is_handed_on_by_the_next_pass():
         assert layer.lethal[3]
         np.testing.assert_array_equal(changed[layer.name], EVERYTHING)
     assert graph.apply(lambda layer: NOTHING_CHANGED) == {}
+
+
+class BreakingLayer(FailingLayer):
+    """Leaves its values broken when it raises."""
+
+    def update_from_inputs(self, changed):
+        if self.fails:
+            self._costs = np.full(20, 0.1, dtype=np.float32)
+        return super().update_from_inputs(changed)
+
+
+def test_a_layer_that_raised_starts_over_even_if_another_one_raises_in_between():
+    first, second = make(GivenLayer, "first"), make(GivenLayer, "second")
+    failing, breaking = make(FailingLayer, "failing", first), make(BreakingLayer, "breaking", second)
+    graph = LayerGraph([first, second, failing, breaking])
+    breaking.fails = True
+    with pytest.raises(RuntimeError, match="no idea"):
+        graph.apply(event_of(second, lambda: second.give(0.0, [3])))
+    failing.fails, breaking.fails = True, False
+    with pytest.raises(RuntimeError, match="no idea"):
+        graph.apply(event_of(first, lambda: first.give(0.6)))
+    failing.fails = False
+
+    graph.apply(lambda layer: NOTHING_CHANGED)
+
+    np.testing.assert_array_equal(breaking.costs, second.costs)
+    np.testing.assert_array_equal(breaking.lethal, second.lethal)
+
+
+class PartLayer(MeshLayer):
+    """The costs of its input at the first so many vertices."""
+
+    class Parameters(LayerParameters):
+        """Parameters of the layer."""
+
+        size: int = parameter(20, "Number of vertices.")
+
+    inputs_allowed = (1, 1)
+
+    def compute(self):
+        costs = np.where(EVERYTHING < self.parameters.size, self.inputs[0].costs, 0.0).astype(np.float32)
+        return costs, np.zeros(20, dtype=np.bool_)
+
+
+def test_what_putting_parameters_back_changes_is_handed_on_by_the_next_pass():
+    top = make(GivenLayer, "top")
+    interrupted, part = make(FailingLayer, "interrupted", top), make(PartLayer, "part", top, size=10)
+    below, failing = make(MaxCombinationLayer, "below", part), make(FailingLayer, "failing", top)
+    graph = LayerGraph([top, interrupted, part, below, failing])
+    interrupted.fails = True
+    with pytest.raises(RuntimeError, match="no idea"):
+        graph.apply(event_of(top, lambda: top.give(0.7)))
+    interrupted.fails, failing.fails = False, True
+    with pytest.raises(RuntimeError, match="no idea"):
+        graph.set_parameters("part", PartLayer.Parameters(size=5))
+    failing.fails = False
+
+    graph.apply(lambda layer: NOTHING_CHANGED)
+
+    np.testing.assert_array_equal(part.costs, np.where(EVERYTHING < 10, top.costs, 0.0))
+    np.testing.assert_array_equal(below.costs, part.costs)
 
 
 def test_parameters_that_a_layer_further_down_cannot_take_are_put_back():
