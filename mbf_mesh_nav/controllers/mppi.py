@@ -88,7 +88,7 @@ class MPPIController(MeshController):
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
-        self._hardness_version = -1
+        self._hardness_of: tuple[int, float] = (-1, 0.0)  # version of the map and cost limit
         self._hardness: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
 
     def set_plan(self, path: Path) -> bool:
@@ -273,9 +273,9 @@ class MPPIController(MeshController):
 
     def _hardness_at(self, snapshot: MeshSnapshot) -> NDArray[np.float32]:
         """How forbidden the vertices (V,) are to the robot."""
-        if snapshot.version != self._hardness_version:
-            self._hardness = snapshot.hardness(self.parameters.cost_limit)
-            self._hardness_version = snapshot.version
+        wanted = snapshot.version, self.parameters.cost_limit
+        if wanted != self._hardness_of:
+            self._hardness, self._hardness_of = snapshot.hardness(self.parameters.cost_limit), wanted
         return self._hardness
 
     def _as_motions(self, controls: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -50,6 +50,17 @@ def test_a_robot_that_got_beside_its_goal_or_past_it_still_drives_to_it(
     assert controller.is_goal_reached(poses[-1], 0.15, 0.3), poses[-1]
 
 
+def test_a_cost_limit_changed_between_two_goals_counts_at_once(make_plugin, plain, paint, pose_on):
+    mesh_map = paint(plain(spacing=0.1), lambda v: np.full(len(v), 0.6))
+    controller = make_plugin(MPPIController, mesh_map)
+    request = ControlRequest(pose_on(mesh_map, (0.8, 3, 0), (1, 0, 0)), Twist())
+    controller.set_plan(straight_path())
+    assert controller.compute_velocity_commands(request).outcome == ExePathOutcome.SUCCESS
+    controller.parameters = controller.parameters.model_copy(update={"cost_limit": 0.5})
+    controller.set_plan(straight_path())
+    assert controller._blocked().all()
+
+
 def test_it_goes_round_an_obstacle_that_appeared_after_planning(make_plugin, plain, paint, drive, pose_on):
     mesh_map = plain(spacing=0.1)
     controller = make_plugin(MPPIController, mesh_map)
