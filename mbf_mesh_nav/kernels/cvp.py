@@ -89,7 +89,8 @@ def propagate_wave(
     targets : (t,) int32
         Once all of them are settled the wave goes on for ``overshoot`` [m] and ends; empty: the whole field.
     step : float
-        Typical weight of an edge [m], for the queue's buckets; it changes the speed only.
+        Typical weight of an edge [m]: for the queue's buckets, where it changes the speed only, and for what is near
+        the source, see ``NEAR_STEPS``.
     cancel_flag : (1,) uint8
         Polled; nonzero ends the call.
 
