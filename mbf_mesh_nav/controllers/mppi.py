@@ -5,7 +5,7 @@ motion model (differential or Ackermann). Known failure: a local method with a h
 out of a pocket deeper than that only a new plan leads. An Ackermann robot cannot mend its heading
 where it stands; it comes in on a curve along the goal's heading, if there is room for one.
 Cost: about 3 ms a cycle with 400 samples of 30 steps; so many times more as a step is longer than half
-an edge of the mesh.
+the shortest edge of the mesh, or than 0.05 m if that is more.
 
 Method: Williams et al., "Information theoretic MPC for model-based reinforcement learning", ICRA 2017, algorithm 2,
 with noise that partly lasts and partly changes, and a last check that the blended motion itself is free.
@@ -88,6 +88,7 @@ class MPPIController(MeshController):
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
+        self._shortest_edge = float(self.mesh_map.neighbour_lengths.min())
         self._hardness_of: tuple[int, float] = (-1, 0.0)  # version of the map and cost limit
         self._hardness: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
 
@@ -261,11 +262,12 @@ class MPPIController(MeshController):
     def _pieces_of_a_step(self) -> int:
         """Into how many pieces a step is cut, so that none leads from one side of a thin wall to the other.
 
-        Forbidden is the ground half an edge on both sides of a row of lethal vertices.
+        Forbidden is the ground half an edge on both sides of a row of lethal vertices; the row may run where the mesh
+        is finest.
         """
         p = self.parameters
         stride = max(p.max_lin_velocity, -p.min_lin_velocity) * p.step_time
-        return math.ceil(stride / max(0.5 * self.mesh_map.topology.mean_edge_length, _LEAST_STRIDE))
+        return math.ceil(stride / max(0.5 * self._shortest_edge, _LEAST_STRIDE))
 
     def _blocked(self) -> NDArray[np.bool_]:
         """Vertices (V,) no curve may come near."""

@@ -9,6 +9,7 @@ from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_mesh_nav.controllers.mppi import MPPIController
+from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 
 
@@ -140,8 +141,17 @@ def test_it_tells_what_it_means_to_drive_next_with_the_turns_of_a_car_as_yaw_rat
         assert (np.abs(motion.velocities[:, 2]) <= limit + 1e-9).all()
 
 
-def test_a_wall_thinner_than_a_step_is_not_jumped_over(make_plugin, plain, paint):
-    mesh_map = paint(plain(spacing=0.1), lambda v: np.where(np.abs(v[:, 0] - 3.0) < 0.06, np.inf, 0.0))
+def coarse_with_a_fine_strip():
+    """A flat mesh of 6 m x 6 m with edges of 1 m and, around x = 3 m, of 0.06 m."""
+    xs = np.concatenate([np.arange(3.0), 3.0 + 0.06 * np.arange(-5, 6), np.arange(4.0, 7.0)])
+    grid = MeshMap.from_heights(np.zeros((7, len(xs))), 1.0, 1.0)
+    return MeshMap.from_arrays(np.column_stack([xs[grid.vertices[:, 0].astype(int)], grid.vertices[:, 1:]]), grid.faces)
+
+
+@pytest.mark.parametrize("refined", [False, True])
+def test_a_wall_thinner_than_a_step_is_not_jumped_over(make_plugin, plain, paint, refined):
+    mesh_map = coarse_with_a_fine_strip() if refined else plain(spacing=0.1)
+    paint(mesh_map, lambda v: np.where(np.abs(v[:, 0] - 3.0) < 0.01, np.inf, 0.0))
     controller = make_plugin(MPPIController, mesh_map, step_time=0.5, horizon_steps=8, max_lin_velocity=2.0)
     controller.set_plan(straight_path())
     pose = Pose.planar(1.0, 3.0)
