@@ -74,10 +74,10 @@ def spread_from(
     finished : bool
         False if cancelled.
     """
-    distances, predecessors, seeds = seeded_arrays(mesh_map, blocked, source, snapshot.costs)
+    distances, predecessors, seeds = seeded_arrays(mesh_map, blocked, source, snapshot)
     targets, offsets = NO_TARGETS, NO_OFFSETS
     if target is not None:
-        targets, offsets = corner_distances(mesh_map, blocked, target, snapshot.costs)
+        targets, offsets = corner_distances(mesh_map, blocked, target, snapshot)
     finished = propagate_distances(
         mesh_map.neighbour_offsets,
         mesh_map.neighbours,
@@ -98,16 +98,16 @@ def seeded_arrays(
     mesh_map: MeshMap,
     blocked: NDArray[np.bool_],
     source: SurfacePoint,
-    costs: NDArray[np.float32] | None = None,
+    snapshot: MeshSnapshot | None = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
     """Start state of a search from a surface point: distances (V,), predecessors (V,), seed vertices.
 
-    ``costs`` (V,) weigh the ways to the seeds, see ``corner_distances``.
+    A ``snapshot`` weighs the ways to the seeds, see ``corner_distances``.
     """
     vertex_count = len(mesh_map.vertices)
     distances = np.full(vertex_count, np.inf, dtype=np.float32)
     predecessors = np.full(vertex_count, -1, dtype=np.int32)
-    seeds, offsets = corner_distances(mesh_map, blocked, source, costs)
+    seeds, offsets = corner_distances(mesh_map, blocked, source, snapshot)
     distances[seeds] = offsets
     return distances, predecessors, seeds
 
@@ -131,9 +131,7 @@ def vertex_path_leg(
     start, goal = query.start, query.goal
     if start.face == goal.face:
         return straight_leg(mesh_map, query)
-    corners, offsets = corner_distances(
-        mesh_map, query.blocked, start if rooted_at_goal else goal, query.snapshot.costs
-    )
+    corners, offsets = corner_distances(mesh_map, query.blocked, start if rooted_at_goal else goal, query.snapshot)
     total, best = min(zip((distances[corners] + offsets).tolist(), corners.tolist(), strict=True), default=(np.inf, -1))
     if total == np.inf:
         return None

@@ -27,7 +27,7 @@ def cost_along(
         goal have, do not count.
     """
     lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    if mesh_map.edge_cost_factor == 0.0:
+    if snapshot.edge_cost_factor == 0.0:
         return float(lengths.sum())
     middles = (positions[1:] + positions[:-1]) / 2.0
     corners = mesh_map.faces[point_faces[1:]]
@@ -41,4 +41,4 @@ def cost_along(
     finite = np.isfinite(corner_costs)
     costs = np.sum(weights * np.where(finite, corner_costs, 0.0), axis=1)
     costs /= np.maximum(np.sum(np.where(finite, weights, 0.0), axis=1), 1e-9)
-    return float(np.sum(lengths * (1.0 + mesh_map.edge_cost_factor * costs)))
+    return float(np.sum(lengths * (1.0 + snapshot.edge_cost_factor * costs)))

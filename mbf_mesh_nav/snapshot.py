@@ -32,12 +32,15 @@ class MeshSnapshot:
         Vertices no plan may touch.
     edge_weights : (2E,) float32
         Aligned with ``MeshMap.neighbours``: length plus collected cost, +inf at lethal vertices.
+    edge_cost_factor : float
+        How much a cost of 1 lengthens an edge, in lengths.
     """
 
     version: int
     costs: CostArray
     lethal: LethalArray
     edge_weights: CostArray
+    edge_cost_factor: float
 
     def __post_init__(self) -> None:
         for array in (self.costs, self.lethal, self.edge_weights):
@@ -114,4 +117,4 @@ class SnapshotSeries:
         factor = float(self._edge_cost_factor)
         show_changes(*graph, costs, lethal, factor, outdated, now.costs, now.lethal, now.edge_weights)
         self._version += 1
-        return MeshSnapshot(self._version, now.costs.view(), now.lethal.view(), now.edge_weights.view())
+        return MeshSnapshot(self._version, now.costs.view(), now.lethal.view(), now.edge_weights.view(), factor)

@@ -65,19 +65,20 @@ def on_surface(
 
 
 def corner_distances(
-    mesh_map: MeshMap, blocked: NDArray[np.bool_], point: SurfacePoint, costs: NDArray[np.float32] | None = None
+    mesh_map: MeshMap, blocked: NDArray[np.bool_], point: SurfacePoint, snapshot: MeshSnapshot | None = None
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Free corners of the point's face (k,) int32 and how far the point is from them (k,) float32 [m].
 
-    With ``costs`` (V,) the straight lines are weighted like edges, by the mean of the costs at both ends; corners of
-    infinite cost do not count for the point's own. At a vertex that makes a line the edge.
+    With a ``snapshot`` the straight lines are weighted like its edges, by the mean of the costs at both ends; corners
+    of infinite cost do not count for the point's own. At a vertex that makes a line the edge.
     """
     face = mesh_map.faces[point.face].tolist()
     corners = [corner for corner in face if not blocked[corner]]
     place = point.point.tolist()
     lengths = [math.dist(mesh_map.vertices[corner].tolist(), place) for corner in corners]
-    if costs is not None and mesh_map.edge_cost_factor > 0.0:
-        at_point, factor = _cost_at(point, [float(costs[corner]) for corner in face]), mesh_map.edge_cost_factor
+    if snapshot is not None and snapshot.edge_cost_factor > 0.0:
+        costs, factor = snapshot.costs, snapshot.edge_cost_factor
+        at_point = _cost_at(point, [float(costs[corner]) for corner in face])
         lengths = [
             length * (1.0 + factor * 0.5 * (at_point + float(costs[corner])))
             for length, corner in zip(lengths, corners, strict=True)

@@ -127,7 +127,7 @@ class WaveSearch:
         weights = self._take_weights(query)
         if weights is None:
             return None
-        distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal, query.snapshot.costs)
+        distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal, query.snapshot)
         if len(seeds) == 1:
             seeds = self._seed_around(query, int(seeds[0]), distances, predecessors)
         cut_records = np.full(len(distances), ALONG_EDGE, dtype=np.int32)

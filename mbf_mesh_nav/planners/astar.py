@@ -19,8 +19,8 @@ class AStarPlanner(SurfacePlanner):
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Search from the start's corners to the goal's corners."""
         mesh_map = self.mesh_map
-        distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.start, query.snapshot.costs)
-        targets, offsets = corner_distances(mesh_map, query.blocked, query.goal, query.snapshot.costs)
+        distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.start, query.snapshot)
+        targets, offsets = corner_distances(mesh_map, query.blocked, query.goal, query.snapshot)
         visits = search_towards(
             mesh_map.vertices,
             mesh_map.neighbour_offsets,

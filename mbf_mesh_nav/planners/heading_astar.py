@@ -78,7 +78,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         allowed, roll = self._tilt()
         if query.start.face == query.goal.face and self._may_drive_straight(query, allowed):
             return straight_leg(mesh_map, query)
-        targets = corner_distances(mesh_map, query.blocked, query.goal, query.snapshot.costs)
+        targets = corner_distances(mesh_map, query.blocked, query.goal, query.snapshot)
         best, cost, _, predecessors = self._search(query, allowed, roll, *targets)
         if best < 0:
             self._tilt_at_ends = self._describe_ends(query, allowed)
@@ -114,7 +114,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         distances = np.full(HEADINGS * len(mesh_map.vertices), np.inf, dtype=np.float32)
         predecessors = np.full(len(distances), -1, dtype=np.int32)
         heading = 0 if query.start_pose is None else heading_index(query.start_pose.yaw)
-        corners, offsets = corner_distances(mesh_map, query.blocked, query.start, query.snapshot.costs)
+        corners, offsets = corner_distances(mesh_map, query.blocked, query.start, query.snapshot)
         seeds = corners * np.int32(HEADINGS) + np.int32(heading)
         distances[seeds] = offsets
         best, cost = search_with_heading(

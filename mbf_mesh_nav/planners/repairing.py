@@ -76,7 +76,7 @@ class RepairingPlanner(SurfacePlanner):
 
     def _changes_since(self, wave: RememberedWave, query: LegQuery) -> NDArray[np.int32] | None:
         """Vertices that changed since the wave; None if it leads elsewhere, or nobody remembers what changed."""
-        roots, offsets = corner_distances(self.mesh_map, query.blocked, query.goal, query.snapshot.costs)
+        roots, offsets = corner_distances(self.mesh_map, query.blocked, query.goal, query.snapshot)
         same_source = (
             wave.goal == query.goal.point.tolist()
             and wave.roots.tolist() == roots.tolist()
@@ -87,8 +87,8 @@ class RepairingPlanner(SurfacePlanner):
         return self.mesh_map.changes_between(wave.version, query.snapshot.version)
 
     def _new_wave(self, query: LegQuery) -> RememberedWave:
-        costs = query.snapshot.costs
-        distances, predecessors, seeds = seeded_arrays(self.mesh_map, query.blocked, query.goal, costs)
+        snapshot = query.snapshot
+        distances, predecessors, seeds = seeded_arrays(self.mesh_map, query.blocked, query.goal, snapshot)
         goal, version = query.goal.point.tolist(), query.snapshot.version
         return RememberedWave(
             goal, self.parameters.cost_limit, version, seeds, distances[seeds], distances, predecessors

@@ -61,6 +61,21 @@ def test_a_plan_between_vertices_costs_what_networkx_finds(graph_planner, make_p
             assert result.cost == pytest.approx(networkx.dijkstra_path_length(graph, start, goal), rel=1e-5)
 
 
+def test_a_plan_costs_what_the_map_of_its_start_says_though_that_changes_meanwhile(make_plugin, paint):
+    mesh_map = paint(MeshMap.from_heights(np.zeros((11, 11)), 0.5, 0.5), lambda v: np.full(len(v), 0.5), 1.0)
+    planner = make_plugin(DijkstraPlanner, mesh_map)
+    request = PlanRequest(Pose.planar(0.2, 0.2), Pose.planar(4.7, 4.6))
+    expected = planner.make_plan(request).cost
+    find_leg = planner.find_leg
+
+    def find_late(query):
+        mesh_map.set_edge_cost_factor(50.0)
+        return find_leg(query)
+
+    planner.find_leg = find_late
+    assert planner.make_plan(request).cost == pytest.approx(expected)
+
+
 def test_start_and_goal_in_one_face_give_two_poses(planner_class, make_plugin, plain):
     request = PlanRequest(Pose.planar(1.02, 1.02), Pose.planar(1.05, 1.03, 1.0))
     result = make_plugin(planner_class, plain()).make_plan(request)
