@@ -160,6 +160,7 @@ def report(rows: list[Row], folder: FilePath) -> None:
     """Write the counts as a table, and success over difficulty as a picture with one line per method."""
     from matplotlib.figure import Figure
 
+    folder.mkdir(parents=True, exist_ok=True)
     table = by_place(rows)
     with (folder / "outdoor_evaluation.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, table[0], lineterminator="\n")
