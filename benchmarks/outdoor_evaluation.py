@@ -168,10 +168,11 @@ def report(rows: list[Row], folder: FilePath) -> None:
         writer.writerows(table)
     figure = Figure(figsize=(9.0, 4.5), layout="constrained")
     axes = figure.subplots()
-    for method in dict.fromkeys(line["method"] for line in table):
+    for number, method in enumerate(dict.fromkeys(line["method"] for line in table)):
         lines = [line for line in table if line["method"] == method and line["with_route"]]
         share = [100.0 * line["arrived"] / line["with_route"] for line in lines]
-        axes.plot([line["terrain"] for line in lines], share, marker="o", label=method)
+        style = ("-", "--", ":", "-.")[number % 4]  # lines that lie upon each other show through
+        axes.plot([line["terrain"] for line in lines], share, style, lw=2.5 - 0.2 * number, marker="o", label=method)
     axes.set(ylabel="arrived [%], where a route exists", ylim=(-3, 103))
     axes.tick_params(axis="x", rotation=60)
     axes.legend()
