@@ -82,13 +82,10 @@ def next_bucket(
 
     The size is 0 if nothing waits any more.
     """
-    near_size, empty, walked = Index(0), 0, 0
+    near_size, empty, is_more_ahead = Index(0), 0, False
     while near_size == Index(0) and empty < RING:
-        if walked == RING:  # a whole round and nothing was due: all that waits is farther ahead than the ring is long
-            bucket, walked = _go_to_least(heads, links, entries, bucket, inverse_width), 0
         bucket += 1
         empty += 1
-        walked += 1
         waiting = heads[Index(bucket) & _MASK]
         heads[Index(bucket) & _MASK] = EMPTY
         while waiting != EMPTY:
@@ -97,30 +94,38 @@ def next_bucket(
                 near_size = _push(near, near_size, entries[waiting])
             else:  # too far ahead when it was put in
                 _link(heads, links, Index(waiting), min(place, bucket + RING - 1))
-                empty = 0
+                is_more_ahead = True
             waiting = following
+    if near_size == Index(0) and is_more_ahead:  # a whole round and nothing was due
+        return _go_to_least(heads, links, entries, near, inverse_width)
     return bucket, near_size
 
 
 @inner_kernel
-def _go_to_least(heads: Int32Array, links: Int32Array, entries: Entries, bucket: int, inverse_width: np.float32) -> int:
-    """Sort all that waits into the ring behind the bucket before the least entry's; returns that bucket."""
-    waiting, least = Count(EMPTY), Count(2**62)
+def _go_to_least(
+    heads: Int32Array, links: Int32Array, entries: Entries, near: Entries, inverse_width: np.float32
+) -> tuple[int, int]:
+    """Fill the empty heap from the bucket of the least entry, however far ahead, and sort the others in behind it."""
+    # 1. All that waits in one list, and where the least of it belongs.
+    waiting, bucket = Count(EMPTY), Count(2**62)
     for slot in range(RING):
         entry = Count(heads[slot])
         heads[slot] = EMPTY
         while entry != EMPTY:
             following = Count(links[entry])
-            least = min(least, Count(key_of(entries[entry]) * inverse_width))
+            bucket = min(bucket, Count(key_of(entries[entry]) * inverse_width))
             links[entry] = waiting
             waiting, entry = entry, following
-    before = max(bucket, least - 1)
+    # 2. Into the heap, or into the ring that starts there.
+    near_size = Index(0)
     while waiting != EMPTY:
-        following = Count(links[waiting])
-        place = Count(key_of(entries[waiting]) * inverse_width)
-        _link(heads, links, Index(waiting), max(min(place, before + RING - 1), before + 1))
+        following, place = Count(links[waiting]), Count(key_of(entries[waiting]) * inverse_width)
+        if place <= bucket:
+            near_size = _push(near, near_size, entries[waiting])
+        else:
+            _link(heads, links, Index(waiting), min(place, bucket + RING - 1))
         waiting = following
-    return before if least < 2**62 else bucket
+    return bucket, near_size
 
 
 @inner_kernel
