@@ -4,34 +4,16 @@ import pytest
 
 from mbf_abstract.actions.goals import ExePathGoal
 from mbf_abstract.actions.handle import GoalStatus
-from mbf_abstract.events import EventKind
 from mbf_abstract.execution.arrival import ArrivalCheck
 from mbf_abstract.execution.controller import ControllerExecution, Plan
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome as Outcome
 from mbf_abstract.plugins import ControlResult, PluginKind
-from mbf_abstract.robot import Odometry
 from mbf_abstract.testing.faulty import drive, nan_command, no_command, slow
-from mbf_abstract.testing.scripted import ScriptedController
 
 FAILS = ControlResult(Outcome.BLOCKED_PATH, "a chair")
 FAILS_BUT_DRIVES = ControlResult(Outcome.BLOCKED_PATH, "a chair", Twist.planar(0.1))
-
-
-@pytest.fixture
-def make_bench(make_bench):
-    """F286: after whatever end, the robot is told to stand."""
-    made = []
-
-    def make(*args, **parameters):
-        made.append(make_bench(*args, **parameters))
-        return made[-1]
-
-    yield make
-    for bench in made:
-        bench.clock.sleep(1.0)
-        assert bench.robot.command.is_stopped()
 
 
 def end_state(states, bench):
@@ -342,139 +324,3 @@ def test_turning_far_enough_is_progress(make_bench):
     assert not handle.done
     handle.cancel()
     handle.wait()
-
-
-# ------------------------------------------------------------------------------------------------- arrival
-def _coasting(bench, seconds):
-    """Odometry that says the robot still moves for a while after it was told to stand."""
-    real = bench.robot.odometry
-    stopped_at = []
-
-    def odometry():
-        if bench.robot.command.is_stopped() and bench.robot.commands:
-            stopped_at.append(bench.clock.now())
-            if bench.clock.now() - stopped_at[0] < seconds:
-                return Odometry(Twist.planar(0.3), bench.clock.now())
-        return real()
-
-    return odometry
-
-
-def test_with_force_stop_the_goal_succeeds_only_when_the_robot_stands(make_bench, states):
-    bench = make_bench(force_stop_at_goal=True)
-    bench.robot.odometry = _coasting(bench, 1.0)
-    bench.controller.play(drive(0.5))
-    assert bench.navigator.exe_path(bench.path_to(1.0), dist_tolerance=0.3).success
-    assert states(bench, "controller_execution")[-2:] == ["stopping", "arrived_goal"]
-
-
-def test_a_robot_that_does_not_come_to_rest_at_its_goal_is_no_success(make_bench):
-    bench = make_bench(force_stop_at_goal=True, controller_patience=2.0)
-    bench.robot.odometry = _coasting(bench, 1000.0)
-    bench.controller.play(drive(0.5))
-    result = bench.navigator.exe_path(bench.path_to(1.0), dist_tolerance=0.3)
-    assert result.outcome == Outcome.PAT_EXCEEDED
-    assert "still moves at 0.30 m/s" in result.message
-
-
-def test_without_force_stop_the_goal_succeeds_at_once_and_the_watchdog_stops_the_robot(make_bench):
-    bench = make_bench(force_stop_at_goal=False)
-    bench.controller.play(drive(0.5))
-    assert bench.navigator.exe_path(bench.path_to(1.0), dist_tolerance=0.3).success
-    assert bench.robot.command == Twist.planar(0.5)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "plugin_says", "arrives_at"),
-    [
-        ({}, True, 0.0),  # the plugin alone
-        ({}, False, None),
-        ({"mbf_tolerance_check": True}, True, 0.0),  # either
-        ({"mbf_tolerance_check": True}, False, 0.7),
-        ({"mbf_tolerance_exclusive": True}, True, 0.7),  # the tolerances alone
-        ({"mbf_tolerance_exclusive": True}, False, 0.7),
-    ],
-)
-def test_who_decides_that_the_robot_has_arrived(make_bench, parameters, plugin_says, arrives_at):
-    bench = make_bench(force_stop_at_goal=False, **parameters)
-    bench.controller.is_goal_reached = lambda pose, distance, angle: plugin_says
-    bench.controller.play(drive(0.5))
-    handle = bench.navigator.send(ExePathGoal(bench.path_to(1.0), dist_tolerance=0.3, angle_tolerance=0.1))
-    bench.clock.sleep(10.0)
-    if arrives_at is None:
-        assert not handle.done
-        handle.cancel()
-        handle.wait()
-    else:
-        assert handle.result.success
-        assert handle.result.final_pose.x == pytest.approx(arrives_at, abs=0.06)
-
-
-# F086 to F092: a goal checker's tolerances. Upstream MBF compares strictly (mbf.md 4.4), so the limit is not inside.
-@pytest.mark.parametrize(
-    ("x", "y", "yaw", "arrived"),
-    [
-        (0.0, 0.0, 0.0, True),  # F086
-        (1.0, 0.0, 0.0, False),  # F087
-        (0.0, 1.0, 0.0, False),
-        (0.0, 0.0, 1.0, False),
-        (0.25, 0.0, 0.0, False),  # F090: ours is exclusive
-        (0.25 - 1e-9, 0.0, 0.0, True),
-        (0.25 + 1e-9, 0.0, 0.0, False),  # F091
-    ],
-)
-def test_a_pose_is_inside_the_tolerances_or_not(x, y, yaw, arrived):
-    check = ArrivalCheck(Pose.planar(0.0, 0.0), 0.25, 0.25, "exclusive")
-    assert check.reached(Pose.planar(x, y, yaw), lambda: pytest.fail("the plugin is not asked")) is arrived
-
-
-def test_f088_headings_are_compared_around_the_circle():
-    assert ArrivalCheck(Pose.planar(0, 0, 3.14), 0.25, 0.25).within(Pose.planar(0, 0, -3.14))
-
-
-@pytest.mark.parametrize("velocity", [Twist.planar(1.0), Twist.planar(0.0, 1.0), Twist.planar(wz=1.0)])
-@pytest.mark.parametrize("force_stop", [True, False])
-def test_f089_speed_at_the_goal_counts_only_with_force_stop(make_bench, velocity, force_stop):
-    bench = make_bench(force_stop_at_goal=force_stop, controller_patience=1.0)
-    bench.robot.odometry = lambda: Odometry(velocity, bench.clock.now())
-    assert bench.navigator.exe_path(Path.from_points([(0, 0, 0), (0.01, 0, 0)])).success is not force_stop
-
-
-def test_the_lease_goes_to_one_goal_only(make_bench):
-    bench = make_bench({"controller": ScriptedController, "other": ScriptedController})
-    first = bench.navigator.send(ExePathGoal(bench.path_to(9.0), controller="controller"))
-    bench.clock.sleep(0.5)
-    second = bench.navigator.send(ExePathGoal(bench.path_to(9.0), controller="other", concurrency_slot=1))
-    result = second.wait()
-    assert result.outcome == Outcome.FAILURE
-    assert "driven by exe_path controller" in result.message
-    assert not first.done
-    first.cancel()
-    first.wait()
-
-
-def test_feedback_tells_where_the_robot_is_on_its_path(make_bench):
-    bench = make_bench()
-    seen = []
-    handle = bench.navigator.send(ExePathGoal(bench.path_to(2.0)))
-    handle.add_feedback_callback(seen.append)
-    handle.wait()
-    bench.clock.sleep(0.1)
-    assert len(seen) > 50
-    middle = seen[len(seen) // 2]
-    assert middle.dist_to_goal == pytest.approx(2.0 - middle.current_pose.x, abs=0.02)
-    assert middle.distance_along_path == pytest.approx(middle.dist_to_goal, abs=0.11)
-    assert 0.0 < middle.time_to_goal < 10.0
-    assert [f.distance_along_path for f in seen] == sorted((f.distance_along_path for f in seen), reverse=True)
-    assert len(bench.events(EventKind.LEASE_GRANTED)) == 1
-
-
-def test_a_loop_ends_with_one_event_that_counts_its_cycles(make_bench):
-    bench = make_bench(controller_max_retries=-1)
-    bench.controller.play(FAILS, FAILS, drive())
-    bench.navigator.exe_path(bench.path_to(1.0))
-
-    (told,) = bench.memory.of_kind(EventKind.CONTROL_LOOP)
-    assert (told.source, told.data["failed"]) == ("controller", 2)
-    assert told.data["cycles"] == len(bench.controller.requests)
-    assert told.data["began"] < told.time
