@@ -33,6 +33,7 @@ from terrain.recorder import Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import ROBOTS
 from terrain.robots import WheeledRobot
+from terrain.run_digest import RunDigest
 from terrain.scenario import Scenario, load_scenario
 from terrain.scenario_faults import ODOMETRY, FaultSchedule
 from terrain.scenario_sensors import AnyRobot, make_ego_sensors, make_localization, make_sensors
@@ -110,13 +111,14 @@ class Bench:
         self.recorder = self._make_recorder()
         self.clock: Clock = WallClock() if wall_clock else SimClock()
         self.memory = MemorySink(maxlen=MAX_EVENTS)
-        self.events = EventBus(self.clock.now, [self.memory, *sinks])
-        clocked = ClockedRobot(self.robot, self._odometry)
+        self.digest = RunDigest(self.clock.now)
+        self.events = EventBus(self.clock.now, [self.memory, self.digest, *sinks])
+        clocked = ClockedRobot(self.robot, self._odometry, self.digest)
         on_step("building the map")
         server = server_class(config, clocked, self.clock, TransformBuffer(), self.events, self.seed)
         server.get_path.listeners.append(self._record_plan)
         self.navigator = Navigator(server)
-        self.loop = DriveLoop(self.simulation, clocked, self.localization, server, self.recorder)
+        self.loop = DriveLoop(self.simulation, clocked, self.localization, server, self.recorder, self.digest)
         self.loop.publish()
         on_step("compiling kernels (first run only)")
         server.warm_up(self.robot.pose(), self.goals[0], on_step)

@@ -132,7 +132,7 @@ def compare(
         from rich.table import Table
 
         from terrain.run_folder import read_run
-        from terrain.viewer.comparison import compare_metrics, write_comparison
+        from terrain.viewer.comparison import compare_digests, compare_metrics, write_comparison
 
         runs = read_run(left), read_run(right)
         names = (left.name, right.name) if left.name != right.name else (str(left), str(right))
@@ -140,6 +140,7 @@ def compare(
         for row in compare_metrics(runs[0][1], runs[1][1]):
             table.add_row(*map(escape, row))
         Console().print(table)
+        typer.echo(compare_digests(runs[0][1], runs[1][1]))
         with waiting("writing the page"):
             write_comparison(out, names, *runs)
     typer.echo(out.resolve())

@@ -15,6 +15,7 @@ from mbf_abstract.server import AbstractNavigationServer
 from mbf_abstract.transform import Transform
 from terrain.ego_sensors import Localization, WheelOdometryReading
 from terrain.recorder import Recorder
+from terrain.run_digest import RunDigest
 from terrain.scenario_faults import ODOMETRY, seen_from
 from terrain.simulation import SimulatedRobot, Simulation
 
@@ -34,15 +35,19 @@ class ClockedRobot:
     robot : SimulatedRobot
     measure : callable
         Returns its odometry, stamped with the world's time.
+    digest : RunDigest
+        Takes every command.
     """
 
-    def __init__(self, robot: SimulatedRobot, measure: Callable[[], Odometry]) -> None:
+    def __init__(self, robot: SimulatedRobot, measure: Callable[[], Odometry], digest: RunDigest) -> None:
         self._robot = robot
         self._measure = measure
+        self._digest = digest
         self.time_offset = 0.0
 
     def send_command(self, command: Command) -> None:
         """Hand the command to the simulated motors."""
+        self._digest.command(command)
         self._robot.send_command(command)
 
     def odometry(self) -> Odometry:
@@ -63,6 +68,8 @@ class DriveLoop:
     server : AbstractNavigationServer
         Gets the scans; its clock drives the loop.
     recorder : Recorder
+    digest : RunDigest
+        Takes the true pose after every step.
 
     Attributes
     ----------
@@ -78,12 +85,14 @@ class DriveLoop:
         localization: Localization,
         server: AbstractNavigationServer,
         recorder: Recorder,
+        digest: RunDigest,
     ) -> None:
         self._robot = robot
         self._simulation = simulation
         self._localization = localization
         self._server = server
         self._recorder = recorder
+        self._digest = digest
         self._runtime = server.runtime
         self._scans = 0
         self._odom_stamp: float | None = None
@@ -140,6 +149,7 @@ class DriveLoop:
         clock, tick = self._runtime.clock, 0
         while not self._stopped:
             self._simulation.advance_to(clock.now() - self._origin)
+            self._digest.pose(self._simulation.robot.pose())
             self.publish()
             if tick % TICKS_PER_SAMPLE == 0:
                 self._sample()

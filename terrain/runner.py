@@ -2,7 +2,8 @@
 
 In the folder: ``events.jsonl``, ``metrics.json``, ``recording.npz``, ``picture.png``, ``report.html``, ``replay.html``,
 ``run.mcap``, ``navigation.yaml`` and the world's map files. On simulated time the same scenario and seed write the same
-``events.jsonl``, byte for byte; how long the run took on the wall stands in ``timing.json``.
+``events.jsonl``, byte for byte, and the same ``digest`` in ``metrics.json``, which covers poses and commands too (see
+``terrain.run_digest``); how long the run took on the wall stands in ``timing.json``.
 """
 
 from __future__ import annotations
@@ -198,7 +199,7 @@ def _write_numbers(recording: Recording, bench: Bench, wall_time: float, options
     metrics["slipped_m"] = round(bench.simulation.monitor.slipped, 6)
     metrics["broken_limits"] = broken_limits(bench.scenario.limits, metrics)
     metrics["success"] = metrics["success"] and not metrics["broken_limits"]
-    metrics["seed"] = bench.seed
+    metrics["seed"], metrics["digest"] = bench.seed, bench.digest.hexdigest()
     factor = recording.duration / wall_time if wall_time > 0.0 else 0.0
     timing = {"wall_time_s": round(wall_time, 3), "real_time_factor": round(factor, 2)}
     for name, numbers in (("metrics.json", metrics), ("timing.json", timing)):

@@ -19,7 +19,7 @@ from terrain.table1.gates import (
     no_more_hand_overs_than_plans,
     no_traffic,
     recoveries_add_up,
-    same_logs,
+    same_drives,
 )
 from terrain.table1.outdoor_stage import OUTDOOR
 from terrain.table1.statistics import (
@@ -64,7 +64,7 @@ def run_experiment(campaign: Campaign, seeds: Sequence[int], ablations: bool, on
         return {job: rows[job] for job in jobs}
 
     outdoor = campaign.world == OUTDOOR
-    gates = [same_logs(*_log_hashes(campaign, seeds, run))]
+    gates = [same_drives(*_digests(campaign, seeds, run))]
     if not outdoor:
         gates.insert(0, _gate_of_empty_world(campaign, run))
     closed = [f"{gate.name}: {gate.found}" for gate in gates if not gate.open]
@@ -89,11 +89,11 @@ def _gate_of_empty_world(campaign: Campaign, run: Callable[[Sequence[Job]], Rows
     return no_traffic(*([tally_of(row) for row in of_arm.values()] for of_arm in rows))
 
 
-def _log_hashes(campaign: Campaign, seeds: Sequence[int], run: Callable[[Sequence[Job]], Rows]) -> list[list[str]]:
-    """Return the hashes of some logs, and of the same runs again."""
+def _digests(campaign: Campaign, seeds: Sequence[int], run: Callable[[Sequence[Job]], Rows]) -> list[list[str]]:
+    """Return the digests of some runs, and of the same runs again."""
     twice = [(name, seed) for name in MAIN for seed in seeds[:GATE_SEEDS]]
     jobs = [[campaign.job(name, seed, again=again) for name, seed in twice] for again in (False, True)]
-    return [[row["log_hash"] for row in run(of_one).values()] for of_one in jobs]
+    return [[row["digest"] for row in run(of_one).values()] for of_one in jobs]
 
 
 def _gates_of_main_run(tallies: Mapping[str, Sequence[Tally]], rows: Sequence[Mapping[str, Any]]) -> list[Gate]:

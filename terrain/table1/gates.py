@@ -41,11 +41,11 @@ def no_traffic(a: Sequence[Tally], b: Sequence[Tally]) -> Gate:
     return Gate("1 no traffic: one plan a leg, no recovery, times equal within 1 %", plain and equal, " | ".join(sums))
 
 
-def same_logs(first: Sequence[str], again: Sequence[str]) -> Gate:
-    """Gate 2: the same arms and seeds, run twice, wrote the same event logs (given their hashes)."""
+def same_drives(first: Sequence[str], again: Sequence[str]) -> Gate:
+    """Gate 2: the same arms and seeds, run twice, were the same drives (given their digests)."""
     equal = len(first) == len(again) > 0 and all(x == y for x, y in zip(first, again, strict=True))
     return Gate(
-        "2 same seed twice: identical logs", equal, f"{len(first)} logs, {len(set(first) & set(again))} found again"
+        "2 same seed twice: identical drives", equal, f"{len(first)} runs, {len(set(first) & set(again))} found again"
     )
 
 

@@ -35,6 +35,7 @@ class OutdoorStage:
     def __init__(self, scenario_file: Path, conditions: Conditions, seed: int) -> None:
         self._bench = Bench(load_scenario(scenario_file), seed=seed)
         self.clock, self.events, self.memory = self._bench.clock, self._bench.events, self._bench.memory
+        self.digest = self._bench.digest
         self.navigator, self.simulation = self._bench.navigator, self._bench.simulation
         self.on_tick: list[Callable[[float], None]] = []
         self.distance = 0.0

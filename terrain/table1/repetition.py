@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.clock import wall_seconds
-from mbf_abstract.events import Event, EventKind
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
 from terrain.table1.arms import Arm, Conditions, Executive, make_executive
 from terrain.table1.counting import Tally, count
@@ -32,8 +31,8 @@ class Repetition:
     tally : Tally
     recovery_goals : int
         Recovery goals that were started, counted apart from the calls of the behaviours.
-    log_hash : str
-        Of the whole event log; equal runs have equal hashes.
+    digest : str
+        Of all poses, commands and events; equal runs have equal digests.
     track : (n, 2) float64
         Where the robot was [m], two points a second.
     wall_time : float
@@ -42,7 +41,7 @@ class Repetition:
 
     tally: Tally
     recovery_goals: int
-    log_hash: str
+    digest: str
     track: NDArray[np.float64]
     wall_time: float
 
@@ -52,7 +51,7 @@ class Repetition:
         return {
             "tally": asdict(self.tally),
             "recovery_goals": self.recovery_goals,
-            "log_hash": self.log_hash,
+            "digest": self.digest,
             "track": track,
             "wall_time": self.wall_time,
         }
@@ -88,10 +87,10 @@ def run_repetition(arm: Arm, world: Path, seed: int, legs: int | None = None) ->
         stage.on_tick.append(deadline)
         for number, goal in enumerate(stage.goals()[:legs]):
             _drive_leg(stage, executive, deadline, number, goal)
-        events = stage.memory.events
+        events, digest = stage.memory.events, stage.digest.hexdigest()
         track = np.array([(pose.x, pose.y) for pose in stage.simulation.track[::TRACK_SPACING]])
     recovery_goals = sum(event.kind is EventKind.RECOVERY for event in events)
-    return Repetition(count(events), recovery_goals, hash_of_log(events), track, wall_seconds() - started)
+    return Repetition(count(events), recovery_goals, digest, track, wall_seconds() - started)
 
 
 def _open_stage(world: Path, conditions: Conditions, seed: int) -> Stage | OutdoorStage:
@@ -111,11 +110,3 @@ def _drive_leg(stage: Stage | OutdoorStage, executive: Executive, deadline: _Dea
     stage.events.emit(
         EventKind.CUSTOM, SOURCE, what="leg_ended", leg=number, end=end, distance=distance, message=result.message
     )
-
-
-def hash_of_log(events: tuple[Event, ...]) -> str:
-    """Return the SHA-256 of the log as JSON lines."""
-    digest = hashlib.sha256()
-    for event in events:
-        digest.update(event.to_json().encode() + b"\n")
-    return digest.hexdigest()

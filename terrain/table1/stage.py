@@ -28,6 +28,7 @@ from terrain.bench import TIME_TO_END
 from terrain.floor_plan import write_map
 from terrain.occupancy import wall_triangles
 from terrain.rays import StaticRays
+from terrain.run_digest import RunDigest
 from terrain.sensors import Lidar, planar_directions
 from terrain.simulation import Simulation
 from terrain.table1.arms import Conditions
@@ -61,6 +62,8 @@ class Stage:
     navigator : Navigator
     memory : MemorySink
         The event log.
+    digest : RunDigest
+        Of every pose, command and event.
     on_tick : list of callables
         Called with the time [s] at every publication of the pose, on the simulator's thread.
     """
@@ -68,7 +71,8 @@ class Stage:
     def __init__(self, world: Table1World, conditions: Conditions, seed: int) -> None:
         self.clock = SimClock()
         self.memory = MemorySink(maxlen=MAX_EVENTS)
-        self.events = EventBus(self.clock.now, [self.memory])
+        self.digest = RunDigest(self.clock.now)
+        self.events = EventBus(self.clock.now, [self.memory, self.digest])
         self.on_tick: list[Callable[[float], None]] = []
         grid = world.grid()
         traffic = make_traffic(
@@ -138,6 +142,7 @@ class Stage:
         tick = 0
         while not self._stopped:
             self.simulation.advance_to(self.clock.now() - self._origin)
+            self.digest.pose(self.robot.pose())
             self._publish()
             self._tell_motion()
             for listener in self.on_tick:
@@ -173,6 +178,7 @@ class ClockedCarrier:
 
     def send_command(self, command: Command) -> None:
         """Hand the command to the simulated motors."""
+        self._stage.digest.command(command)
         self._stage.robot.send_command(command)
 
     def odometry(self) -> Odometry:

@@ -29,7 +29,8 @@ def comparison_html(names: tuple[str, str], left: Run, right: Run) -> str:
     parts = [
         beside(heads[0], heads[1]),
         beside(*map(report.picture, runs)),
-        "<h2>Metrics</h2>" + table(("name", *names, "difference"), compare_metrics(left[1], right[1])),
+        f"<h2>Metrics</h2><p>{compare_digests(left[1], right[1])}</p>"
+        + table(("name", *names, "difference"), compare_metrics(left[1], right[1])),
         "<h2>Over time</h2>" + beside(*(report.plots_svg(run) if len(run.times) else "" for run in runs)),
         "<h2>Actions and plugins</h2>" + beside(*(timeline_svg(run.events) for run in runs)),
         "<h2>Results of the goals, in order</h2>" + beside(*map(report.goals_table, runs)),
@@ -44,6 +45,16 @@ def compare_metrics(left: Mapping[str, Any], right: Mapping[str, Any]) -> list[t
     return [
         (name, _told(left, name), _told(right, name), _difference(left.get(name), right.get(name))) for name in names
     ]
+
+
+def compare_digests(left: Mapping[str, Any], right: Mapping[str, Any]) -> str:
+    """Say whether two runs are the same drive, bit for bit, which equal numbers in the table do not prove."""
+    digests = left.get("digest"), right.get("digest")
+    if None in digests:
+        return "digest: at least one run has none, so whether they are the same drive is not known"
+    if digests[0] == digests[1]:
+        return "digest: equal; poses, commands and events of the two runs are the same, bit for bit"
+    return "digest: differs; the two runs are not the same drive"
 
 
 def _told(metrics: Mapping[str, Any], name: str) -> str:

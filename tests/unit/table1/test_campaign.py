@@ -19,7 +19,7 @@ def work(monkeypatch, tally):
         for job in jobs:
             done.append(job.name)
             made = tally(planner=6 + job.seed)
-            yield job, {"tally": json.loads(json.dumps(made, default=vars)), "log_hash": job.name}
+            yield job, {"tally": json.loads(json.dumps(made, default=vars)), "digest": job.name}
 
     monkeypatch.setattr(campaign_module, "run_in_workers", run_all)
     return done

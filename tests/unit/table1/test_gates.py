@@ -7,7 +7,7 @@ from terrain.table1.gates import (
     no_more_hand_overs_than_plans,
     no_traffic,
     recoveries_add_up,
-    same_logs,
+    same_drives,
 )
 
 
@@ -20,9 +20,9 @@ def test_the_empty_world_gate_closes_for_anything_but_one_plan_a_leg_and_equal_t
 
 
 def test_the_log_gate_compares_run_by_run():
-    assert same_logs(["a", "b"], ["a", "b"]).open
-    assert not same_logs(["a", "b"], ["b", "a"]).open
-    assert not same_logs([], []).open
+    assert same_drives(["a", "b"], ["a", "b"]).open
+    assert not same_drives(["a", "b"], ["b", "a"]).open
+    assert not same_drives([], []).open
 
 
 def test_the_sum_gate_finds_a_recovery_that_was_counted_twice_or_is_unknown(tally):

@@ -59,3 +59,17 @@ def test_a_folder_without_a_run_is_exit_code_2(tmp_path):
     result = compare(tmp_path, tmp_path)
 
     assert result.exit_code == 2 and "recording.npz" in result.output
+
+
+def test_equal_digests_are_one_drive_and_equal_numbers_are_not(hill_recording, tmp_path):
+    for name, digest in (("first", "ab"), ("again", "ab"), ("other", "cd"), ("old", None)):
+        (tmp_path / name).mkdir()
+        hill_recording.save(tmp_path / name / "recording.npz")
+        (tmp_path / name / "metrics.json").write_text(json.dumps({"digest": digest} if digest else {}))
+
+    def told(name):
+        return compare(tmp_path / "first", tmp_path / name, "--out", tmp_path / "page.html").stdout
+
+    assert "digest: equal" in told("again") and "digest: equal" in (tmp_path / "page.html").read_text()
+    assert "digest: differs" in told("other")
+    assert "digest: at least one run has none" in told("old")
