@@ -27,6 +27,7 @@ from mbf_abstract.robot import Odometry
 from mbf_abstract.server_factory import read_config
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.transforms import TransformBuffer
+from terrain.command_delay import CommandDelay
 from terrain.drive_loop import ClockedRobot, DriveLoop, Report
 from terrain.kinematic_robot import KinematicRobot, KinematicWorld
 from terrain.recorder import Recorder
@@ -36,9 +37,10 @@ from terrain.robots import WheeledRobot
 from terrain.run_digest import RunDigest
 from terrain.scenario import Scenario, load_scenario
 from terrain.scenario_faults import ODOMETRY, FaultSchedule
+from terrain.scenario_perturbation import draw_disturbance
 from terrain.scenario_sensors import AnyRobot, make_ego_sensors, make_localization, make_sensors
 from terrain.scenario_settings import apply_settings, apply_world_settings
-from terrain.scenario_stage import set_stage
+from terrain.scenario_stage import set_stage, with_noise
 from terrain.scenario_world import ScenarioWorld
 from terrain.sensors import Sensor
 from terrain.simulation import Simulation
@@ -88,7 +90,8 @@ class Bench:
         settings: Mapping[str, str] | None = None,
     ) -> None:
         loaded = load_scenario(scenario) if isinstance(scenario, str) else scenario
-        self.scenario, self._settings = apply_world_settings(loaded, settings or {})
+        asked, self._settings = apply_world_settings(loaded, settings or {})
+        self.scenario = with_noise(asked)
         self.backend = backend or self.scenario.backend
         self.seed = self.scenario.seed if seed is None else seed
         self._temporary = tempfile.TemporaryDirectory(prefix="mbf_bench_")  # removed with the bench, used or not
@@ -113,7 +116,8 @@ class Bench:
         self.memory = MemorySink(maxlen=MAX_EVENTS)
         self.digest = RunDigest(self.clock.now)
         self.events = EventBus(self.clock.now, [self.memory, self.digest, *sinks])
-        clocked = ClockedRobot(self.robot, self._odometry, self.digest)
+        delay = CommandDelay(self.world.physics, self.robot.send_command, self.scenario.perturb.command_delay)
+        clocked = ClockedRobot(delay, self._odometry, self.digest)
         on_step("building the map")
         server = server_class(config, clocked, self.clock, TransformBuffer(), self.events, self.seed)
         server.get_path.listeners.append(self._record_plan)
@@ -151,18 +155,20 @@ class Bench:
         self.close()
 
     def _make_simulation(self) -> tuple[AnyRobot, Simulation]:
-        pose, spec, physics = self.world.pose_of(self.scenario.start), ROBOTS[self.scenario.robot], self.world.physics
+        spec, physics = ROBOTS[self.scenario.robot], self.world.physics
+        disturbance = draw_disturbance(self.scenario.perturb, self.seed)
+        pose = disturbance.moved(self.scenario.start, self.world.pose_of)
         robot: AnyRobot
         if isinstance(physics, KinematicWorld):
             robot = KinematicRobot(physics, spec, pose)
         else:
-            robot = WheeledRobot(physics, spec, pose)
+            robot = WheeledRobot(physics, spec, pose, friction=disturbance.friction, mass_factor=disturbance.mass)
         robot.settle()
         sensors: dict[str, Sensor[Any]] = {
             **make_sensors(self.scenario.sensors, robot, self.world, self.seed),
             **make_ego_sensors(self.scenario, robot, self.seed),
         }
-        self.localization = make_localization(robot, self.seed)
+        self.localization = make_localization(self.scenario.localization, robot, self.seed)
         self.faults = FaultSchedule(self.world.physics, sensors, self.localization, self.scenario.faults)
         return robot, Simulation(self.world.physics, robot, sensors)
 

@@ -17,7 +17,7 @@ from terrain.ego_sensors import Localization, WheelOdometryReading
 from terrain.recorder import Recorder
 from terrain.run_digest import RunDigest
 from terrain.scenario_faults import ODOMETRY, seen_from
-from terrain.simulation import SimulatedRobot, Simulation
+from terrain.simulation import Simulation
 
 PERIOD = 1.0 / 60.0  # s between two publications of the robot's pose
 TICKS_PER_SAMPLE = 6  # 10 samples a second are recorded and reported
@@ -32,15 +32,16 @@ class ClockedRobot:
 
     Parameters
     ----------
-    robot : SimulatedRobot
+    send : callable
+        Takes the commands for its motors.
     measure : callable
         Returns its odometry, stamped with the world's time.
     digest : RunDigest
         Takes every command.
     """
 
-    def __init__(self, robot: SimulatedRobot, measure: Callable[[], Odometry], digest: RunDigest) -> None:
-        self._robot = robot
+    def __init__(self, send: Callable[[Command], None], measure: Callable[[], Odometry], digest: RunDigest) -> None:
+        self._send = send
         self._measure = measure
         self._digest = digest
         self.time_offset = 0.0
@@ -48,7 +49,7 @@ class ClockedRobot:
     def send_command(self, command: Command) -> None:
         """Hand the command to the simulated motors."""
         self._digest.command(command)
-        self._robot.send_command(command)
+        self._send(command)
 
     def odometry(self) -> Odometry:
         """Measured velocity; the stamp is the clock's time, not the simulation's."""

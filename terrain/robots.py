@@ -46,9 +46,21 @@ class WheeledRobot:
         Where base_link shall stand on the ground; the robot is dropped from a little above (see ``settle``).
     command_timeout : float
         Motors stop this long [s of the world] after the last command; ``math.inf`` keeps driving.
+    friction : float
+        Coefficient of the wheels on ground of coefficient 1.
+    mass_factor : float
+        How many times as heavy as its model the robot is, in every part.
     """
 
-    def __init__(self, world: BulletWorld, spec: RobotSpec, pose: Pose, command_timeout: float = 0.5) -> None:
+    def __init__(
+        self,
+        world: BulletWorld,
+        spec: RobotSpec,
+        pose: Pose,
+        command_timeout: float = 0.5,
+        friction: float = 1.0,
+        mass_factor: float = 1.0,
+    ) -> None:
         self.world = world
         self.spec = spec
         self.command_timeout = command_timeout
@@ -70,7 +82,8 @@ class WheeledRobot:
         self._p_base_com = np.array(
             self._bullet.getDynamicsInfo(self.body, BODY_LINK, physicsClientId=world.client)[3], dtype=float
         )
-        self._set_up_contacts()
+        self._set_up_contacts(friction)
+        self._weigh(mass_factor)
         world.set_group(self.body, ROBOT)
         world.before_step(self._drive_motors)
 
@@ -80,7 +93,7 @@ class WheeledRobot:
         infos = [self._bullet.getJointInfo(self.body, i, physicsClientId=self.world.client) for i in range(count)]
         return {info[1].decode(): info[0] for info in infos}
 
-    def _set_up_contacts(self) -> None:
+    def _set_up_contacts(self, friction: float) -> None:
         """Give wheels grip, casters none, and let joints that are neither driven nor steered roll freely."""
         client = self.world.client
         for name, joint in self._joints.items():
@@ -90,7 +103,7 @@ class WheeledRobot:
             self._bullet.changeDynamics(
                 self.body,
                 joint,
-                lateralFriction=1.0,
+                lateralFriction=friction,
                 anisotropicFriction=list(self.spec.wheel_friction),
                 physicsClientId=client,
             )
@@ -98,6 +111,18 @@ class WheeledRobot:
                 self._bullet.setJointMotorControl2(
                     self.body, joint, self._bullet.VELOCITY_CONTROL, force=0, physicsClientId=client
                 )
+
+    def _weigh(self, factor: float) -> None:
+        """Make every part ``factor`` times as heavy, and as hard to turn."""
+        if factor == 1.0:
+            return
+        client = self.world.client
+        for link in (BODY_LINK, *self._joints.values()):
+            mass, _, inertia = self._bullet.getDynamicsInfo(self.body, link, physicsClientId=client)[:3]
+            scaled = [factor * moment for moment in inertia]
+            self._bullet.changeDynamics(
+                self.body, link, mass=factor * mass, localInertiaDiagonal=scaled, physicsClientId=client
+            )
 
     def send_command(self, command: Command) -> None:
         """Hold a command until the next one or the time-out.

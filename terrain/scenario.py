@@ -18,9 +18,11 @@ from mbf_abstract.yaml_source import YamlDocument, load_yaml
 from terrain.scenario_actors import Actor
 from terrain.scenario_faults import IMU, LOCALIZATION, ODOMETRY, Fault, SensorFault
 from terrain.scenario_limits import Limits
+from terrain.scenario_noise import LocalizationNoise, MapNoise
 from terrain.scenario_obstacles import Forest, Obstacle
+from terrain.scenario_perturbation import Perturbation
 from terrain.scenario_places import Place, PlanarPose
-from terrain.scenario_world_types import LevelsWorld, MapWorld, World
+from terrain.scenario_world_types import LevelsWorld, MapWorld, TerrainWorld, World
 
 __all__ = ["MapWorld", "Obstacle", "PlanarPose", "Scenario", "Sensor", "load_scenario", "shipped_scenarios"]
 
@@ -57,6 +59,9 @@ class Scenario(ParameterModel):
         "exact", "Velocity as it is, or as turning wheels tell; then odom drifts and map -> odom corrects it."
     )
     imu: bool = parameter(False, "Whether it has an IMU, for scripts: simulation.latest['imu'] is the tilt.")
+    localization: LocalizationNoise = parameter(LocalizationNoise(), "Noise of the pose; none = it is exact.")
+    map: MapNoise = parameter(MapNoise(), "What is wrong with the map; nothing = it is the world itself.")
+    perturb: Perturbation = parameter(Perturbation(), "What each run may change, drawn from its seed.")
     obstacles: tuple[Obstacle, ...] = parameter((), "Things that are on no map.")
     forests: tuple[Forest, ...] = parameter((), "Posts that are on no map, drawn from the seed.")
     actors: tuple[Actor, ...] = parameter((), "What moves by itself.")
@@ -120,6 +125,9 @@ def _find_contradictions(scenario: Scenario, document: YamlDocument) -> list[Fin
             findings.append(document.finding(("navigation", backend), "a configuration file", f"no file {file}"))
     if scenario.physics == "kinematic" and isinstance(scenario.world, LevelsWorld):
         findings.append(document.finding(("physics",), "bullet, for a world with several levels", scenario.physics))
+    if scenario.map.spacing is not None and not isinstance(scenario.world, TerrainWorld):
+        expected = f"no spacing, which only maps of open ground have (a world of type {scenario.world.type} has none)"
+        findings.append(document.finding(("map", "spacing"), expected, f"{scenario.map.spacing:g}"))
     sensors = [*(sensor.name for sensor in scenario.sensors), *ego_sensors(scenario), LOCALIZATION]
     for index, fault in enumerate(scenario.faults):
         if isinstance(fault, SensorFault) and fault.sensor not in sensors:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from typing import Any
 
@@ -13,6 +14,7 @@ from terrain.kinematic_robot import KinematicRobot
 from terrain.rays import MovingRays, RayCaster, StaticRays
 from terrain.robots import WheeledRobot
 from terrain.scenario_faults import IMU, LOCALIZATION, ODOMETRY
+from terrain.scenario_noise import LocalizationNoise
 from terrain.scenario_world import ScenarioWorld
 from terrain.sensors import Lidar, Sensor, camera_directions, planar_directions, ring_directions
 from terrain.upright_solids import SolidRays
@@ -38,9 +40,16 @@ def make_ego_sensors(scenario: model.Scenario, robot: AnyRobot, seed: int) -> di
     return {name: makers[name](robot, _generator(seed, name)) for name in model.ego_sensors(scenario)}
 
 
-def make_localization(robot: AnyRobot, seed: int) -> Localization:
-    """Make the localisation of a robot: exact until a fault of the scenario says otherwise."""
-    return Localization(robot, _generator(seed, LOCALIZATION))
+def make_localization(noise: LocalizationNoise, robot: AnyRobot, seed: int) -> Localization:
+    """Make the localisation of a robot, which is as noisy as the scenario says."""
+    return Localization(
+        robot,
+        _generator(seed, LOCALIZATION),
+        position_noise=noise.position_noise,
+        yaw_noise=math.radians(noise.yaw_noise),
+        height_noise=noise.height_noise,
+        tilt_noise=math.radians(noise.tilt_noise),
+    )
 
 
 def _generator(seed: int, name: str) -> np.random.Generator:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 
+from terrain.map_files import MapFiles
 from terrain.recording import Surface
 from terrain.scenario import Scenario
 from terrain.scenario_actors import add_actors
@@ -13,7 +15,7 @@ from terrain.scenario_obstacles import add_obstacles
 from terrain.scenario_places import coordinates
 from terrain.scenario_world import ScenarioWorld, build_world
 
-WORLD_STREAM, FOREST_STREAM, ACTOR_STREAM = 1, 2, 3  # each part draws from its own generator
+WORLD_STREAM, FOREST_STREAM, ACTOR_STREAM, MAP_STREAM = 1, 2, 3, 4  # each part draws from its own generator
 
 
 def set_stage(scenario: Scenario, folder: Path, seed: int) -> tuple[ScenarioWorld, Surface | None]:
@@ -27,7 +29,8 @@ def set_stage(scenario: Scenario, folder: Path, seed: int) -> tuple[ScenarioWorl
     """
     keep_clear = coordinates((scenario.start, *scenario.goals))
     rng, is_kinematic = np.random.default_rng([seed, WORLD_STREAM]), scenario.physics == "kinematic"
-    world = build_world(scenario.world, folder, rng, keep_clear, 1.0 / scenario.physics_rate, is_kinematic)
+    files = MapFiles(folder, scenario.map, np.random.default_rng([seed, MAP_STREAM]))
+    world = build_world(scenario.world, files, rng, keep_clear, 1.0 / scenario.physics_rate, is_kinematic)
     try:
         rng = np.random.default_rng([seed, FOREST_STREAM])
         posts = [post for forest in scenario.forests for post in forest.posts(rng, keep_clear)]
@@ -37,3 +40,14 @@ def set_stage(scenario: Scenario, folder: Path, seed: int) -> tuple[ScenarioWorl
         world.physics.close()
         raise
     return world, obstacles
+
+
+def with_noise(scenario: Scenario) -> Scenario:
+    """Return the scenario with the noise of its ``perturb`` block in its sensors and its localisation."""
+    perturb = scenario.perturb
+    sensors = tuple(
+        sensor.model_copy(update={"noise": math.hypot(sensor.noise, perturb.range_noise)})
+        for sensor in scenario.sensors
+    )
+    localization = scenario.localization.widened(perturb.pose_position, perturb.pose_angle)
+    return scenario.model_copy(update={"sensors": sensors, "localization": localization})

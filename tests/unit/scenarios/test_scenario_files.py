@@ -5,7 +5,9 @@ import pytest
 from PIL import Image
 
 from mbf_abstract.findings import ConfigError
+from terrain.map_files import MapFiles
 from terrain.scenario import load_scenario
+from terrain.scenario_noise import MapNoise
 from terrain.scenario_stage import set_stage
 from terrain.scenario_world import build_world
 from terrain.scenario_world_types import (
@@ -38,7 +40,9 @@ def scenario_file(folder, text):
 
 
 def built(world, folder, seed=0, keep_clear=NO_PLACES):
-    return build_world(world, folder, np.random.default_rng(seed), keep_clear)
+    return build_world(
+        world, MapFiles(folder, MapNoise(), np.random.default_rng(seed)), np.random.default_rng(seed), keep_clear
+    )
 
 
 def test_a_fault_of_an_unknown_sensor_is_refused_with_its_line(tmp_path):

@@ -11,12 +11,14 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.sensing import RangeScan
 from terrain.ego_sensors import Localization
 from terrain.kinematic_robot import KinematicRobot, KinematicWorld
+from terrain.map_files import MapFiles
 from terrain.mishaps import MishapKind
 from terrain.robot_models import TURTLEBOT
 from terrain.scenario import load_scenario
 from terrain.scenario_actors import Crowd, Door, OtherRobot, Walker, add_actors
 from terrain.scenario_faults import FaultSchedule, LocalizationJump, SensorFault, seen_from
 from terrain.scenario_limits import Limits, broken_limits
+from terrain.scenario_noise import MapNoise
 from terrain.scenario_settings import apply_settings, apply_world_settings
 from terrain.scenario_world import build_world
 from terrain.scenario_world_types import OfficeWorld
@@ -105,7 +107,8 @@ def test_actors_move_in_the_world_and_the_seed_draws_the_crowd(tmp_path):
     )
     places = []
     for seed in (1, 1, 2):
-        world = build_world(OfficeWorld(type="office"), tmp_path, np.random.default_rng(0), np.zeros((0, 2)))
+        rng = np.random.default_rng(0)
+        world = build_world(OfficeWorld(type="office"), MapFiles(tmp_path, MapNoise(), rng), rng, np.zeros((0, 2)))
         before = world.physics.bullet.getNumBodies(physicsClientId=world.physics.client)
         add_actors(world, actors, np.random.default_rng(seed))
         for _ in range(240):
