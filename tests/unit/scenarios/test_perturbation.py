@@ -16,6 +16,7 @@ from terrain.mishaps import tilt_of
 from terrain.occupancy import OccupancyGrid
 from terrain.robot_models import HUSKY, TURTLEBOT
 from terrain.robots import WheeledRobot
+from terrain.runner import RunOptions, run_scenario
 from terrain.scenario import load_scenario, shipped_scenarios
 from terrain.scenario_noise import LocalizationNoise, MapNoise
 from terrain.scenario_perturbation import Disturbance, Perturbation, draw_disturbance
@@ -194,3 +195,12 @@ def test_the_seed_changes_something_in_every_shipped_scenario(name, tmp_path):
         "pose": scenario.localization.position_noise > 0.0,
     }
     assert any(drawn.values())
+
+
+def test_two_seeds_drive_differently_on_ground_that_is_not_drawn(tmp_path):
+    scenario = load_scenario("bridge").model_copy(update={"time_limit": 2.0})
+    digests = [
+        run_scenario(scenario, RunOptions(tmp_path / str(number), seed=seed, draw=False)).metrics["digest"]
+        for number, seed in enumerate((1, 1, 2))
+    ]
+    assert digests[0] == digests[1] != digests[2]

@@ -6,6 +6,7 @@ from mbf_abstract.geometry import Twist
 from terrain.bench import Bench
 from terrain.scenario import PlanarPose, Sensor, load_scenario
 from terrain.scenario_faults import LocalizationJump, SensorFault
+from terrain.scenario_noise import LocalizationNoise
 from terrain.scenario_world_types import GeneratedWorld
 
 CAMERA = Sensor(name="camera", type="depth", rays=16, rate=5.0)
@@ -23,6 +24,7 @@ def sensing():
                 "goals": (PlanarPose(x=9.0, y=5.0),),
                 "sensors": (CAMERA,),
                 "odometry": "wheels",
+                "localization": LocalizationNoise(),
                 "imu": True,
                 "faults": faults,
             }
