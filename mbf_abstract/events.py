@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import json
 import logging
-import math
 import os
 import threading
 from collections import deque
@@ -22,13 +21,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Any, Protocol, TextIO, TypeAlias
+from typing import Any, Protocol, TextIO
 
-import numpy as np
+from mbf_abstract.event_values import FLOAT_DIGITS, JsonValue, error_text, to_json_value
 
-JsonValue: TypeAlias = "bool | int | float | str | list[JsonValue] | dict[str, JsonValue] | None"
-
-FLOAT_DIGITS = 9
 DEFAULT_MEMORY_EVENTS = 10_000
 DEFAULT_MAX_FILE_BYTES = 256 * 1024 * 1024
 
@@ -98,30 +94,6 @@ class Event:
         """Read a line written by ``to_json``; raises ValueError or KeyError on any other text."""
         record = json.loads(line)
         return cls(record["time"], EventKind(record["kind"]), record["source"], record["data"])
-
-
-def to_json_value(value: Any) -> JsonValue:
-    """Turn ``value`` into plain JSON: numbers rounded to 9 decimals, arrays to lists, inf and nan to text.
-
-    A type that JSON does not know becomes its ``str``; an enum becomes its name.
-    """
-    if isinstance(value, Enum):
-        return value.name
-    if value is None or isinstance(value, (bool, str)):
-        return value
-    if isinstance(value, np.generic):
-        return to_json_value(value.item())
-    if isinstance(value, int):
-        return value
-    if isinstance(value, float):
-        return round(value, FLOAT_DIGITS) + 0.0 if math.isfinite(value) else str(value)  # + 0.0: no "-0.0"
-    if isinstance(value, Mapping):
-        return {str(key): to_json_value(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return to_json_value(value.tolist())
-    if isinstance(value, (list, tuple)):
-        return [to_json_value(item) for item in value]
-    return str(value)
 
 
 class EventSink(Protocol):
@@ -204,8 +176,8 @@ class EventBus:
             substitute.write(event)
             self._sinks.append(substitute)
         name = type(sink).__name__
-        _logger.warning("event sink %s failed and was removed: %s", name, error)
-        self.emit(EventKind.SINK_FAILED, "event_bus", sink=name, message=f"{type(error).__name__}: {error}")
+        _logger.warning("event sink %s failed and was removed: %s", name, error_text(error))
+        self.emit(EventKind.SINK_FAILED, "event_bus", sink=name, message=f"{type(error).__name__}: {error_text(error)}")
 
 
 def _close_quietly(sink: EventSink) -> None:
@@ -213,7 +185,7 @@ def _close_quietly(sink: EventSink) -> None:
     try:
         sink.close()
     except Exception as error:
-        _logger.debug("closing event sink %s failed: %s", type(sink).__name__, error)
+        _logger.debug("closing event sink %s failed: %s", type(sink).__name__, error_text(error))
 
 
 class MemorySink:

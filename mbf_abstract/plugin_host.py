@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mbf_abstract.config import PluginDeclaration, PluginSpec
+from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.runtime import Runtime
@@ -56,8 +57,8 @@ class PluginHost(ABC):
         """Construct and add a plugin; raises ServerError with the reason if its constructor fails."""
         try:
             self.plugins.add(spec.kind, self._construct(spec))
-        except Exception as error:
-            text = f"{spec.kind.name.lower()} {spec.name!r} ({spec.type_name}): {type(error).__name__}: {error}"
+        except (Exception, SystemExit) as error:
+            text = f"{spec.kind.name.lower()} {spec.name!r} ({spec.type_name}): {type(error).__name__}: {error_text(error)}"
             if not spec.optional:
                 raise ServerError(text) from error
             self.runtime.events.emit(EventKind.FAULT, "server", message=f"optional plugin left out: {text}")
@@ -109,8 +110,8 @@ class PluginHost(ABC):
         values = plugin_class.Parameters.model_validate(present)  # type: ignore[attr-defined]
         try:
             new = self._construct(replace(old.spec, plugin_class=plugin_class, parameters=values))
-        except Exception as error:
-            text = f"{kind.name.lower()} {name!r} ({old.spec.type_name}): {type(error).__name__}: {error}"
+        except (Exception, SystemExit) as error:
+            text = f"{kind.name.lower()} {name!r} ({old.spec.type_name}): {type(error).__name__}: {error_text(error)}"
             raise ServerError(text) from error
         if not old.retire():
             raise ServerError(f"{kind.name.lower()} {name!r} is in use")
@@ -151,12 +152,15 @@ class PluginHost(ABC):
         """
         plugin = self._loaded(kind, name)
         instance = plugin.instance
-        new = with_changes(instance.parameters, changes)
+        old, new = instance.parameters, with_changes(instance.parameters, changes)
         if not plugin.acquire(self, lambda: True):
             raise ServerError(f"{kind.name.lower()} {name!r} is in use")
         try:
             instance.parameters = new
             instance.parameters_changed()
+        except BaseException:
+            instance.parameters = old
+            raise
         finally:
             plugin.release(self)
         self.runtime.events.emit(EventKind.PARAMETER_CHANGED, name, **changes)

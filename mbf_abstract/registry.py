@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 
+from mbf_abstract.event_values import error_text
 from mbf_abstract.findings import suggest
 from mbf_abstract.plugins import PLUGIN_BASES, PluginKind
 
@@ -117,7 +118,7 @@ class PluginRegistry:
         module = sys.modules[self.load(group, type_name, base).__module__]
         try:
             importlib.reload(module)
-        except Exception as error:
+        except (Exception, SystemExit) as error:  # a module may call sys.exit()
             raise PluginError(_group(group), type_name, f"reload failed: {_describe(error)}") from error
         return self.load(group, type_name, base)
 
@@ -165,7 +166,7 @@ class PluginRegistry:
             raise PluginError(group, name, f"name clash between {clash}; use module:Class")
         try:
             return points[0].load()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise PluginError(group, name, f"import failed: {_describe(error)}") from error
 
     def _import_module_type(self, group: str, type_name: str) -> object:
@@ -174,7 +175,7 @@ class PluginRegistry:
         module_name, _, class_name = type_name.partition(":")
         try:
             return getattr(importlib.import_module(module_name), class_name)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise PluginError(group, type_name, f"import failed: {_describe(error)}") from error
 
     def _checked(self, group: str, type_name: str, plugin_class: object, base: type | None) -> type:
@@ -214,5 +215,5 @@ def _origin(point: EntryPoint) -> str:
     return f"{point.dist.name} {point.dist.version}" if point.dist is not None else "unknown distribution"
 
 
-def _describe(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
+def _describe(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error_text(error)}"

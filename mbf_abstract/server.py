@@ -223,7 +223,7 @@ class AbstractNavigationServer(PluginHost):
     ) -> Runtime:
         transforms = transforms or TransformBuffer(parameters.tf_cache_time)
         events = events or EventBus(clock.now)
-        supervisor = Supervisor(clock)
+        supervisor = Supervisor(clock, events)
         runtime = Runtime(
             clock=clock,
             events=events,

@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass, replace
 
 from mbf_abstract.clock import Clock, Priority
+from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventBus, EventKind
 from mbf_abstract.geometry import AckermannCommand, Command, Twist
 from mbf_abstract.robot import Robot
@@ -200,10 +201,10 @@ class VelocityGate:
         delivered = True
         try:
             self._robot.send_command(command)
-        except Exception as error:
+        except BaseException as error:  # also sys.exit() in a driver: the watchdog must live on
             delivered = False
             self._events.emit(
-                EventKind.FAULT, "robot", where="send_command", type=type(error).__name__, message=str(error)
+                EventKind.FAULT, "robot", where="send_command", type=type(error).__name__, message=error_text(error)
             )
         was_stopped = self._last_command.is_stopped(0.0, 0.0)
         if delivered or not command.is_stopped(0.0, 0.0):

@@ -13,6 +13,8 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from mbf_abstract.actions.goals import ActionResult
 from mbf_abstract.actions.handle import GoalHandle, GoalStatus
+from mbf_abstract.clock import ThreadDetached
+from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import PluginGone
 from mbf_abstract.execution.plugin_run import Abandoned
@@ -50,11 +52,14 @@ class GoalJob(Generic[G, R, F]):
             pass  # the goal has ended without this thread
         except PluginGone as error:
             action.finish(self.handle, action.invalid_plugin_outcome, str(error))
-        except Exception as error:
+        except ThreadDetached:
+            raise  # the clock has given up on this thread
+        except BaseException as error:  # e.g. of a driver; the slot must live on
+            text = error_text(error)
             action.runtime.events.emit(
-                EventKind.FAULT, action.name, goal_id=self.handle.id, type=type(error).__name__, message=str(error)
+                EventKind.FAULT, action.name, goal_id=self.handle.id, type=type(error).__name__, message=text
             )
-            text = f"{type(error).__name__} in the framework: {error}"
+            text = f"{type(error).__name__} in the framework: {text}"
             action.finish(self.handle, action.internal_error_outcome, text)
 
     def preempt(self) -> None:

@@ -14,7 +14,7 @@ from enum import Enum
 from mbf_abstract.clock import Stopwatch
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.arrival import ArrivalCheck
-from mbf_abstract.execution.loaded_plugin import PluginFault, PluginNonFinite
+from mbf_abstract.execution.loaded_plugin import PluginFault, PluginNonFinite, checked_answer
 from mbf_abstract.execution.oscillation import OscillationDetector
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import Path, Pose, Twist
@@ -284,14 +284,10 @@ class ControllerExecution:
         controller = self._run.plugin.instance
         request = ControlRequest(pose, velocity, self._run.handle.cancel_token)
         try:
-            result = self._run.call("compute_velocity_commands", lambda: controller.compute_velocity_commands(request))
+            answer = self._run.call("compute_velocity_commands", lambda: controller.compute_velocity_commands(request))
+            result = checked_answer(answer, ControlResult, self._run.plugin.name, "compute_velocity_commands")
         except PluginNonFinite as error:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, str(error))
-        if not isinstance(result, ControlResult):
-            raise PluginFault(
-                f"plugin {self._run.plugin.name!r} returned {type(result).__name__} from compute_velocity_commands, "
-                "not ControlResult"
-            )
         if result.success and result.command is None:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, "success, but no command")
         self._last_result = result

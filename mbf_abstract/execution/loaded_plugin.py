@@ -5,12 +5,15 @@ The same instance never runs twice at once: a second goal waits for it, as long 
 
 from __future__ import annotations
 
+import numbers
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
+from mbf_abstract.clock import ThreadDetached
+from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import NonFiniteError
 from mbf_abstract.plugins import Plugin
@@ -19,8 +22,24 @@ if TYPE_CHECKING:
     from mbf_abstract.config import PluginSpec
     from mbf_abstract.execution.runtime import Runtime
 
+
+class Answer(Protocol):
+    """What the results of all plugins have."""
+
+    @property
+    def outcome(self) -> int:
+        """Outcome code."""
+
+    @property
+    def message(self) -> str:
+        """Text, may be empty."""
+
+
 P = TypeVar("P", bound=Plugin)
 T = TypeVar("T")
+A = TypeVar("A", bound=Answer)
+
+MAX_OUTCOME = 2**32 - 1  # outcomes are unsigned integers of 32 bits in ``mbf_msgs``
 
 
 class PluginFault(Exception):
@@ -104,17 +123,21 @@ class LoadedPlugin(Generic[P]):
                 result = function()
                 self._take_modelled_time(started)
                 return result
-        except Exception as error:
+        except BaseException as error:  # sys.exit() in a plugin must end its goal, not the thread of its slot
+            if isinstance(error, ThreadDetached):
+                clock.sleep(0.0)  # raises it again where the clock has given up on this thread
             self.report(goal_id, method, error)
             fault = PluginNonFinite if isinstance(error, NonFiniteError) else PluginFault
-            raise fault(f"plugin {self.name!r} raised {type(error).__name__} in {method}: {error}") from error
+            raise fault(
+                f"plugin {self.name!r} raised {type(error).__name__} in {method}: {error_text(error)}"
+            ) from error
 
     def _take_modelled_time(self, started: float) -> None:
         modelled = self.instance.modelled_compute_time
         if modelled > 0.0:
             self._runtime.clock.sleep_until(started + modelled)
 
-    def report(self, goal_id: int, method: str, error: Exception) -> None:
+    def report(self, goal_id: int, method: str, error: BaseException) -> None:
         """Record that the plugin raised, with where in its code it did."""
         frames = traceback.extract_tb(error.__traceback__)[-8:]
         self._runtime.events.emit(
@@ -123,9 +146,27 @@ class LoadedPlugin(Generic[P]):
             goal_id=goal_id,
             where=method,
             type=type(error).__name__,
-            message=str(error),
+            message=error_text(error),
             traceback=[f"{PurePath(frame.filename).name}:{frame.lineno} in {frame.name}" for frame in frames],
         )
+
+
+def checked_answer(answer: object, expected: type[A], plugin: str, method: str) -> A:
+    """Return a plugin's answer if it is a result that can be passed on; raises PluginFault if it is not."""
+    if not isinstance(answer, expected):
+        raise PluginFault(f"plugin {plugin!r} returned {type(answer).__name__} from {method}, not {expected.__name__}")
+    outcome: object = answer.outcome
+    message: object = answer.message
+    problem = ""
+    if isinstance(outcome, bool) or not isinstance(outcome, numbers.Integral):
+        problem = f"an outcome of type {type(outcome).__name__}, not an integer"
+    elif not 0 <= int(outcome) <= MAX_OUTCOME:
+        problem = f"an outcome that is not within 0 and {MAX_OUTCOME}"  # may have too many digits to be printed
+    elif not isinstance(message, str):
+        problem = f"a message of type {type(message).__name__}, not str"
+    if problem:
+        raise PluginFault(f"plugin {plugin!r} returned {problem}, from {method}")
+    return answer
 
 
 @contextmanager

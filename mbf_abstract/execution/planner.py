@@ -19,7 +19,7 @@ from __future__ import annotations
 from enum import Enum
 
 from mbf_abstract.events import EventKind
-from mbf_abstract.execution.loaded_plugin import PluginFault, plugin_events
+from mbf_abstract.execution.loaded_plugin import PluginFault, checked_answer, plugin_events
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.goal_area import GoalArea, plan_to_area
 from mbf_abstract.outcomes import GetPathOutcome
@@ -91,11 +91,8 @@ class PlannerExecution:
     def _call(self) -> PlanResult:
         planner = self._run.plugin.instance
         with plugin_events(self._runtime, self._run.handle.id, self._run.plugin.name, "make_plan") as told:
-            result = self._run.call("make_plan", lambda: self._plan_with(planner))
-            if not isinstance(result, PlanResult):
-                raise PluginFault(
-                    f"plugin {self._run.plugin.name!r} returned {type(result).__name__} from make_plan, not PlanResult"
-                )
+            answer = self._run.call("make_plan", lambda: self._plan_with(planner))
+            result = checked_answer(answer, PlanResult, self._run.plugin.name, "make_plan")
             told.update(outcome=int(result.outcome), message=result.message)
         self.last_result = result
         return result

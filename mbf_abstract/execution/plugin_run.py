@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from mbf_abstract.actions.handle import AnyGoalHandle
-from mbf_abstract.clock import Priority, Stopwatch
+from mbf_abstract.clock import Priority, Stopwatch, ThreadDetached
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.plugins import Plugin
@@ -160,7 +160,9 @@ class PluginRun(Generic[P]):
         try:
             with self.runtime.clock.guarded(f"{self.plugin.name}.cancel"):
                 self.plugin.instance.cancel()
-        except Exception as error:
+        except ThreadDetached:
+            raise
+        except BaseException as error:
             self.plugin.report(self.handle.id, "cancel", error)
 
     def _abandon(self) -> None:

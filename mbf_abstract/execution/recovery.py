@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbf_abstract.clock import Stopwatch
-from mbf_abstract.execution.loaded_plugin import PluginFault, plugin_events
+from mbf_abstract.execution.loaded_plugin import PluginFault, checked_answer, plugin_events
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
@@ -100,11 +100,7 @@ class RecoveryExecution:
         behavior = self._run.plugin.instance
         request = RecoveryRequest(self.motion, self._run.handle.cancel_token)
         with plugin_events(self._run.runtime, self._run.handle.id, self._run.plugin.name, "run_behavior") as told:
-            result = self._run.call("run_behavior", lambda: behavior.run_behavior(request))
-            if not isinstance(result, RecoveryResult):
-                raise PluginFault(
-                    f"plugin {self._run.plugin.name!r} returned {type(result).__name__} from run_behavior, "
-                    "not RecoveryResult"
-                )
+            answer = self._run.call("run_behavior", lambda: behavior.run_behavior(request))
+            result = checked_answer(answer, RecoveryResult, self._run.plugin.name, "run_behavior")
             told.update(outcome=int(result.outcome), message=result.message)
         return result

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbf_abstract.execution.loaded_plugin import PluginFault, plugin_events
+from mbf_abstract.execution.loaded_plugin import PluginFault, checked_answer, plugin_events
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import Path
 from mbf_abstract.outcomes import RefinePathOutcome
@@ -50,11 +50,7 @@ class RefinerExecution:
         refiner = self._run.plugin.instance
         token = self._run.handle.cancel_token
         with plugin_events(self._run.runtime, self._run.handle.id, self._run.plugin.name, "apply_refinement") as told:
-            result = self._run.call("apply_refinement", lambda: refiner.apply_refinement(self._path, token))
-            if not isinstance(result, RefineResult):
-                raise PluginFault(
-                    f"plugin {self._run.plugin.name!r} returned {type(result).__name__} from apply_refinement, "
-                    "not RefineResult"
-                )
+            answer = self._run.call("apply_refinement", lambda: refiner.apply_refinement(self._path, token))
+            result = checked_answer(answer, RefineResult, self._run.plugin.name, "apply_refinement")
             told.update(outcome=int(result.outcome), message=result.message)
         return result

@@ -1,7 +1,8 @@
 """One thread that looks after all running plugin calls: patience, and the grace after a cancel.
 
 A *watch* is a function that does what is due and answers in how many seconds it wants to be asked again (None =
-never). It runs on the supervisor's thread and must be short.
+never). It runs on the supervisor's thread and must be short. A check that raises (no more threads can be made, say) is
+reported and asked again a little later: all promises of an end rest on this thread.
 """
 
 from __future__ import annotations
@@ -9,8 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from mbf_abstract.clock import Clock, Priority
+from mbf_abstract.event_values import error_text
+from mbf_abstract.events import EventBus, EventKind
 
 Check = Callable[[], float | None]
+
+RETRY = 0.1  # s until a check that has raised is asked again
 
 
 class Watch:
@@ -26,8 +31,9 @@ class Watch:
 class Supervisor:
     """Runs checks at the times they ask for."""
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, events: EventBus) -> None:
         self._clock = clock
+        self._events = events
         self._condition = clock.condition()
         self._watches: list[Watch] = []
         self._wake_at = float("inf")
@@ -72,11 +78,19 @@ class Supervisor:
                 return
             for watch in due:
                 watch.due = float("inf")
-                again = watch.check()
+                again = self._ask(watch)
                 if again is None:
                     self.stop(watch)
                 else:
                     self._ask_again(watch, again)
+
+    def _ask(self, watch: Watch) -> float | None:
+        try:
+            return watch.check()
+        except BaseException as error:
+            text = error_text(error)
+            self._events.emit(EventKind.FAULT, "supervisor", type=type(error).__name__, message=text)
+            return RETRY
 
     def _ask_again(self, watch: Watch, seconds: float) -> None:
         with self._condition:  # a poke that came during the check has set an earlier time: keep it

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from mbf_abstract.clock import Clock, Priority
+from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventBus, EventKind
 
 
@@ -32,8 +33,8 @@ class Ticker:
         while not self._stopped:
             try:
                 self._task()
-            except Exception as error:
-                self._events.emit(EventKind.FAULT, self._name, type=type(error).__name__, message=str(error))
+            except BaseException as error:  # also a layer's sys.exit()
+                self._events.emit(EventKind.FAULT, self._name, type=type(error).__name__, message=error_text(error))
             due = max(due + self._period, self._clock.now())
             with self._condition:
                 while not self._stopped and self._clock.now() < due - 1e-9:

@@ -1,14 +1,22 @@
 """Fault table, row 3: a planner "succeeds" with a path that cannot be followed."""
 
+from dataclasses import replace
+
 import pytest
 
 from mbf_abstract.actions.goals import GetPathGoal
+from mbf_abstract.events import EventKind, JsonLinesSink, read_events
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome, is_success
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing import faulty
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
+from mbf_abstract.testing.scripted import straight_plan
+
+
+def outcome(code, message="found"):
+    return lambda request: replace(straight_plan(request), outcome=code, message=message)
 
 
 @pytest.mark.parametrize(
@@ -22,6 +30,11 @@ from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_w
         (faulty.path_that_starts_elsewhere, GetPathOutcome.INTERNAL_ERROR, "pose 0 of the path is 5.00 m"),
         (lambda request: None, GetPathOutcome.INTERNAL_ERROR, "returned NoneType from make_plan"),
         (lambda request: (0, "found"), GetPathOutcome.INTERNAL_ERROR, "returned tuple from make_plan"),
+        (outcome(10**5000), GetPathOutcome.INTERNAL_ERROR, "an outcome that is not within 0 and 4294967295"),
+        (outcome(-1), GetPathOutcome.INTERNAL_ERROR, "an outcome that is not within 0 and 4294967295"),
+        (outcome(False), GetPathOutcome.INTERNAL_ERROR, "an outcome of type bool, not an integer"),
+        (outcome("0"), GetPathOutcome.INTERNAL_ERROR, "an outcome of type str, not an integer"),
+        (outcome(0, None), GetPathOutcome.INTERNAL_ERROR, "a message of type NoneType, not str"),
     ],
 )
 def test_a_lie_becomes_a_failure_that_names_it(lie, outcome, text):
@@ -40,3 +53,16 @@ def test_an_outcome_of_another_action_does_not_pass_as_success():
     with Bench(planner_max_retries=0) as bench:
         bench.planner.play(PlanResult(999, "strange"))
         assert not is_success(bench.navigator.get_path(Pose.planar(3.0, 0.0)).outcome)
+
+
+def test_no_outcome_and_no_message_ends_the_record_of_the_run(tmp_path):
+    with Bench() as bench:
+        bench.bus.add_sink(JsonLinesSink(tmp_path / "events.jsonl"))
+        huge = "x" * 30_000_000
+        bench.planner.play(outcome(10**5000), outcome(0, huge), RuntimeError(huge), straight_plan)
+        for _ in range(4):
+            bench.navigator.get_path(Pose.planar(3.0, 0.0))
+        bench.bus.close()
+        ends = [event for event in read_events(tmp_path / "events.jsonl") if event.kind is EventKind.GOAL_FINISHED]
+        assert [event.data["outcome"] for event in ends] == [62, 0, 62, 0]
+        assert (tmp_path / "events.jsonl").stat().st_size < 100_000

@@ -29,6 +29,11 @@ class BrokenConstructor(ScriptedPlanner):
         raise RuntimeError("no licence")
 
 
+class ConstructorThatExits(ScriptedPlanner):
+    def __init__(self, context):
+        raise SystemExit("no licence")
+
+
 def config(folder, text):
     path = folder / "robot.yaml"
     path.write_text(text)
@@ -52,9 +57,21 @@ def test_optional_plugins_are_left_out_with_their_reason(tmp_path):
     assert [skipped.name for skipped in loaded.skipped] == ["missing", "wrong_base", "unknown"]
 
 
-def test_a_raising_constructor_refuses_the_server_and_names_the_plugin():
-    with pytest.raises(ServerError, match=r"planner 'broken' \(BrokenConstructor\): RuntimeError: no licence"):
-        Bench({"broken": BrokenConstructor})
+@pytest.mark.parametrize(
+    ("plugin", "text"),
+    [(BrokenConstructor, "RuntimeError: no licence"), (ConstructorThatExits, "SystemExit: no licence")],
+)
+def test_a_raising_constructor_refuses_the_server_and_names_the_plugin(plugin, text):
+    with pytest.raises(ServerError, match=rf"planner 'broken' \({plugin.__name__}\): {text}"):
+        Bench({"broken": plugin})
+
+
+def test_a_module_that_exits_on_import_is_a_finding(tmp_path, monkeypatch):
+    (tmp_path / "a_script_without_a_main_guard.py").write_text("import sys\nsys.exit('usage: ...')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    text = "backend: none\nplanners:\n  - {name: p, type: 'a_script_without_a_main_guard:Planner'}\n"
+    with pytest.raises(ConfigError, match=r"import failed: SystemExit: usage: \.\.\."):
+        config(tmp_path, text)
 
 
 def test_after_a_refused_start_a_good_one_works():

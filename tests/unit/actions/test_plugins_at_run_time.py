@@ -107,3 +107,14 @@ def test_what_can_not_be_loaded_is_refused_with_the_reason(bench):
         load(PluginKind.PLANNER, "new", "reloaded_planner:Refuser", code=1)
     with pytest.raises(ServerError, match="no planner named 'nobody'"):
         bench.server.reload_plugin(PluginKind.PLANNER, "nobody")
+
+
+def test_a_plugin_that_refuses_its_new_parameters_keeps_the_old_ones(bench, monkeypatch):
+    def refuse(plugin):
+        raise ValueError("this one is read once only")
+
+    instance = bench.server.plugins.get(PluginKind.PLANNER, "refuser").instance
+    monkeypatch.setattr(type(instance), "parameters_changed", refuse)
+    with pytest.raises(ValueError, match="read once only"):
+        bench.server.set_plugin_parameters(PluginKind.PLANNER, "refuser", code=80)
+    assert answer(bench) == (75, "one")

@@ -4,7 +4,8 @@ import threading
 import numpy as np
 import pytest
 
-from mbf_abstract.events import Event, EventBus, EventKind, JsonLinesSink, MemorySink, read_events, to_json_value
+from mbf_abstract.event_values import error_text, to_json_value
+from mbf_abstract.events import Event, EventBus, EventKind, JsonLinesSink, MemorySink, read_events
 from mbf_abstract.outcomes import GetPathOutcome
 
 
@@ -53,6 +54,61 @@ def test_values_become_plain_json(value, expected):
     assert result == expected
     assert type(result) is type(expected)
     json.dumps(result, allow_nan=False)
+
+
+def holding_itself():
+    endless = []
+    endless.append(endless)
+    return endless
+
+
+class Unspeakable:
+    def __str__(self):
+        raise SystemExit("no text")
+
+
+class RaisingMapping(dict):
+    def items(self):
+        raise RuntimeError("no items")
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        (10**5000, "integer of 16610 bits"),
+        (-(2**63) - 1, "integer of 64 bits"),
+        ("x" * 30_000_000, "(29990000 more characters)"),
+        ({"a": "x" * 20_000}, "(10000 more characters)"),
+        ({"x" * 20_000: 1}, "(10000 more characters)"),
+        (np.zeros((3000, 4000)), "array of shape (3000, 4000)"),
+        ([0.123456789] * 1_000_000, "more values left out"),
+        ({number: number for number in range(100_000)}, "more values left out"),
+        ([["x" * 9_000] * 100] * 100, "more values left out"),
+        (holding_itself(), "list nested deeper than 30"),
+        (Unspeakable(), "Unspeakable whose text raises SystemExit"),
+        ([RaisingMapping()], "list that cannot be told: RuntimeError"),
+        (np.longdouble(0.5), "0.5"),
+        ("\ud800", "ud800"),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_no_value_ends_the_record_of_the_run(value, told, tmp_path):
+    bus = bus_with(sink := JsonLinesSink(tmp_path / "events.jsonl"))
+    bus.emit(EventKind.CUSTOM, "test", value=value)
+    bus.emit(EventKind.CUSTOM, "test", value="the next one")
+    assert bus.sinks == (sink,)
+    bus.close()
+    first, second = (tmp_path / "events.jsonl").read_text().splitlines()
+    assert told in first
+    assert len(first) < 500_000
+    assert "the next one" in second
+    assert len(list(read_events(tmp_path / "events.jsonl"))) == 2
+
+
+def test_the_text_of_an_error_never_raises_and_is_never_long():
+    assert error_text(ValueError("short")) == "short"
+    assert len(error_text(ValueError("x" * 1_000_000))) < 10_100
+    assert error_text(type("Bad", (BaseException,), {"__str__": lambda self: 1})()) == "Bad whose text raises TypeError"
 
 
 def test_memory_forgets_the_oldest_and_selects_by_kind():

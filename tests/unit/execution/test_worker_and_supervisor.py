@@ -108,7 +108,7 @@ def test_a_closed_worker_gives_its_waiting_job_back_and_takes_no_more(clock, job
 
 # --------------------------------------------------------------------------------------------- supervisor
 def test_a_watch_is_asked_when_it_wants_to_be(clock):
-    supervisor, asked = Supervisor(clock), []
+    supervisor, asked = Supervisor(clock, EventBus(clock.now)), []
 
     def check():
         asked.append(round(clock.now(), 3))
@@ -120,7 +120,7 @@ def test_a_watch_is_asked_when_it_wants_to_be(clock):
 
 
 def test_a_poked_watch_is_asked_at_once_also_when_it_is_poked_during_its_check(clock):
-    supervisor, asked = Supervisor(clock), []
+    supervisor, asked = Supervisor(clock, EventBus(clock.now)), []
 
     def check():
         asked.append(round(clock.now(), 3))
@@ -136,7 +136,7 @@ def test_a_poked_watch_is_asked_at_once_also_when_it_is_poked_during_its_check(c
 
 
 def test_a_stopped_watch_is_asked_no_more_and_a_closed_supervisor_asks_nobody(clock):
-    supervisor, asked = Supervisor(clock), []
+    supervisor, asked = Supervisor(clock, EventBus(clock.now)), []
     watch = supervisor.watch(lambda: asked.append("stopped"), 0.5)
     supervisor.stop(watch)
     supervisor.stop(watch)
@@ -148,8 +148,25 @@ def test_a_stopped_watch_is_asked_no_more_and_a_closed_supervisor_asks_nobody(cl
     assert asked == []
 
 
+@pytest.mark.parametrize("error", [RuntimeError("no more threads"), SystemExit(1)])
+def test_a_check_that_raises_is_reported_and_asked_again_and_the_others_are_served(clock, error):
+    memory = MemorySink()
+    supervisor, asked = Supervisor(clock, EventBus(clock.now, [memory])), []
+
+    def raise_at_first():
+        asked.append(round(clock.now(), 3))
+        if len(asked) < 4:
+            raise error
+
+    supervisor.watch(raise_at_first, 1.0)
+    supervisor.watch(lambda: asked.append("other"), 1.05)
+    clock.sleep(5.0)
+    assert asked == [1.0, "other", 1.1, 1.2]
+    assert [event.data["type"] for event in memory.of_kind(EventKind.FAULT)] == [type(error).__name__] * 2
+
+
 def test_a_nearer_watch_is_not_delayed_by_a_farther_one(clock):
-    supervisor, asked = Supervisor(clock), []
+    supervisor, asked = Supervisor(clock, EventBus(clock.now)), []
     supervisor.watch(lambda: asked.append(("far", clock.now())), 5.0)
     clock.sleep(1.0)
     supervisor.watch(lambda: asked.append(("near", clock.now())), 1.0)
@@ -166,7 +183,8 @@ def memory():
 @pytest.fixture
 def make_callbacks(clock, memory):
     def make(**options):
-        return CallbackThread(clock, EventBus(clock.now, [memory]), Supervisor(clock), **options)
+        events = EventBus(clock.now, [memory])
+        return CallbackThread(clock, events, Supervisor(clock, events), **options)
 
     return make
 
