@@ -151,7 +151,10 @@ class Pose:
     def planar(
         cls, x: float, y: float, yaw: float = 0.0, z: float = 0.0, frame_id: str = "map", stamp: float = 0.0
     ) -> Pose:
-        """Pose at (x, y, z) [m] whose x axis points along ``yaw`` [rad], z up."""
+        """Pose at (x, y, z) [m] whose x axis points along ``yaw`` [rad], z up.
+
+        On a map with heights ``Navigator.ground_pose`` finds the z.
+        """
         return cls((x, y, z), quaternion_from_yaw(yaw), frame_id, stamp)
 
     @property

@@ -165,6 +165,10 @@ class Navigator:
         """Fresh robot pose in the global frame; raises RobotStateError."""
         return self.server.runtime.robot.pose()
 
+    def ground_pose(self, x: float, y: float, yaw: float = 0.0) -> Pose:
+        """Pose on the ground at (x, y) [m], looking along ``yaw`` [rad]: on the lowest free storey there."""
+        return self.server.ground_pose(x, y, yaw)
+
     def cancel_all(self) -> None:
         """Cancel every running goal."""
         self.server.cancel_all()

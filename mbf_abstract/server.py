@@ -108,9 +108,14 @@ class AbstractNavigationServer(PluginHost):
         """YAML text of a sane configuration for a bare map file; None if this server does not read such files."""
         return None
 
-    def ground_height(self, x: float, y: float) -> float:
-        """Height [m] of the ground at a place of the global frame; 0 where the map has none there."""
-        return 0.0
+    def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
+        """Heights [m] of the ground at a place of the global frame, the best to stand on first; () without any."""
+        return (0.0,)
+
+    def ground_pose(self, x: float, y: float, yaw: float = 0.0) -> Pose:
+        """Pose on the ground in the global frame: on the lowest free storey, at height 0 where there is no ground."""
+        heights = self.ground_heights(x, y)
+        return Pose.planar(x, y, yaw, heights[0] if heights else 0.0, frame_id=self.config.parameters.global_frame)
 
     @property
     def map_views(self) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.server import AbstractNavigationServer
+from mbf_mesh_nav.ground import ground_heights
 from mbf_mesh_nav.layer_graph import LayerGraphError
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh_io import known_endings
@@ -185,11 +186,9 @@ class MeshNavigationServer(AbstractNavigationServer):
         """
         self.mesh_map.insert_scan(scan.in_frame(self.mesh_map.frame_id, self.runtime.transforms))
 
-    def ground_height(self, x: float, y: float) -> float:
-        """Height of the highest surface at a place."""
-        top = float(self.mesh_map.vertices[:, 2].max()) + 1.0
-        faces, distances = self.mesh_map.locator.cast_rays([[x, y, top]], [[0.0, 0.0, -1.0]])
-        return top - float(distances[0]) if faces[0] >= 0 else 0.0
+    def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
+        """Heights of all surfaces at a place, the lowest free one first; see ``ground.ground_heights``."""
+        return ground_heights(self.mesh_map, x, y)
 
     @property
     def map_views(self) -> tuple[str, ...]:

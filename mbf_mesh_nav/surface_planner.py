@@ -22,6 +22,7 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_mesh_nav.blocked_vertices import BlockedVertices
+from mbf_mesh_nav.ground import ground_heights
 from mbf_mesh_nav.kernels.path_poses import poses_along
 from mbf_mesh_nav.leg_search import Leg, LegQuery, spread_from
 from mbf_mesh_nav.locate import SurfacePoint
@@ -139,13 +140,21 @@ class SurfacePlanner(MeshPlanner):
             where = f"the {name} {position_text(pose.position)} is {distance:.2f} m from the surface"
             if distance <= reach:
                 return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{where}, past its border")
-            return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{where}, allowed are {reach:g} m")
+            hint = self._heights_text(pose)
+            return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{where}, allowed are {reach:g} m; {hint}")
         vertex = nearest_corner(self.mesh_map, point)
         if blocked[vertex]:
             outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
             reason = describe_blockage(self.mesh_map, snapshot, vertex, self.parameters.cost_limit)
             return PlanResult(outcome, f"the {name} {position_text(pose.position)} is blocked: {reason}")
         return point
+
+    def _heights_text(self, pose: Pose) -> str:
+        """Say where the ground is at a pose that is not on it."""
+        heights = sorted(ground_heights(self.mesh_map, pose.x, pose.y))
+        if not heights:
+            return "there is no surface above or below it"
+        return f"the surface there is at z = {', '.join(f'{height:.2f}' for height in heights)} m"
 
     def _different_components(self, start: SurfacePoint, stop: SurfacePoint) -> PlanResult | None:
         """NO_PATH_FOUND if two points lie on surfaces that do not touch; known without a search."""

@@ -158,6 +158,7 @@ class ElevationGridServer(AbstractNavigationServer):
     def take_scan(self, scan: RangeScan) -> None:
         """Look away: this map is static."""
 
-    def ground_height(self, x: float, y: float) -> float:
-        """Height of the next sample."""
-        return 0.0 if (index := self.grid.index(x, y)) < 0 else float(np.nan_to_num(self.grid.heights.flat[index]))
+    def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
+        """Height of the next sample, if there is one."""
+        height = np.nan if (index := self.grid.index(x, y)) < 0 else float(self.grid.heights.flat[index])
+        return () if np.isnan(height) else (height,)

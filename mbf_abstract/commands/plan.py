@@ -33,7 +33,7 @@ def plan(
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object, with all poses."),
     png: Path | None = typer.Option(None, "--png", help="Draw map and path into this file."),
 ) -> None:
-    """Plan a path; exit code 0 only if there is one. Without Z the height of the ground is taken."""
+    """Plan a path; exit code 0 only if there is one. Without Z the lowest free ground is taken."""
     from_place, to_place = parse_place(start, "--start"), parse_place(goal, "--goal")
     with readable_errors():
         from mbf_abstract.actions.goals import GetPathGoal
@@ -47,7 +47,8 @@ def plan(
             with waiting("building the map and its layers"):
                 server = open_server.enter_context(standing_server(cls, checked))
             notes = map_messages(server)
-            start_pose, goal_pose = _pose(from_place, server), _pose(to_place, server)
+            start_pose = _pose("start", from_place, server, notes)
+            goal_pose = _pose("goal", to_place, server, notes)
             place_robot(server, start_pose)
             began = wall_seconds()
             with waiting("planning"):
@@ -62,11 +63,19 @@ def plan(
         raise typer.Exit(FAILURE)
 
 
-def _pose(place: Place, server: AbstractNavigationServer) -> Pose:
+def _pose(name: str, place: Place, server: AbstractNavigationServer, notes: list[str]) -> Pose:
+    """Pose at a place; a note tells which storey was taken where there are several, or that there is no ground."""
     from mbf_abstract.geometry import Pose
 
-    z = server.ground_height(place.x, place.y) if place.z is None else place.z
-    return Pose.planar(place.x, place.y, place.yaw, z, frame_id=server.config.parameters.global_frame)
+    if place.z is not None:
+        return Pose.planar(place.x, place.y, place.yaw, place.z, frame_id=server.config.parameters.global_frame)
+    heights = server.ground_heights(place.x, place.y)
+    if not heights:
+        notes.append(f"there is no ground at the {name} ({place.x:g}, {place.y:g}); its z is taken as 0 m")
+    if len(heights) > 1:
+        others = ", ".join(f"{height:.2f}" for height in heights[1:])
+        notes.append(f"the {name} is put on the ground at z = {heights[0]:.2f} m; there is more at {others} m: give Z")
+    return server.ground_pose(place.x, place.y, place.yaw)
 
 
 def _tell(result: GetPathResult, seconds: float, notes: list[str], as_json: bool) -> None:

@@ -101,7 +101,8 @@ def first_hits(
             if depth == 0:
                 for face in range(first, min(first + BRANCHES, faces.shape[0])):
                     distance = distance_to_triangle(vertices, faces, face, origin, direction)
-                    if distance <= best and (distance < best or best_face < 0):
+                    # A hit as far as the limit counts, but a miss is no hit at infinity.
+                    if distance < best or (distance == best and best_face < 0 and distance < np.inf):
                         best_face, best = face, distance
                 continue
             # Children on the stack with the one entered first on top.

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
 from mbf_abstract.commands import doctor
+from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from terrain.heightfield import Heightfield
 
 OFFICE = Path(__file__).resolve().parents[2] / "terrain" / "data" / "office.yaml"
@@ -50,6 +51,34 @@ def test_a_plan_on_a_bare_mesh_takes_the_height_of_the_ground(hill, tmp_path):
     assert answer["length_m"] == pytest.approx(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1).sum(), abs=1e-4)
     assert poses[0, 2] == pytest.approx(2.0 * np.exp(-32.0 / 12.0), abs=0.05)
     assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.fixture(scope="module")
+def two_storeys(tmp_path_factory):
+    """A mesh file of a floor with a hole of 2 m x 2 m, and a roof above half of it."""
+    lower, upper = np.zeros((31, 31)), np.full((31, 14), 3.0)
+    lower[10:21, 5:16] = np.nan
+    surfaces = [heightfield_mesh(heights, 0.2, 0.2) for heights in (lower, upper)]
+    parts = [trimesh.Trimesh(vertices, faces, process=False) for vertices, faces in surfaces]
+    parts[1].apply_translation([3.2, 0.0, 0.0])
+    file = tmp_path_factory.mktemp("meshes") / "storeys.ply"
+    trimesh.util.concatenate(parts).export(file)
+    return file
+
+
+def test_a_plan_over_a_hole_says_that_there_is_no_ground(two_storeys):
+    result = mbf("plan", two_storeys, "--start", 2, 3, "--goal", 1, 5, "--json")
+    answer = json.loads(result.stdout)
+    assert (result.exit_code, answer["outcome_name"]) == (1, "OUT_OF_MAP")
+    assert any("no ground at the start" in note for note in answer["map"])
+
+
+def test_a_plan_without_z_stays_on_the_lowest_free_floor_and_tells_of_the_others(two_storeys):
+    result = mbf("plan", two_storeys, "--start", 1, 1, "--goal", 5, 1, "--json")
+    answer = json.loads(result.stdout)
+    assert (result.exit_code, answer["outcome_name"]) == (0, "SUCCESS"), answer
+    assert np.array(answer["poses"])[:, 2] == pytest.approx(0.0, abs=1e-6)
+    assert any("the goal is put on the ground at z = 0.00 m; there is more at 3.00 m" in note for note in answer["map"])
 
 
 def test_a_bare_image_without_description_has_cells_of_five_centimetres(tmp_path):

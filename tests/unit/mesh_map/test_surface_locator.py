@@ -107,18 +107,18 @@ def test_face_regions_of_the_closest_point_cover_corners_edges_and_inside():
 
 
 @settings(deadline=None, max_examples=30)
-@given(st.integers(0, 10_000))
-def test_first_hits_are_those_of_a_search_over_all_faces(seed):
+@given(st.integers(0, 10_000), st.sampled_from([3.0, np.inf]))
+def test_first_hits_are_those_of_a_search_over_all_faces(seed, limit):
     mesh = random_soup(seed)
     rng = np.random.default_rng(seed)
     origins, directions = rng.uniform(-1.0, 5.0, (20, 3)), rng.normal(size=(20, 3))
     directions[:5] = [[0, 0, -1], [0, 0, 1], [1, 0, 0], [0, -1, 0], [-1, 0, 0]]
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
 
-    faces, distances = mesh.locator.cast_rays(origins, directions, 3.0)
+    faces, distances = mesh.locator.cast_rays(origins, directions, limit)
 
     for index in range(20):
-        expected = naive_hit(mesh, origins[index], directions[index], 3.0)
+        expected = naive_hit(mesh, origins[index], directions[index], limit)
         assert distances[index] == pytest.approx(expected, abs=1e-9)
         assert (faces[index] >= 0) == np.isfinite(expected)
 
