@@ -44,9 +44,9 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
         problem = self._plugins.problem(PluginKind.PLANNER, goal.planner)
         if problem:
             return GetPathOutcome.INVALID_PLUGIN, problem
-        if not (goal.dist_tolerance >= 0.0 and goal.angle_tolerance >= 0.0):  # not a number is no tolerance either
-            text = f"tolerances must not be negative, got {goal.dist_tolerance} m and {goal.angle_tolerance} rad"
-            return GetPathOutcome.INVALID_GOAL, text
+        distance, angle = self._tolerances(goal)
+        if not (distance >= 0.0 and angle >= 0.0):  # not a number is no tolerance either
+            return GetPathOutcome.INVALID_GOAL, f"tolerances must not be negative, got {distance} m and {angle} rad"
         problem = area_problem(goal.goal_area, self.runtime)
         return (GetPathOutcome.INVALID_GOAL, problem) if problem else None
 
@@ -81,14 +81,22 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
             return in_global_frame(pose, self.runtime)
 
         relaxed = self.runtime.relaxation.slack(self.runtime.clock.now()).plan_distance
+        distance, angle = self._tolerances(goal)
         return PlanRequest(
             start=to_global(goal.start_pose) if goal.start_pose else self.runtime.robot.pose(),
             goal=to_global(goal.target_pose),
-            dist_tolerance=max(goal.dist_tolerance, relaxed),
-            angle_tolerance=goal.angle_tolerance,
+            dist_tolerance=max(distance, relaxed),
+            angle_tolerance=angle,
             via=tuple(to_global(pose) for pose in goal.via),
             cancel_token=handle.cancel_token,
         )
+
+    def _tolerances(self, goal: GetPathGoal) -> tuple[float, float]:
+        """Distance [m] and angle [rad] from the target at which the path may end: the goal's, else the server's."""
+        parameters = self.runtime.parameters
+        usual = (parameters.dist_tolerance, parameters.angle_tolerance) if goal.goal_area is None else (0.0, 0.0)
+        distance = usual[0] if goal.dist_tolerance is None else goal.dist_tolerance
+        return distance, usual[1] if goal.angle_tolerance is None else goal.angle_tolerance
 
     def _result(
         self, state: PlannerState, last: PlanResult | None, handle: Handle, request: PlanRequest, planner: str

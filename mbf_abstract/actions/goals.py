@@ -23,8 +23,9 @@ class GetPathGoal:
     start_pose : Pose, optional
         None = from where the robot is.
     planner : str
-    dist_tolerance, angle_tolerance : float
-        How far [m, rad] from the target the path may end where the target itself cannot be reached.
+    dist_tolerance, angle_tolerance : float, optional
+        How far [m, rad] from the target the path may end where the target itself cannot be reached; 0 = exactly there,
+        None = the server's tolerances (with a ``goal_area`` 0: the area is tolerance enough).
     via : tuple of Pose
         Poses to pass on the way, in order.
     goal_area : GoalArea, optional
@@ -36,8 +37,8 @@ class GetPathGoal:
     target_pose: Pose
     start_pose: Pose | None = None
     planner: str = ""
-    dist_tolerance: float = 0.0
-    angle_tolerance: float = 0.0
+    dist_tolerance: float | None = None
+    angle_tolerance: float | None = None
     via: tuple[Pose, ...] = ()
     goal_area: GoalArea | None = None
     concurrency_slot: int = 0
@@ -84,7 +85,8 @@ class MoveBaseGoal:
     recovery_behaviors : tuple of str, optional
         Names to try in order; None = all that are loaded, in load order; empty = none.
     dist_tolerance, angle_tolerance : float, optional
-        Arrival tolerances [m, rad], None = the server's. The planner may end its path that far from the target too.
+        Arrival tolerances [m, rad], None = the server's. Where the target cannot be reached, the path may end that far
+        from it too; the robot then comes the nearer to the path's end, at least to a quarter of the tolerance.
     goal_area : GoalArea, optional
         Go to the cheapest place inside instead of to ``target_pose``, and stop as soon as inside.
     """

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 Job = GoalJob[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
 SUB_GOAL_SLOT = 255  # so that a client's goal in slot 0 does not preempt a part of move_base
 NO_REPLAN_WITHIN = 0.1  # m from the goal
+LEAST_SHARE_LEFT = 0.25  # of the tolerance, for stopping at the end of a path that does not reach the target
 FATAL = range(ExePathOutcome.INVALID_PATH, ExePathOutcome.INTERNAL_ERROR + 1)
 
 
@@ -172,8 +173,8 @@ class MoveBaseMachine:
             GetPathGoal(
                 self._target,
                 planner=goal.planner,
-                dist_tolerance=goal.dist_tolerance or 0.0,
-                angle_tolerance=goal.angle_tolerance or 0.0,
+                dist_tolerance=goal.dist_tolerance,
+                angle_tolerance=goal.angle_tolerance,
                 goal_area=goal.goal_area,
                 concurrency_slot=SUB_GOAL_SLOT,
             ),
@@ -229,12 +230,20 @@ class MoveBaseMachine:
             ExePathGoal(
                 path,
                 controller=goal.controller,
-                dist_tolerance=goal.dist_tolerance,
+                dist_tolerance=self._arrival_tolerance(path),
                 angle_tolerance=goal.angle_tolerance,
                 goal_area=goal.goal_area,
                 concurrency_slot=SUB_GOAL_SLOT,
             ),
         )
+
+    def _arrival_tolerance(self, path: Path) -> float | None:
+        """What a path that ends off the target leaves of the tolerance [m]; None = the server's."""
+        goal, off = self._job.handle.goal, path[-1].distance_to(self._target)
+        tolerance = self._runtime.parameters.dist_tolerance if goal.dist_tolerance is None else goal.dist_tolerance
+        if goal.goal_area is not None or off == 0.0 or tolerance == 0.0:
+            return goal.dist_tolerance
+        return max(tolerance - off, LEAST_SHARE_LEFT * tolerance)
 
     def _on_feedback(self, message: AnyGoalHandle) -> End | None:
         if message is not self._follow or message.feedback is None or self._state is not MoveBaseState.EXE_PATH:

@@ -97,8 +97,8 @@ class GetPath(ActionLeaf):
         name: str = "get path",
         planner: str = "",
         target: Pose | None = None,
-        dist_tolerance: float = 0.0,
-        angle_tolerance: float = 0.0,
+        dist_tolerance: float | None = None,
+        angle_tolerance: float | None = None,
         slot: int = 0,
     ) -> None:
         super().__init__(name)

@@ -1,5 +1,7 @@
 """move_base: order and resets of recovery, replanning, oscillation, goals that supersede, cancel and pause anywhere."""
 
+from dataclasses import replace
+
 import pytest
 
 from mbf_abstract.actions.goals import MoveBaseGoal
@@ -71,6 +73,23 @@ def test_the_goals_tolerances_reach_planner_and_controller(make_bench):
     request = bench.planner.requests[0]
     assert (request.dist_tolerance, request.angle_tolerance) == (0.7, 0.3)
     assert 0.3 < result.dist_to_goal < 0.75
+
+
+def test_without_tolerances_of_the_goal_those_of_the_server_reach_the_planner(make_bench):
+    bench = make_bench(dist_tolerance=0.4, angle_tolerance=0.5)
+    send(bench).wait()
+    request = bench.planner.requests[0]
+    assert (request.dist_tolerance, request.angle_tolerance) == (0.4, 0.5)
+
+
+@pytest.mark.parametrize(("off", "farthest"), [(0.1, 0.4), (0.3, 0.4), (0.39, 0.5)])
+def test_a_path_that_ends_off_the_target_leaves_less_of_the_tolerance_for_arrival(make_bench, off, farthest):
+    bench = make_bench(dist_tolerance=0.4)
+    short = Pose.planar(2.0 - off, 0.0)
+    bench.planner.play(lambda request: straight_plan(replace(request, goal=short)))
+    result = send(bench).wait()
+    assert result.success
+    assert result.final_pose.distance_to(Pose.planar(2.0, 0.0)) <= farthest
 
 
 # -------------------------------------------------------------------------------------------------- recovery

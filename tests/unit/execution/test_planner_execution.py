@@ -5,6 +5,7 @@ import pytest
 from mbf_abstract.actions.goals import GetPathGoal
 from mbf_abstract.actions.handle import GoalStatus
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goal_area import DiscArea
 from mbf_abstract.outcomes import GetPathOutcome as Outcome
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing.faulty import empty_path, obedient, slow, wrong_frame_path
@@ -228,6 +229,15 @@ def test_the_planner_sees_every_field_of_the_goal(make_bench):
     request = bench.planner.requests[0]
     assert (request.start, request.goal, request.via) == (Pose.planar(1, 2), TARGET, via)
     assert (request.dist_tolerance, request.angle_tolerance) == (0.5, 0.2)
+
+
+def test_tolerances_a_goal_does_not_give_are_those_of_the_server_and_0_is_exact(make_bench):
+    bench = make_bench(dist_tolerance=0.4, angle_tolerance=0.3)
+    bench.navigator.get_path(TARGET)
+    bench.navigator.get_path(TARGET, dist_tolerance=0.0, angle_tolerance=0.0)
+    bench.navigator.get_path(TARGET, goal_area=DiscArea(TARGET, 1.0))
+    seen = [(request.dist_tolerance, request.angle_tolerance) for request in bench.planner.requests]
+    assert seen[:3] == [(0.4, 0.3), (0.0, 0.0), (0.0, 0.0)]
 
 
 @pytest.mark.parametrize(
