@@ -58,7 +58,7 @@ class PluginHost(ABC):
         try:
             self.plugins.add(spec.kind, self._construct(spec))
         except (Exception, SystemExit) as error:
-            text = f"{spec.kind.name.lower()} {spec.name!r} ({spec.type_name}): {type(error).__name__}: {error_text(error)}"
+            text = _failure(spec, error)
             if not spec.optional:
                 raise ServerError(text) from error
             self.runtime.events.emit(EventKind.FAULT, "server", message=f"optional plugin left out: {text}")
@@ -111,8 +111,7 @@ class PluginHost(ABC):
         try:
             new = self._construct(replace(old.spec, plugin_class=plugin_class, parameters=values))
         except (Exception, SystemExit) as error:
-            text = f"{kind.name.lower()} {name!r} ({old.spec.type_name}): {type(error).__name__}: {error_text(error)}"
-            raise ServerError(text) from error
+            raise ServerError(_failure(old.spec, error)) from error
         if not old.retire():
             raise ServerError(f"{kind.name.lower()} {name!r} is in use")
         self.plugins.replace(kind, new)
@@ -164,3 +163,8 @@ class PluginHost(ABC):
         finally:
             plugin.release(self)
         self.runtime.events.emit(EventKind.PARAMETER_CHANGED, name, **changes)
+
+
+def _failure(spec: PluginSpec, error: BaseException) -> str:
+    kind = spec.kind.name.lower()
+    return f"{kind} {spec.name!r} ({spec.type_name}): {type(error).__name__}: {error_text(error)}"
