@@ -16,8 +16,11 @@ from mbf_abstract.transforms import TransformBuffer
 
 
 def server_class(raw: RawConfig, registry: PluginRegistry | None = None) -> type[AbstractNavigationServer]:
-    """Find the server class of a configuration's ``backend``; raises ConfigError if there is none."""
-    registry = registry or PluginRegistry()
+    """Find the server class of a configuration's ``backend``; raises ConfigError if there is none.
+
+    ``allow_module_types: false`` holds for the backend, too, unless a ``registry`` of one's own says otherwise.
+    """
+    registry = registry or PluginRegistry(allow_module_types=raw.allow_module_types)
     try:
         found: Any = registry.load("servers", raw.backend, AbstractNavigationServer)
     except PluginError as error:

@@ -164,9 +164,10 @@ def _model_at(model: type[BaseModel], loc: KeyPath) -> type[BaseModel]:
 
 
 def _inner_model(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+    arguments = get_args(annotation)  # for Python 3.10 tuple[float, float] is a type, too
+    if not arguments and isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    return next((found for arg in get_args(annotation) if (found := _inner_model(arg))), None)
+    return next((found for arg in arguments if (found := _inner_model(arg))), None)
 
 
 def _with_absolute_paths(model: type[BaseModel], data: object, folder: Path) -> object:

@@ -16,6 +16,7 @@ from typing import Any
 
 import yaml
 
+from mbf_abstract.bounded_files import special_file
 from mbf_abstract.findings import ConfigError, Finding, KeyPath, describe_value, format_key_path
 
 MAX_BYTES = 1_000_000
@@ -92,6 +93,9 @@ def read_yaml(path: str | os.PathLike[str], findings: list[Finding]) -> YamlDocu
 
 def _read_text(path: Path, findings: list[Finding]) -> str | None:
     try:
+        if kind := special_file(path):
+            findings.append(Finding(str(path), 1, "", "a file", kind))
+            return None
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a name with a null character

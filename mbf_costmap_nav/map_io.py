@@ -23,6 +23,7 @@ import yaml
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
+from mbf_abstract.bounded_files import special_file
 from mbf_abstract.findings import describe_value
 from mbf_costmap_nav.costmap import FREE, LETHAL, MAX_CELLS, UNKNOWN, Costmap
 from mbf_costmap_nav.map_description import (
@@ -39,6 +40,8 @@ from mbf_costmap_nav.turned_map import turned_upright, upright_shape
 
 IMAGE_SUFFIXES = {".pgm", ".png", ".bmp"}
 BARE_IMAGE_RESOLUTION = 0.05  # m, what most map makers use
+IMAGE_FORMATS = ("PPM", "PNG", "BMP")
+"""What Pillow may try; for some of its other formats it starts programs."""
 GREY_MODES = {"1", "L", "LA", "P", "RGB", "RGBA"}
 """Pillow's names of the 8-bit pixel layouts we read."""
 
@@ -171,10 +174,12 @@ def load_image(
 
 def _read_pixels(file: Path, max_cells: int) -> NDArray[np.uint8]:
     """Grey and opacity (height, width, 2) uint8 of an image, top row first."""
+    if kind := special_file(file):
+        raise MapError(file, f"expected an image, got {kind}")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            image = Image.open(file)
+            image = Image.open(file, formats=IMAGE_FORMATS)
         with image:
             width, height = image.size
             if width * height > max_cells:

@@ -1,9 +1,9 @@
 """Elevation models as meshes: rasters of heights (GeoTIFF, ESRI ASCII, SRTM), read by whatever package can read them.
 
 This package parses no raster. One that does offers a function by an entry point of the group
-``mbf.elevation_readers``, named by the ending without its dot: ``read(path)`` returns heights (ny, nx) [m], NaN where
-the survey has none, with the southern row first, and the distances dx and dy [m] between samples. Whatever it raises
-becomes a ``MeshError``.
+``mbf.elevation_readers``, named by the ending without its dot: ``read(path, max_samples)`` returns heights (ny, nx)
+[m], NaN where the survey has none, with the southern row first, and the distances dx and dy [m] between samples. It
+refuses a raster of more than ``max_samples`` heights before it reads them. Whatever it raises becomes a ``MeshError``.
 
 A void stays a hole in the mesh: where nothing was measured, there is no ground to drive on.
 """
@@ -23,7 +23,7 @@ from mbf_mesh_nav.mesh_report import MeshError
 
 READERS_GROUP = "mbf.elevation_readers"
 
-ElevationReader = Callable[[Path], tuple[NDArray[Any], float, float]]
+ElevationReader = Callable[[Path, int], tuple[NDArray[Any], float, float]]
 
 
 def elevation_readers() -> dict[str, EntryPoint]:
@@ -48,9 +48,7 @@ def read_elevation(path: Path, max_faces: int) -> tuple[NDArray[np.float64], NDA
     """
     try:
         read: ElevationReader = elevation_readers()[path.suffix.lower()].load()
-        heights, dx, dy = read(path)
-        if (count := 2 * (heights.shape[0] - 1) * (heights.shape[1] - 1)) > max_faces:
-            raise MeshError(str(path), [f"{count} faces, the limit is {max_faces}"])
+        heights, dx, dy = read(path, max_faces // 2)  # two faces between four samples
         vertices, faces = heightfield_mesh(heights, dx, dy, keep_grid=True)
     except MeshError:
         raise

@@ -17,7 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
+from mbf_abstract.bounded_files import ArrayFileError, read_arrays
 from mbf_mesh_nav.layer import CostArray, LethalArray, MeshLayer
+
+VALUE_BYTES = 5
+"""Bytes of a vertex in a file: its cost as float32 and whether it is lethal."""
 
 
 class LayerCache:
@@ -47,9 +51,9 @@ class LayerCache:
         """Values (V,) float32 and (V,) bool of a layer, or None if there are none to be trusted."""
         count = layer.topology.vertex_count
         try:
-            with self.file_of(layer).open("rb") as file, np.load(file, allow_pickle=False) as stored:
-                costs, lethal = stored["costs"], stored["lethal"]
-        except Exception:  # a damaged zip file raises a dozen kinds of errors; all mean: compute it
+            stored = read_arrays(self.file_of(layer), VALUE_BYTES * count, ("costs", "lethal"))
+            costs, lethal = stored["costs"], stored["lethal"]
+        except (OSError, TypeError, KeyError, ArrayFileError):  # whatever is wrong with it: compute it
             return None
         fits = costs.shape == lethal.shape == (count,) and costs.dtype == np.float32 and lethal.dtype == np.bool_
         return (costs, lethal) if fits else None

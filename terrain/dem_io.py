@@ -18,13 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from mbf_abstract.bounded_files import read_arrays
 from terrain.generate import add_roughness
 from terrain.heightfield import Heightfield
 
 METRES_PER_DEGREE = 111_320.0  # along a meridian, and along the equator; good to half a percent everywhere
-MAX_SAMPLES = 200_000_000  # refuse absurd headers before memory is asked for
+MAX_SAMPLES = 20_000_000
+"""How many heights are read unless a caller asks for more; absurd headers are refused before memory is asked for."""
 MAX_VOID_SHARE = 0.5
 
+ASCII_VOID = -9999.0
+"""What an ESRI ASCII grid without a NODATA_value has for voids, by the format's definition."""
+MAX_ASCII_BYTES_PER_SAMPLE = 64
 HGT_VOID = -32768
 TIFF_PIXEL_SCALE, TIFF_TIE_POINT, TIFF_NO_DATA, TIFF_GEO_KEYS = 33550, 33922, 42113, 34735
 GEO_KEY_MODEL_TYPE, MODEL_TYPE_GEOGRAPHIC = 1024, 2
@@ -90,7 +95,7 @@ def jacksboro(
     return terrain
 
 
-def read_dem(path: str | Path) -> Heightfield:
+def read_dem(path: str | Path, max_samples: int = MAX_SAMPLES) -> Heightfield:
     """Read an elevation model and fill its voids; parameters and errors as in ``read_elevation``.
 
     Raises
@@ -99,12 +104,12 @@ def read_dem(path: str | Path) -> Heightfield:
         Also where more than half of the raster is void.
     """
     try:
-        return _filled(read_elevation(path))
+        return _filled(read_elevation(path, max_samples))
     except ValueError as error:
         raise TerrainFileError(path, f"cannot be read: {error}") from error
 
 
-def read_elevation(path: str | Path) -> Elevation:
+def read_elevation(path: str | Path, max_samples: int = MAX_SAMPLES) -> Elevation:
     """Read an elevation model by its file name's ending; voids are NaN.
 
     Parameters
@@ -112,11 +117,13 @@ def read_elevation(path: str | Path) -> Elevation:
     path : path
         ``.asc`` (ESRI ASCII grid), ``.hgt`` (SRTM tile), ``.tif``/``.tiff`` (GeoTIFF) or ``.npz`` with ``z`` and
         ``dx``, ``dy`` [m], row 0 in the north.
+    max_samples : int
+        Larger rasters are refused before their heights are read.
 
     Raises
     ------
     TerrainFileError
-        Missing file, unknown ending, or contents that are not what the ending says.
+        Missing file, unknown ending, too many samples, or contents that are not what the ending says.
     """
     path = Path(path)
     readers = {".asc": _read_esri_ascii, ".hgt": _read_hgt, ".tif": _read_geotiff, ".tiff": _read_geotiff}
@@ -126,7 +133,7 @@ def read_elevation(path: str | Path) -> Elevation:
     if not path.is_file():
         raise TerrainFileError(path, "no such file")
     try:
-        return reader(path)
+        return reader(path, max_samples)
     except TerrainFileError:
         raise
     except (OSError, ValueError, KeyError, IndexError, OverflowError) as error:
@@ -153,7 +160,14 @@ def _filled(elevation: Elevation) -> Heightfield:
     return Heightfield(heights.astype(np.float32), elevation.dx, elevation.dy)
 
 
-def _read_esri_ascii(path: Path) -> Elevation:
+def _refuse_size(path: Path, rows: int, columns: int, max_samples: int) -> None:
+    if min(rows, columns) < 2:
+        raise TerrainFileError(path, f"unusable size of {rows} rows x {columns} columns")
+    if rows * columns > max_samples:
+        raise TerrainFileError(path, f"{rows} rows x {columns} columns of heights, the limit is {max_samples} in all")
+
+
+def _read_esri_ascii(path: Path, max_samples: int) -> Elevation:
     header: dict[str, float] = {}
     with path.open(encoding="ascii") as file:
         for line in file:
@@ -165,38 +179,41 @@ def _read_esri_ascii(path: Path) -> Elevation:
     if missing:
         raise TerrainFileError(path, f"header without {', '.join(missing)}")
     shape = int(header["nrows"]), int(header["ncols"])
-    if min(shape) < 2 or shape[0] * shape[1] > MAX_SAMPLES:
-        raise TerrainFileError(path, f"unusable size of {shape[0]} rows x {shape[1]} columns")
+    _refuse_size(path, *shape, max_samples)
+    if path.stat().st_size > MAX_ASCII_BYTES_PER_SAMPLE * (shape[0] * shape[1] + len(header)):
+        raise TerrainFileError(path, f"{path.stat().st_size} bytes are too many for {shape[0]} x {shape[1]} heights")
     values = np.array(path.read_text(encoding="ascii").split()[2 * len(header) :], dtype=np.float64)
     if values.size != shape[0] * shape[1]:
         raise TerrainFileError(path, f"{values.size} heights, the header promises {shape[0]} x {shape[1]}")
-    return _northern_row_first(
-        values.reshape(shape), header["cellsize"], header["cellsize"], header.get("nodata_value")
-    )
+    void = header.get("nodata_value", ASCII_VOID)
+    return _northern_row_first(values.reshape(shape), header["cellsize"], header["cellsize"], void)
 
 
-def _read_hgt(path: Path) -> Elevation:
+def _read_hgt(path: Path, max_samples: int) -> Elevation:
     """SRTM: one degree square of big-endian int16; the name holds the south-west corner, e.g. ``N44W072``."""
     name = re.match(r"([NS])(\d{2})[EW]\d{3}", path.stem, re.IGNORECASE)
     if name is None:
         raise TerrainFileError(path, "the name of an SRTM tile must start with its corner, such as N44W072")
+    size = path.stat().st_size
+    side = math.isqrt(size // 2)
+    if side < 2 or 2 * side * side != size:
+        raise TerrainFileError(path, f"{size} bytes are not a square of 16-bit heights")
+    _refuse_size(path, side, side, max_samples)
     values = np.fromfile(path, dtype=">i2")
-    side = math.isqrt(values.size)
-    if side < 2 or side * side != values.size or path.stat().st_size != 2 * values.size:
-        raise TerrainFileError(path, f"{path.stat().st_size} bytes are not a square of 16-bit heights")
     latitude = (1.0 if name[1].upper() == "N" else -1.0) * float(name[2]) + 0.5
     dx, dy = (length / (side - 1) for length in degree_lengths(latitude))
     return _northern_row_first(values.reshape(side, side), dx, dy, HGT_VOID)
 
 
-def _read_geotiff(path: Path) -> Elevation:
+def _read_geotiff(path: Path, max_samples: int) -> Elevation:
     from PIL import Image
 
     with warnings.catch_warnings():
         warnings.simplefilter("error", Image.DecompressionBombWarning)
         try:
-            with Image.open(path) as image:
+            with Image.open(path, formats=("TIFF",)) as image:
                 tags = dict(image.tag_v2)  # type: ignore[attr-defined]
+                _refuse_size(path, image.height, image.width, max_samples)
                 raster = np.asarray(image)
         except (Image.DecompressionBombError, Image.DecompressionBombWarning, SyntaxError) as error:
             raise TerrainFileError(path, f"cannot be read: {error}") from error
@@ -214,9 +231,12 @@ def _read_geotiff(path: Path) -> Elevation:
     return _northern_row_first(raster, dx, dy, None if no_data is None else float(str(no_data).strip("\0 ")))
 
 
-def _read_npz(path: Path) -> Elevation:
-    with np.load(path, allow_pickle=False) as data:
-        missing = [key for key in ("z", "dx", "dy") if key not in data.files]
-        if missing:
-            raise TerrainFileError(path, f"lacks {', '.join(missing)}; it holds {', '.join(data.files)}")
-        return _northern_row_first(data["z"], float(data["dx"]), float(data["dy"]))
+def _read_npz(path: Path, max_samples: int) -> Elevation:
+    keys = ("z", "dx", "dy")
+    data = read_arrays(path, 8 * (max_samples + 2), keys)
+    if missing := [key for key in keys if key not in data]:
+        raise TerrainFileError(path, f"lacks {', '.join(missing)}")
+    if data["z"].ndim != 2:
+        raise TerrainFileError(path, f"z has the shape {data['z'].shape}, expected rows and columns")
+    _refuse_size(path, len(data["z"]), data["z"].shape[1], max_samples)
+    return _northern_row_first(data["z"], float(data["dx"]), float(data["dy"]))

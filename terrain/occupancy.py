@@ -16,6 +16,7 @@ import yaml
 from numpy.typing import NDArray
 from PIL import Image
 
+from mbf_abstract.bounded_files import special_file
 from terrain.solids import BOX_CORNERS, BOX_FACES
 
 FloatArray = NDArray[np.float64]
@@ -114,8 +115,10 @@ def _read_header(path: Path) -> dict[str, Any]:
 
 def _read_image(path: Path, image_path: Path) -> FloatArray:
     """Brightness 0..1 of each pixel (ny, nx), row 0 on top."""
+    if kind := special_file(image_path):
+        raise OccupancyFileError(path, f"image {image_path.name} is {kind}")
     try:
-        with Image.open(image_path) as image:
+        with Image.open(image_path, formats=("PPM", "PNG", "BMP")) as image:
             if image.width * image.height > MAX_CELLS:
                 raise OccupancyFileError(path, f"image {image_path.name} has {image.width} x {image.height} pixels")
             return np.asarray(image.convert("L"), dtype=np.float64) / 255.0

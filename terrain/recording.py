@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.bounded_files import read_arrays
 from mbf_abstract.events import Event
 from mbf_abstract.geometry import Pose
 from terrain.actor_track import ActorTrack, track_arrays, tracks_from
@@ -25,6 +26,9 @@ from terrain.robot_models import Drive, RobotSpec
 
 FloatArray = NDArray[np.float64]
 StampedPoints = tuple[float, FloatArray]
+
+MAX_BYTES = 4 * 2**30
+"""How large a recording's arrays may be in memory unless a caller allows more."""
 
 
 class RecordingError(Exception):
@@ -172,11 +176,10 @@ class Recording:
         np.savez_compressed(file, **arrays)
 
     @classmethod
-    def load(cls, file: str | Path) -> Recording:
-        """Read a file written by ``save``; raises RecordingError."""
+    def load(cls, file: str | Path, max_bytes: int = MAX_BYTES) -> Recording:
+        """Read a file written by ``save``, of at most ``max_bytes`` in memory; raises RecordingError."""
         try:
-            with np.load(file, allow_pickle=False) as arrays:
-                return _recording_from(dict(arrays))
+            return _recording_from(read_arrays(Path(file), max_bytes))
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise RecordingError(f"{file}: is no readable recording: {type(error).__name__}: {error}") from error
 

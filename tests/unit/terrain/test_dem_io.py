@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from terrain.dem_io import TerrainFileError, jacksboro, read_dem
+from terrain.dem_io import TerrainFileError, jacksboro, read_dem, read_elevation
 
 
 def test_jacksboro_is_shrunk_isotropically() -> None:
@@ -87,7 +87,7 @@ def test_voids_are_filled_from_the_nearest_sample(tmp_path: Path) -> None:
         ("a.asc", b"ncols 3\nnrows 2\n1 2 3 4 5 6\n", "cellsize"),
         ("a.asc", b"ncols 3\nnrows 2\ncellsize 1\n1 2 3\n", "3 heights"),
         ("a.asc", b"ncols 3\nnrows 2\ncellsize 1\n1 2 3 4 x 6\n", "cannot be read"),
-        ("a.asc", b"ncols 3000000\nnrows 2000000\ncellsize 1\n1\n", "unusable size"),
+        ("a.asc", b"ncols 3000000\nnrows 2000000\ncellsize 1\n1\n", "the limit is"),
         ("a.asc", b"\xff\xfe\x00", "cannot be read"),
         ("N10E010.hgt", b"12345", "not a square"),
         ("tile.hgt", b"12345678", "N44W072"),
@@ -119,3 +119,33 @@ def test_other_refusals(tmp_path: Path) -> None:
     Image.fromarray(np.zeros((4, 4), np.float32)).save(tmp_path / "plain.tif")
     with pytest.raises(TerrainFileError, match="33550"):
         read_dem(tmp_path / "plain.tif")
+
+
+def test_an_ascii_grid_that_names_no_void_has_the_formats_own(tmp_path: Path) -> None:
+    file = tmp_path / "survey.asc"
+    file.write_text("ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 2\n1 2 3\n4 -9999 6\n7 8 9\n")
+    assert np.isnan(read_elevation(file).heights).sum() == 1
+    assert read_dem(file).heights.min() == 1.0
+
+
+@pytest.mark.parametrize("ending", ["asc", "hgt", "tif", "npz"])
+def test_a_raster_larger_than_allowed_is_refused_in_every_format(tmp_path: Path, ending: str) -> None:
+    heights, file = np.ones((20, 20), np.int16), tmp_path / f"N44W072.{ending}"
+    if ending == "asc":
+        file.write_text("ncols 20\nnrows 20\ncellsize 1\n" + "1 " * 400)
+    elif ending == "hgt":
+        heights.astype(">i2").tofile(file)
+    elif ending == "tif":
+        Image.fromarray(heights.astype(np.float32)).save(file, tiffinfo={33550: (1.0, 1.0, 0.0)})
+    else:
+        np.savez_compressed(file, z=heights, dx=1.0, dy=1.0)
+    assert read_elevation(file, 400).heights.shape == (20, 20)
+    with pytest.raises(TerrainFileError, match="the limit is") as caught:
+        read_elevation(file, 399 if ending != "npz" else 40)
+    assert str(file) in str(caught.value)
+
+
+def test_a_grid_with_more_text_than_heights_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    (tmp_path / "long.asc").write_text("ncols 2\nnrows 2\ncellsize 1\n1 2 3 4" + " 5" * 1000)
+    with pytest.raises(TerrainFileError, match="too many for 2 x 2 heights"):
+        read_elevation(tmp_path / "long.asc")
