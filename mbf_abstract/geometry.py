@@ -15,6 +15,8 @@ from typing import Any, TypeAlias, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbf_abstract.arithmetic import norm, scalar_products
+
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 FloatArray = NDArray[np.float64]
@@ -79,13 +81,13 @@ def quaternions_from_axes(x_axes: ArrayLike, z_axes: ArrayLike) -> FloatArray:
         vanishes any heading is returned.
     """
     z = np.asarray(z_axes, dtype=float)
-    z = z / np.maximum(np.linalg.norm(z, axis=-1, keepdims=True), 1e-12)
+    z = z / np.maximum(norm(z)[..., None], 1e-12)
     x = np.asarray(x_axes, dtype=float)
     x = x - np.sum(x * z, axis=-1, keepdims=True) * z
-    length = np.linalg.norm(x, axis=-1, keepdims=True)
+    length = norm(x)[..., None]
     fallback = np.cross(np.where(np.abs(z[..., :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]), z)
     x = np.where(length > 1e-9, x, fallback)
-    x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-12)
+    x = x / np.maximum(norm(x)[..., None], 1e-12)
     y = np.cross(z, x)
     return _quaternions_from_matrices(np.stack([x, y, z], axis=-1))
 
@@ -110,7 +112,7 @@ def _quaternions_from_matrices(m: FloatArray) -> FloatArray:
     q[pick, 1] = mm[..., 0, 2] - mm[..., 2, 0]
     q[pick, 2] = mm[..., 1, 0] - mm[..., 0, 1]
     q[pick, 3] = 1 + trace[pick]
-    return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True), dtype=float)
+    return np.asarray(q / norm(q)[..., None], dtype=float)
 
 
 def _finite(name: str, values: Iterable[float]) -> tuple[float, ...]:
@@ -311,7 +313,7 @@ class Path:
         if len(positions) != len(orientations):
             raise ValueError(f"{len(positions)} positions but {len(orientations)} orientations")
         # Whole arrays first: which pose is wrong is looked for only if one may be.
-        norms = np.einsum("ij,ij->i", orientations, orientations)
+        norms = scalar_products(orientations, orientations)
         is_unit = np.abs(norms - 1.0) <= QUATERNION_NORM_TOLERANCE
         if not (is_unit.all() and np.isfinite(positions).all()):
             _refuse_wrong_pose(positions, orientations, norms)
@@ -386,12 +388,12 @@ class Path:
     @property
     def length(self) -> float:
         """Sum of the 3D lengths of the path's segments [m]."""
-        return float(np.linalg.norm(np.diff(self.positions, axis=0), axis=1).sum())
+        return float(norm(np.diff(self.positions, axis=0)).sum())
 
     @property
     def remaining_lengths(self) -> FloatArray:
         """(n,) float64, length [m] along the path from each pose to the last one."""
-        segments = np.linalg.norm(np.diff(self.positions, axis=0), axis=1)
+        segments = norm(np.diff(self.positions, axis=0))
         return np.concatenate([np.cumsum(segments[::-1])[::-1], [0.0]]) if len(self) else np.zeros(0)
 
     def __repr__(self) -> str:

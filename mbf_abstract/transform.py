@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mbf_abstract.arithmetic import rotated
 from mbf_abstract.geometry import (
     QUATERNION_NORM_TOLERANCE,
     FloatArray,
@@ -107,7 +108,7 @@ class Transform:
 
     def apply(self, points: ArrayLike) -> FloatArray:
         """Map (n, 3) points [m] from the child frame to the parent frame."""
-        return np.asarray(points, dtype=np.float64) @ rotation_matrix(self.rotation).T + self.translation
+        return rotated(rotation_matrix(self.rotation), points) + self.translation
 
     def apply_to_pose(self, pose: Pose) -> Pose:
         """Map a pose from the child frame to the parent frame; it keeps its stamp."""

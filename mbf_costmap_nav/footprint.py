@@ -18,6 +18,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbf_abstract.arithmetic import norm, plane_rotation, rotated, scalar_products
+
 FloatArray = NDArray[np.float64]
 
 CIRCLE_POINTS = 16
@@ -81,9 +83,7 @@ class Footprint:
 
     def at(self, x: float, y: float, yaw: float) -> FloatArray:
         """Vertices (n, 2) [m] with the base at (x, y) [m], turned by ``yaw`` [rad]."""
-        c, s = math.cos(yaw), math.sin(yaw)
-        turned = self.vertices @ np.array([[c, s], [-s, c]])
-        return np.asarray(np.add(turned, (x, y)))
+        return np.asarray(rotated(plane_rotation(yaw), self.vertices) + np.array([x, y]))
 
     def padded(self, padding: float) -> Footprint:
         """Move each vertex by ``padding`` [m] along x and y, by the sign of its coordinate (costmap_2d)."""
@@ -156,7 +156,7 @@ def _radii(points: FloatArray) -> tuple[float, float]:
     lengths_squared = np.maximum(np.sum(sides**2, axis=1), 1e-30)
     along = np.clip(-np.sum(points * sides, axis=1) / lengths_squared, 0.0, 1.0)
     nearest = points + along[:, None] * sides
-    return float(np.linalg.norm(nearest, axis=1).min()), float(np.linalg.norm(points, axis=1).max())
+    return float(norm(nearest).min()), float(norm(points).max())
 
 
 def _convex_hull(points: FloatArray) -> FloatArray:
@@ -185,8 +185,8 @@ def _shrunk(vertices: FloatArray, distance: float) -> FloatArray:
     hull = rest = _convex_hull(vertices) if len(vertices) >= 3 else np.zeros((0, 2))
     sides = np.roll(hull, -1, axis=0) - hull
     for vertex, side in zip(hull, sides, strict=True):
-        inwards = np.array([-side[1], side[0]]) / np.linalg.norm(side)
-        rest = _clipped(rest, (rest - vertex) @ inwards - distance)
+        inwards = np.array([-side[1], side[0]]) / norm(side)
+        rest = _clipped(rest, scalar_products(rest - vertex, inwards) - distance)
     if len(rest) < 3:
         raise ValueError(f"shrinking the footprint by {distance:g} m leaves nothing of it")
     return rest
@@ -206,14 +206,14 @@ def _clipped(polygon: FloatArray, depths: FloatArray) -> FloatArray:
 def _mitred_offset(hull: FloatArray, distance: float) -> FloatArray:
     """Offset a counter-clockwise convex polygon, or a segment, outwards by moving its sides."""
     sides = np.roll(hull, -1, axis=0) - hull
-    normals = np.column_stack([sides[:, 1], -sides[:, 0]]) / np.linalg.norm(sides, axis=1)[:, None]
+    normals = np.column_stack([sides[:, 1], -sides[:, 0]]) / norm(sides)[:, None]
     corners: list[FloatArray] = []
     for vertex, before, after in zip(hull, np.roll(normals, 1, axis=0), normals, strict=True):
         between = before + after
-        length = float(np.linalg.norm(between))
+        length = float(norm(between))
         # At the end of a segment the sides run back on themselves; outwards is then straight on.
         bisector = between / length if length > 1e-9 else np.array([-before[1], before[0]])
-        half_turn_cosine = float(bisector @ before)
+        half_turn_cosine = float(scalar_products(bisector, before))
         if half_turn_cosine * MITRE_LIMIT >= 1.0:
             corners.append(vertex + bisector * (distance / half_turn_cosine))
             continue

@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import plane_rotation, rotated
 from mbf_costmap_nav.costmap import LETHAL, Costmap
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.kernels.footprint_cost import first_collision, footprint_cost
@@ -48,15 +49,13 @@ class FootprintCheck:
 
     def lethal_count(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
         """Number of covering points on lethal cells: a measure of how deep the robot is in a collision."""
-        c, s = math.cos(yaw), math.sin(yaw)
-        points = self.samples @ np.array([[c, s], [-s, c]]) + (x, y)
+        points = rotated(plane_rotation(yaw), self.samples) + np.array([x, y])
         cells, inside = costmap.world_to_cells(points)
         return int(np.count_nonzero(costmap.cells[cells[inside, 1], cells[inside, 0]] == LETHAL))
 
     def outside_count(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
         """Number of covering points off the map."""
-        c, s = math.cos(yaw), math.sin(yaw)
-        points = self.samples @ np.array([[c, s], [-s, c]]) + (x, y)
+        points = rotated(plane_rotation(yaw), self.samples) + np.array([x, y])
         return int(np.count_nonzero(~costmap.world_to_cells(points)[1]))
 
     def first_collision(self, costmap: Costmap, poses: FloatArray) -> int:

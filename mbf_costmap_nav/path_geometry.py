@@ -8,6 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbf_abstract.arithmetic import scalar_products
+
 FloatArray = NDArray[np.float64]
 
 
@@ -85,9 +87,9 @@ def circle_crossing(a: ArrayLike, b: ArrayLike, radius: float) -> FloatArray:
     segment that starts on the circle and runs through it: of two the one nearer to ``b`` is returned.
     """
     start, side = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64) - np.asarray(a, dtype=np.float64)
-    quadratic = float(side @ side)
-    linear = float(start @ side)
-    constant = float(start @ start) - radius * radius
+    quadratic = float(scalar_products(side, side))
+    linear = float(scalar_products(start, side))
+    constant = float(scalar_products(start, start)) - radius * radius
     root = math.sqrt(max(0.0, linear * linear - quadratic * constant))
     far, near = (-linear + root) / quadratic, (-linear - root) / quadratic
     return np.asarray(start + side * (far if -1e-12 <= far <= 1.0 + 1e-12 else near))

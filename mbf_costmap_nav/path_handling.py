@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import plane_rotation, rotated_back
 from mbf_abstract.geometry import Path, Pose, normalize_angle
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
@@ -135,8 +136,7 @@ def _reverse_segments(path: Path) -> NDArray[np.bool_]:
 
 def to_base_frame(points: FloatArray, pose: Pose) -> FloatArray:
     """Points (n, 2) of the map expressed in the base frame of a robot at ``pose``."""
-    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-    return np.asarray((points - (pose.x, pose.y)) @ np.array([[c, -s], [s, c]]))
+    return rotated_back(plane_rotation(pose.yaw), points - (pose.x, pose.y))
 
 
 @dataclass(frozen=True)

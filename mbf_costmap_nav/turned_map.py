@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import plane_rotation, rotated, rotated_back
 from mbf_costmap_nav.map_description import OCCUPIED, UNKNOWN_OCCUPANCY, OccupancyArray
 
 BLOCK_CELLS = 500_000
@@ -44,7 +45,7 @@ def upright_shape(shape: tuple[int, ...], yaw: float, max_cells: int) -> tuple[t
     height, width = shape
     if math.remainder(yaw, 2.0 * math.pi) == 0.0:
         return (height, width), np.zeros(2)
-    corners = np.array([[0, 0], [width, 0], [width, height], [0, height]]) @ _rotation(yaw).T
+    corners = rotated(plane_rotation(yaw), [[0, 0], [width, 0], [width, height], [0, height]])
     lower = corners.min(axis=0)
     columns, rows = np.ceil(corners.max(axis=0) - lower - 1e-9).astype(int).tolist()
     if rows * columns > max_cells:
@@ -70,16 +71,12 @@ def turned_upright(occupancy: OccupancyArray, yaw: float, max_cells: int) -> tup
     """
     shape, lower = upright_shape(occupancy.shape, yaw, max_cells)
     upright = np.full(shape, UNKNOWN_OCCUPANCY, dtype=np.uint8)
-    rotation = _rotation(yaw)
+    rotation = plane_rotation(yaw)
     for block in _row_blocks(shape):
         _fill(upright, block, occupancy, lower, rotation)
     for block in _row_blocks(occupancy.shape):
         _write_obstacles(upright, block, occupancy, lower, rotation)
     return upright, (float(lower[0]), float(lower[1]))
-
-
-def _rotation(yaw: float) -> NDArray[np.float64]:
-    return np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
 
 
 def _row_blocks(shape: tuple[int, ...]) -> Iterator[slice]:
@@ -97,7 +94,7 @@ def _fill(
     """Give each cell of the block the value at its centre."""
     height, width = occupancy.shape
     columns, rows = np.meshgrid(np.arange(upright.shape[1]), np.arange(block.start, block.stop))
-    source = np.floor((np.stack([columns, rows], axis=-1) + 0.5 + lower) @ rotation).astype(np.int64)
+    source = np.floor(rotated_back(rotation, np.stack([columns, rows], axis=-1) + 0.5 + lower)).astype(np.int64)
     inside = np.all((source >= 0) & (source < (width, height)), axis=-1)
     upright[block][inside] = occupancy[source[inside][:, 1], source[inside][:, 0]]
 
@@ -112,6 +109,6 @@ def _write_obstacles(
     """Write the occupied cells of the old block where their centres lie."""
     part = occupancy[block]
     rows, columns = np.nonzero((part >= OCCUPIED) & (part != UNKNOWN_OCCUPANCY))
-    points = (np.column_stack([columns, rows + block.start]) + 0.5) @ rotation.T - lower
+    points = rotated(rotation, np.column_stack([columns, rows + block.start]) + 0.5) - lower
     cells = np.minimum(points.astype(np.int64), (upright.shape[1] - 1, upright.shape[0] - 1))
     upright[cells[:, 1], cells[:, 0]] = part[rows, columns]

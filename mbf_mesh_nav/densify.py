@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm
 from mbf_mesh_nav.checked_mesh import CheckedMesh, IntArray
 from mbf_mesh_nav.mesh_report import MeshError
 
@@ -35,7 +36,7 @@ def densify(
     while True:
         edges, edge_of_corner = np.unique(_corner_edges(faces).reshape(-1, 2), axis=0, return_inverse=True)
         edge_of_corner = edge_of_corner.reshape(-1, 3)
-        long = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1) > max_edge_length
+        long = norm(vertices[edges[:, 0]] - vertices[edges[:, 1]]) > max_edge_length
         if not long.any():
             break
         if len(faces) + int(long[edge_of_corner].sum()) > max_faces:

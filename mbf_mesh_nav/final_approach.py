@@ -13,6 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm, rotated, rotated_back, scalar_products
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw, quaternion_multiply
 from mbf_mesh_nav.locate import Location
 from mbf_mesh_nav.mesh_map import MeshMap
@@ -85,27 +86,27 @@ def _fits(mesh_map: MeshMap, blocked: NDArray[np.bool_], curve: NDArray[np.float
     """Whether a curve (n, 3) lies over free ground all along: past no border, and not with a part on another storey."""
     if (spots.faces < 0).any() or blocked[mesh_map.faces[spots.faces]].any():
         return False
-    steps = np.linalg.norm(np.diff(spots.points, axis=0), axis=1)
+    steps = norm(np.diff(spots.points, axis=0))
     return not beyond_border(mesh_map, curve, spots).any() and bool((steps <= _LONGEST_STEP).all())
 
 
 def _corner_at_goal(path: Path) -> float:
     """Angle [rad] between the last step of a path and the heading of its last pose."""
     step = path.positions[-1] - path.positions[-2]
-    cosine = float(step @ path[-1].rotation[:, 0]) / max(float(np.linalg.norm(step)), 1e-9)
+    cosine = float(scalar_products(step, path[-1].rotation[:, 0])) / max(float(norm(step)), 1e-9)
     return math.acos(min(max(cosine, -1.0), 1.0))
 
 
 def _curve_to_goal(path: Path, progress: PathProgress, leaves_at: float, radius: float) -> NDArray[np.float64]:
     """Points (n, 3) in the goal's tangent plane from ``leaves_at`` [m] of the path to the straight piece at the end."""
     goal = path[-1]
-    start, ahead = progress.points_at(np.array([leaves_at, leaves_at + 0.5 * _SPACING])) @ goal.rotation
+    start, ahead = rotated_back(goal.rotation, progress.points_at(np.array([leaves_at, leaves_at + 0.5 * _SPACING])))
     end = path.positions[-1] - _STRAIGHT * goal.rotation[:, 0]
-    x, y, _ = start - end @ goal.rotation
+    x, y, _ = start - rotated_back(goal.rotation, end)
     yaw = math.atan2(ahead[1] - start[1], ahead[0] - start[0])
     flat = dubins_curve((x, y, yaw), radius, _SPACING)
     flat = np.concatenate([flat, [[0.0, 0.0]]])
-    return np.asarray(np.column_stack([flat, np.zeros(len(flat))]) @ goal.rotation.T + end)
+    return np.asarray(rotated(goal.rotation, np.column_stack([flat, np.zeros(len(flat))])) + end)
 
 
 def dubins_curve(start: tuple[float, float, float], radius: float, spacing: float) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import rotated_back
 from mbf_abstract.geometry import Pose
 
 _SAME_STOREY = 0.5  # [m]
@@ -14,7 +15,7 @@ _SAME_STOREY = 0.5  # [m]
 
 def in_robot_frame(pose: Pose, point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Coordinates (3,) of a global point in the robot's frame: x ahead, y left, both in its tangent plane."""
-    return np.asarray(pose.rotation.T @ (point - np.asarray(pose.position)))
+    return rotated_back(pose.rotation, point - np.asarray(pose.position))
 
 
 def arc_to(pose: Pose, point: NDArray[np.float64]) -> tuple[float, float]:
@@ -25,7 +26,7 @@ def arc_to(pose: Pose, point: NDArray[np.float64]) -> tuple[float, float]:
 
 def heading_error(pose: Pose, other: Pose) -> float:
     """Angle [rad] in (-pi, pi] the robot has to turn left, about its own z axis, to look where ``other`` looks."""
-    ahead = pose.rotation.T @ other.rotation[:, 0]
+    ahead = rotated_back(pose.rotation, other.rotation[:, 0])
     return math.atan2(ahead[1], ahead[0])
 
 

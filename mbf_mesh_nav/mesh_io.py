@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import rotated, scalar_products
 from mbf_mesh_nav.cut_files import refuse_cut_file
 from mbf_mesh_nav.elevation_files import elevation_readers, read_elevation
 from mbf_mesh_nav.mesh_report import MeshError
@@ -113,9 +114,11 @@ def _read_scene(path: Path, part: str) -> MeshArrays:
         if not hasattr(geometry, "faces"):
             continue
         points = np.asarray(geometry.vertices, dtype=np.float64)
-        vertices.append(points @ transform[:3, :3].T + transform[:3, 3])
+        vertices.append(rotated(transform[:3, :3], points) + transform[:3, 3])
         corners = np.asarray(geometry.faces, dtype=np.int64) + offset
-        faces.append(corners[:, ::-1] if np.linalg.det(transform[:3, :3]) < 0.0 else corners)  # mirrored inside out
+        x_axis, y_axis, z_axis = transform[:3, :3].T
+        mirrored = float(scalar_products(np.cross(x_axis, y_axis), z_axis)) < 0.0
+        faces.append(corners[:, ::-1] if mirrored else corners)  # mirrored parts are inside out
         offset += len(points)
     if not faces:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)

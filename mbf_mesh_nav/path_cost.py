@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.snapshot import MeshSnapshot
 
@@ -26,7 +27,7 @@ def cost_along(
         The face in which the way to each point lies. Corners of infinite cost, which only the faces of a start or a
         goal have, do not count.
     """
-    lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    lengths = norm(np.diff(positions, axis=0))
     if snapshot.edge_cost_factor == 0.0:
         return float(lengths.sum())
     middles = (positions[1:] + positions[:-1]) / 2.0

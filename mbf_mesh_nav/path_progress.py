@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm, scalar_products
 from mbf_abstract.geometry import Path
 
 _SAME_DISTANCE = 0.05  # [m] a first projection prefers the earliest point that is about as near as the nearest
@@ -46,7 +47,7 @@ class PathProgress:
     def __init__(self, path: Path, window: float) -> None:
         self.positions = path.positions
         self.window = window
-        steps = np.linalg.norm(np.diff(self.positions, axis=0), axis=1)
+        steps = norm(np.diff(self.positions, axis=0))
         self.arc_lengths = np.concatenate([[0.0], np.cumsum(steps)])
         self._travelled: float | None = None
 
@@ -58,7 +59,7 @@ class PathProgress:
     def update(self, position: NDArray[np.float64]) -> PathProjection:
         """Project ``position`` (3,) onto the path, at or ahead of the last projection."""
         if self._travelled is None:
-            offsets = np.linalg.norm(self.positions - position, axis=1)
+            offsets = norm(self.positions - position)
             nearest = int(np.argmax(offsets <= offsets.min() + _SAME_DISTANCE))
             self._travelled = float(self.arc_lengths[max(nearest - 1, 0)])
         start = self._travelled
@@ -71,7 +72,7 @@ class PathProgress:
             projected, along = _nearest_on_polyline(points, position)
             travelled = max(start, float(self.arc_lengths[first]) + along)
         self._travelled = travelled
-        deviation = float(np.linalg.norm(projected - position))
+        deviation = float(norm(projected - position))
         return PathProjection(projected, travelled, self.length - travelled, deviation)
 
     def point_at(self, travelled: float) -> NDArray[np.float64]:
@@ -89,9 +90,9 @@ def _nearest_on_polyline(
 ) -> tuple[NDArray[np.float64], float]:
     """Nearest point of the segments through ``points`` (n >= 2, 3), and its arc length [m] from the first."""
     steps = np.diff(points, axis=0)
-    lengths = np.linalg.norm(steps, axis=1)
-    along = np.einsum("ij,ij->i", position - points[:-1], steps) / np.maximum(lengths**2, 1e-18)
+    lengths = norm(steps)
+    along = scalar_products(position - points[:-1], steps) / np.maximum(lengths**2, 1e-18)
     along = np.clip(along, 0.0, 1.0)
     candidates = points[:-1] + along[:, None] * steps
-    best = int(np.argmin(np.linalg.norm(candidates - position, axis=1)))
+    best = int(np.argmin(norm(candidates - position)))
     return candidates[best], float(lengths[:best].sum() + along[best] * lengths[best])

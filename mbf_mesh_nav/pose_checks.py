@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mbf_abstract.arithmetic import norm, scalar_products
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.map_queries import CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_mesh_nav.kernels.surface_disc import vertices_in_disc
@@ -39,7 +40,7 @@ def check_point(mesh_map: MeshMap, point: Pose) -> PlaceAnswer:
     snapshot = mesh_map.snapshot()
     nearest = _nearest_vertex(mesh_map, place)
     weights = place.barycentric > 1e-12
-    cost = float(place.barycentric[weights] @ snapshot.costs[mesh_map.faces[place.face][weights]])
+    cost = float(scalar_products(place.barycentric[weights], snapshot.costs[mesh_map.faces[place.face][weights]]))
     if _blocked(snapshot, np.array([nearest])).any():
         return PlaceAnswer(CellState.LETHAL, cost)
     touched = _blocked(snapshot, _disc(mesh_map, place, mesh_map.inscribed_radius)).any()
@@ -103,7 +104,7 @@ def find_valid_pose(mesh_map: MeshMap, pose: Pose, dist_tolerance: float, query:
     everywhere = np.arange(len(mesh_map.vertices), dtype=np.int32)
     near = everywhere if place is None else _disc(mesh_map, place, dist_tolerance)
     near = near[~_blocked(mesh_map.snapshot(), near)]
-    distances = np.linalg.norm(mesh_map.vertices[near] - np.array(pose.position), axis=1)
+    distances = norm(mesh_map.vertices[near] - np.array(pose.position))
     order = np.argsort(distances, kind="stable")
     for vertex in near[order[distances[order] <= dist_tolerance]]:
         x, y, z = mesh_map.vertices[vertex].tolist()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import arcsin, arctan2, norm
+
 FloatArray = NDArray[np.float64]
 
 BIN_ANGLE = np.radians(1.0)
@@ -27,7 +29,7 @@ class RangeImage:
     def __init__(self, points: FloatArray, sensor_origin: FloatArray) -> None:
         self.sensor_origin = sensor_origin
         self._ranges = np.full((ROWS, COLUMNS), np.inf)
-        away = np.linalg.norm(points - sensor_origin, axis=1) > NO_RANGE
+        away = norm(points - sensor_origin) > NO_RANGE
         rows, columns, distances = self._bins(points[away])
         np.minimum.at(self._ranges, (rows, columns), distances)
 
@@ -48,8 +50,8 @@ class RangeImage:
 
     def _bins(self, points: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
         rays = points - self.sensor_origin
-        distances = np.linalg.norm(rays, axis=1)
-        elevations = np.arcsin(np.clip(rays[:, 2] / np.maximum(distances, 1e-9), -1.0, 1.0))
+        distances = norm(rays)
+        elevations = arcsin(np.clip(rays[:, 2] / np.maximum(distances, 1e-9), -1.0, 1.0))
         rows = np.rint((elevations + np.pi / 2.0) / BIN_ANGLE).astype(np.intp)
-        columns = np.rint(np.arctan2(rays[:, 1], rays[:, 0]) / BIN_ANGLE).astype(np.intp) % COLUMNS
+        columns = np.rint(arctan2(rays[:, 1], rays[:, 0]) / BIN_ANGLE).astype(np.intp) % COLUMNS
         return rows, columns, distances

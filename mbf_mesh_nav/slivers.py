@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from mbf_abstract.arithmetic import norm
 from mbf_mesh_nav.checked_mesh import CheckedMesh, FloatArray, IntArray
 from mbf_mesh_nav.kernels.defects import faces_without_area
 from mbf_mesh_nav.kernels.slivers import flip_slivers
@@ -53,7 +54,7 @@ def without_slivers(mesh: CheckedMesh, tolerance: float) -> tuple[CheckedMesh, i
 def _edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Lengths (n, 3) [m] of the edges from corner k to corner k+1."""
     corners = vertices[faces]
-    lengths: FloatArray = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+    lengths: FloatArray = norm(corners - np.roll(corners, -1, axis=1))
     return lengths
 
 

@@ -17,6 +17,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -188,7 +189,7 @@ class SurfacePlanner(MeshPlanner):
         distances = self.reach(query)
         if distances is None:
             return None
-        offsets = np.linalg.norm(mesh_map.vertices - np.asarray(request.goal.position), axis=1)
+        offsets = norm(mesh_map.vertices - np.asarray(request.goal.position))
         offsets[~np.isfinite(distances)] = np.inf
         vertex = int(np.argmin(offsets))
         if offsets[vertex] > request.dist_tolerance:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm
 from mbf_mesh_nav.locate import Location, SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.snapshot import MeshSnapshot
@@ -47,7 +48,7 @@ def beyond_border(
     on_border = (~np.roll(near, -2, axis=1) & (mesh_map.face_neighbours[on_surface] < 0)).any(axis=1)
     in_vertex = near.sum(axis=1) == 1
     on_border |= in_vertex & (near & mesh_map.topology.border_vertices[mesh_map.faces[on_surface]]).any(axis=1)
-    return np.asarray(on_border & (np.linalg.norm(sideways, axis=1) > slack))
+    return np.asarray(on_border & (norm(sideways) > slack))
 
 
 def on_surface(

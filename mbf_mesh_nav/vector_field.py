@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm, rotated_back
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.topology import MeshTopology
@@ -54,6 +55,6 @@ class VectorField:
         if point.face == self.goal_face:
             direction = self.goal - point.point
         else:
-            direction = point.barycentric @ self.directions[mesh_map.faces[point.face]].astype(np.float64)
-        length = float(np.linalg.norm(direction))
+            direction = rotated_back(self.directions[mesh_map.faces[point.face]], point.barycentric)
+        length = float(norm(direction))
         return direction / length if length > 1e-9 else None

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm
 from mbf_mesh_nav.kernels.corners import build_corner_ends, write_corner_weights
 from mbf_mesh_nav.kernels.cvp import ALONG_EDGE, propagate_wave
 from mbf_mesh_nav.kernels.descent import trace_descent
@@ -116,7 +117,7 @@ class WaveSearch:
         self._weights = weights
         corners = mesh_map.faces[goal.face]
         towards_goal = goal.point - mesh_map.vertices[corners]
-        directions[corners] = towards_goal / np.maximum(np.linalg.norm(towards_goal, axis=1, keepdims=True), 1e-9)
+        directions[corners] = towards_goal / np.maximum(norm(towards_goal)[..., None], 1e-9)
         return VectorField(
             directions, wave.distances, goal.face, goal.point.copy(), query.snapshot.version, mesh_map.topology
         )

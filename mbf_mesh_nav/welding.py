@@ -13,6 +13,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from mbf_abstract.arithmetic import norm
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
@@ -61,4 +63,4 @@ def close_rims(vertices: FloatArray, face_neighbours: IntArray, faces: IntArray,
 def rounding_distance(vertices: FloatArray) -> float:
     """Distance [m] within which rims are taken for one unless the user says otherwise."""
     extent = np.ptp(vertices, axis=0) if len(vertices) else np.zeros(3)
-    return ROUNDING_SHARE * float(np.linalg.norm(extent))
+    return ROUNDING_SHARE * float(norm(extent))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from mbf_abstract.arithmetic import norm
 from mbf_abstract.geometry import Pose
 from terrain.kinematic_robot import KinematicWorld
 from terrain.mishaps import Thing
@@ -84,7 +85,7 @@ class RouteWalker:
         if corners.shape[1] == 2:
             corners = np.column_stack([corners, np.zeros(len(corners))])
         self._corners = np.vstack([corners, corners[:1]])
-        self._travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self._corners, axis=0), axis=1))])
+        self._travelled = np.concatenate([[0.0], np.cumsum(norm(np.diff(self._corners, axis=0)))])
         self._world = world
         self._speed = speed
         self._start = start
@@ -209,7 +210,7 @@ def random_route(
 
 
 def _leg_is_open(open_cells: NDArray[np.bool_], a: NDArray[np.intp], b: NDArray[np.intp], longest: float) -> bool:
-    length = float(np.linalg.norm(b - a))
+    length = float(norm(b - a))
     if length > longest:
         return False
     points = np.rint(a + np.linspace(0.0, 1.0, 2 * math.ceil(length) + 2)[:, None] * (b - a)).astype(np.intp)

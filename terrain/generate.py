@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import exp, power, tan
 from terrain.heightfield import Heightfield
 
 FloatArray = NDArray[np.float64]
@@ -34,7 +35,7 @@ def fractal_noise(terrain: Heightfield, rng: np.random.Generator, exponent: floa
     ny, nx = 2 * terrain.ny, 2 * terrain.nx
     wave_number = np.hypot(np.fft.fftfreq(ny, terrain.dy)[:, None], np.fft.rfftfreq(nx, terrain.dx)[None, :])
     wave_number[0, 0] = np.inf  # no constant term
-    spectrum = np.fft.rfft2(rng.normal(size=(ny, nx))) * wave_number**-exponent
+    spectrum = np.fft.rfft2(rng.normal(size=(ny, nx))) * power(wave_number, -exponent)
     noise = np.fft.irfft2(spectrum, s=(ny, nx))[: terrain.ny, : terrain.nx]
     noise = noise - noise.mean()
     return np.asarray(noise / noise.std())
@@ -52,7 +53,7 @@ def fractal_terrain(
     """Hills whose median slope is ``median_slope`` [degrees], with bumps of ``roughness`` [m] rms added after that."""
     terrain = flat_terrain(size_x, size_y, spacing)
     hills = terrain.with_heights(fractal_noise(terrain, rng, exponent))
-    tangent = np.median(np.tan(np.radians(hills.slopes())))
+    tangent = np.median(tan(np.radians(hills.slopes())))
     hills = hills.with_heights(hills.heights * (math.tan(math.radians(median_slope)) / tangent))
     return add_roughness(hills, rng, roughness) if roughness > 0.0 else hills
 
@@ -80,7 +81,7 @@ def _distance_to_polyline(terrain: Heightfield, points: FloatArray) -> FloatArra
 def add_ridge(terrain: Heightfield, points: FloatArray, height: float, width: float) -> Heightfield:
     """Raise a ridge of Gaussian section along a polyline (n, 2) [m]; ``width`` [m] is from foot to foot (4 sigma)."""
     distance = _distance_to_polyline(terrain, np.asarray(points, dtype=float))
-    return terrain.with_heights(terrain.heights + height * np.exp(-0.5 * (4.0 * distance / width) ** 2))
+    return terrain.with_heights(terrain.heights + height * exp(-0.5 * (4.0 * distance / width) ** 2))
 
 
 def add_crater(
@@ -99,7 +100,8 @@ def add_crater(
     gx, gy = _grid(terrain)
     r = np.hypot(gx - x, gy - y) / radius
     inside = (depth + rim) * r**2 - depth
-    outside = rim * np.maximum(r, 1e-9) ** -3.0
+    r_outside = np.maximum(r, 1e-9)
+    outside = rim / (r_outside * r_outside * r_outside)
     return terrain.with_heights(terrain.heights + np.where(r < 1.0, inside, outside))
 
 
@@ -155,7 +157,7 @@ def add_boulders(
         [rng.uniform(terrain.x0, terrain.x_max, count), rng.uniform(terrain.y0, terrain.y_max, count)]
     )
     u = rng.uniform(size=count)  # inverse of the cumulative distribution of r**-3 between the two radii
-    radii = (radius_min**-2 + u * (radius_max**-2 - radius_min**-2)) ** -0.5
+    radii = 1.0 / np.sqrt(radius_min**-2 + u * (radius_max**-2 - radius_min**-2))
     clear = np.zeros((0, 2)) if keep_clear is None else np.asarray(keep_clear, dtype=float).reshape(-1, 2)
     heights = terrain.heights.astype(np.float64)
     for (x, y), radius in zip(centres.tolist(), radii.tolist(), strict=True):

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RectBivariateSpline
-from scipy.ndimage import gaussian_filter
 
+from mbf_abstract.arithmetic import arctan, norm
 from mbf_abstract.geometry import Pose, quaternion_from_yaw, quaternion_multiply
+from terrain.smoothing import smoothed
 
 FloatArray = NDArray[np.float64]
 
@@ -151,7 +152,7 @@ class Heightfield:
         rise_x = np.where(is_lower, h10 - h00, h11 - h01)
         rise_y = np.where(is_lower, h01 - h00, h11 - h10)
         normal = np.stack([-rise_x / self.dx, -rise_y / self.dy, np.where(np.isnan(s), np.nan, 1.0)], axis=-1)
-        return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
+        return np.asarray(normal / norm(normal)[..., None])
 
     def ground_at(self, x: float, y: float) -> tuple[float, float, float]:
         """Height [m] and its derivatives along x and y at one place, without the cost of array calls.
@@ -258,12 +259,12 @@ class Heightfield:
         along_x, along_y = np.diff(h, axis=1) / self.dx, np.diff(h, axis=0) / self.dy
         lower = np.hypot(along_x[:-1], along_y[:, :-1])
         upper = np.hypot(along_x[1:], along_y[:, 1:])
-        return np.asarray(np.degrees(np.arctan(np.stack([lower, upper], axis=2).ravel())))
+        return np.asarray(np.degrees(arctan(np.stack([lower, upper], axis=2).ravel())))
 
     def slope_report(self) -> SlopeReport:
         """Summarise how steep and how rough the terrain is."""
         median, p90, p99, maximum = np.percentile(self.slopes(), [50, 90, 99, 100]).tolist()
         heights = self.heights.astype(np.float64)
         sigma = 0.25 * SMOOTHING_WIDTH
-        bumps = heights - gaussian_filter(heights, (sigma / self.dy, sigma / self.dx), mode="nearest")
+        bumps = heights - smoothed(heights, (sigma / self.dy, sigma / self.dx))
         return SlopeReport(median, p90, p99, maximum, float(np.ptp(heights)), float(np.sqrt(np.mean(bumps**2))))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import arcsin, arctan2, norm
 from mbf_abstract.events import Event, EventKind
 from terrain.recording import Recording
 
@@ -83,7 +84,7 @@ class Metrics:
 def measure(recording: Recording) -> Metrics:
     """Compute all metrics of a run."""
     steps = np.diff(recording.poses[:, :3], axis=0)
-    length = float(np.linalg.norm(steps, axis=1).sum())
+    length = float(norm(steps).sum())
     roll, pitch = roll_and_pitch(recording.poses[:, 3:])
     errors = cross_track_errors(recording)
     errors = errors[np.isfinite(errors)]
@@ -119,8 +120,8 @@ def measure(recording: Recording) -> Metrics:
 def roll_and_pitch(orientations: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Roll and pitch (n,) [rad] of quaternions (n, 4) x y z w, fixed axes as in REP-103."""
     x, y, z, w = orientations.T
-    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    return np.asarray(roll), np.asarray(np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)))
+    roll = arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    return np.asarray(roll), np.asarray(arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)))
 
 
 def count_stops(twists: FloatArray) -> int:
@@ -145,17 +146,17 @@ def _distances_to_polyline(points: FloatArray, line: FloatArray) -> FloatArray:
     """Distance (n,) of each point (n, 2) to the nearest piece of a polyline (m, 2)."""
     starts, pieces = line[:-1], np.diff(line, axis=0)
     if len(pieces) == 0:
-        return np.asarray(np.linalg.norm(points - line[0], axis=1))
+        return np.asarray(norm(points - line[0]))
     squared = np.maximum(np.sum(pieces**2, axis=1), 1e-12)
     distances = np.empty(len(points))
     for index, point in enumerate(points):  # n x m at once would need gigabytes on long runs
         along = np.clip(np.sum((point - starts) * pieces, axis=1) / squared, 0.0, 1.0)
-        distances[index] = np.linalg.norm(starts + along[:, None] * pieces - point, axis=1).min()
+        distances[index] = norm(starts + along[:, None] * pieces - point).min()
     return distances
 
 
 def _length(points: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    return float(norm(np.diff(points, axis=0)).sum())
 
 
 def _largest_degrees(angles: FloatArray) -> float:
@@ -165,7 +166,7 @@ def _largest_degrees(angles: FloatArray) -> float:
 def _distance_to_goal(recording: Recording) -> float | None:
     if not recording.goals or not len(recording.poses):
         return None
-    return float(np.linalg.norm(recording.poses[-1, :3] - recording.goals[-1].position))
+    return float(norm(recording.poses[-1, :3] - recording.goals[-1].position))
 
 
 def _count(events: tuple[Event, ...], kind: EventKind) -> int:

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm
 from terrain.world import MOVING, BulletWorld
 
 FloatArray = NDArray[np.float64]
@@ -73,4 +74,4 @@ class MovingRays:
         if not self._world.has_moving_bodies:
             return np.full(len(origins), np.inf)
         hits = self._world.cast_rays(origins, origins + max_range * directions, MOVING)
-        return np.where(hits.hit, np.linalg.norm(hits.points - origins, axis=1), np.inf)
+        return np.where(hits.hit, norm(hits.points - origins), np.inf)

@@ -20,8 +20,10 @@ from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from mbf_abstract.arithmetic import arctan
 from terrain.heightfield import Heightfield
 from terrain.robot_models import RobotSpec
+from terrain.smoothing import smoothed
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -92,8 +94,8 @@ def allowed_states(terrain: Heightfield, spec: RobotSpec, limits: DrivingLimits)
     disc = (reach <= limits.room + 1e-9)[None]
     allowed = ndimage.binary_erosion(allowed, disc)
     heights = terrain.heights.astype(np.float64)
-    smooth = ndimage.gaussian_filter(heights, (0.25 * spec.wheelbase / terrain.dy, 0.25 * spec.wheelbase / terrain.dx))
-    tilt = np.degrees(np.arctan(np.hypot(*np.gradient(smooth, terrain.dy, terrain.dx))))
+    smooth = smoothed(heights, (0.25 * spec.wheelbase / terrain.dy, 0.25 * spec.wheelbase / terrain.dx))
+    tilt = np.degrees(arctan(np.hypot(*np.gradient(smooth, terrain.dy, terrain.dx))))
     return allowed, allowed & (tilt <= limits.turning_tilt)
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import arccos
 from mbf_abstract.bounded_files import read_arrays
 from mbf_abstract.events import Event
 from mbf_abstract.geometry import Pose
@@ -145,7 +146,7 @@ class Recording:
     def tilt(self) -> FloatArray:
         """(n,) angle [rad] between the robot's z axis and the vertical."""
         x, y = self.poses[:, 3], self.poses[:, 4]
-        return np.asarray(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
+        return np.asarray(arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
 
     @property
     def duration(self) -> float:

@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm
+
 URDF_FOLDER = Path(__file__).resolve().parent / "urdf"
 
 
@@ -87,12 +89,12 @@ class RobotSpec:
         corners = np.array(self.footprint)
         edges = np.roll(corners, -1, axis=0) - corners
         along = np.clip(-np.sum(corners * edges, axis=1) / np.sum(edges**2, axis=1), 0.0, 1.0)
-        return float(np.linalg.norm(corners + along[:, None] * edges, axis=1).min())
+        return float(norm(corners + along[:, None] * edges).min())
 
     @cached_property
     def circumscribed_radius(self) -> float:
         """Radius [m] of the smallest circle about base_link around the footprint."""
-        return float(np.linalg.norm(np.array(self.footprint), axis=1).max())
+        return float(norm(np.array(self.footprint)).max())
 
     @property
     def min_turning_radius(self) -> float:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from mbf_abstract.arithmetic import rotated, rotated_back
 from mbf_abstract.geometry import (
     AckermannCommand,
     Command,
@@ -184,10 +185,10 @@ class WheeledRobot:
         p_map_com, orientation = self._bullet.getBasePositionAndOrientation(self.body, physicsClientId=client)
         v_map_com, omega_map = self._bullet.getBaseVelocity(self.body, physicsClientId=client)
         R_map_base = rotation_matrix(orientation)
-        offset_map = R_map_base @ self._p_base_com
+        offset_map = rotated(R_map_base, self._p_base_com)
         v_map_base = np.array(v_map_com) - np.cross(omega_map, offset_map)
         pose = Pose(_vector(np.array(p_map_com) - offset_map), orientation, "map", self.world.time)
-        twist = Twist(_vector(R_map_base.T @ v_map_base), _vector(R_map_base.T @ np.array(omega_map)))
+        twist = Twist(_vector(rotated_back(R_map_base, v_map_base)), _vector(rotated_back(R_map_base, omega_map)))
         self._last_state = (step, pose, twist)
         return pose, twist
 
@@ -206,7 +207,7 @@ class WheeledRobot:
     def place(self, pose: Pose) -> None:
         """Put base_link at ``pose`` at once, at rest."""
         client = self.world.client
-        p_map_com = np.array(pose.position) + pose.rotation @ self._p_base_com
+        p_map_com = np.array(pose.position) + rotated(pose.rotation, self._p_base_com)
         self._bullet.resetBasePositionAndOrientation(
             self.body, p_map_com.tolist(), pose.orientation, physicsClientId=client
         )

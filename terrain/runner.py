@@ -9,13 +9,12 @@ In the folder: ``events.jsonl``, ``metrics.json``, ``recording.npz``, ``picture.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from mbf_abstract.actions.goals import MoveBaseResult
 from mbf_abstract.clock import wall_seconds
@@ -182,7 +181,7 @@ class _ProgressReporter:
                 wall_time=wall_seconds() - self._started,
                 distance_left=feedback.distance_along_path if feedback else float("nan"),
                 speed=speed,
-                tilt=float(np.arccos(np.clip(pose.rotation[2, 2], -1.0, 1.0))),
+                tilt=math.acos(min(max(float(pose.rotation[2, 2]), -1.0), 1.0)),
                 state=at_work[0] if at_work else "waiting",
             )
         )

@@ -7,9 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from mbf_abstract.geometry import Pose, rotation_matrix
+from mbf_abstract.arithmetic import rotated, rotated_back
+from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.sensing import RangeScan
 from terrain.actors import AnyWorld
@@ -105,7 +108,9 @@ class FaultSchedule:
 
 def seen_from(scan: RangeScan, true_pose: Pose, believed_pose: Pose) -> RangeScan:
     """Return a scan as a robot puts it into the map that believes to be at ``believed_pose``."""
-    R_believed_true = rotation_matrix(believed_pose.orientation) @ true_pose.rotation.T
-    true_place, believed_place = true_pose.position, believed_pose.position
-    origin = (scan.origin - true_place) @ R_believed_true.T + believed_place
-    return replace(scan, origin=origin, ends=(scan.ends - true_place) @ R_believed_true.T + believed_place)
+
+    def believed(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        in_base = rotated_back(true_pose.rotation, points - true_pose.position)
+        return rotated(believed_pose.rotation, in_base) + believed_pose.position
+
+    return replace(scan, origin=believed(scan.origin), ends=believed(scan.ends))

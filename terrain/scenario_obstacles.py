@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from mbf_abstract.arithmetic import rotated
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.actors import AnyWorld
@@ -65,5 +66,5 @@ def add_obstacles(
         else:
             world.add_cylinder(pose, 0.5 * length, height)
             corners, triangles = cylinder_triangles(0.5 * length, height)
-        parts.append((corners @ pose.rotation.T + np.array(pose.position), triangles))
+        parts.append((rotated(pose.rotation, corners) + pose.position, triangles))
     return Surface(*joined(parts)) if parts else None

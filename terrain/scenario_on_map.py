@@ -5,6 +5,7 @@ Use it for ``mbf run indoor --map FILE``. Obstacles of the scenario stay behind,
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +60,7 @@ def far_apart_places(grid: OccupancyGrid, radius: float) -> tuple[PlanarPose, Pl
         return None
     first = _farthest(cells, cells.mean(axis=0))
     second = _farthest(cells, first)
-    yaw = float(np.arctan2(*(second - first)))
+    yaw = math.atan2(*(second - first).tolist())
     return _place(grid, first, yaw), _place(grid, second, yaw)
 
 

@@ -8,6 +8,7 @@ scenarios: ``silent`` (nothing comes), ``stale`` (the last measurement comes aga
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,6 +17,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm, rotated
 from mbf_abstract.geometry import Pose, Twist, Vector3
 from mbf_abstract.sensing import RangeScan
 from terrain.rays import RayCaster
@@ -137,8 +139,8 @@ class Lidar(Sensor[RangeScan]):
     def _sense(self, stamp: float) -> RangeScan:
         pose = self.robot.pose()
         R_map_base = pose.rotation
-        origin = np.array(pose.position) + R_map_base @ self.position
-        directions = self.directions @ R_map_base.T
+        origin = np.array(pose.position) + rotated(R_map_base, self.position)
+        directions = rotated(R_map_base, self.directions)
         origins = np.broadcast_to(origin, directions.shape)
         ranges = np.full(len(directions), np.inf)
         for caster in self.casters:
@@ -186,7 +188,7 @@ def camera_directions(width: int = 160, height: int = 120, field_of_view: float 
     field_of_view : float
         Horizontal [rad]; pixels are square.
     """
-    pixel = 2.0 * np.tan(0.5 * field_of_view) / width
+    pixel = 2.0 * math.tan(0.5 * field_of_view) / width
     left = 0.5 * (width - 1) - np.arange(width)
     up = 0.5 * (height - 1) - np.arange(height)
     rays = np.stack(
@@ -197,4 +199,4 @@ def camera_directions(width: int = 160, height: int = 120, field_of_view: float 
         ],
         axis=-1,
     ).reshape(-1, 3)
-    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+    return np.asarray(rays / norm(rays)[..., None])

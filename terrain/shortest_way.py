@@ -17,6 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from trimesh.triangles import closest_point
 
+from mbf_abstract.arithmetic import norm
 from terrain.occupancy import OccupancyGrid
 from terrain.recording import Surface
 
@@ -47,7 +48,7 @@ def shortest_way(surface: Surface, places: Sequence[Sequence[float]]) -> float:
         starts = np.concatenate([starts, np.full(nodes_of_faces.shape[1], number)])
         ends = np.concatenate([ends, nodes_of_faces[face]])
     points = np.concatenate([points, np.array(places, dtype=float).reshape(-1, 3)])
-    lengths = np.maximum(np.linalg.norm(points[starts] - points[ends], axis=1), 1e-12)  # 0 would mean no connection
+    lengths = np.maximum(norm(points[starts] - points[ends]), 1e-12)  # 0 would mean no connection
     graph = coo_array((lengths, (starts, ends)), (len(points), len(points))).tocsr()
     legs = [dijkstra(graph, directed=False, indices=a)[b] for a, b in pairwise(own.tolist())]
     return float(np.sum(legs))
@@ -95,6 +96,6 @@ def _nearest_face(triangles: FloatArray, place: FloatArray) -> tuple[int, float]
     if len(candidates) == 0:
         return -1, float("inf")
     nearest = closest_point(triangles[candidates], np.tile(place, (len(candidates), 1)))
-    distances = np.linalg.norm(nearest - place, axis=1)
+    distances = norm(nearest - place)
     best = int(np.argmin(distances))
     return (int(candidates[best]), float(distances[best])) if distances[best] <= SEARCH_RADIUS else (-1, float("inf"))

@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from scipy import ndimage
 
+from mbf_abstract.arithmetic import arctan
 from terrain.heightfield import Heightfield
 from terrain.occupancy import OccupancyGrid
+from terrain.smoothing import smoothed
 
 FloatArray = NDArray[np.float64]
 
@@ -36,9 +37,10 @@ def cell_slopes(terrain: Heightfield, resolution: float, robot_length: float = R
     x = terrain.x0 + (np.arange(nx) + 0.5) * resolution
     y = terrain.y0 + (np.arange(ny) + 0.5) * resolution
     heights = terrain.height_at(*np.meshgrid(x, y))
-    smooth = ndimage.gaussian_filter(heights, 0.25 * robot_length / resolution, mode="nearest")
+    sigma = 0.25 * robot_length / resolution
+    smooth = smoothed(heights, (sigma, sigma))
     rise_y, rise_x = np.gradient(smooth, resolution)
-    return np.asarray(np.degrees(np.arctan(np.hypot(rise_x, rise_y))))
+    return np.asarray(np.degrees(arctan(np.hypot(rise_x, rise_y))))
 
 
 def slope_occupancy(terrain: Heightfield, resolution: float, lethal_slope: float = LETHAL_SLOPE) -> NDArray[np.uint8]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import rotated
 from mbf_abstract.geometry import Pose
 from terrain.solids import box_triangles, cylinder_triangles
 
@@ -65,7 +66,7 @@ class UprightSolid:
             vertices, faces = cylinder_triangles(self.size[0], self.size[1])
         else:
             vertices, faces = box_triangles(self.size)
-        return vertices @ self.pose.rotation.T + np.array(self.pose.position), faces
+        return rotated(self.pose.rotation, vertices) + self.pose.position, faces
 
     def _in_own_frame(self, dx: NDArray[np.float64] | float, dy: NDArray[np.float64] | float) -> tuple[float, float]:
         """Turn horizontal differences into ahead and left of the solid's heading."""

@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbf_abstract.arithmetic import rotated
 from mbf_abstract.geometry import Pose
 from terrain.bullet import load_pybullet, quiet_native_output
 from terrain.heightfield import Heightfield
@@ -223,7 +224,7 @@ class BulletWorld:
         group = MOVING if moving or mass > 0.0 else STATIC
         self.has_moving_bodies |= group == MOVING
         if group == STATIC:
-            self._static.append((vertices @ pose.rotation.T + pose.position, faces))
+            self._static.append((rotated(pose.rotation, vertices) + pose.position, faces))
         body: int = self.bullet.createMultiBody(
             mass, shape, basePosition=pose.position, baseOrientation=pose.orientation, physicsClientId=self.client
         )

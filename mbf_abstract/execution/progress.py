@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_abstract.actions.goals import ExePathFeedback
+from mbf_abstract.arithmetic import norm
 from mbf_abstract.clock import Clock, Stopwatch
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.plugins import ControlResult
@@ -32,7 +33,7 @@ class PathProgress:
         horizon = self._remaining[self._index] - SEARCH_AHEAD
         end = int(np.searchsorted(-self._remaining, -horizon, side="right")) + 1
         window = self.path.positions[self._index : max(end, self._index + 2)]
-        distances = np.linalg.norm(window - np.asarray(pose.position), axis=1)
+        distances = norm(window - np.asarray(pose.position))
         nearest = int(np.argmin(distances))
         to_go = distances[nearest : nearest + 2] + self._remaining[self._index + nearest :][:2]
         self._index += nearest

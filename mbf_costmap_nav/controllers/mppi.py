@@ -27,7 +27,7 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
 from mbf_costmap_nav.critics import CriticParameters
 from mbf_costmap_nav.critics.obstacle import COLLISION
-from mbf_costmap_nav.kernels.rollout import add_noise, clip_velocities, integrate
+from mbf_costmap_nav.kernels.rollout import add_noise, blend, clip_velocities, integrate
 from mbf_costmap_nav.path_handling import ControlCycle, PathFollower
 from mbf_costmap_nav.plugins import CostmapContext
 from mbf_costmap_nav.trajectory_scoring import build_critics, is_free, roll_out, score
@@ -146,8 +146,7 @@ class MppiController(PathFollower):
         costs = score(self._critics, rollouts, cycle.tracker.driving_backward)
         if rollouts.collided.all():
             return None
-        weights = np.exp(-(costs + self._control_cost(velocities) - costs.min()) / p.temperature)
-        controls = (velocities @ (weights / weights.sum()).astype(np.float32) @ self._smoothing)[:, :, None]
+        controls = blend(velocities, costs + self._control_cost(velocities), p.temperature, self._smoothing)[:, :, None]
         self._clip(cycle, controls)
         checked_steps = max(1, round(p.footprint_check_time / cycle.limit_factor / p.model_dt))
         trajectory = np.empty_like(controls)

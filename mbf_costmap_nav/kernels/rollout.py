@@ -6,6 +6,8 @@ relative to the robot (axes of the map), which keeps float32 exact to micrometre
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -128,3 +130,60 @@ def add_noise(nominal: Float32Array, noise: Float32Array, deviation: Float32Arra
             row, out = noise[component, t], velocities[component, t]
             for n in range(samples):
                 out[n] = base + scale * row[n]
+
+
+LANES = 8
+
+
+@kernel
+def blend(velocities: Float32Array, costs: Float32Array, temperature: float, smoothing: Float32Array) -> Float32Array:
+    """Mean of all samples, weighted by exp(-cost / temperature) (Williams 2018, algorithm 1), then smoothed in time.
+
+    Sums run in ``LANES`` interleaved parts: an order that vectorises and is the same on every CPU.
+
+    Parameters
+    ----------
+    velocities : (3, steps, samples) float32
+    costs : (samples,) float32
+    temperature : float
+        Unit of the costs.
+    smoothing : (steps, steps) float32
+        Applied to each row of the mean from the right.
+
+    Returns
+    -------
+    (3, steps) float32
+    """
+    components, steps, samples = velocities.shape
+    # 1. Weights.
+    whole = samples - samples % LANES
+    lowest = costs.min()
+    weights = np.empty(samples, dtype=np.float32)
+    total = 0.0
+    for n in range(samples):
+        weight = math.exp(-(costs[n] - lowest) / temperature)
+        weights[n] = weight
+        total += weight
+    # 2. Weighted means of every component and step.
+    mean = np.empty((components, steps), dtype=np.float32)
+    lanes = np.empty(LANES, dtype=np.float32)
+    for component in range(components):
+        for t in range(steps):
+            row = velocities[component, t]
+            lanes[:] = 0.0
+            for begin in range(0, whole, LANES):
+                for lane in range(LANES):
+                    lanes[lane] += weights[begin + lane] * row[begin + lane]
+            weighted = 0.0
+            for lane in range(LANES):
+                weighted += lanes[lane]
+            for n in range(whole, samples):
+                weighted += weights[n] * row[n]
+            mean[component, t] = weighted / total
+    # 3. Smoothing along time.
+    smooth = np.zeros((components, steps), dtype=np.float32)
+    for component in range(components):
+        for t in range(steps):
+            for source in range(steps):
+                smooth[component, t] += mean[component, source] * smoothing[source, t]
+    return smooth

@@ -18,6 +18,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import arctan2
 from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Path
 from mbf_abstract.outcomes import RefinePathOutcome
@@ -146,7 +147,7 @@ def first_lethal(costmap: Costmap, points: FloatArray) -> FloatArray | None:
 def curvatures(points: FloatArray) -> FloatArray:
     """(n,) curvature [1/m] at the inner points of a polyline: turn over the mean length beside it; 0 at the ends."""
     steps = np.diff(points, axis=0)
-    headings, lengths = np.arctan2(steps[:, 1], steps[:, 0]), np.hypot(*steps.T)
+    headings, lengths = arctan2(steps[:, 1], steps[:, 0]), np.hypot(*steps.T)
     turns = np.abs((np.diff(headings) + np.pi) % (2.0 * np.pi) - np.pi)
     inner = turns / np.maximum(0.5 * (lengths[1:] + lengths[:-1]), 1e-9)
     return np.concatenate([[0.0], inner, [0.0]])

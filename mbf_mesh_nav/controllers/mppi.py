@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import exp, tan
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -104,7 +105,7 @@ class MPPIController(MeshController):
             radius = p.wheelbase / math.tan(p.max_steering_angle)
             bent = with_final_approach(path, self.mesh_map, self._blocked(), _ROOM_TO_STEER * radius)
             # Beyond the goal, for the critic that looks along the path: it shows how to stand there.
-            self._run_out = path.positions[-1] + np.outer((0.1, 0.2, 0.3), self._goal.rotation[:, 0])
+            self._run_out = path.positions[-1] + np.array([[0.1], [0.2], [0.3]]) * self._goal.rotation[:, 0]
             self._strict_below = _STRICT_RADII * radius if bent is not path else 0.0
             path = bent
         self._path, self._begun, self._idle_cycles = path, False, 0
@@ -175,8 +176,8 @@ class MPPIController(MeshController):
         controls = self._sample(max_speed, max(projection.remaining, self._distance_to_goal(pose)))
         scores, collided = self._score(controls, spot, pose, projection)
         scores = np.where(collided, scores + _COLLISION_SCORE, scores)
-        weights = np.exp(-(scores - scores.min()) / self.parameters.temperature)
-        blended: NDArray[np.float64] = np.einsum("n,ntc->tc", weights / weights.sum(), controls)
+        weights = exp(-(scores - scores.min()) / self.parameters.temperature)
+        blended = np.asarray(((weights / weights.sum())[:, None, None] * controls).sum(axis=0))
         # The mean of two free motions, left and right of an obstacle, may hit it.
         if self._score(blended[None], spot, pose, projection)[1][0]:
             blended = np.asarray(controls[int(np.argmin(scores))])
@@ -284,7 +285,7 @@ class MPPIController(MeshController):
         """Turn controls (..., 2) into speed and yaw rate (..., 2), where a car has a steering angle."""
         if self.parameters.motion_model != "ackermann":
             return controls
-        yaw_rates = controls[..., 0] * np.tan(controls[..., 1]) / self.parameters.wheelbase
+        yaw_rates = controls[..., 0] * tan(controls[..., 1]) / self.parameters.wheelbase
         return np.stack([controls[..., 0], yaw_rates], axis=-1)
 
     def _as_command(self, speed: float, turn: float) -> Command:

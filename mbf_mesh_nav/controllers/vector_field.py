@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from mbf_abstract.arithmetic import norm, rotated_back
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -77,13 +76,13 @@ class VectorFieldController(MeshController):
             return ControlResult(ExePathOutcome.OUT_OF_MAP, f"the robot is more than {reach:g} m from the surface")
         self._face = spot.face
         if self._leg < len(self._fields) - 1:
-            self._leg += bool(np.linalg.norm(self._fields[self._leg].goal - spot.point) <= self.parameters.via_distance)
+            self._leg += bool(norm(self._fields[self._leg].goal - spot.point) <= self.parameters.via_distance)
         elif self._arrival.update(pose, self._goal):
             return self._command(0.0, self._turn_rate(heading_error(pose, self._goal)))
         direction = self._fields[self._leg].direction_at(self.mesh_map, spot)
         if direction is None:
             return ControlResult(ExePathOutcome.MISSED_PATH, "the field does not lead on from here; plan again")
-        ahead = pose.rotation.T @ direction
+        ahead = rotated_back(pose.rotation, direction)
         return self._steer(math.atan2(ahead[1], ahead[0]), ground_distance(pose, self._goal))
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:

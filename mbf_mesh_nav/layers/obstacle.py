@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import field_validator
 
+from mbf_abstract.arithmetic import norm
 from mbf_abstract.parameters import parameter
 from mbf_abstract.sensing import MAX_STAMP_LEAD, RangeScan
 from mbf_mesh_nav.layer import (
@@ -150,11 +151,11 @@ class ObstacleLayer(MeshLayer):
     def _project(self, scan: RangeScan) -> tuple[IntArray, FloatArray]:
         """Faces (k,) below the points that are obstacles, and those points (k, 3)."""
         settings, points = self.parameters, scan.points
-        distances = np.linalg.norm(points - scan.origin, axis=1)
+        distances = norm(points - scan.origin)
         least = max(settings.min_obstacle_dist, NO_RANGE)
         near = points[(distances > least) & (distances <= settings.max_obstacle_dist)]
         near = near[self.locator.locate(near, settings.ground_tolerance).faces < 0]
-        down = np.array(settings.down_axis) / np.linalg.norm(settings.down_axis)
+        down = np.array(settings.down_axis) / norm(settings.down_axis)
         faces, _ = self.locator.cast_rays(near, down, settings.robot_height)
         return faces[faces >= 0], near[faces >= 0]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydantic import field_validator, model_validator
 
+from mbf_abstract.arithmetic import norm, scalar_products
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.kernels.polygons import inside_polygon
 from mbf_mesh_nav.layer import FloatArray, IntArray, LethalArray
@@ -79,8 +80,8 @@ def _on_outline(vertices: FloatArray, outline: FloatArray) -> LethalArray:
     flat, mask = vertices[:, :2], np.zeros(len(vertices), dtype=np.bool_)
     for begin, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
         side = end - begin
-        share = np.clip((flat - begin) @ side / max(float(side @ side), 1e-30), 0.0, 1.0)
-        mask |= np.linalg.norm(flat - begin - share[:, None] * side, axis=1) <= ON_OUTLINE
+        share = np.clip(scalar_products(flat - begin, side) / max(float(scalar_products(side, side)), 1e-30), 0.0, 1.0)
+        mask |= norm(flat - begin - share[:, None] * side) <= ON_OUTLINE
     return mask
 
 

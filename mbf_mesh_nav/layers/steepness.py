@@ -8,9 +8,8 @@ Rule of mesh_navigation: acos of the normal's z component.
 
 from __future__ import annotations
 
-import numpy as np
-
 from mbf_abstract.parameters import parameter
+from mbf_mesh_nav.kernels.slopes import inclinations
 from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 
 
@@ -28,6 +27,5 @@ class SteepnessLayer(MeshLayer):
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = inclination [rad] from 0 to pi, lethal above ``threshold``."""
-        upward = np.clip(self.topology.vertex_normals[:, 2], -1.0, 1.0)
-        costs = np.arccos(upward).astype(np.float32)
+        costs = inclinations(self.topology.vertex_normals)
         return costs, costs > self.parameters.threshold

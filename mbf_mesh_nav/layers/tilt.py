@@ -114,7 +114,7 @@ class TiltLayer(MeshLayer):
             0.5 * settings.wheelbase - settings.center_of_mass_x,
         )
         configured = (settings.max_roll, settings.max_pitch_up, settings.max_pitch_down)
-        steady = [float(np.arctan2(arm, height)) - settings.tip_over_margin for arm in arms]
+        steady = [math.atan2(arm, height) - settings.tip_over_margin for arm in arms]
         roll, up, down = (max(min(pair), 1e-3) for pair in zip(configured, steady, strict=True))
         return roll, up, down
 

@@ -15,10 +15,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import arctan2
 from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import PlanResult
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors
 from mbf_mesh_nav.kernels.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
+from mbf_mesh_nav.kernels.slopes import tilt_of_normals
 from mbf_mesh_nav.layers.tilt import TiltLayer, heading_index
 from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, Leg, LegQuery, straight_leg
 from mbf_mesh_nav.locate import SurfacePoint
@@ -59,7 +61,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         self._refuse_other_layers(self.parameters.tilt_layer)
         starts = np.repeat(np.arange(len(mesh_map.vertices)), np.diff(mesh_map.neighbour_offsets))
         steps = mesh_map.vertices[mesh_map.neighbours] - mesh_map.vertices[starts]
-        headings = np.rint(np.arctan2(steps[:, 1], steps[:, 0]) / HEADING_STEP).astype(np.int64)
+        headings = np.rint(arctan2(steps[:, 1], steps[:, 0]) / HEADING_STEP).astype(np.int64)
         self._edge_headings = (headings % HEADINGS).astype(np.uint8)
 
     def _refuse_other_layers(self, name: str) -> None:
@@ -167,13 +169,9 @@ class HeadingAStarPlanner(SurfacePlanner):
         layer = self.mesh_map.layers.get(self.parameters.tilt_layer)
         if isinstance(layer, TiltLayer):
             return layer.allowed, layer.roll
-        headings = np.arange(HEADINGS) * HEADING_STEP
-        normals = self.mesh_map.vertex_normals
-        along = normals[:, :1] * np.cos(headings) + normals[:, 1:2] * np.sin(headings)
-        across = normals[:, 1:2] * np.cos(headings) - normals[:, :1] * np.sin(headings)
-        pitch, roll = np.arctan2(-along, normals[:, 2:]), np.arctan2(-across, normals[:, 2:])
-        allowed = (np.abs(roll) <= self.parameters.max_roll) & (np.abs(pitch) <= self.parameters.max_pitch)
-        return allowed, roll.astype(np.float32)
+        limits = self.parameters.max_roll, self.parameters.max_pitch
+        headings = np.asarray(np.arange(HEADINGS) * HEADING_STEP, dtype=np.float64)
+        return tilt_of_normals(self.mesh_map.vertex_normals, headings, *limits)
 
 
 def may_turn_to(allowed: NDArray[np.bool_], heading: int) -> NDArray[np.bool_]:

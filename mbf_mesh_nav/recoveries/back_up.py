@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import norm
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -73,10 +74,10 @@ class BackUpRecovery(MeshRecovery):
         p, position = self.parameters, np.asarray(pose.position)
         straight = -pose.rotation[:, 0] * (p.distance + p.lookahead)
         track = self.robot.recent_track()[::-1]
-        far_enough = np.linalg.norm(track - position, axis=1) >= p.lookahead / 2.0
+        far_enough = norm(track - position) >= p.lookahead / 2.0
         track = track[np.argmax(far_enough) :] if far_enough.any() else track[:0]
-        if len(track) == 0 or np.linalg.norm(track[0] - position) > TRACK_GAP or in_robot_frame(pose, track[0])[0] >= 0:
+        if len(track) == 0 or norm(track[0] - position) > TRACK_GAP or in_robot_frame(pose, track[0])[0] >= 0:
             return np.array([position, position + straight])
         last = track[-1] - (track[-2] if len(track) > 1 else position)
-        end = track[-1] + last / np.linalg.norm(last) * (p.distance + p.lookahead)
+        end = track[-1] + last / norm(last) * (p.distance + p.lookahead)
         return np.concatenate([[position], track, [end]])

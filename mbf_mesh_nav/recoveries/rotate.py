@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -50,7 +48,7 @@ class RotateRecovery(MeshRecovery):
             spot = self.mesh_map.locate_one(pose.position, 1.0)
             if spot is None:
                 return RecoveryResult(RecoveryOutcome.FAILURE, "the robot is more than 1 m from the surface")
-            slope = float(np.arccos(np.clip(self.mesh_map.face_normals[spot.face, 2], -1.0, 1.0)))
+            slope = math.acos(min(max(float(self.mesh_map.face_normals[spot.face, 2]), -1.0), 1.0))
             if slope > p.max_slope:
                 message = f"the ground slopes {slope:.2f} rad, turning is allowed up to {p.max_slope:g} rad"
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import arctan2, plane_rotation, rotated_back
 from mbf_abstract.geometry import normalize_angle
 from terrain.table1.robot import CARRIER, HALF_LENGTH, HALF_WIDTH
 
@@ -80,7 +81,7 @@ class Shuttle:
         self.polite = polite
         legs = np.roll(self.corners, -1, axis=0) - self.corners
         self._lengths = np.hypot(*legs.T)
-        self._headings = np.arctan2(legs[:, 1], legs[:, 0])
+        self._headings = arctan2(legs[:, 1], legs[:, 0])
         travelled = phase % 1.0 * float(self._lengths.sum())
         ends = np.cumsum(self._lengths)
         self._leg = min(int(np.searchsorted(ends, travelled, side="right")), len(ends) - 1)
@@ -179,8 +180,8 @@ class TrafficRays:
             offset = origins[:, :2] - (box.x, box.y)
             if float(np.hypot(*offset[0])) > max_range + 1.0:
                 continue
-            turn = np.array([[math.cos(box.yaw), -math.sin(box.yaw)], [math.sin(box.yaw), math.cos(box.yaw)]])
-            start, ray = offset @ turn, directions[:, :2] @ turn
+            turn = plane_rotation(box.yaw)
+            start, ray = rotated_back(turn, offset), rotated_back(turn, directions[:, :2])
             half = np.array([box.half_length, box.half_width])
             with np.errstate(divide="ignore", invalid="ignore"):
                 first, second = (-half - start) / ray, (half - start) / ray

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from mbf_abstract.arithmetic import plane_rotation, rotated
 from mbf_abstract.geometry import Pose
 from terrain.kinematic_robot import TIME_STEP, KinematicRobot, KinematicWorld
 from terrain.occupancy import OccupancyGrid
@@ -96,8 +97,7 @@ class WarehouseRobot(KinematicRobot):
             return ""
         building = self.world.building
         assert building is not None
-        c, s = math.cos(self._yaw), math.sin(self._yaw)
-        points = self._outline @ np.array([[c, s], [-s, c]]) + (self._x, self._y)
+        points = rotated(plane_rotation(self._yaw), self._outline) + np.array([self._x, self._y])
         cells = np.floor((points - (building.origin_x, building.origin_y)) / building.resolution).astype(int)
         return "rack" if building.occupied[cells[:, 1], cells[:, 0]].any() else ""
 
