@@ -25,7 +25,11 @@ planners: [{name: shortest, type: dijkstra}]
     "costmap": """
 backend: costmap
 dist_tolerance: 0.6
-global_costmap: {width: 4.0, height: 4.0, layers: [{name: area, type: keepout}], area: {zones: [{name: spot, polygon: SPOT}]}}
+global_costmap:
+  width: 4.0
+  height: 4.0
+  layers: [{name: area, type: keepout}]
+  area: {zones: [{name: spot, polygon: SPOT}]}
 local_costmap: {width: 4.0, height: 4.0, layers: [{name: area, type: keepout}], area: {zones: []}}
 planners: [{name: shortest, type: dijkstra}]
 """,
