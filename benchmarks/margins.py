@@ -44,7 +44,7 @@ PERTURBED = Perturbation(
 )
 VARIANTS = {"plain": None, "perturbed": PERTURBED}
 QUICK_SCENARIOS = ("door_closes", "bridge")
-KEPT = ("success", "outcome", "broken_limits", "mishaps", "time_s", "max_tilt_deg", "message", "digest")
+KEPT = ("success", "outcome", "failures", "mishaps", "time_s", "max_tilt_deg", "message", "digest")
 
 Job = tuple[str, str, int]  # scenario, variant, seed
 
@@ -60,7 +60,7 @@ def run_job(job: Job) -> dict[str, Any]:
     name, variant, seed = job
     with tempfile.TemporaryDirectory(prefix="mbf_margins_") as folder:
         result = run_scenario(scenario_of(name, variant), RunOptions(Path(folder), seed=seed, draw=False))
-    numbers = {**result.metrics, "message": result.message}
+    numbers = result.metrics
     return {"scenario": name, "variant": variant, "seed": seed} | {key: numbers.get(key) for key in KEPT}
 
 
@@ -109,8 +109,8 @@ def summarise(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def reasons_of(run: Mapping[str, Any]) -> list[str]:
-    """Why a run has failed: the limits that it broke, by their first word, or else its outcome."""
-    return [limit.split()[0] for limit in run["broken_limits"]] or [str(run["outcome"])]
+    """Why a run has failed: what its verdict holds against it, by the first word, or else its outcome."""
+    return [failure.split()[0] for failure in run["failures"]] or [str(run["outcome"])]
 
 
 def main() -> None:

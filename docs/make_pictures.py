@@ -21,7 +21,7 @@ def make(name: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         result = run_scenario(load_scenario(name), RunOptions(Path(folder)))
         if not result.success:
-            raise SystemExit(f"{name}: {result.outcome_name}: {result.message}")
+            raise SystemExit(f"{name}: {result.verdict}")
         image = Image.open(Path(folder) / "picture.png").convert("RGB")
         image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
         image.quantize(128).save(PICTURES / f"{name}.png", optimize=True)

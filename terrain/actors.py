@@ -1,7 +1,7 @@
 """Things that move by themselves: people and other robots on routes, doors that close. Only sensors see them.
 
-Their positions are functions of the world's time and of what they were made with, nothing else; seeds go into the
-routes. They are as heavy as walls: a robot in their way is pushed.
+Their positions are functions of the world's time and of what they were made with; only who gives way looks at the
+robot too. Seeds go into the routes. They are as heavy as walls: a robot in the way of one that does not look is pushed.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ Triangles = tuple[FloatArray, NDArray[np.int32]]
 PERSON_RADIUS, PERSON_HEIGHT = 0.25, 1.7
 PERSON_SIZE = (PERSON_RADIUS, PERSON_HEIGHT)
 MAX_ROUTE_DRAWS = 10_000
+COURTESY = 0.3  # m; who gives way stops this far from the robot
 
 
 class Actor(Protocol):
@@ -52,6 +53,17 @@ class Actor(Protocol):
         """Pose of the actor's frame now."""
 
 
+class VisibleRobot(Protocol):
+    """What somebody who walks sees of a robot."""
+
+    @property
+    def spec(self) -> RobotSpec:
+        """Its model."""
+
+    def pose(self) -> Pose:
+        """Where it is."""
+
+
 class RouteWalker:
     """Somebody or something that follows a closed route of straight lines at constant speed.
 
@@ -69,6 +81,8 @@ class RouteWalker:
     thing : Thing
     looks : triangles, optional
         In the frame of its middle; those of the cylinder or box where absent.
+    gives_way : bool
+        Wait as long as the robot it has met is just ahead, instead of pushing it.
     """
 
     def __init__(
@@ -80,6 +94,7 @@ class RouteWalker:
         size: Sequence[float] = PERSON_SIZE,
         thing: Thing = Thing.PERSON,
         looks: Triangles | None = None,
+        gives_way: bool = False,
     ) -> None:
         corners = np.asarray(route, dtype=float)
         if corners.shape[1] == 2:
@@ -90,6 +105,10 @@ class RouteWalker:
         self._speed = speed
         self._start = start
         self._lift = 0.5 * size[-1]
+        self._reach = size[0] if len(size) == 2 else 0.5 * math.hypot(size[0], size[1])
+        self._waited = 0.0
+        self._gives_way = gives_way
+        self._robot: VisibleRobot | None = None
         self.thing = thing
         if len(size) == 2:
             radius, height = size
@@ -104,14 +123,27 @@ class RouteWalker:
     def pose(self) -> Pose:
         """Pose of its middle now."""
         length = float(self._travelled[-1])
-        along = (self._start + self._speed * self._world.time) % length if length > 0.0 else 0.0
+        along = (self._start + self._speed * (self._world.time - self._waited)) % length if length > 0.0 else 0.0
         x, y, z = (float(np.interp(along, self._travelled, self._corners[:, k])) for k in range(3))
         leg = min(int(np.searchsorted(self._travelled, along, side="right")), len(self._corners) - 1)
         ahead = self._corners[leg] - self._corners[leg - 1]
         return Pose.planar(x, y, math.atan2(ahead[1], ahead[0]), z + self._lift)
 
+    def meet(self, robot: VisibleRobot) -> None:
+        """Know from now on which robot to give way to."""
+        self._robot = robot if self._gives_way else None
+
     def _move(self) -> None:
+        if self._robot is not None and self._is_ahead(self._robot):
+            self._waited += self._world.time_step
         self._world.place_body(self.body, self.pose())
+
+    def _is_ahead(self, robot: VisibleRobot) -> bool:
+        """Whether the robot is near, and on the side this one walks to."""
+        here, there = self.pose(), robot.pose()
+        dx, dy = there.x - here.x, there.y - here.y
+        near = math.hypot(dx, dy) < self._reach + robot.spec.circumscribed_radius + COURTESY
+        return near and dx * math.cos(here.yaw) + dy * math.sin(here.yaw) > 0.0
 
 
 class SlidingDoor:

@@ -164,6 +164,7 @@ class Bench:
         else:
             robot = WheeledRobot(physics, spec, pose, friction=disturbance.friction, mass_factor=disturbance.mass)
         robot.settle()
+        self.world.introduce(robot)
         sensors: dict[str, Sensor[Any]] = {
             **make_sensors(self.scenario.sensors, robot, self.world, self.seed),
             **make_ego_sensors(self.scenario, robot, self.seed),

@@ -50,7 +50,7 @@ def run(
     quiet: bool = typer.Option(False, "--quiet", help="Print only the outcome."),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object with outcome and metrics."),
 ) -> None:
-    """Drive a scenario in the simulator; exit code 0 only if the goal was reached."""
+    """Drive a scenario in the simulator; exit code 0 only if it arrived within all limits and touched nothing."""
     with readable_errors():
         from terrain.live_line import LiveLine
         from terrain.runner import RunOptions, run_scenario
@@ -156,10 +156,9 @@ def new_run_folder(parent: Path, now: datetime) -> Path:
 def _tell(result: RunResult, as_json: bool) -> None:
     metrics = result.metrics
     if as_json:
-        facts = {"outcome": result.outcome, "outcome_name": result.outcome_name, "message": result.message}
-        typer.echo(json.dumps({**facts, "success": result.success, "folder": str(result.folder), "metrics": metrics}))
+        typer.echo(json.dumps({**result.verdict.to_json(), "folder": str(result.folder), "metrics": metrics}))
         return
-    typer.echo(f"{result.outcome_name}: {result.message}")
+    typer.echo(result.verdict)
     typer.echo(
         f"{metrics['path_length_m']:.1f} m in {metrics['time_s']:.1f} s simulated, "
         f"{metrics['wall_time_s']:.1f} s of wall time: {metrics['real_time_factor']:.1f} x real time"

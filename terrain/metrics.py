@@ -53,9 +53,6 @@ class Metrics:
 
     scenario: str
     backend: str
-    success: bool
-    outcome: str
-    message: str
     time_s: float
     path_length_m: float
     planned_length_m: float
@@ -92,9 +89,6 @@ def measure(recording: Recording) -> Metrics:
     return Metrics(
         scenario=recording.scenario,
         backend=recording.backend,
-        success=recording.success,
-        outcome=recording.outcome,
-        message=recording.message,
         time_s=recording.duration,
         path_length_m=length,
         planned_length_m=_length(recording.paths[0][1]) if recording.paths else 0.0,

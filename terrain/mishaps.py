@@ -25,13 +25,14 @@ class Thing(Enum):
 
 
 class MishapKind(Enum):
-    """What went wrong; a collision counts as such and by what was hit."""
+    """What went wrong; a collision counts as such, by what was hit, and once more if the robot moved by itself."""
 
     TIPPED_OVER = "tipped_over"
     SLIPPING = "slipping"
     HIGH_CENTRED = "high_centred"
     STUCK = "stuck"
     COLLISION = "collision"
+    COLLISION_WHILE_MOVING = "collision_while_moving"
     COLLISION_WITH_WALL = "collision_with_wall"
     COLLISION_WITH_DOOR = "collision_with_door"
     COLLISION_WITH_PERSON = "collision_with_person"
@@ -88,6 +89,8 @@ class MishapLimits:
         [m/s], counts after ``slip_hold`` [s].
     asked_speed : float
         Commands below it [m/s, rad/s] do not ask for motion.
+    standing_speed, standing_yaw_rate : float
+        A robot whose command and wheels stay below both [m/s, rad/s] stands, also while something pushes it.
     progress_distance, progress_angle : float
         A robot that is asked to move and neither moves [m] nor turns [rad] this far is stuck after ``stuck_hold`` [s];
         if its body lies on the ground it is high-centred, already after ``high_centred_hold`` [s].
@@ -98,6 +101,8 @@ class MishapLimits:
     slip_speed: float = 0.25
     slip_hold: float = 0.5
     asked_speed: float = 0.05
+    standing_speed: float = 0.02
+    standing_yaw_rate: float = 0.05
     progress_distance: float = 0.05
     progress_angle: float = 0.1
     high_centred_hold: float = 1.5
@@ -145,9 +150,11 @@ class MishapMonitor:
     _counted: set[MishapKind] = field(default_factory=set)
     _last: MotionSample | None = None
     _anchor: Pose | None = None
+    _moved_in_contact: bool = False
 
     def update(self, sample: MotionSample) -> list[Mishap]:
         """Take one sample, stamped by its pose; return the mishaps that count from this instant on."""
+        self._watch_contact(sample)
         self._sum_up(sample)
         limits, standing = self.limits, self._standing_time(sample)
         conditions: list[tuple[MishapKind, float, Callable[[MotionSample], bool]]] = [
@@ -156,6 +163,7 @@ class MishapMonitor:
             (MishapKind.HIGH_CENTRED, 0.0, lambda s: s.body_on_ground and standing >= limits.high_centred_hold),
             (MishapKind.STUCK, 0.0, lambda s: standing >= limits.stuck_hold),
             (MishapKind.COLLISION, 0.0, lambda s: bool(s.touched)),
+            (MishapKind.COLLISION_WHILE_MOVING, 0.0, lambda s: self._moved_in_contact),
             *((MishapKind(f"collision_with_{t.value}"), 0.0, lambda s, t=t: t in s.touched) for t in Thing),
         ]
         return [
@@ -173,6 +181,22 @@ class MishapMonitor:
             self.slipped += slip_speed(sample) * passed
             self.energy += sample.power * passed
         self._last = sample
+
+    def _watch_contact(self, sample: MotionSample) -> None:
+        """Note whether the robot has moved by itself in this contact, or when it began.
+
+        What turns its wheels after that may be what pushes it, so only its command counts then.
+        """
+        limits, before = self.limits, self._last
+        if not sample.touched:
+            self._moved_in_contact = False
+            return
+        motions = [sample.commanded]
+        if before is not None and not before.touched:
+            motions.append(before.rolling)
+        self._moved_in_contact |= not all(
+            motion.is_stopped(limits.standing_speed, limits.standing_yaw_rate) for motion in motions
+        )
 
     def _begins(self, kind: MishapKind, hold: float, holds: bool, now: float) -> bool:
         """Whether ``kind`` has held long enough and was not counted yet."""

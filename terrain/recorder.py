@@ -21,6 +21,7 @@ from terrain.actors import Actor
 from terrain.recorded_grid import RecordedGrid
 from terrain.recorded_mesh import RecordedMesh, add_if_changed
 from terrain.recording import Recording, RobotShape, StampedPoints, Surface
+from terrain.verdict import UNFINISHED, Verdict
 
 MAP_PERIOD = 5.0  # s at least between two looks at the map
 MAX_GRID_CELLS = 4_000_000  # larger maps are not recorded
@@ -90,9 +91,7 @@ class Recorder:
         elif isinstance(view, MeshView) and view.costs.size <= MAX_MESH_VERTICES:
             add_if_changed(self.meshes, time, view)
 
-    def finish(
-        self, success: bool, outcome: str, message: str, events: Sequence[Event] = (), began: float = 0.0
-    ) -> Recording:
+    def finish(self, verdict: Verdict = UNFINISHED, events: Sequence[Event] = (), began: float = 0.0) -> Recording:
         """Return what was recorded; ``began`` [s] is the events' time at which the samples' time was 0."""
         rows = np.array(self._samples, dtype=np.float64).reshape(-1, 14)
         return Recording(
@@ -111,9 +110,7 @@ class Recorder:
             paths=list(self.paths),
             scans=list(self.scans),
             events=tuple(replace(event, time=max(0.0, round(event.time - began, 9))) for event in events),
-            success=success,
-            outcome=outcome,
-            message=message,
+            verdict=verdict,
             grids=list(self.grids),
             meshes=list(self.meshes),
             actors=self.actor_tracks(),

@@ -8,7 +8,7 @@ or machine.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from terrain.actor_track import ActorTrack, track_arrays, tracks_from
 from terrain.recorded_grid import RecordedGrid, grid_arrays, grids_from
 from terrain.recorded_mesh import RecordedMesh, mesh_arrays, meshes_from
 from terrain.robot_models import Drive, RobotSpec
+from terrain.verdict import Verdict
 
 FloatArray = NDArray[np.float64]
 StampedPoints = tuple[float, FloatArray]
@@ -112,6 +113,8 @@ class Recording:
     goals : tuple of Pose
         In the order they were given.
     events : tuple of Event
+    verdict : Verdict
+        How it ended.
     grids : list of RecordedGrid
         The map the plans were made on, where it is a grid; seldom enough that the file stays small.
     meshes : list of RecordedMesh
@@ -135,9 +138,7 @@ class Recording:
     paths: list[StampedPoints]
     scans: list[StampedPoints]
     events: tuple[Event, ...]
-    success: bool
-    outcome: str
-    message: str
+    verdict: Verdict
     grids: list[RecordedGrid] = field(default_factory=list)
     meshes: list[RecordedMesh] = field(default_factory=list)
     actors: list[ActorTrack] = field(default_factory=list)
@@ -164,9 +165,9 @@ class Recording:
             arrays |= _stamped_arrays(name, getattr(self, name))
         arrays |= grid_arrays(self.grids) | mesh_arrays(self.meshes) | track_arrays(self.actors)
         words: dict[str, Any] = {
-            name: getattr(self, name) for name in ("scenario", "backend", "success", "outcome", "message")
-        }
-        words |= {
+            "scenario": self.scenario,
+            "backend": self.backend,
+            "verdict": asdict(self.verdict),
             "robot": self.robot.name,
             "height": self.robot.height,
             "wheel_radius": self.robot.wheel_radius,
@@ -222,6 +223,7 @@ def _stamped(name: str, arrays: dict[str, Any]) -> list[StampedPoints]:
 
 def _recording_from(arrays: dict[str, Any]) -> Recording:
     words = json.loads(str(arrays["words"]))
+    ending = words["verdict"]
     shape = RobotShape(
         words["robot"], arrays["footprint"], words["height"], arrays["wheels"], words["wheel_radius"]
     )  # fmt: skip
@@ -241,9 +243,7 @@ def _recording_from(arrays: dict[str, Any]) -> Recording:
         paths=_stamped("paths", arrays),
         scans=_stamped("scans", arrays),
         events=tuple(Event.from_json(line) for line in words["events"]),
-        success=words["success"],
-        outcome=words["outcome"],
-        message=words["message"],
+        verdict=Verdict(ending["outcome"], ending["message"], tuple(ending["failures"])),
         grids=grids_from(arrays),
         meshes=meshes_from(arrays),
         actors=tracks_from(arrays),

@@ -17,7 +17,7 @@ def read_run(folder: Path) -> tuple[Recording, dict[str, Any]]:
     measured again. Raises RecordingError for a folder without a readable recording.
     """
     recording = Recording.load(folder / "recording.npz")
-    metrics = measure(recording).to_json()
+    metrics = measure(recording).to_json() | recording.verdict.to_json()
     for name in ("metrics.json", "timing.json"):
         if (folder / name).is_file():
             metrics |= json.loads((folder / name).read_text())

@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,9 @@ from terrain.metrics import measure
 from terrain.mishaps import MishapKind
 from terrain.recording import Recording
 from terrain.scenario import Scenario
-from terrain.scenario_limits import broken_limits
 from terrain.scenario_world import ScenarioWorld
 from terrain.shortest_way import shortest_way
+from terrain.verdict import Verdict, judge
 from terrain.viewer.live.options import ViewOptions
 
 
@@ -49,12 +49,14 @@ class Progress:
 class RunResult:
     """What became of a run; ``metrics`` holds the contents of metrics.json and timing.json."""
 
-    success: bool
-    outcome: int
-    outcome_name: str
-    message: str
+    verdict: Verdict
     folder: Path
     metrics: dict[str, Any] = field(repr=False)
+
+    @property
+    def success(self) -> bool:
+        """Whether the run has succeeded, see ``terrain.verdict``."""
+        return self.verdict.success
 
 
 @dataclass(frozen=True)
@@ -128,14 +130,15 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
         result, wall_time = _drive(bench, options)
     finally:
         bench.close()
-    recording = bench.recorder.finish(
-        result.success, result.outcome_name, result.message, bench.memory.events, began=bench.loop.origin
-    )
-    metrics = _write_numbers(recording, bench, wall_time, options)
+    recording = bench.recorder.finish(events=bench.memory.events, began=bench.loop.origin)
+    metrics = _measure(recording, bench)
+    if options.geodesic and result.success:
+        metrics |= _compare_with_geodesic(recording, bench.world)
+    recording = replace(recording, verdict=judge(result, bench.scenario.limits, metrics))
+    metrics = _write_numbers(recording, metrics, wall_time, options.folder)
     if options.draw:
         _draw(recording, metrics, options)
-    message = "; ".join([result.message, *metrics["broken_limits"]])
-    return RunResult(metrics["success"], result.outcome, result.outcome_name, message, options.folder, metrics)
+    return RunResult(recording.verdict, options.folder, metrics)
 
 
 def _drive(bench: Bench, options: RunOptions) -> tuple[MoveBaseResult, float]:
@@ -187,18 +190,23 @@ class _ProgressReporter:
         )
 
 
-def _write_numbers(recording: Recording, bench: Bench, wall_time: float, options: RunOptions) -> dict[str, Any]:
-    metrics, folder = measure(recording).to_json(), options.folder
-    if options.geodesic and recording.success:
-        metrics |= _compare_with_geodesic(recording, bench.world)
+def _measure(recording: Recording, bench: Bench) -> dict[str, Any]:
+    """Return the numbers of a run: those of its recording, and those that only its simulation knows."""
+    metrics = measure(recording).to_json()
     metrics["mishaps"] = sorted({mishap.kind.value for mishap in bench.simulation.mishaps})
     counts = bench.simulation.monitor.counts
-    metrics |= {"collisions": counts[MishapKind.COLLISION], "tip_overs": counts[MishapKind.TIPPED_OVER]}
+    metrics["collisions"] = counts[MishapKind.COLLISION]
+    metrics["collisions_while_moving"] = counts[MishapKind.COLLISION_WHILE_MOVING]
+    metrics["tip_overs"] = counts[MishapKind.TIPPED_OVER]
     metrics["energy_j"] = round(bench.simulation.monitor.energy, 3)
     metrics["slipped_m"] = round(bench.simulation.monitor.slipped, 6)
-    metrics["broken_limits"] = broken_limits(bench.scenario.limits, metrics)
-    metrics["success"] = metrics["success"] and not metrics["broken_limits"]
     metrics["seed"], metrics["digest"] = bench.seed, bench.digest.hexdigest()
+    return metrics
+
+
+def _write_numbers(recording: Recording, measured: Mapping[str, Any], wall_time: float, folder: Path) -> dict[str, Any]:
+    """Write metrics.json, timing.json and the recording; returns what stands in the first two."""
+    metrics = {**measured, **recording.verdict.to_json()}
     factor = recording.duration / wall_time if wall_time > 0.0 else 0.0
     timing = {"wall_time_s": round(wall_time, 3), "real_time_factor": round(factor, 2)}
     for name, numbers in (("metrics.json", metrics), ("timing.json", timing)):

@@ -26,6 +26,7 @@ class Walker(ParameterModel):
     start: float = parameter(0.0, "How far along the route it starts.", unit="m", ge=0.0)
     radius: float = parameter(PERSON_RADIUS, "Of the upright cylinder it is.", unit="m", gt=0.0)
     height: float = parameter(PERSON_HEIGHT, "Of the upright cylinder it is.", unit="m", gt=0.0)
+    gives_way: bool = parameter(False, "Wait while our robot is just ahead, instead of pushing it.")
 
 
 class OtherRobot(ParameterModel):
@@ -46,6 +47,7 @@ class Crowd(ParameterModel):
     speed: float = parameter(0.6, "Walking speed.", unit="m/s", ge=0.0, le=5.0)
     x_range: tuple[float, float] | None = parameter(None, "Part of the building where they walk.", unit="m")
     y_range: tuple[float, float] | None = parameter(None, "Part of the building where they walk.", unit="m")
+    gives_way: bool = parameter(False, "Wait while our robot is just ahead, instead of pushing it.")
 
 
 class Door(ParameterModel):
@@ -80,7 +82,8 @@ def add_actors(
 def _on_route(world: ScenarioWorld, actor: Walker | OtherRobot, route: FloatArray) -> RouteWalker:
     if isinstance(actor, OtherRobot):
         return other_robot(world.physics, ROBOTS[actor.model], route, actor.speed, actor.start)
-    return RouteWalker(world.physics, route, actor.speed, actor.start, (actor.radius, actor.height))
+    size = (actor.radius, actor.height)
+    return RouteWalker(world.physics, route, actor.speed, actor.start, size, gives_way=actor.gives_way)
 
 
 def _crowd(world: ScenarioWorld, crowd: Crowd, rng: np.random.Generator) -> list[RouteWalker]:
@@ -88,7 +91,13 @@ def _crowd(world: ScenarioWorld, crowd: Crowd, rng: np.random.Generator) -> list
         raise ValueError("a crowd needs a world with a 2D map to draw its routes on")
     grid = _part_of(world.grid, crowd)
     return [
-        RouteWalker(world.physics, random_route(grid, rng), crowd.speed, float(rng.uniform(0.0, 20.0)))
+        RouteWalker(
+            world.physics,
+            random_route(grid, rng),
+            crowd.speed,
+            float(rng.uniform(0.0, 20.0)),
+            gives_way=crowd.gives_way,
+        )
         for _ in range(crowd.count)
     ]
 

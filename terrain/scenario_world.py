@@ -15,7 +15,7 @@ import numpy as np
 
 from mbf_abstract.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray, Pose
-from terrain.actors import Actor, AnyWorld
+from terrain.actors import Actor, AnyWorld, RouteWalker, VisibleRobot
 from terrain.heightfield import Heightfield
 from terrain.indoor import add_building
 from terrain.kinematic_robot import KinematicWorld
@@ -60,6 +60,12 @@ class ScenarioWorld:
     grid: OccupancyGrid | None = None
     places: Mapping[str, Pose] = field(default_factory=dict)
     actors: list[Actor] = field(default_factory=list)
+
+    def introduce(self, robot: VisibleRobot) -> None:
+        """Let those who walk know the robot, for they may give way to it."""
+        for actor in self.actors:
+            if isinstance(actor, RouteWalker):
+                actor.meet(robot)
 
     def open_surface(self) -> Surface:
         """Return what a robot may drive on: the ground, in a building only its free cells."""

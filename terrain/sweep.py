@@ -63,8 +63,9 @@ def run_once(scenario: Scenario, run: SweepRun) -> dict[str, Any]:
         try:
             result = run_scenario(scenario, options)
         except Exception as error:  # one impossible variant must not end the sweep
-            return {"success": False, "outcome": type(error).__name__, "message": str(error)}
-    return {**result.metrics, "outcome_code": result.outcome, "message": result.message}
+            name, message = type(error).__name__, str(error)
+            return {"success": False, "verdict": f"{name}: {message}", "outcome": name, "message": message}
+    return result.metrics
 
 
 def run_all(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, dict[str, Any]]]:

@@ -50,7 +50,7 @@ def sweep(
                 finished, loaded.name, len(left), console=console, disable=not console.is_terminal
             ):
                 log.append(run.key(hashed), {**metrics, "seed": run.seed, "variant": run.variant})
-                console.print(f"seed {run.seed} {run.variant}: {metrics['outcome']}", markup=False, highlight=False)
+                console.print(f"seed {run.seed} {run.variant}: {metrics['verdict']}", markup=False, highlight=False)
             rows = [log.rows[run.key(hashed)] for run in planned]
         files = write_tables(f"{loaded.name}: {loaded.proves}", rows, out)
         summary = summarise(rows)

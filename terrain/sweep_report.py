@@ -27,11 +27,12 @@ COLUMNS = (
     "energy_j",
     "slipped_m",
     "collisions",
+    "collisions_while_moving",
     "tip_overs",
     "mishaps",
     "recoveries",
     "wall_time_s",
-    "message",
+    "verdict",
 )
 STYLE = (
     "body{font:14px sans-serif;margin:2em}table{border-collapse:collapse;margin-bottom:2em}"

@@ -168,7 +168,7 @@ def _paint_moment(painter: ImageDraw.ImageDraw, camera: Camera, recording: Recor
         for x, y in camera.project(scan).tolist():
             painter.rectangle((x - 1, y - 1, x + 1, y + 1), fill=SCAN)
     _paint_robot(painter, camera, recording, index)
-    text = status_text(recording, index) if index < len(recording.times) - 1 else recording.outcome
+    text = status_text(recording, index) if index < len(recording.times) - 1 else recording.verdict.title
     painter.text((14, 10), text, fill=TEXT, font=ImageFont.load_default(20))
 
 

@@ -23,7 +23,7 @@ def write_mcap(file: str | Path, recording: Recording) -> None:
     with Path(file).open("wb") as stream:
         writer = Writer(stream)
         writer.start(library="mbf-flex")
-        facts = {name: str(getattr(recording, name)) for name in ("scenario", "backend", "outcome", "message")}
+        facts = {"scenario": recording.scenario, "backend": recording.backend, "verdict": str(recording.verdict)}
         writer.add_metadata("run", {**facts, "robot": recording.robot.name})
         channels: dict[str, int] = {}
         for time, topic, message in messages_of(recording):

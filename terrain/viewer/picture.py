@@ -164,7 +164,7 @@ def draw_marks(axes: Axes, start: Pose, goals: tuple[Pose, ...]) -> None:
 
 def _label(axes: Axes, recording: Recording) -> None:
     length = float(np.linalg.norm(np.diff(recording.poses[:, :3], axis=0), axis=1).sum())
-    title = f"{recording.scenario} · {recording.backend} · {recording.outcome}"
+    title = f"{recording.scenario} · {recording.backend} · {recording.verdict.title}"
     tilt = np.degrees(recording.tilt).max(initial=0.0)
     facts = f"{length:.1f} m driven in {recording.duration:.1f} s, tilt up to {tilt:.0f}°"
     axes.set_title(f"{title}\n", loc="left", fontsize=12, fontweight="bold")

@@ -115,7 +115,7 @@ class _Player:
 
     def _show_outcome(self) -> None:
         recording = self._recording
-        text = f"{recording.outcome}: {recording.message}"
+        text = str(recording.verdict)
         self._robot.place(recording.poses[-1], np.zeros(len(recording.robot.wheels)), text)
         self._serializer.insert_sleep(OUTCOME_TIME)
 

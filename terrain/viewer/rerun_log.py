@@ -35,7 +35,7 @@ def write_rrd(file: str | Path, recording: Recording) -> None:
         stream.set_log_tick_enabled(False)
         stream.save(file)
         stream.log("/", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        stream.send_recording_name(f"{recording.scenario} on {recording.backend}: {recording.outcome}")
+        stream.send_recording_name(f"{recording.scenario} on {recording.backend}: {recording.verdict.title}")
         _log_world(rerun, stream, recording)
         _log_motion(rerun, stream, recording)
         _log_happenings(rerun, stream, recording)

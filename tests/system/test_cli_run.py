@@ -10,6 +10,7 @@ from terrain.cli import register
 from terrain.recorder import Recorder
 from terrain.recording import Recording, RobotShape
 from terrain.robot_models import HUSKY
+from terrain.verdict import Verdict
 
 
 def mbf(*arguments):
@@ -52,7 +53,7 @@ def test_a_run_through_a_real_building_reaches_its_goal_and_leaves_all_files(sha
     assert {"picture.png", "report.html", "replay.html", "run.mcap"} <= files
     assert {"events.jsonl", "metrics.json", "recording.npz"} <= files
     recording = Recording.load(tmp_path / "run" / "recording.npz")
-    assert recording.success and recording.paths and recording.scans and recording.grids
+    assert recording.verdict.success and recording.paths and recording.scans and recording.grids
     assert answer["metrics"]["distance_to_goal_m"] < 0.5
 
 
@@ -61,7 +62,7 @@ def test_a_replay_is_made_again_from_the_recording_alone(tmp_path):
     recorder = Recorder("straight", "mesh", shape, Pose.planar(0.0, 0.0), [Pose.planar(1.0, 0.0)])
     for step in range(11):
         recorder.sample(0.1 * step, Pose.planar(0.1 * step, 0.0), Twist.planar(1.0), Twist.planar(1.0))
-    recorder.finish(True, "SUCCESS", "goal reached").save(tmp_path / "recording.npz")
+    recorder.finish(Verdict(0, "goal reached")).save(tmp_path / "recording.npz")
 
     result = mbf("replay", tmp_path, "--no-open")
 

@@ -22,7 +22,7 @@ def nearby(scenario, **changes):
 @pytest.mark.parametrize(("name", "backend"), [("outdoor", "mesh"), ("indoor", "costmap")])
 def test_the_robot_arrives_and_leaves_its_results(name, backend, tmp_path):
     result = run(load_scenario(name), tmp_path, backend=backend)
-    assert result.success, result.message
+    assert result.success, result.verdict
     assert result.metrics["distance_to_goal_m"] < 0.5
     assert result.metrics["real_time_factor"] > 1.0
     assert json.loads((tmp_path / "metrics.json").read_text())["outcome"] == "SUCCESS"
@@ -35,7 +35,7 @@ def test_the_same_scenario_runs_on_the_other_map(name, backend, tmp_path):
     scenario = load_scenario(name)
     goal = PlanarPose(x=scenario.start.x + 2.0, y=scenario.start.y + 3.0, yaw=1.0)
     result = run(nearby(scenario, goals=(goal,)), tmp_path, backend=backend)
-    assert result.success, result.message
+    assert result.success, result.verdict
 
 
 @pytest.mark.parametrize("name", ["outdoor", "indoor"])
@@ -63,7 +63,7 @@ def test_the_robot_drives_in_a_real_building(tmp_path, shared_data):
         }
     )
     result = run(scenario, tmp_path)
-    assert result.success, result.message
+    assert result.success, result.verdict
     assert "collision" not in result.metrics["mishaps"]
 
 
@@ -72,5 +72,5 @@ def test_a_goal_that_cannot_be_reached_ends_with_its_reason(tmp_path):
     inside_a_wall = scenario.model_copy(update={"goals": (PlanarPose(x=8.0, y=4.0),), "time_limit": 30.0})
     result = run(inside_a_wall, tmp_path)
     assert not result.success
-    assert result.outcome_name in {"BLOCKED_GOAL", "NO_PATH_FOUND"}
-    assert result.message
+    assert result.verdict.outcome_name in {"BLOCKED_GOAL", "NO_PATH_FOUND"}
+    assert result.verdict.message

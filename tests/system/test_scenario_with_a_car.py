@@ -41,7 +41,7 @@ def test_a_car_reaches_a_pose_behind_it_without_turning_on_the_spot(tmp_path):
 
     result = run_scenario(load_scenario(tmp_path / "parking.yaml"), RunOptions(tmp_path / "run", draw=False))
 
-    assert result.success, result.message
+    assert result.success, result.verdict
     with np.load(tmp_path / "run" / "recording.npz") as recording:
         forward, turning = recording["twists"][:, 0], recording["twists"][:, 2]
     moving = np.abs(forward) > 0.1

@@ -36,4 +36,4 @@ def test_the_shipped_scenario_fails_on_the_straight_line(name, shipped, tmp_path
     settings = {"planner": STRAIGHT[scenario.backend], **GIVE_UP_SOON}
     result = run_scenario(scenario, RunOptions(tmp_path, draw=False, settings=settings))
     assert not result.success
-    assert result.outcome_name != "INVALID_PLUGIN", result.message
+    assert result.verdict.outcome_name != "INVALID_PLUGIN", result.verdict

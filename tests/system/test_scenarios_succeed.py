@@ -22,7 +22,7 @@ def test_at_least_twelve_scenarios_ship_and_each_says_what_it_proves():
 @pytest.mark.parametrize("name", sorted(set(shipped_scenarios()) - RUN_ELSEWHERE))
 def test_the_shipped_scenario_succeeds(name, shipped, tmp_path):
     result = run_scenario(shipped(name), RunOptions(tmp_path, draw=False))
-    assert result.success, result.message
+    assert result.success, result.verdict
 
 
 def test_the_robot_stands_still_while_its_lidar_is_silent(shipped, tmp_path):

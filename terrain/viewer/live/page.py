@@ -47,7 +47,7 @@ class LivePage:
         self._tour = tour
         self._log = log
         self._frame = 0
-        gui, start = server_page.gui, bench.recorder.finish(False, "", "")
+        gui, start = server_page.gui, bench.recorder.finish()
         gui.configure_theme(show_logo=False, show_share_button=False)
         add_surroundings(server_page.scene, start)
         look_at_route(server_page.initial_camera, start, FARTHER)

@@ -93,3 +93,41 @@ def test_distance_slip_and_energy_add_up() -> None:
         monitor.update(MotionSample(pose, Twist.planar(0.4), asked, asked, power=30.0))
     assert monitor.distance == pytest.approx(0.4)
     assert monitor.slipped == pytest.approx(0.1) and monitor.energy == pytest.approx(30.0)
+
+
+PERSON = {"touched": frozenset({Thing.PERSON})}
+DRIVEN = {"commanded": Twist.planar(0.3), "rolling": Twist.planar(0.3)}
+
+
+def contacts_while_moving(*phases: dict[str, object]) -> int:
+    monitor = MishapMonitor()
+    for number, phase in enumerate(phases):
+        feed(monitor, 0.2, 0.2 * number, **phase)
+    return monitor.counts[MishapKind.COLLISION_WHILE_MOVING]
+
+
+@pytest.mark.parametrize(
+    "phases",
+    [
+        (DRIVEN, PERSON | DRIVEN),
+        ({}, PERSON, PERSON | {"commanded": Twist.planar(wz=0.3)}),
+        ({"rolling": Twist.planar(0.3)}, PERSON),
+        (PERSON | DRIVEN, PERSON, PERSON | DRIVEN),
+    ],
+    ids=["drives into it", "turns in contact", "still rolls when it touches", "goes, stands and goes in one contact"],
+)
+def test_a_contact_in_which_the_robot_moves_counts_once(phases: tuple[dict[str, object], ...]) -> None:
+    assert contacts_while_moving(*phases) == 1
+
+
+@pytest.mark.parametrize(
+    "phases",
+    [({}, PERSON), ({}, PERSON, PERSON | {"rolling": Twist.planar(0.4), "velocity": Twist.planar(0.4)}), (DRIVEN, {})],
+    ids=["walked into", "pushed along", "no contact"],
+)
+def test_a_standing_robot_that_is_touched_or_pushed_has_not_moved(phases: tuple[dict[str, object], ...]) -> None:
+    assert contacts_while_moving(*phases) == 0
+
+
+def test_each_new_contact_counts() -> None:
+    assert contacts_while_moving(PERSON | DRIVEN, DRIVEN, PERSON | DRIVEN) == 2

@@ -15,6 +15,7 @@ from terrain.robot_models import HUSKY, TURTLEBOT
 from terrain.scenario import PlanarPose, Scenario, Sensor, load_scenario
 from terrain.scenario_world_types import GeneratedWorld
 from terrain.solids import box_triangles
+from terrain.verdict import Verdict
 
 RATE = 10.0
 
@@ -55,7 +56,7 @@ def make_hill_recording() -> Recording:
     recorder.path(0.4, np.column_stack([xs, ys + 0.3 * np.sin(20 * along), field.height_at(xs, ys)]))
     drive(recorder, poses, speed=1.2)
     events = life_of_a_goal(30.4, 0, "goal reached")
-    return recorder.finish(True, "SUCCESS", "goal reached", events)
+    return recorder.finish(Verdict(0, "goal reached"), events)
 
 
 def make_office_recording() -> Recording:
@@ -81,7 +82,7 @@ def make_office_recording() -> Recording:
         ring = np.column_stack([pose.x + 2 * np.cos(angles), pose.y + 2 * np.sin(angles), np.full(180, 0.3)])
         recorder.scan(index / RATE, ring)
     drive(recorder, poses, speed=0.5)
-    return recorder.finish(False, "BLOCKED_PATH", "a box stands on the path", life_of_a_goal(15.4, 110, "blocked"))
+    return recorder.finish(Verdict(110, "a box stands on the path"), life_of_a_goal(15.4, 110, "blocked"))
 
 
 @pytest.fixture

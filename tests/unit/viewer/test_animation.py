@@ -7,6 +7,7 @@ from mbf_abstract.geometry import Pose
 from terrain.recorder import Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import HUSKY
+from terrain.verdict import Verdict
 from terrain.viewer.animation import FRAMES, SIZE, Camera, draw_world, write_animation
 from terrain.viewer.colours import BODY, DRIVEN, OBSTACLE, PLANNED
 
@@ -60,9 +61,7 @@ def test_the_robot_moves_and_leaves_its_track(hill_recording, tmp_path):
 
 
 def test_a_run_that_never_began_is_a_still_picture(tmp_path):
-    empty = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(
-        False, "FAILURE", "no robot"
-    )
+    empty = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(Verdict(100, "no robot"))
     write_animation(tmp_path / "nothing.gif", empty)
 
     assert len({frame.tobytes() for frame in frames_of(tmp_path / "nothing.gif")}) == 1

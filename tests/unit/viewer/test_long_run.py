@@ -10,6 +10,7 @@ from terrain.generate import fractal_terrain
 from terrain.recorder import Recorder
 from terrain.recording import RobotShape, Surface
 from terrain.robot_models import HUSKY
+from terrain.verdict import Verdict
 from terrain.viewer.mcap_log import write_mcap
 from terrain.viewer.replay import write_replay
 
@@ -31,7 +32,7 @@ def long_run():
         if index % RATE == 0:
             recorder.path(index / RATE, way[index::4])
             recorder.scan(index / RATE, way[index] + 4.0 * rng.normal(size=(720, 3)))
-    return recorder.finish(True, "SUCCESS", "goal reached")
+    return recorder.finish(Verdict(0, "goal reached"))
 
 
 def test_the_run_is_as_long_and_the_ground_as_large_as_promised(long_run):

@@ -18,6 +18,7 @@ from terrain.bench import Bench
 from terrain.recorder import MAP_PERIOD, Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import HUSKY
+from terrain.verdict import Verdict
 from terrain.viewer.colours import WALL
 from terrain.viewer.foxglove_messages import MAP_LIFT, nanoseconds
 from terrain.viewer.mcap_log import write_mcap
@@ -189,7 +190,7 @@ def test_events_and_the_log_tell_what_events_jsonl_tells(log, office):
     assert [Event.from_json(json.dumps(values)) for values in log["/events"]] == list(office.events)
     assert (levels["goal_accepted"], levels["robot_stopped"], levels["plugin_call_started"]) == (2, 3, 1)
     assert log["/log"][-1].level == 3, "the goal failed"
-    assert log.metadata["run"]["outcome"] == "BLOCKED_PATH"
+    assert log.metadata["run"]["verdict"] == "BLOCKED_PATH: a box stands on the path"
 
 
 def test_actions_are_active_from_acceptance_to_their_outcome(log):
@@ -230,10 +231,10 @@ def test_a_hill_of_ten_thousand_triangles_is_well_below_a_megabyte(hill_recordin
 
 
 def test_a_run_that_never_began_has_a_log_too(tmp_path):
-    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(False, "FAILURE", "no robot")
+    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(Verdict(100, "no robot"))
     write_mcap(tmp_path / "run.mcap", run)
 
-    assert Log(tmp_path / "run.mcap").metadata["run"]["message"] == "no robot"
+    assert Log(tmp_path / "run.mcap").metadata["run"]["verdict"] == "FAILURE: no robot"
 
 
 def test_the_same_recording_gives_the_same_bytes(office, tmp_path):

@@ -13,6 +13,7 @@ from terrain.mishaps import roll_pitch
 from terrain.recorder import Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import HUSKY
+from terrain.verdict import Verdict
 
 
 def straight_run(goals):
@@ -20,7 +21,7 @@ def straight_run(goals):
     recorder.path(0.0, [[0, 0.5, 0], [10, 0.5, 0]])
     for step in range(11):
         recorder.sample(step * 1.0, Pose.planar(step * 0.5, 0.0, z=0.1 * step), Twist.planar(0.5), Twist.planar(0.5))
-    return recorder.finish(True, "SUCCESS", "goal reached")
+    return recorder.finish(Verdict(0, "goal reached"))
 
 
 def test_length_speed_climb_and_distance_of_a_straight_run():
@@ -45,7 +46,7 @@ def test_without_goal_and_plan_there_is_no_distance_and_no_error():
 
 
 def test_an_empty_run_has_metrics_too():
-    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(False, "FAILURE", "no robot")
+    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(Verdict(100, "no robot"))
 
     metrics = measure(run)
 
@@ -63,7 +64,6 @@ def test_metrics_are_plain_json(office_recording):
     values = measure(office_recording).to_json()
 
     assert json.loads(json.dumps(values, allow_nan=False)) == values
-    assert values["outcome"] == "BLOCKED_PATH"
 
 
 def test_roll_and_pitch_agree_with_the_mishap_monitor(hill_recording):

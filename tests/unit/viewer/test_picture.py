@@ -12,6 +12,7 @@ from terrain.actor_track import ActorTrack
 from terrain.recorder import Recorder
 from terrain.recording import RobotShape, Surface
 from terrain.robot_models import HUSKY
+from terrain.verdict import Verdict
 from terrain.viewer.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, WALL, linear_for_viewer, slope_colours
 from terrain.viewer.picture import picture_png, write_picture
 from terrain.viewer.shading import shaded_triangles, vertex_colours
@@ -51,7 +52,7 @@ def test_the_picture_of_hills_is_written_to_the_file(hill_recording, tmp_path):
 
 
 def test_a_run_that_never_began_has_a_picture_too():
-    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(False, "FAILURE", "no robot")
+    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(Verdict(100, "no robot"))
 
     assert pixels_of(picture_png(run)).size > 0
 

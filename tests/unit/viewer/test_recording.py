@@ -13,6 +13,7 @@ from terrain.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, Reco
 from terrain.recording import Recording, RecordingError, RobotShape
 from terrain.robot_models import CAR, HUSKY, TURTLEBOT
 from terrain.solids import cylinder_triangles
+from terrain.verdict import Verdict
 
 
 @pytest.mark.parametrize("name", ["hill_recording", "office_recording"])
@@ -36,7 +37,7 @@ def test_a_recording_comes_back_from_its_file_unchanged(name, request, tmp_path)
         for (_, mine), (_, yours) in zip(ours, theirs, strict=True):
             np.testing.assert_array_equal(yours, mine)
     assert (loaded.start, loaded.goals, loaded.events) == (recording.start, recording.goals, recording.events)
-    assert (loaded.success, loaded.outcome, loaded.message) == (recording.success, recording.outcome, recording.message)
+    assert loaded.verdict == recording.verdict
 
 
 def test_a_file_that_is_no_recording_is_refused_by_name(tmp_path):
@@ -47,9 +48,7 @@ def test_a_file_that_is_no_recording_is_refused_by_name(tmp_path):
 
 
 def test_an_empty_run_can_be_saved_and_has_no_duration(tmp_path):
-    empty = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(
-        False, "FAILURE", "no robot"
-    )
+    empty = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(Verdict(100, "no robot"))
     empty.save(tmp_path / "recording.npz")
 
     loaded = Recording.load(tmp_path / "recording.npz")
@@ -64,7 +63,7 @@ def test_tilt_is_the_angle_of_the_z_axis():
     recorder.sample(0.0, Pose((0, 0, 0), (math.sin(half), 0, 0, math.cos(half))), Twist(), Twist())
     recorder.sample(0.1, Pose.planar(0, 0, yaw=2.0), Twist(), Twist())
 
-    recording = recorder.finish(True, "SUCCESS", "")
+    recording = recorder.finish(Verdict(0, ""))
 
     np.testing.assert_allclose(np.degrees(recording.tilt), [30.0, 0.0], atol=1e-9)
 
@@ -73,7 +72,7 @@ def test_the_command_of_a_car_is_recorded_as_its_speed():
     recorder = Recorder("car", "mesh", RobotShape.of(CAR), Pose.planar(0, 0), [])
     recorder.sample(0.0, Pose.planar(0, 0), Twist(), AckermannCommand(1.5, 0.2))
 
-    assert recorder.finish(True, "SUCCESS", "").commands.tolist() == [[1.5, 0.0, 0.0]]
+    assert recorder.finish(Verdict(0, "")).commands.tolist() == [[1.5, 0.0, 0.0]]
 
 
 @pytest.mark.parametrize(("spec", "count", "rear"), [(HUSKY, 4, -0.256), (TURTLEBOT, 2, 0.0), (CAR, 4, 0.0)])
@@ -93,7 +92,7 @@ def test_maps_are_recorded_every_few_seconds_and_come_back_from_the_file(tmp_pat
     ]
     for time, view in ((0.0, views[0]), (MAP_PERIOD - 0.1, views[1]), (MAP_PERIOD, views[1])):
         recorder.map(time, lambda view=view: view)
-    recorder.finish(True, "SUCCESS", "").save(tmp_path / "recording.npz")
+    recorder.finish(Verdict(0, "")).save(tmp_path / "recording.npz")
 
     grids = Recording.load(tmp_path / "recording.npz").grids
 
@@ -107,7 +106,7 @@ def test_a_mesh_map_is_recorded_when_its_costs_have_changed_and_comes_back_from_
     corners, faces = np.array([[0.0, 0.0, 0.1], [1.0, 0.0, 0.2], [0.0, 1.0, 0.3]]), np.array([[0, 1, 2]], np.int32)
     for turn, costs in enumerate(([0.0, 1.5, np.inf], [0.0, 1.5, np.inf], [0.0, 1e9, 2.0])):
         recorder.map(MAP_PERIOD * turn, lambda costs=costs: MeshView(corners, faces, np.array(costs, np.float32)))
-    recorder.finish(True, "SUCCESS", "").save(tmp_path / "recording.npz")
+    recorder.finish(Verdict(0, "")).save(tmp_path / "recording.npz")
 
     first, second = Recording.load(tmp_path / "recording.npz").meshes
 
@@ -162,7 +161,7 @@ def test_what_moves_by_itself_is_recorded_with_every_sample_and_comes_back(tmp_p
     recorder = Recorder("paced", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), [], actors=[Pacer()])
     for index in range(3):
         recorder.sample(0.1 * index, Pose.planar(0, 0), Twist(), Twist())
-    recorder.finish(True, "SUCCESS", "").save(tmp_path / "recording.npz")
+    recorder.finish(Verdict(0, "")).save(tmp_path / "recording.npz")
 
     (track,) = Recording.load(tmp_path / "recording.npz").actors
 
@@ -176,7 +175,7 @@ def test_events_of_a_real_clock_are_brought_to_the_time_of_the_samples():
     recorder = Recorder("late", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), [])
     events = [Event(time, EventKind.CUSTOM, "test", {"number": number}) for number, time in enumerate((3.0, 4.5, 9.0))]
 
-    recording = recorder.finish(True, "SUCCESS", "", events, began=4.25)
+    recording = recorder.finish(Verdict(0, ""), events, began=4.25)
 
     assert [event.time for event in recording.events] == [0.0, 0.25, 4.75]
     assert [event.data["number"] for event in recording.events] == [0, 1, 2]

@@ -15,6 +15,7 @@ from terrain.recorder import Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import HUSKY
 from terrain.solids import cylinder_triangles
+from terrain.verdict import Verdict
 from terrain.viewer.replay import FRAME_RATE, MAX_FRAMES, frame_indices, replay_html, status_text, write_replay
 from terrain.viewer.scene import wheel_angles
 
@@ -65,7 +66,7 @@ def test_a_replay_is_one_html_file_of_a_few_megabytes(name, request, tmp_path, c
 
 
 def test_a_run_that_never_began_has_a_replay_too():
-    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(False, "FAILURE", "no robot")
+    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(Verdict(100, "no robot"))
 
     assert "__VISER_EMBED_DATA__" in replay_html(replace(run, goals=()))
 

@@ -12,6 +12,7 @@ from terrain.metrics import measure
 from terrain.recorder import Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import HUSKY
+from terrain.verdict import Verdict
 from terrain.viewer.page import MAX_ROWS
 from terrain.viewer.report import report_html, write_report
 from terrain.viewer.timeline import Bar, action_bars, plugin_bars, timeline_svg
@@ -39,7 +40,7 @@ def test_the_report_is_one_file_without_script_and_links(hill_recording, tmp_pat
 
 
 def test_texts_of_a_run_cannot_break_the_page(hill_recording):
-    evil = replace(hill_recording, message="<script>alert(1)</script>", scenario="<b>")
+    evil = replace(hill_recording, verdict=Verdict(0, "<script>alert(1)</script>"), scenario="<b>")
 
     assert "<script" not in report_of(evil)
 
@@ -53,7 +54,7 @@ def test_long_lists_are_cut_and_say_so(hill_recording):
 
 
 def test_a_run_that_never_began_has_a_report_too():
-    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(False, "FAILURE", "no robot")
+    run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(Verdict(100, "no robot"))
 
     assert "FAILURE: no robot" in report_of(run)
 

@@ -81,7 +81,7 @@ def test_an_interface_that_does_not_exist_is_told_in_one_line(meadow, tmp_path):
 def test_every_executive_drives_a_run_or_plans_it(meadow, tmp_path, executive):
     result = run(meadow, tmp_path, executive=executive)
 
-    assert result.success, result.message
+    assert result.success, result.verdict
     arrived = result.metrics["distance_to_goal_m"] < 0.5
     assert arrived == (executive != "planning")
     trees = [event for event in read_events(tmp_path / "events.jsonl") if event.kind is EventKind.TREE]

@@ -1,0 +1,54 @@
+"""A run that arrives and drives into people is no success, wherever one looks."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from mbf_abstract.cli import make_app
+from terrain.run_folder import read_run
+from terrain.scenario import SHIPPED
+from terrain.sweep_log import SweepLog
+
+pytestmark = pytest.mark.timeout(300)
+
+
+def mbf(*arguments):
+    return CliRunner(env={"COLUMNS": "300"}).invoke(make_app(), [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def rude(tmp_path):
+    """The crowded corridor, with people who do not look where they walk."""
+    text = (SHIPPED / "crowded_corridor.yaml").read_text()
+    text = text.replace(", gives_way: true", "").replace("config/", f"{SHIPPED}/config/")
+    (tmp_path / "rude.yaml").write_text(text)
+    return tmp_path / "rude.yaml"
+
+
+def test_a_contact_while_the_robot_moves_fails_the_run_everywhere(rude, tmp_path):
+    run = mbf("run", rude, "--out", tmp_path / "run", "--quiet")
+
+    metrics = json.loads((tmp_path / "run" / "metrics.json").read_text())
+    count = metrics["collisions_while_moving"]
+    said = f"FAILED: contacts while the robot moved: {count} (person) (navigation: SUCCESS, goal reached)"
+    assert run.exit_code == 1
+    assert said in run.stdout
+    assert (metrics["success"], metrics["verdict"], metrics["outcome"]) == (False, said, "SUCCESS")
+    recording, _ = read_run(tmp_path / "run")
+    assert (recording.verdict.success, str(recording.verdict)) == (False, said)
+    report = (tmp_path / "run" / "report.html").read_text()
+    assert f'<p class="outcome bad">{said}</p>' in report
+    compared = mbf("compare", tmp_path / "run", tmp_path / "run", "--out", tmp_path / "compare.html")
+    assert said in compared.stdout and said in (tmp_path / "compare.html").read_text()
+
+
+def test_a_sweep_tells_the_verdict_and_counts_no_success(rude, tmp_path):
+    swept = mbf("sweep", rude, "--seeds", "0:1", "--out", tmp_path / "sweep")
+
+    with SweepLog(tmp_path / "sweep" / "runs.jsonl") as log:
+        (row,) = log.rows.values()
+    assert row["success"] is False and row["verdict"].startswith("FAILED: ")
+    assert f"seed 0 : {row['verdict']}" in swept.stdout
+    assert "FAILED: " in (tmp_path / "sweep" / "sweep.csv").read_text()
+    assert 'class="failed"' in (tmp_path / "sweep" / "sweep.html").read_text()

@@ -1,0 +1,60 @@
+"""The verdict on a run: navigation's outcome, the scenario's limits, and no contact while the robot moved."""
+
+import pytest
+
+from mbf_abstract.actions.goals import MoveBaseResult
+from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
+from terrain.mishaps import MishapKind
+from terrain.scenario_limits import Limits
+from terrain.verdict import UNFINISHED, judge
+
+ARRIVED = MoveBaseResult(MoveBaseOutcome.SUCCESS, "goal reached")
+BLOCKED = MoveBaseResult(ExePathOutcome.BLOCKED_PATH, "a box")
+CALM = {"max_tilt_deg": 5.0, "path_length_m": 10.0, "mishaps": [], "collisions": 0, "collisions_while_moving": 0}
+HIT = CALM | {
+    "mishaps": ["collision", "collision_while_moving", "collision_with_person", "collision_with_wall"],
+    "collisions": 3,
+    "collisions_while_moving": 2,
+}
+PUSHED = CALM | {"mishaps": ["collision", "collision_with_person"], "collisions": 1}
+
+
+@pytest.mark.parametrize(
+    ("result", "limits", "metrics", "success", "text"),
+    [
+        (ARRIVED, Limits(), CALM, True, "SUCCESS: goal reached"),
+        (ARRIVED, Limits(), PUSHED, True, "SUCCESS: goal reached"),
+        (BLOCKED, Limits(), CALM, False, "BLOCKED_PATH: a box"),
+        (
+            ARRIVED,
+            Limits(),
+            HIT,
+            False,
+            "FAILED: contacts while the robot moved: 2 (person, wall) (navigation: SUCCESS, goal reached)",
+        ),
+        (
+            BLOCKED,
+            Limits(),
+            HIT | {"collisions_while_moving": 1},
+            False,
+            "BLOCKED_PATH: a box; contacts while the robot moved: 1 (person, wall)",
+        ),
+        (
+            ARRIVED,
+            Limits(max_tilt=4.0, forbidden=(MishapKind.COLLISION,)),
+            PUSHED,
+            False,
+            "FAILED: max_tilt_deg 5.0 is above 4 degrees; collision happened (navigation: SUCCESS, goal reached)",
+        ),
+    ],
+)
+def test_a_run_succeeds_only_if_all_is_well(result, limits, metrics, success, text):
+    verdict = judge(result, limits, metrics)
+
+    assert (verdict.success, str(verdict)) == (success, text)
+    assert verdict.to_json()["outcome_code"] == int(result.outcome)
+
+
+def test_a_run_that_was_cut_short_is_no_success():
+    assert not UNFINISHED.success
+    assert str(UNFINISHED) == "UNFINISHED: the run was cut short"
