@@ -2,13 +2,21 @@
 
 A handle works in three styles: block (``wait``), poll (``status``, ``feedback``) or ``await``. Callbacks run on the
 server's callback thread, so one that raises or is slow harms neither the robot nor the sender.
+
+An asyncio task that is canceled, or times out, while it awaits a handle cancels the goal: nobody waits for the robot
+any more, so it stops. To give up waiting only, shield the handle:
+``await asyncio.wait_for(asyncio.shield(handle), 5.0)``.
 """
 
 from __future__ import annotations
 
 import asyncio
+import math
+import threading
 from collections.abc import Callable, Generator
+from contextlib import suppress
 from enum import Enum
+from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
 from mbf_abstract.actions.goals import ActionResult
@@ -73,7 +81,7 @@ class GoalHandle(Generic[G, R, F]):
         self._feedback: F | None = None
         self._paused = False
         self._done_callbacks: list[Callable[[GoalHandle[G, R, F]], None]] = []
-        self._feedback_callbacks: list[Callable[[F], None]] = []
+        self._feedback_callbacks: dict[object, Callable[[F], None]] = {}
         self._wake_callbacks: list[Callable[[], None]] = []
         self._subscribers: list[Callable[[GoalHandle[G, R, F]], None]] = []
 
@@ -104,9 +112,24 @@ class GoalHandle(Generic[G, R, F]):
         return self._paused
 
     def wait(self, timeout: float | None = None) -> R:
-        """Wait for the result; raises TimeoutError when ``timeout`` [s] passes first (the goal goes on)."""
+        """Wait for the result.
+
+        Parameters
+        ----------
+        timeout : float, optional
+            Longest wait [s]; None or infinity = until the goal is done.
+
+        Raises
+        ------
+        TimeoutError
+            The time has passed; the goal goes on.
+        ValueError
+            The timeout is not a number.
+        """
+        if timeout is not None and math.isnan(timeout):
+            raise ValueError("the timeout is not a number")
         clock = self._runtime.clock
-        deadline = None if timeout is None else clock.now() + timeout
+        deadline = None if timeout is None or timeout > threading.TIMEOUT_MAX else clock.now() + timeout
         with self._condition:
             while self._result is None:
                 remaining = None if deadline is None else deadline - clock.now()
@@ -127,11 +150,17 @@ class GoalHandle(Generic[G, R, F]):
                 finished.set_result(None)
 
         def wake(_: object) -> None:
-            loop.call_soon_threadsafe(set_finished)
+            if self.done and not loop.is_closed():
+                with suppress(RuntimeError):  # the loop was closed in this very moment: nobody waits any more
+                    loop.call_soon_threadsafe(set_finished)
 
-        self.add_done_callback(wake)
-        with self._runtime.clock.outside():
-            await finished
+        self.subscribe(wake)
+        try:
+            with self._runtime.clock.outside():
+                await finished
+        except asyncio.CancelledError:
+            self.cancel("the task that awaited the goal was canceled")
+            raise
         assert self._result is not None
         return self._result
 
@@ -157,17 +186,17 @@ class GoalHandle(Generic[G, R, F]):
         self._set_paused(False)
 
     def add_done_callback(self, callback: Callable[[GoalHandle[G, R, F]], None]) -> None:
-        """Call ``callback(handle)`` once when the goal is done, also if it already is."""
+        """Call ``callback(handle)`` once when the goal is done, also if it already is; it is never left out."""
         with self._condition:
-            if not self.done:
+            if self.done:
+                self._runtime.callbacks.submit(lambda: callback(self))
+            else:
                 self._done_callbacks.append(callback)
-                return
-        self._runtime.callbacks.submit(lambda: callback(self))
 
     def add_feedback_callback(self, callback: Callable[[F], None]) -> None:
-        """Call ``callback(feedback)`` for every feedback from now on."""
+        """Call ``callback(feedback)`` for every feedback from now on; a slow one gets the newest and misses others."""
         with self._condition:
-            self._feedback_callbacks.append(callback)
+            self._feedback_callbacks[object()] = callback
 
     # ------------------------------------------------------------------------------------------ server
     def on_wake(self, callback: Callable[[], None]) -> None:
@@ -194,12 +223,11 @@ class GoalHandle(Generic[G, R, F]):
             if self.done:
                 return
             self._feedback = feedback
-            callbacks = list(self._feedback_callbacks)
+            for taker, callback in self._feedback_callbacks.items():
+                self._runtime.callbacks.submit(partial(callback, feedback), newest_of=taker)
             subscribers = list(self._subscribers)
         for subscriber in subscribers:
             subscriber(self)
-        for callback in callbacks:
-            self._runtime.callbacks.submit(lambda callback=callback: callback(feedback))  # type: ignore[misc]
 
     def finish(self, status: GoalStatus, result: R) -> bool:
         """Set the final status and the result; False if the goal already was final (then nothing changes)."""
@@ -217,15 +245,15 @@ class GoalHandle(Generic[G, R, F]):
             )
             self._status = status
             self._result = result
-            callbacks, self._done_callbacks = self._done_callbacks, []
+            for callback in self._done_callbacks:  # queued with the lock held, so after all feedback
+                self._runtime.callbacks.submit(partial(callback, self))
+            self._done_callbacks.clear()
             subscribers, self._subscribers = self._subscribers, []
             self._feedback_callbacks.clear()
             self._wake_callbacks.clear()
             self._condition.notify_all()
         for subscriber in subscribers:
             subscriber(self)
-        for callback in callbacks:
-            self._runtime.callbacks.submit(lambda callback=callback: callback(self))  # type: ignore[misc]
         return True
 
     def _set_paused(self, paused: bool) -> None:

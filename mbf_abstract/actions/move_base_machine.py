@@ -156,7 +156,8 @@ class MoveBaseMachine:
 
     def _has_news(self) -> bool:
         handle = self._job.handle
-        if handle.paused != self._oscillation.stopwatch.paused:
+        paused = [self._oscillation.stopwatch.paused, *(sub_goal.paused for sub_goal in self._sub_goals())]
+        if (not handle.paused) in paused:
             return True
         if self._state is MoveBaseState.CANCELING:
             return not self._sub_goals()
@@ -368,9 +369,8 @@ class MoveBaseMachine:
         return self._ending or (MoveBaseOutcome.CANCELED, self._job.handle.cancel_reason)
 
     def _forward_pause(self) -> None:
+        """Bring everything into the goal's state, whoever else has paused or resumed a sub-goal meanwhile."""
         paused = self._job.handle.paused
-        if paused == self._oscillation.stopwatch.paused:
-            return
         for watch in (self._oscillation.stopwatch, self._replan_watch):
             watch.pause() if paused else watch.resume()
         for handle in self._sub_goals():
@@ -380,6 +380,7 @@ class MoveBaseMachine:
         handle: AnyGoalHandle = action.send(goal)
         if self._job.handle.paused:
             handle.pause()
+        handle.on_wake(self._wake)
         handle.subscribe(self._post)
         return handle
 

@@ -52,7 +52,7 @@ class RefinePathAction(Action[RefinePathGoal, RefinePathResult, NoFeedback]):
             plugin,
             handle,
             patience=lambda: self.runtime.parameters.planner_patience,
-            on_abandon=lambda: job.abandon(RefinePathOutcome.STOPPED, f"refiner {plugin.name!r} hangs"),
+            on_abandon=lambda: job.abandon(*self._hung(plugin.name, handle)),
         )
         with self.runtime.map_hooks.using_map(PluginKind.REFINER), run:
             result = RefinerExecution(run, handle.goal.path).execute()
@@ -75,6 +75,12 @@ class RefinePathAction(Action[RefinePathGoal, RefinePathResult, NoFeedback]):
             path_length_ratio=refined.length / original.length if original.length > 0.0 else 1.0,
             refiner=refiner,
         )
+
+    def _hung(self, refiner: str, handle: Handle) -> tuple[int, str]:
+        if handle.cancel_requested:
+            return RefinePathOutcome.CANCELED, f"{handle.cancel_reason}; refiner {refiner!r} has not ended yet"
+        patience = self.runtime.parameters.planner_patience
+        return RefinePathOutcome.STOPPED, f"refiner {refiner!r} gave no answer within {patience:g} s and its grace"
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> RefinePathResult:
         """Result without a path."""

@@ -114,12 +114,12 @@ class LoadedPlugin(Generic[P]):
             self._retired = True
             return True
 
-    def call(self, goal_id: int, method: str, function: Callable[[], T]) -> T:
-        """Call into the plugin, guarded; exceptions become ``PluginFault`` and an event with the traceback."""
+    def call(self, goal_id: int, method: str, function: Callable[[], T], label: str) -> T:
+        """Call into the plugin, guarded as ``label``; what it raises becomes ``PluginFault`` and a traceback event."""
         clock = self._runtime.clock
         started = clock.now()
         try:
-            with clock.guarded(f"{self.name}.{method}"):
+            with clock.guarded(label):
                 result = function()
                 self._take_modelled_time(started)
                 return result

@@ -9,6 +9,7 @@ instance stays quarantined until the call returns. While the goal is paused its 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
 from typing import Generic, TypeVar
 
 from mbf_abstract.actions.handle import AnyGoalHandle
@@ -22,6 +23,7 @@ T = TypeVar("T")
 
 IDLE_CHECK = 1.0  # s; how often a run without a patience limit is looked at
 SHORTEST_CHECK = 0.05  # s; how often one is whose patience is over, but that is not inside a call
+_call_numbers = count(1)  # unique in the process: servers on one clock hear of each other's hung calls
 
 
 class Abandoned(Exception):
@@ -56,6 +58,7 @@ class PluginRun(Generic[P]):
         self._patience = patience
         self._on_abandon = on_abandon
         self._call_began: float | None = None
+        self._call_label = ""
         self._stop_asked: float | None = None
         self._hung = False
 
@@ -95,9 +98,10 @@ class PluginRun(Generic[P]):
 
     def call(self, method: str, function: Callable[[], T]) -> T:
         """Call into the plugin; raises PluginFault if it raises, Abandoned if the goal ended meanwhile."""
+        self._call_label = label = f"call {next(_call_numbers)}: {self.plugin.name}.{method}"
         self._call_began = self.runtime.clock.now()
         try:
-            return self.plugin.call(self.handle.id, method, function)
+            return self.plugin.call(self.handle.id, method, function, label)
         finally:
             self._call_began = None
             if self.abandoned and not self._hung:
@@ -112,7 +116,7 @@ class PluginRun(Generic[P]):
 
     def declare_hung(self, label: str) -> None:
         """Give up at once if the hung section is this run's call: its thread was detached from the clock."""
-        if self._call_began is not None and label.startswith(f"{self.plugin.name}."):
+        if self._call_began is not None and label == self._call_label:
             self._hung = True
             self.runtime.supervisor.poke(self._watch)
 

@@ -38,13 +38,15 @@ class Supervisor:
         self._watches: list[Watch] = []
         self._wake_at = float("inf")
         self._closed = False
-        clock.spawn(self._loop, "supervisor", Priority.WATCHDOG)
+        self._serving = False
+        self._serve()
 
     def watch(self, check: Check, first_in: float) -> Watch:
         """Ask ``check`` for the first time in ``first_in`` seconds."""
         watch = Watch(check, self._clock.now() + first_in)
         with self._condition:
             self._watches.append(watch)
+            self._serve()
             self._wake_for(watch)
         return watch
 
@@ -60,12 +62,20 @@ class Supervisor:
         with self._condition:
             if watch in self._watches:
                 self._watches.remove(watch)
+                if self._closed and not self._watches:
+                    self._condition.notify_all()
 
     def close(self) -> None:
-        """End the thread."""
+        """End the thread once nothing is left to be watched: a goal that still runs has its end coming."""
         with self._condition:
             self._closed = True
             self._condition.notify_all()
+
+    def _serve(self) -> None:
+        """Make sure that a thread asks the checks."""
+        if not self._serving:
+            self._serving = True
+            self._clock.spawn(self._loop, "supervisor", Priority.WATCHDOG)
 
     def _wake_for(self, watch: Watch) -> None:
         if watch.due < self._wake_at:
@@ -97,13 +107,14 @@ class Supervisor:
             watch.due = min(watch.due, self._clock.now() + seconds)
 
     def _next_due(self) -> list[Watch] | None:
-        """Wait until at least one watch is due; None = closed."""
+        """Wait until at least one watch is due; None = closed, and nothing is left to be watched."""
         with self._condition:
-            while not self._closed:
+            while self._watches or not self._closed:
                 now = self._clock.now()
                 due = [watch for watch in self._watches if watch.due <= now + 1e-9]
                 if due:
                     return due
                 self._wake_at = min((watch.due for watch in self._watches), default=float("inf"))
                 self._condition.wait(None if self._wake_at == float("inf") else self._wake_at - now)
+            self._serving = False
             return None

@@ -1,5 +1,7 @@
 """Fault table, row 20: callbacks of the user that raise or block."""
 
+import asyncio
+
 from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
@@ -41,15 +43,72 @@ def test_a_blocking_callback_is_left_alone_and_the_others_are_served():
         hang.release()
 
 
-def test_the_queue_of_callbacks_is_bounded():
+def test_behind_a_slow_feedback_callback_no_end_is_lost_and_the_order_of_each_goal_is_kept():
+    with Bench() as bench:
+        log = []
+
+        def slow(feedback):
+            bench.clock.sleep(0.5)
+            log.append(("feedback", round(feedback.dist_to_goal, 1)))
+
+        driving = bench.navigator.send(ExePathGoal(bench.path_to(3.0)))
+        driving.add_feedback_callback(slow)
+        driving.add_done_callback(lambda handle: log.append(("end", handle.id)))
+        handles = [driving]
+        for _ in range(1500):
+            handles.append(bench.server.get_path.send(GetPathGoal(Pose.planar(1.0, 0.0))))
+            handles[-1].add_done_callback(lambda handle: log.append(("end", handle.id)))
+        assert driving.wait().success
+        bench.clock.sleep(2.0)
+        assert sorted(end for what, end in log if what == "end") == [handle.id for handle in handles]
+        ends = [index for index, entry in enumerate(log) if entry == ("end", driving.id)]
+        distances = [(index, distance) for index, (what, distance) in enumerate(log) if what == "feedback"]
+        assert 10 < len(distances) < 25  # it took as many as it had time for, each time the newest
+        assert [distance for _, distance in distances] == sorted((d for _, d in distances), reverse=True)
+        assert distances[-1][0] < ends[0]
+
+
+def test_a_callback_that_exits_stops_no_other_callback():
+    def leave(*arguments):
+        raise SystemExit(1)
+
+    with Bench() as bench:
+        log = []
+        for number in range(10):
+            handle = bench.navigator.send(GetPathGoal(Pose.planar(1.0, 0.0)))
+            handle.add_done_callback(leave)
+            handle.add_done_callback(lambda handle, number=number: log.append((number, bench.clock.now())))
+            handle.wait()
+        bench.clock.sleep(0.1)
+        assert log == [(number, 0.0) for number in range(10)]
+
+
+def test_callbacks_run_although_the_server_is_closed_right_after_or_before_the_end():
+    log = []
+    with Bench() as bench:
+        ended = bench.navigator.send(GetPathGoal(Pose.planar(1.0, 0.0)))
+        ended.add_done_callback(lambda handle: log.append("ended"))
+        ended.wait()
+        bench.server.close()
+        ended.add_done_callback(lambda handle: log.append("added after the close"))
+    with Bench() as bench:
+        running = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
+        running.add_done_callback(lambda handle: log.append(handle.status.value))
+        bench.clock.sleep(1.0)
+    assert log == ["ended", "added after the close", "canceled"]
+
+
+def test_a_goal_is_awaited_past_a_blocked_callback():
+    async def main(handle):
+        return await handle
+
     with Bench() as bench:
         hang = Hang(bench.clock)
-        handle = bench.navigator.send(GetPathGoal(Pose.planar(1.0, 0.0)))
-        handle.add_done_callback(hang)
-        handle.wait()
+        bench.server.runtime.callbacks._patience = float("inf")
+        first = bench.navigator.send(GetPathGoal(Pose.planar(1.0, 0.0)))
+        first.add_done_callback(hang)
+        first.wait()
         bench.clock.sleep(0.1)
-        for _ in range(1500):
-            handle.add_done_callback(lambda handle: None)
-        lost = [event for event in bench.events(EventKind.FAULT) if "oldest lost" in event.data["message"]]
-        assert (hang.entered, len(lost)) == (1, 500)
+        assert asyncio.run(main(bench.navigator.send(GetPathGoal(Pose.planar(2.0, 0.0))))).success
+        assert (hang.entered, hang.left) == (1, 0)
         hang.release()

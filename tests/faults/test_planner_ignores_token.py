@@ -9,9 +9,9 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.bench import SCRIPTED, Bench
-from mbf_abstract.testing.faulty import BusyHang, Hang
+from mbf_abstract.testing.faulty import BusyHang, Hang, slow
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
-from mbf_abstract.testing.scripted import ScriptedPlanner
+from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
 
 GOAL = GetPathGoal(Pose.planar(3.0, 0.0))
 
@@ -97,3 +97,31 @@ def test_a_planner_that_keeps_the_processor_busy_is_found_by_the_wall_clock_guar
         hang.release.cancel()
         assert (hang.entered, result.outcome) == (1, GetPathOutcome.PAT_EXCEEDED)
         assert_ended_once(bench, handle)
+
+
+@pytest.mark.parametrize(("hanging", "healthy"), [("nav.plan", "nav"), ("nav", "nav.plan")])
+def test_a_busy_planner_takes_no_other_one_with_it_whatever_their_names(hanging, healthy):
+    with Bench({"nav": ScriptedPlanner, "nav.plan": ScriptedPlanner}, hang_guard=0.2, planner_patience=5.0) as bench:
+        hang = BusyHang()
+        bench.plugin(hanging, ScriptedPlanner).play(hang)
+        bench.plugin(healthy, ScriptedPlanner).play(slow(bench.clock, 1.0, straight_plan))
+        other = bench.navigator.send(GetPathGoal(GOAL.target_pose, planner=healthy, concurrency_slot=1))
+        bench.clock.sleep(0.1)
+        handle = bench.navigator.send(GetPathGoal(GOAL.target_pose, planner=hanging))
+        assert handle.wait().outcome == GetPathOutcome.PAT_EXCEEDED
+        hang.release.cancel()
+        assert hang.entered == 1
+        assert other.wait().success
+
+
+def test_a_busy_planner_takes_none_of_another_server_on_the_same_clock_with_it():
+    clock = SimClock()
+    with Bench(clock=clock, hang_guard=0.2) as first, Bench(clock=clock, hang_guard=0.2) as second:
+        hang = BusyHang()
+        first.planner.play(hang)
+        second.planner.play(slow(clock, 1.0, straight_plan))
+        other = second.navigator.send(GOAL)
+        clock.sleep(0.1)
+        assert first.navigator.send(GOAL).wait().outcome == GetPathOutcome.PAT_EXCEEDED
+        hang.release.cancel()
+        assert other.wait().success

@@ -244,6 +244,19 @@ def test_a_canceled_refiner_ends_canceled(make_bench):
     assert handle.wait().outcome == RefinePathOutcome.CANCELED
 
 
+def test_a_canceled_refiner_that_hangs_ends_canceled_too(make_bench):
+    bench = make_bench(planner_patience=0.0, cancel_grace=0.5)
+    hang = Hang(bench.clock, then=NO)
+    bench.refiner.play(hang)
+    handle = bench.navigator.send(RefinePathGoal(BENT))
+    bench.clock.sleep(0.1)
+    handle.cancel("enough")
+    result = handle.wait(1.0)
+    assert (handle.status, result.outcome) == (GoalStatus.CANCELED, RefinePathOutcome.CANCELED)
+    assert result.message == "enough; refiner 'refiner' has not ended yet"
+    hang.release()
+
+
 def test_a_refiner_that_hangs_is_given_up(make_bench):
     bench = make_bench(planner_patience=1.0, cancel_grace=0.5)
     hang = Hang(bench.clock, then=NO)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from mbf_abstract.clock import ThreadDetached
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.execution.callbacks import CallbackThread
 from mbf_abstract.execution.supervisor import Supervisor
@@ -135,17 +136,30 @@ def test_a_poked_watch_is_asked_at_once_also_when_it_is_poked_during_its_check(c
     assert asked == [1.0, 1.0]
 
 
-def test_a_stopped_watch_is_asked_no_more_and_a_closed_supervisor_asks_nobody(clock):
+def test_a_stopped_watch_is_asked_no_more(clock):
     supervisor, asked = Supervisor(clock, EventBus(clock.now)), []
     watch = supervisor.watch(lambda: asked.append("stopped"), 0.5)
     supervisor.stop(watch)
     supervisor.stop(watch)
     supervisor.poke(watch)
     clock.sleep(1.0)
-    supervisor.watch(lambda: asked.append("closed"), 0.5)
+    assert asked == []
+
+
+def test_a_closed_supervisor_still_asks_what_is_watched_and_then_its_thread_ends(clock):
+    supervisor, asked = Supervisor(clock, EventBus(clock.now)), []
+    supervisor.watch(lambda: asked.append("early"), 0.5)
+    stopped = supervisor.watch(lambda: asked.append("stopped"), 2.0)
     supervisor.close()
     clock.sleep(1.0)
-    assert asked == []
+    assert "supervisor" in {who.name for who in clock._known}
+    supervisor.stop(stopped)
+    clock.sleep(0.0)
+    assert "supervisor" not in {who.name for who in clock._known}
+    supervisor.watch(lambda: asked.append("late"), 0.5)  # e.g. a done callback of a goal that has just ended
+    clock.sleep(1.0)
+    assert asked == ["early", "late"]
+    assert "supervisor" not in {who.name for who in clock._known}
 
 
 @pytest.mark.parametrize("error", [RuntimeError("no more threads"), SystemExit(1)])
@@ -220,32 +234,63 @@ def test_a_callback_that_blocks_is_left_alone_and_the_others_are_served(clock, m
     assert "blocked for over 5.0 s" in memory.of_kind(EventKind.FAULT)[0].data["message"]
 
 
-def test_after_too_many_blocked_callbacks_no_more_run(clock, make_callbacks):
+def test_with_too_many_blocked_callbacks_the_others_wait_until_one_comes_back(clock, make_callbacks):
     callbacks, log = make_callbacks(patience=1.0, max_blocked=2), []
-    for _ in range(3):
-        callbacks.submit(lambda: clock.sleep(1e6))
-    callbacks.submit(lambda: log.append("never"))
-    clock.sleep(100.0)
-    callbacks.submit(lambda: log.append("never"))
-    clock.sleep(100.0)
+    for seconds in (10.0, 1e6, 1e6):
+        callbacks.submit(lambda seconds=seconds: clock.sleep(seconds))
+    for i in range(2000):
+        callbacks.submit(lambda i=i: log.append((i, clock.now())))
+    clock.sleep(9.0)
     assert log == []
+    assert [who.name for who in clock._known].count("callbacks") == 3
+    clock.sleep(2.0)
+    assert log == [(i, 10.0) for i in range(2000)]
     assert [who.name for who in clock._known].count("callbacks") == 3
 
 
-def test_a_full_queue_loses_its_oldest_entry_and_says_so(clock, make_callbacks, memory):
-    callbacks, log = make_callbacks(max_queue=2), []
-    for i in range(4):
-        callbacks.submit(lambda i=i: log.append(i))
+def test_of_what_one_taker_has_not_taken_only_the_newest_stays_and_keeps_its_place(clock, make_callbacks):
+    callbacks, log = make_callbacks(), []
+    callbacks.submit(lambda: clock.sleep(1.0))
+    for i in range(1000):
+        callbacks.submit(lambda i=i: log.append(i), newest_of="feedback")
+        if i == 0:
+            callbacks.submit(lambda: log.append("done"))
+    clock.sleep(2.0)
+    assert log == [999, "done"]
+
+
+def test_a_blocked_taker_gets_nothing_until_it_returns(clock, make_callbacks):
+    callbacks, log = make_callbacks(patience=1.0, max_blocked=1), []
+    callbacks.submit(lambda: clock.sleep(5.0), newest_of="slow")
+    for i in range(6):
+        clock.sleep(1.0)
+        callbacks.submit(lambda i=i: log.append((i, "slow")), newest_of="slow")
+        callbacks.submit(lambda i=i: log.append((i, "quick")), newest_of="quick")
+    clock.sleep(1.0)
+    assert [i for i, who in log if who == "quick"] == [0, 1, 2, 3, 4, 5]
+    assert [i for i, who in log if who == "slow"] == [4, 5]
+
+
+@pytest.mark.parametrize("error", [SystemExit(1), KeyboardInterrupt(), GeneratorExit(), ThreadDetached("liar")])
+def test_a_callback_that_raises_what_nobody_expects_delays_nobody(clock, make_callbacks, error):
+    def bad():
+        raise error
+
+    callbacks, log = make_callbacks(), []
+    for i in range(10):
+        callbacks.submit(bad)
+        callbacks.submit(lambda i=i: log.append((i, clock.now())))
     clock.sleep(0.1)
-    assert log == [2, 3]
-    assert len(memory.of_kind(EventKind.FAULT)) == 2
+    assert log == [(i, 0.0) for i in range(10)]
 
 
-def test_closing_runs_what_is_queued_and_then_ends(clock, make_callbacks):
+def test_closing_runs_what_is_queued_and_what_comes_later(clock, make_callbacks):
     callbacks, log = make_callbacks(), []
     callbacks.submit(lambda: log.append("queued"))
     callbacks.close()
-    callbacks.submit(lambda: log.append("too late"))
     clock.sleep(0.1)
-    assert log == ["queued"]
+    assert "callbacks" not in {who.name for who in clock._known}
+    callbacks.submit(lambda: log.append("later"))
+    clock.sleep(0.1)
+    assert log == ["queued", "later"]
     assert "callbacks" not in {who.name for who in clock._known}

@@ -1,0 +1,69 @@
+"""Pausing all goals and resuming one: the parts of a move_base goal follow it, whoever else has paused them."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from mbf_abstract.actions.goals import MoveBaseGoal
+from mbf_abstract.actions.handle import GoalStatus
+from mbf_abstract.clock import WallClock
+from mbf_abstract.geometry import Pose
+from mbf_abstract.plugins import RecoveryResult
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.faulty import slow
+from mbf_abstract.testing.scripted import straight_plan
+
+GOAL = MoveBaseGoal(Pose.planar(0.5, 0.0))
+
+
+def recovering(bench):
+    bench.planner.play(RuntimeError("no"), straight_plan)
+    bench.recovery.play(slow(bench.clock, 0.3, RecoveryResult(0, "")))
+
+
+def planning(bench):
+    bench.planner.play(slow(bench.clock, 0.3, straight_plan))
+
+
+def following(bench):
+    pass
+
+
+PHASES = [planning, following, recovering]
+
+
+@pytest.mark.parametrize(("phase", "clock"), product(PHASES, [SimClock, WallClock]))
+def test_a_move_base_goal_resumed_after_pausing_all_goes_on(make_bench, phase, clock):
+    bench = make_bench(clock=clock())
+    phase(bench)
+    handle = bench.navigator.send(GOAL)
+    bench.clock.sleep(0.15)
+    for _ in range(5):
+        bench.server.pause_all()
+        handle.resume()
+    assert handle.wait(20.0).success
+
+
+@pytest.mark.parametrize("phase", PHASES)
+def test_resumed_part_by_part_in_any_order_it_stays_as_its_own_handle_says(make_bench, phase):
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        bench = make_bench(clock=SimClock(schedule=rng))
+        phase(bench)
+        handle = bench.navigator.send(GOAL)
+        bench.clock.sleep(float(rng.choice([0.0, 0.1, 0.2])))
+        for _ in range(6):
+            parts = [handle, *bench.server.get_path.unfinished, *bench.server.exe_path.unfinished]
+            part = parts[rng.integers(len(parts))]
+            [part.pause, part.resume, bench.server.pause_all, bench.server.resume_all][rng.integers(4)]()
+            bench.clock.sleep(float(rng.choice([0.0, 0.01, 0.1])))
+        bench.clock.sleep(0.1)
+        if handle.paused:
+            here = bench.robot.pose
+            bench.clock.sleep(2.0)
+            assert handle.status is GoalStatus.PAUSED
+            assert bench.robot.pose.position == here.position
+        handle.resume()
+        assert handle.wait(20.0).success, seed
+        bench.close()
