@@ -13,7 +13,7 @@ from mbf_costmap_nav.critics import ALL_CRITICS, Critic, CriticParameters, Rollo
 from mbf_costmap_nav.critics.obstacle import COLLISION
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.kernels.rollout import integrate
-from mbf_costmap_nav.path_handling import CUSP_REACHED, ControlCycle
+from mbf_costmap_nav.path_handling import ControlCycle
 
 Float32Array = NDArray[np.float32]
 
@@ -49,10 +49,9 @@ def roll_out(
         Of the tightest curve the velocities hold [m]; 0 = they may turn on the spot.
     """
     pose, tracker = cycle.request.pose, cycle.tracker
-    to_cusp = tracker.to_cusp if tracker.to_cusp > CUSP_REACHED else tracker.remaining
-    length = min(1.3 * reach + 6 * PATH_SPACING, to_cusp)
+    length = min(1.3 * reach + 6 * PATH_SPACING, tracker.to_cusp)
     lengths = tracker.progress + np.append(np.arange(0.0, length, PATH_SPACING), length)
-    points = np.column_stack([np.interp(lengths, tracker.lengths, tracker.points[:, axis]) for axis in range(2)])
+    points = tracker.points_at(lengths)
     goal = tracker.goal
     poses = np.empty_like(velocities) if poses is None else poses
     integrate(velocities, pose.yaw, dt, poses)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from mbf_abstract.arithmetic import norm, rotated, rotated_back, scalar_products
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw, quaternion_multiply
+from mbf_abstract.path_tracker import PathTracker
 from mbf_mesh_nav.locate import Location
 from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.path_progress import PathProgress
 from mbf_mesh_nav.surface_point import beyond_border
 
 _SMALL_CORNER = 0.2  # [rad] between the path's end and the goal's heading: driven without an approach
@@ -65,17 +65,17 @@ def with_final_approach(
     small_corner : float
         Up to this angle [rad] between its end and the goal's heading the path stays as it is.
     """
-    progress = PathProgress(path, window=0.0)
-    if progress.length < _SPACING or _corner_at_goal(path) < small_corner:
+    tracker = PathTracker(path)
+    if tracker.length < _SPACING or _corner_at_goal(path) < small_corner:
         return path
     best, best_length = path, np.inf
     for distance in [radii * turning_radius for radii in _LEAVING]:
-        leaves_at = max(progress.length - distance, 0.0)
-        curve = _curve_to_goal(path, progress, leaves_at, turning_radius)
+        leaves_at = max(tracker.length - distance, 0.0)
+        curve = _curve_to_goal(path, tracker, leaves_at, turning_radius)
         spots = mesh_map.locate(curve, distance + turning_radius)
         length = leaves_at + _SPACING * len(curve)
         if _fits(mesh_map, blocked, curve, spots) and length < best_length:
-            kept = path.positions[progress.arc_lengths < leaves_at]
+            kept = path.positions[tracker.lengths < leaves_at]
             positions = np.concatenate([kept, spots.points, path.positions[-1:]])
             best = Path.from_points(positions, path[-1].orientation, frame_id=path.frame_id, stamp=path.stamp)
             best_length = length
@@ -97,10 +97,10 @@ def _corner_at_goal(path: Path) -> float:
     return math.acos(min(max(cosine, -1.0), 1.0))
 
 
-def _curve_to_goal(path: Path, progress: PathProgress, leaves_at: float, radius: float) -> NDArray[np.float64]:
+def _curve_to_goal(path: Path, tracker: PathTracker, leaves_at: float, radius: float) -> NDArray[np.float64]:
     """Points (n, 3) in the goal's tangent plane from ``leaves_at`` [m] of the path to the straight piece at the end."""
     goal = path[-1]
-    start, ahead = rotated_back(goal.rotation, progress.points_at(np.array([leaves_at, leaves_at + 0.5 * _SPACING])))
+    start, ahead = rotated_back(goal.rotation, tracker.points_at(np.array([leaves_at, leaves_at + 0.5 * _SPACING])))
     end = path.positions[-1] - _STRAIGHT * goal.rotation[:, 0]
     x, y, _ = start - rotated_back(goal.rotation, end)
     yaw = math.atan2(ahead[1] - start[1], ahead[0] - start[0])

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.arithmetic import rotated_back
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.path_tracker import PathTracker
+from mbf_mesh_nav.mesh_map import MeshMap
 
 _SAME_STOREY = 0.5  # [m]
 
@@ -49,25 +52,52 @@ def is_at_goal(pose: Pose, goal: Pose, dist_tolerance: float, angle_tolerance: f
     return ground_distance(pose, goal) <= dist_tolerance and abs(heading_error(pose, goal)) <= angle_tolerance
 
 
-class ArrivalLatch:
-    """Remembers that the goal's position was reached and only the heading is left.
+def tracker_on_surface(mesh_map: MeshMap, path: Path, reach: float) -> PathTracker:
+    """Track a path whose last pose is put onto the surface, at most ``reach`` [m] away: no robot drives up to it."""
+    end = mesh_map.locate_one(path.positions[-1], reach)
+    if end is None:
+        return PathTracker(path)
+    return PathTracker(replace(path, positions=np.concatenate([path.positions[:-1], end.point[None]])))
 
-    Once there, the robot may drift twice as far before it has to drive again, so turning does not flicker.
+
+class GoalApproach:
+    """How a robot comes to the end of its path: along the path, then to the position, then to the heading.
 
     Parameters
     ----------
+    goal : Pose
+        Last pose of the path as it was asked for.
     reach : float
-        Distance [m] at which the position counts as reached.
+        Distance [m] at which the position counts as reached, unless the goal's tolerance is less.
+    straying : float
+        So many times its deviation from the path a robot may be short of the path's end; for controllers that do not
+        keep to the path.
     """
 
-    def __init__(self, reach: float) -> None:
+    def __init__(self, goal: Pose, reach: float, straying: float = 0.0) -> None:
+        self.goal = goal
         self._reach = reach
-        self._arrived = False
+        self._straying = straying
+        self._only_turning = False
 
-    def update(self, pose: Pose, goal: Pose) -> bool:
-        """Take in the pose of this cycle; whether only turning is left."""
-        self._arrived = ground_distance(pose, goal) <= self._reach * (2.0 if self._arrived else 1.0)
-        return self._arrived
+    def is_reached(self, pose: Pose, tracker: PathTracker, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """Whether the robot has driven to the end of the path and stands there within the tolerances [m, rad]."""
+        self._reach = min(self._reach, dist_tolerance)
+        tracker.update(pose.position)
+        driven = self._has_driven(tracker, dist_tolerance)
+        return driven and is_at_goal(pose, self.goal, dist_tolerance, angle_tolerance)
+
+    def is_only_turning(self, pose: Pose, tracker: PathTracker) -> bool:
+        """Whether only the heading is left, with the pose of this cycle.
+
+        Once there, the robot may drift twice as far before it has to drive again, so turning does not flicker.
+        """
+        reach = self._reach * (2.0 if self._only_turning else 1.0)
+        self._only_turning = self._has_driven(tracker, reach) and ground_distance(pose, self.goal) <= reach
+        return self._only_turning
+
+    def _has_driven(self, tracker: PathTracker, reach: float) -> bool:
+        return tracker.has_arrived(reach + self._straying * tracker.deviation)
 
 
 def clamp(value: float, limit: float) -> float:

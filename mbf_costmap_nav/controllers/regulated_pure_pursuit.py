@@ -22,7 +22,7 @@ from mbf_costmap_nav.costmap import FREE, INSCRIBED
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.footprint_check import arc_poses
 from mbf_costmap_nav.path_geometry import look_ahead_point
-from mbf_costmap_nav.path_handling import PATH_LENGTH_TOLERANCE, ControlCycle, PathFollower, to_base_frame
+from mbf_costmap_nav.path_handling import ControlCycle, PathFollower, to_base_frame
 
 DEFAULT_DECAY, LEAST_DECAY = 10.0, 1e-3
 """1/m: of a map without an inflation layer, and of one whose costs do not fall at all."""
@@ -127,8 +127,8 @@ class RegulatedPurePursuitController(PathFollower):
             return cycle
         tracker = cycle.tracker
         furthest = self.parameters.max_cross_track * cycle.limit_factor
-        if tracker.cross_track > furthest:
-            text = f"{tracker.cross_track:.2f} m off the path, limit {furthest:.2f} m"
+        if tracker.deviation > furthest:
+            text = f"{tracker.deviation:.2f} m off the path, limit {furthest:.2f} m"
             return ControlResult(ExePathOutcome.MISSED_PATH, text)
         turn = self._turn_at_goal(cycle)
         if turn is None:
@@ -177,23 +177,22 @@ class RegulatedPurePursuitController(PathFollower):
         return speed
 
     def _carrot(self, cycle: ControlCycle) -> tuple[float, float]:
-        """Look-ahead point in the base frame; it does not pass a change of driving direction."""
+        """Look-ahead point in the base frame; it does not pass a cusp."""
         distance = self.look_ahead_distance(cycle.request.velocity.vx)
-        reach = distance + cycle.tracker.cross_track
-        if self.parameters.allow_reversing:
-            reach = min(reach, max(cycle.tracker.to_cusp, 0.05))
+        reach = min(distance + cycle.tracker.deviation, cycle.tracker.to_cusp)
         local = to_base_frame(cycle.tracker.ahead(reach), cycle.request.pose)
         x, y = look_ahead_point(local, distance)
         return float(x), float(y)
 
     def _turn_at_goal(self, cycle: ControlCycle) -> float | None:
         """Angle to the goal's heading once the robot stands at the goal's position."""
-        goal, pose = cycle.tracker.goal, cycle.request.pose
-        if not self.parameters.rotate_to_heading or cycle.tracker.remaining > PATH_LENGTH_TOLERANCE:
+        if not self.parameters.rotate_to_heading:
             return None
+        goal, pose = cycle.tracker.goal, cycle.request.pose
         # Once inside, twice the tolerance keeps the robot turning although it slides a little while it stops.
         reach = self.goal_dist_tolerance * (2.0 if self._at_goal else 1.0)
-        self._at_goal = math.hypot(goal.x - pose.x, goal.y - pose.y) <= reach
+        near = math.hypot(goal.x - pose.x, goal.y - pose.y) <= reach
+        self._at_goal = near and cycle.tracker.has_arrived(reach)
         if not self._at_goal:
             return None
         return normalize_angle(goal.yaw - pose.yaw)
@@ -202,9 +201,8 @@ class RegulatedPurePursuitController(PathFollower):
         """Command along the arc through the carrot."""
         p, velocity = self.parameters, cycle.request.velocity
         curvature = 2.0 * carrot[1] / max(carrot[0] ** 2 + carrot[1] ** 2, 1e-6)
-        remaining = cycle.tracker.to_cusp if p.allow_reversing else cycle.tracker.remaining
         cost = cycle.costmap.cost_at(cycle.request.pose.x, cycle.request.pose.y) or FREE
-        regulated = min(self.regulated_speed(curvature, cost, remaining), cycle.speed_limit)
+        regulated = min(self.regulated_speed(curvature, cost, cycle.tracker.to_cusp), cycle.speed_limit)
         wanted = -regulated if backward else regulated
         change = p.max_linear_accel * p.control_period
         speed = min(max(wanted, velocity.vx - change), velocity.vx + change)

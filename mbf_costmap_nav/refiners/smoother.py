@@ -23,12 +23,12 @@ from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Path
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import RefineResult
 from mbf_abstract.transforms import TransformError
 from mbf_costmap_nav.costmap import LETHAL, Costmap
 from mbf_costmap_nav.kernels.smoothing import relax_path
 from mbf_costmap_nav.path_geometry import arc_lengths, resample
-from mbf_costmap_nav.path_handling import PathTracker
 from mbf_costmap_nav.plugins import CostmapRefiner
 
 FloatArray = NDArray[np.float64]
@@ -64,7 +64,7 @@ class SmootherRefiner(CostmapRefiner):
         """Smooth between the ends of the path."""
         if len(path) < 2:
             return RefineResult(RefinePathOutcome.SUCCESS, "nothing to smooth", path)
-        if PathTracker(path).reverse.any():
+        if PathTracker(path, dimensions=2).reverse.any():
             text = "the path drives backward somewhere and is left as it is"
             return RefineResult(RefinePathOutcome.SUCCESS, text, path)
         costmap = self.costmap.snapshot()

@@ -19,18 +19,24 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.arithmetic import exp, tan
+from mbf_abstract.arithmetic import exp, norm, tan
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
 from mbf_mesh_nav.final_approach import with_final_approach, with_first_turn
-from mbf_mesh_nav.goal_approach import ArrivalLatch, braking_speed, clamp, ground_distance, heading_error, is_at_goal
+from mbf_mesh_nav.goal_approach import (
+    GoalApproach,
+    braking_speed,
+    clamp,
+    ground_distance,
+    heading_error,
+    tracker_on_surface,
+)
 from mbf_mesh_nav.kernels.mppi import score_rollouts
 from mbf_mesh_nav.kernels.surface_walk import tangent
 from mbf_mesh_nav.kernels.vectors import Vector
 from mbf_mesh_nav.locate import SurfacePoint
-from mbf_mesh_nav.path_progress import PathProgress, PathProjection
 from mbf_mesh_nav.plugins import MeshContext, MeshController
 from mbf_mesh_nav.snapshot import MeshSnapshot
 
@@ -85,7 +91,7 @@ class MPPIController(MeshController):
     Parameters = MPPIParameters
     parameters: MPPIParameters
 
-    _goal: Pose | None = None
+    _approach: GoalApproach | None = None
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
@@ -97,38 +103,40 @@ class MPPIController(MeshController):
         """Take over a path of at least one pose in the map's frame."""
         if len(path) == 0 or path.frame_id != self.mesh_map.frame_id:
             return False
-        self._goal = path[-1]
         p = self.parameters
+        self._approach = GoalApproach(path[-1], p.goal_distance)
         self._run_out: NDArray[np.float64] = np.zeros((0, 3))
         self._strict_below = 0.0
         if p.motion_model == "ackermann":
             radius = p.wheelbase / math.tan(p.max_steering_angle)
             bent = with_final_approach(path, self.mesh_map, self._blocked(), _ROOM_TO_STEER * radius)
             # Beyond the goal, for the critic that looks along the path: it shows how to stand there.
-            self._run_out = path.positions[-1] + np.array([[0.1], [0.2], [0.3]]) * self._goal.rotation[:, 0]
+            self._run_out = path.positions[-1] + np.array([[0.1], [0.2], [0.3]]) * path[-1].rotation[:, 0]
             self._strict_below = _STRICT_RADII * radius if bent is not path else 0.0
             path = bent
-        self._path, self._begun, self._idle_cycles = path, False, 0
+        self._begun, self._idle_cycles = False, 0
         self._follow(path)
-        self._arrival = ArrivalLatch(p.goal_distance)
         self._nominal: NDArray[np.float64] = np.zeros((p.horizon_steps, 2))
         return True
 
     def _follow(self, path: Path) -> None:
-        p = self.parameters
-        self._progress = PathProgress(path, window=2.0 * p.max_lin_velocity * p.horizon_steps * p.step_time)
+        self._tracker = tracker_on_surface(self.mesh_map, path, self.parameters.max_surface_distance)
 
-    def _begin(self, pose: Pose) -> None:
+    def _begin(self, spot: SurfacePoint, pose: Pose) -> None:
         """Lead a car that looks elsewhere onto its path on a curve, now that its pose is known."""
-        p = self.parameters
+        p, path = self.parameters, self._tracker.path
         self._begun = True
-        if p.motion_model == "ackermann" and len(self._path) > 1:
+        if p.motion_model == "ackermann":
             radius = _ROOM_TO_STEER * p.wheelbase / math.tan(p.max_steering_angle)
-            self._follow(with_first_turn(self._path, self.mesh_map, self._blocked(), radius, pose))
+            self._tracker.update(spot.point)
+            ahead = Path.from_points(self._tracker.ahead(math.inf), path[-1].orientation, None, path.frame_id)
+            bent = with_first_turn(ahead, self.mesh_map, self._blocked(), radius, pose)
+            if bent is not ahead:
+                self._follow(bent)
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: locate, sample around the last motion, score, blend, check."""
-        if self._goal is None:
+        if self._approach is None:
             return ControlResult(ExePathOutcome.INVALID_PATH, "there is no plan to follow")
         p, pose = self.parameters, request.pose
         spot = self.mesh_map.locate_one(pose.position, p.max_surface_distance)
@@ -136,20 +144,21 @@ class MPPIController(MeshController):
             message = f"the robot is more than {p.max_surface_distance:g} m from the surface"
             return ControlResult(ExePathOutcome.OUT_OF_MAP, message)
         if not self._begun:
-            self._begin(pose)
-        projection = self._progress.update(spot.point)
-        if projection.deviation > p.max_path_distance:
-            message = f"the robot is {projection.deviation:.2f} m from the path, allowed are {p.max_path_distance:g} m"
+            self._begin(spot, pose)
+        self._tracker.update(spot.point)
+        if self._tracker.deviation > p.max_path_distance:
+            off = self._tracker.deviation
+            message = f"the robot is {off:.2f} m from the path, allowed are {p.max_path_distance:g} m"
             return ControlResult(ExePathOutcome.MISSED_PATH, message)
-        if self._arrival.update(pose, self._goal):
-            off = heading_error(pose, self._goal)
+        if self._approach.is_only_turning(pose, self._tracker):
+            off = heading_error(pose, self._approach.goal)
             self._idle_cycles += p.motion_model == "ackermann"
             if self._idle_cycles > _IDLE_CYCLES:
                 message = f"the goal is reached but for {off:.2f} rad, which a car cannot mend where it stands"
                 return ControlResult(ExePathOutcome.NO_VALID_CMD, message)
             turn = clamp(2.0 * off, p.max_ang_velocity)
             return ControlResult(ExePathOutcome.SUCCESS, "", self._as_command(0.0, turn))
-        motion = self._best_motion(spot, pose, projection)
+        motion = self._best_motion(spot, pose)
         if motion is None:
             return ControlResult(ExePathOutcome.NO_VALID_CMD, "no sampled motion is free and gets on")
         self._nominal = np.concatenate([motion[1:], motion[-1:]])
@@ -157,29 +166,33 @@ class MPPIController(MeshController):
 
     def planned_motion(self) -> PlannedMotion | None:
         """Return the last motion, without its first step."""
-        if self._goal is None:
+        if self._approach is None:
             return None
         speed, yaw_rate = np.moveaxis(self._as_motions(self._nominal), -1, 0)
         return PlannedMotion(np.stack([speed, np.zeros_like(speed), yaw_rate], axis=1), self.parameters.step_time)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
-        """Whether the last pose of the plan is reached."""
-        return self._goal is not None and is_at_goal(pose, self._goal, dist_tolerance, angle_tolerance)
+        """Whether the path has been driven to its last pose, and that is reached."""
+        if self._approach is None:
+            return False
+        return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
 
-    def _best_motion(self, spot: SurfacePoint, pose: Pose, projection: PathProjection) -> NDArray[np.float64] | None:
+    def _best_motion(self, spot: SurfacePoint, pose: Pose) -> NDArray[np.float64] | None:
         """Blend the sampled motions by their scores; (horizon_steps, 2), or None if the robot cannot get on."""
         max_speed = min(
             self.parameters.max_lin_velocity,
-            max(braking_speed(projection.remaining, self.parameters.max_deceleration), 0.1),
+            max(braking_speed(self._tracker.to_cusp, self.parameters.max_deceleration), 0.1),
         )
         # A robot beside its goal or past it has no path ahead of it, but still a way to go.
-        controls = self._sample(max_speed, max(projection.remaining, self._distance_to_goal(pose)))
-        scores, collided = self._score(controls, spot, pose, projection)
+        end = self._tracker.point_at(self._tracker.next_cusp)
+        to_end = float(norm(end - spot.point))
+        controls = self._sample(max_speed, max(self._tracker.to_cusp, to_end))
+        scores, collided = self._score(controls, spot, pose)
         scores = np.where(collided, scores + _COLLISION_SCORE, scores)
         weights = exp(-(scores - scores.min()) / self.parameters.temperature)
         blended = np.asarray(((weights / weights.sum())[:, None, None] * controls).sum(axis=0))
         # The mean of two free motions, left and right of an obstacle, may hit it.
-        if self._score(blended[None], spot, pose, projection)[1][0]:
+        if self._score(blended[None], spot, pose)[1][0]:
             blended = np.asarray(controls[int(np.argmin(scores))])
         # Where most motions collide and the best one hardly moves, standing there would last for ever. So it would
         # where none leads nearer, as for a car that has passed its goal; a cycle or two of it are chance.
@@ -191,8 +204,8 @@ class MPPIController(MeshController):
         return None if stuck or bool(collided.all()) else blended
 
     def _distance_to_goal(self, pose: Pose) -> float:
-        assert self._goal is not None
-        return ground_distance(pose, self._goal)
+        assert self._approach is not None
+        return ground_distance(pose, self._approach.goal)
 
     def _sample(self, max_speed: float, remaining: float) -> NDArray[np.float64]:
         """Motions (samples, horizon_steps, 2) around the last one; the first is that one, the second stands still.
@@ -219,7 +232,7 @@ class MPPIController(MeshController):
         return np.asarray(controls)
 
     def _score(
-        self, controls: NDArray[np.float64], spot: SurfacePoint, pose: Pose, projection: PathProjection
+        self, controls: NDArray[np.float64], spot: SurfacePoint, pose: Pose
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Scores (n,) and collisions (n,) of motions on the map of now."""
         p, mesh_map = self.parameters, self.mesh_map
@@ -227,13 +240,14 @@ class MPPIController(MeshController):
         pieces = self._pieces_of_a_step()
         motions = np.repeat(self._as_motions(controls), pieces, axis=1)
         reach = p.max_lin_velocity * p.horizon_steps * p.step_time + 1.0
-        end = min(projection.travelled + reach, self._progress.length)
-        along = np.append(np.arange(projection.travelled, end, _PATH_SPACING), end)
-        ahead, remaining = self._progress.points_at(along), self._progress.length - along
-        if end == self._progress.length:
+        tracker = self._tracker
+        end = min(tracker.progress + reach, tracker.next_cusp)
+        along = np.append(np.arange(tracker.progress, end, _PATH_SPACING), end)
+        ahead, remaining = tracker.points_at(along), tracker.next_cusp - along
+        if end == tracker.length:
             ahead = np.concatenate([ahead, self._run_out])
             remaining = np.append(remaining, np.zeros(len(self._run_out)))
-        strictness = _STRICTNESS if projection.remaining < self._strict_below else 1.0
+        strictness = _STRICTNESS if tracker.remaining < self._strict_below else 1.0
         weights = (
             strictness * p.path_weight,
             p.cost_weight,

@@ -20,16 +20,15 @@ from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.goal_approach import (
-    ArrivalLatch,
+    GoalApproach,
     arc_to,
     braking_speed,
     clamp,
     heading_error,
     in_robot_frame,
-    is_at_goal,
+    tracker_on_surface,
 )
 from mbf_mesh_nav.kernels.forbidden_ground import LETHAL_HARDNESS, may_enter
-from mbf_mesh_nav.path_progress import PathProgress, PathProjection
 from mbf_mesh_nav.plugins import MeshController
 from mbf_mesh_nav.surface_point import beyond_border
 
@@ -74,54 +73,55 @@ class PathFollower(MeshController):
     Parameters = PathFollowerParameters
     parameters: PathFollowerParameters
 
-    _goal: Pose | None = None
+    _approach: GoalApproach | None = None
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the map's frame."""
         if len(path) == 0 or path.frame_id != self.mesh_map.frame_id:
             return False
-        self._goal = path[-1]
-        self._progress = PathProgress(path, window=3.0 * self.parameters.lookahead)
-        self._arrival = ArrivalLatch(self.parameters.goal_distance)
+        self._tracker = tracker_on_surface(self.mesh_map, path, self.parameters.max_surface_distance)
+        self._approach = GoalApproach(path[-1], self.parameters.goal_distance)
         return True
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: locate, project onto the path, pursue the point ahead."""
-        if self._goal is None:
+        if self._approach is None:
             return ControlResult(ExePathOutcome.INVALID_PATH, "there is no plan to follow")
         pose = request.pose
         surface = self.mesh_map.locate_one(pose.position, self.parameters.max_surface_distance)
         if surface is None:
             reach = self.parameters.max_surface_distance
             return ControlResult(ExePathOutcome.OUT_OF_MAP, f"the robot is more than {reach:g} m from the surface")
-        projection = self._progress.update(np.asarray(pose.position))
-        if projection.deviation > self.parameters.max_path_distance:
+        self._tracker.update(surface.point)
+        if self._tracker.deviation > self.parameters.max_path_distance:
             message = (
-                f"the robot is {projection.deviation:.2f} m from the path, "
+                f"the robot is {self._tracker.deviation:.2f} m from the path, "
                 f"allowed are {self.parameters.max_path_distance:g} m"
             )
             return ControlResult(ExePathOutcome.MISSED_PATH, message)
-        if self._arrival.update(pose, self._goal):
-            turn = self.parameters.turn_gain * heading_error(pose, self._goal)
+        if self._approach.is_only_turning(pose, self._tracker):
+            turn = self.parameters.turn_gain * heading_error(pose, self._approach.goal)
             return self._command(0.0, turn)
-        blocked_in = self._distance_to_obstacle(surface.point, projection.travelled)
+        blocked_in = self._distance_to_obstacle(surface.point)
         if blocked_in is not None:
             return ControlResult(ExePathOutcome.BLOCKED_PATH, f"the path is blocked {blocked_in:.2f} m ahead")
         slope = math.acos(clamp(float(self.mesh_map.face_normals[surface.face, 2]), 1.0))
-        return self._pursue(pose, projection, slope)
+        return self._pursue(pose, slope)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
-        """Whether the last pose of the plan is reached."""
-        return self._goal is not None and is_at_goal(pose, self._goal, dist_tolerance, angle_tolerance)
+        """Whether the path has been driven to its last pose, and that is reached."""
+        if self._approach is None:
+            return False
+        return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
 
-    def _distance_to_obstacle(self, here: NDArray[np.float64], travelled: float) -> float | None:
+    def _distance_to_obstacle(self, here: NDArray[np.float64]) -> float | None:
         """Distance [m] along the path to where the current map forbids to go on; None if that is not in sight.
 
         A robot that stands on forbidden ground itself may leave it, see ``kernels.forbidden_ground``. Where the path
         leads off the surface it is blocked too.
         """
         ahead = np.arange(0.0, self.parameters.obstacle_distance, OBSTACLE_STEP)
-        places = np.concatenate([here[None], self._progress.points_at(travelled + ahead)])
+        places = np.concatenate([here[None], self._tracker.points_at(self._tracker.progress + ahead)])
         location = self.mesh_map.locate(places, self.parameters.max_surface_distance)
         corners = self.mesh_map.faces[location.faces]
         hardness = self.mesh_map.snapshot().hardness(self.parameters.cost_limit, corners)
@@ -133,17 +133,18 @@ class PathFollower(MeshController):
                 return float(distance)
         return None
 
-    def _pursue(self, pose: Pose, projection: PathProjection, slope: float) -> ControlResult:
+    def _pursue(self, pose: Pose, slope: float) -> ControlResult:
         """Drive the arc that is tangent to the robot's heading and passes through the point ahead."""
         p = self.parameters
-        target = self._progress.point_at(projection.travelled + p.lookahead)
+        tracker = self._tracker
+        target = tracker.point_at(min(tracker.progress + p.lookahead, tracker.next_cusp))
         bearing, curvature = arc_to(pose, target)
         if abs(bearing) > p.turn_in_place_angle:
             return self._command(0.0, p.turn_gain * bearing)
         slope_factor = 1.0 - (1.0 - p.slope_speed_factor) * min(slope / p.slow_slope, 1.0)
         # A robot that ran past the goal has no path left, but still the way back to it; how high its frame is above
         # the ground does not count.
-        left = max(projection.remaining, math.hypot(*in_robot_frame(pose, target)[:2]))
+        left = max(tracker.to_cusp, math.hypot(*in_robot_frame(pose, target)[:2]))
         speed = min(
             p.max_lin_velocity * slope_factor,
             math.sqrt(p.max_lateral_acceleration / max(abs(curvature), 1e-6)),

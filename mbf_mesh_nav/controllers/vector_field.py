@@ -12,14 +12,20 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mbf_abstract.arithmetic import norm, rotated_back
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_mesh_nav.goal_approach import ArrivalLatch, clamp, ground_distance, heading_error, is_at_goal
+from mbf_mesh_nav.goal_approach import GoalApproach, clamp, ground_distance, heading_error, tracker_on_surface
 from mbf_mesh_nav.plugins import MeshController
 from mbf_mesh_nav.vector_field import VectorField
+
+STRAYING = 2.0
+"""The field leads to the goal from anywhere, not back to the path: a robot off the path comes to its end otherwise."""
 
 
 class VectorFieldParameters(PluginParameters):
@@ -49,7 +55,7 @@ class VectorFieldController(MeshController):
     Parameters = VectorFieldParameters
     parameters: VectorFieldParameters
 
-    _goal: Pose | None = None
+    _approach: GoalApproach | None = None
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path that brings its vector fields along; refuse others, and those of another mesh or frame."""
@@ -58,16 +64,16 @@ class VectorFieldController(MeshController):
             return False
         if not all(isinstance(one, VectorField) and one.topology is self.mesh_map.topology for one in fields):
             return False
-        self._goal = path[-1]
         self._fields: tuple[VectorField, ...] = fields
+        self._tracker = tracker_on_surface(self.mesh_map, self._last_leg(path), self.parameters.max_search_distance)
+        self._approach = GoalApproach(path[-1], self.parameters.goal_distance, STRAYING)
         self._leg = 0
         self._face = -1
-        self._arrival = ArrivalLatch(self.parameters.goal_distance)
         return True
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: locate, look up the direction, apply the law."""
-        if self._goal is None:
+        if self._approach is None:
             return ControlResult(ExePathOutcome.INVALID_PATH, "there is no plan to follow")
         pose = request.pose
         reach = self.parameters.max_search_distance
@@ -75,19 +81,37 @@ class VectorFieldController(MeshController):
         if spot is None:
             return ControlResult(ExePathOutcome.OUT_OF_MAP, f"the robot is more than {reach:g} m from the surface")
         self._face = spot.face
-        if self._leg < len(self._fields) - 1:
-            self._leg += bool(norm(self._fields[self._leg].goal - spot.point) <= self.parameters.via_distance)
-        elif self._arrival.update(pose, self._goal):
-            return self._command(0.0, self._turn_rate(heading_error(pose, self._goal)))
+        self._pass_via(spot.point)
+        if self._on_last_leg and self._approach.is_only_turning(pose, self._tracker):
+            return self._command(0.0, self._turn_rate(heading_error(pose, self._approach.goal)))
         direction = self._fields[self._leg].direction_at(self.mesh_map, spot)
         if direction is None:
             return ControlResult(ExePathOutcome.MISSED_PATH, "the field does not lead on from here; plan again")
         ahead = rotated_back(pose.rotation, direction)
-        return self._steer(math.atan2(ahead[1], ahead[0]), ground_distance(pose, self._goal))
+        return self._steer(math.atan2(ahead[1], ahead[0]), ground_distance(pose, self._approach.goal))
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
-        """Whether the last pose of the plan is reached."""
-        return self._goal is not None and is_at_goal(pose, self._goal, dist_tolerance, angle_tolerance)
+        """Whether the last leg has been driven to its end, and the last pose of the plan is reached."""
+        if self._approach is None or not self._on_last_leg:
+            return False
+        return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
+
+    @property
+    def _on_last_leg(self) -> bool:
+        return self._leg == len(self._fields) - 1
+
+    def _last_leg(self, path: Path) -> Path:
+        """Part of the path behind its last via point."""
+        if len(self._fields) == 1:
+            return path
+        return path[int(np.argmin(norm(path.positions - self._fields[-2].goal))) :]
+
+    def _pass_via(self, point: NDArray[np.float64]) -> None:
+        """Go on to the next leg where its via point is passed; on the last leg keep the progress."""
+        if self._on_last_leg:
+            self._tracker.update(point)
+        else:
+            self._leg += bool(norm(self._fields[self._leg].goal - point) <= self.parameters.via_distance)
 
     def _steer(self, error: float, distance_to_goal: float) -> ControlResult:
         """Apply the law to a heading error [rad, left positive] and the distance [m] left to the goal."""
@@ -95,8 +119,7 @@ class VectorFieldController(MeshController):
         if abs(error) > p.max_angle:
             return self._command(0.0, self._turn_rate(error))
         speed = p.max_lin_velocity * (1.0 - abs(error) / p.max_angle) * p.lin_vel_factor
-        is_last_leg = self._leg == len(self._fields) - 1
-        fading = min(1.0, distance_to_goal / p.arrival_fading) if is_last_leg else 1.0
+        fading = min(1.0, distance_to_goal / p.arrival_fading) if self._on_last_leg else 1.0
         faded = max(p.max_lin_velocity * fading, p.min_lin_velocity)
         return self._command(min(speed, faded, p.max_lin_velocity), self._turn_rate(error))
 

@@ -15,10 +15,10 @@ from mbf_abstract.arithmetic import norm
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.goal_approach import arc_to, clamp, in_robot_frame
 from mbf_mesh_nav.guarded_motion import free_distance, reports_lost_pose, run_guarded
-from mbf_mesh_nav.path_progress import PathProgress
 from mbf_mesh_nav.plugins import MeshRecovery
 
 TRACK_GAP = 0.5
@@ -49,17 +49,18 @@ class BackUpRecovery(MeshRecovery):
         """Back up until the distance is driven or the ground behind ends."""
         p = self.parameters
         begin = request.motion.pose()
-        progress = PathProgress(Path.from_points(self._way_back(begin), frame_id=self.mesh_map.frame_id), window=0.5)
+        tracker = PathTracker(Path.from_points(self._way_back(begin), frame_id=self.mesh_map.frame_id))
 
         def step(pose: Pose) -> Twist | RecoveryResult:
-            driven = progress.update(np.asarray(pose.position)).travelled
+            tracker.update(pose.position)
+            driven = tracker.progress
             if driven >= p.distance:
                 return RecoveryResult(RecoveryOutcome.SUCCESS, f"backed up {driven:.2f} m")
             spot = self.mesh_map.locate_one(pose.position, 1.0)
             if spot is None:
                 return RecoveryResult(RecoveryOutcome.FAILURE, "the robot is more than 1 m from the surface")
             hardness = self.mesh_map.snapshot().hardness(p.cost_limit)
-            target = progress.point_at(driven + p.lookahead)
+            target = tracker.point_at(driven + p.lookahead)
             direction = target - np.asarray(pose.position)
             if free_distance(self.mesh_map, hardness, spot, direction, p.clearance + 0.1) > p.clearance:
                 _, curvature = arc_to(pose, target)

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.goal_approach import arc_to, clamp, ground_distance
 from mbf_mesh_nav.guarded_motion import reports_lost_pose, run_guarded
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distances
 from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, seeded_arrays, threshold_step
 from mbf_mesh_nav.locate import SurfacePoint
-from mbf_mesh_nav.path_progress import PathProgress
 from mbf_mesh_nav.plugins import MeshRecovery
 from mbf_mesh_nav.snapshot import MeshSnapshot
 from mbf_mesh_nav.surface_point import nearest_corner
@@ -49,16 +49,16 @@ class WayOut:
     ----------
     vertices : (n,) int32
         Over which it leads, from the robot on.
-    progress : PathProgress
+    tracker : PathTracker
         Of the robot along the polyline from where it stood over these vertices.
     """
 
     vertices: NDArray[np.int32]
-    progress: PathProgress
+    tracker: PathTracker
 
-    def is_open(self, lethal: NDArray[np.bool_], blocked: NDArray[np.bool_], travelled: float) -> bool:
-        """Whether no vertex farther ahead than ``travelled`` [m] is ``lethal`` (V,), nor the end ``blocked`` (V,)."""
-        ahead = self.vertices[self.progress.arc_lengths[1:] > travelled]
+    def is_open(self, lethal: NDArray[np.bool_], blocked: NDArray[np.bool_]) -> bool:
+        """Whether no vertex ahead of the robot is ``lethal`` (V,), nor the end ``blocked`` (V,)."""
+        ahead = self.vertices[self.tracker.lengths[1:] > self.tracker.progress]
         return not (lethal[ahead].any() or blocked[self.vertices[-1]])
 
 
@@ -83,26 +83,26 @@ class EscapeRecovery(MeshRecovery):
 
         def step(pose: Pose) -> Twist | RecoveryResult:
             nonlocal way
-            travelled = way.progress.update(np.asarray(pose.position)).travelled if way is not None else 0.0
             now = mesh_map.snapshot()
-            if way is not None and not way.is_open(_lethal(now) & ~own_patch, now.blocked(p.cost_limit), travelled):
-                here = mesh_map.locate_one(pose.position, 1.0)
-                way = None if here is None else self._way_to_safety(here, own_patch, request)
-                travelled = 0.0
+            if way is not None:
+                way.tracker.update(pose.position)
+                if not way.is_open(_lethal(now) & ~own_patch, now.blocked(p.cost_limit)):
+                    here = mesh_map.locate_one(pose.position, 1.0)
+                    way = None if here is None else self._way_to_safety(here, own_patch, request)
             if way is None:
                 message = f"no safe ground within {p.max_distance:g} m over the surface"
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)
-            return self._drive(pose, way.progress, travelled)
+            return self._drive(pose, way.tracker)
 
         return run_guarded(request, self.clock, p.time_limit, step)
 
-    def _drive(self, pose: Pose, progress: PathProgress, travelled: float) -> Twist | RecoveryResult:
-        """Pursue the way from ``travelled`` [m] on, or say that its end is reached."""
+    def _drive(self, pose: Pose, tracker: PathTracker) -> Twist | RecoveryResult:
+        """Pursue the way, or say that its end is reached."""
         p = self.parameters
-        x, y, z = progress.positions[-1].tolist()
+        x, y, z = tracker.points[-1].tolist()
         if ground_distance(pose, Pose((x, y, z), frame_id=pose.frame_id)) <= p.reach:
-            return RecoveryResult(RecoveryOutcome.SUCCESS, f"reached safe ground after {progress.length:.2f} m")
-        bearing, curvature = arc_to(pose, progress.point_at(travelled + 0.3))
+            return RecoveryResult(RecoveryOutcome.SUCCESS, f"reached safe ground after {tracker.length:.2f} m")
+        bearing, curvature = arc_to(pose, tracker.point_at(tracker.progress + 0.3))
         if abs(bearing) > 0.6:
             return Twist.planar(wz=math.copysign(p.yaw_rate, bearing))
         return Twist.planar(vx=p.speed, wz=clamp(p.speed * curvature, p.yaw_rate))
@@ -133,7 +133,7 @@ class EscapeRecovery(MeshRecovery):
             return None
         chain = follow_predecessors(predecessors, nearest)[::-1]
         points = np.concatenate([[spot.point], mesh_map.vertices[chain]])
-        return WayOut(chain, PathProgress(Path.from_points(points, frame_id=mesh_map.frame_id), window=1.0))
+        return WayOut(chain, PathTracker(Path.from_points(points, frame_id=mesh_map.frame_id)))
 
     def _spread(
         self, spot: SurfacePoint, closed: NDArray[np.bool_], flag: NDArray[np.uint8]

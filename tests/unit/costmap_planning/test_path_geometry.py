@@ -1,11 +1,11 @@
-"""Peer facts about path geometry, and the tracker's progress."""
+"""Peer facts about path geometry."""
 
 import math
 
 import numpy as np
 import pytest
 
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.path_geometry import (
     arc_lengths,
     circle_crossing,
@@ -13,7 +13,7 @@ from mbf_costmap_nav.path_geometry import (
     look_ahead_point,
     resample,
 )
-from mbf_costmap_nav.path_handling import PathTracker, to_base_frame
+from mbf_costmap_nav.path_handling import to_base_frame
 
 X_AXIS = np.column_stack([np.arange(10.0), np.zeros(10)])
 
@@ -140,18 +140,3 @@ def test_f134_start_index_beyond_the_path_is_an_error():
 def test_f135_pose_in_the_robots_frame():
     assert to_base_frame(np.array([[3.0, 4.0]]), Pose.planar(1, 2)) == pytest.approx(np.array([[2, 2]]))
     assert to_base_frame(np.array([[1.0, 3.0]]), Pose.planar(1, 2, math.pi / 2)) == pytest.approx(np.array([[1, 0]]))
-
-
-def test_progress_does_not_jump_where_a_path_crosses_itself():
-    loop = np.array([[0, 0], [5, 0], [5, 5], [2, 5], [2, -5]], dtype=float)
-    tracker = PathTracker(Path.from_points(np.column_stack([loop, np.zeros(5)])))
-    for x in np.linspace(0, 2.1, 10):
-        tracker.update(Pose.planar(x, 0))
-    assert tracker.progress == pytest.approx(2.1)
-
-
-def test_cusps_are_where_the_poses_turn_against_the_path():
-    positions = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 0, 0], [0, 0, 0]], dtype=float)
-    tracker = PathTracker(Path(positions, np.tile([0.0, 0.0, 0.0, 1.0], (5, 1))))
-    assert tracker.reverse.tolist() == [False, False, True, True]
-    assert tracker.to_cusp == pytest.approx(2.0)
