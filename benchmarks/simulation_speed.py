@@ -21,7 +21,8 @@ import numpy as np
 from mbf_abstract.geometry import Twist
 from terrain.dem_io import jacksboro
 from terrain.heightfield import Heightfield
-from terrain.kinematic_robot import KinematicRobot, KinematicWorld
+from terrain.kinematic_robot import KinematicRobot
+from terrain.kinematic_world import KinematicWorld
 from terrain.rays import StaticRays
 from terrain.robot_models import HUSKY
 from terrain.robots import WheeledRobot

@@ -13,6 +13,7 @@ import weakref
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import fields
 from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
@@ -255,7 +256,7 @@ class AbstractNavigationServer(PluginHost):
 
 
 def _limits(parameters: NavigationParameters) -> VelocityLimits:
-    given = {name: getattr(parameters, name) for name in ("max_vx", "min_vx", "max_vy", "max_wz", "max_steering_angle")}
+    given = {limit.name: getattr(parameters, limit.name) for limit in fields(VelocityLimits)}
     return VelocityLimits(**{name: value for name, value in given.items() if value is not None})
 
 

@@ -16,6 +16,8 @@ from mbf_abstract.events import EventBus, EventKind
 from mbf_abstract.geometry import AckermannCommand, Command, Twist
 from mbf_abstract.robot import Robot
 
+CURVATURE_TOLERANCE = 1e-6  # a controller that keeps to the same circle must not be corrected for its rounding
+
 
 @dataclass(frozen=True)
 class VelocityLimits:
@@ -31,6 +33,9 @@ class VelocityLimits:
         Yaw rate limit [rad/s].
     max_steering_angle : float
         Limit of an Ackermann command's steering angle [rad], clamped on its own.
+    min_turning_radius : float
+        Radius [m] of the tightest curve; 0 = the robot may turn on the spot. A twist keeps its speed and loses what is
+        too much of its yaw rate, all of it where it does not drive.
     """
 
     max_vx: float = math.inf
@@ -38,6 +43,7 @@ class VelocityLimits:
     max_vy: float = math.inf
     max_wz: float = math.inf
     max_steering_angle: float = math.inf
+    min_turning_radius: float = 0.0
 
     def apply(self, command: Command) -> Command:
         """Return the command within the limits; the same object if it already is."""
@@ -46,6 +52,18 @@ class VelocityLimits:
             angle = min(max(command.steering_angle, -self.max_steering_angle), self.max_steering_angle)
             limited = AckermannCommand(speed, angle)
             return command if limited == command else limited
+        return self._scaled(self._curved(command))
+
+    def _curved(self, command: Twist) -> Twist:
+        """Widen a curve that is too tight."""
+        speed = math.hypot(command.vx, command.vy)
+        if abs(command.wz) * self.min_turning_radius <= speed * (1.0 + CURVATURE_TOLERANCE):
+            return command
+        wx, wy, wz = command.angular
+        return Twist(command.linear, (wx, wy, math.copysign(speed / self.min_turning_radius, wz)))
+
+    def _scaled(self, command: Twist) -> Twist:
+        """Slow down what is too fast, all components alike: the curve stays."""
         scale = min(
             _scale(command.vx, self.max_vx if command.vx > 0.0 else -self.min_vx),
             _scale(command.vy, self.max_vy),

@@ -17,7 +17,7 @@ from scipy import ndimage
 
 from mbf_abstract.arithmetic import norm
 from mbf_abstract.geometry import Pose
-from terrain.kinematic_robot import KinematicWorld
+from terrain.kinematic_world import KinematicWorld
 from terrain.mishaps import Thing
 from terrain.occupancy import OccupancyGrid
 from terrain.recording import RobotShape

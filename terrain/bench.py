@@ -29,7 +29,8 @@ from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.transforms import TransformBuffer
 from terrain.command_delay import CommandDelay
 from terrain.drive_loop import ClockedRobot, DriveLoop, Report
-from terrain.kinematic_robot import KinematicRobot, KinematicWorld
+from terrain.kinematic_robot import KinematicRobot
+from terrain.kinematic_world import KinematicWorld
 from terrain.recorder import Recorder
 from terrain.recording import RobotShape
 from terrain.robot_models import ROBOTS

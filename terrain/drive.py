@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from mbf_abstract.geometry import AckermannCommand, Command, Twist
 from terrain.robot_models import Drive, RobotSpec
 
+STEERING_SPEED = 3.0  # rad/s; how fast a car turns its wheels
 MIN_STEERING_SPEED = 0.05  # m/s; a slower car that is asked for a yaw rate turns its wheels as for this speed
 
 
@@ -35,6 +36,13 @@ def steering_angle(spec: RobotSpec, twist: Twist) -> float:
         return 0.0
     speed = math.copysign(max(abs(twist.vx), MIN_STEERING_SPEED), twist.vx)
     return _clip(math.atan(spec.wheelbase * twist.wz / speed), spec.max_steering_angle)
+
+
+def steering_command(spec: RobotSpec, command: Command) -> float:
+    """Bicycle steering angle [rad] that a command asks of a car, inside the robot's limits."""
+    if isinstance(command, AckermannCommand):
+        return _clip(command.steering_angle, spec.max_steering_angle)
+    return steering_angle(spec, command)
 
 
 def wheel_targets(spec: RobotSpec, command: Command) -> WheelTargets:

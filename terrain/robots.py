@@ -23,14 +23,13 @@ from mbf_abstract.geometry import (
 )
 from mbf_abstract.robot import Odometry
 from terrain.bullet import quiet_native_output
-from terrain.drive import commanded_twist, twist_from_wheels, wheel_targets
+from terrain.drive import STEERING_SPEED, commanded_twist, twist_from_wheels, wheel_targets
 from terrain.mishaps import MotionSample, Thing
 from terrain.robot_models import Drive, RobotSpec
 from terrain.world import ROBOT, BulletWorld
 
 STANDSTILL = Twist()
 STEERING_TORQUE = 40.0  # N m
-STEERING_SPEED = 3.0  # rad/s
 TOUCHING_DISTANCE = 1e-3  # m; Bullet reports contacts up to 2 cm apart
 BODY_LINK = -1
 SETTLING_TIME = 1.0  # s

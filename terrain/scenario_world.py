@@ -18,7 +18,7 @@ from mbf_abstract.geometry import FloatArray, Pose
 from terrain.actors import Actor, AnyWorld, RouteWalker, VisibleRobot
 from terrain.heightfield import Heightfield
 from terrain.indoor import add_building
-from terrain.kinematic_robot import KinematicWorld
+from terrain.kinematic_world import KinematicWorld
 from terrain.map_files import MapFiles
 from terrain.occupancy import OccupancyGrid, wall_triangles
 from terrain.recording import Surface

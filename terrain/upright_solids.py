@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.arithmetic import rotated
 from mbf_abstract.geometry import Pose
+from terrain.contact_depth import depth_in_circle, depth_in_polygon, placed
 from terrain.solids import box_triangles, cylinder_triangles
 
 FloatArray = NDArray[np.float64]
@@ -45,6 +46,14 @@ class UprightSolid:
         if len(self.size) == 2:
             return max(0.0, math.hypot(ahead, left) - self.size[0])
         return math.hypot(max(0.0, abs(ahead) - 0.5 * self.size[0]), max(0.0, abs(left) - 0.5 * self.size[1]))
+
+    def depth(self, corners: FloatArray) -> float:
+        """How deep [m] a convex outline (n, 2), counter-clockwise, lies in it; below 0 where they are apart."""
+        if len(self.size) == 2:
+            return depth_in_circle(corners, self.pose.x, self.pose.y, self.size[0])
+        half_length, half_width = 0.5 * self.size[0], 0.5 * self.size[1]
+        box = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * (half_length, half_width)
+        return depth_in_polygon(corners, placed(box, self.pose.x, self.pose.y, self.pose.yaw))
 
     def ray_distances(self, origins: FloatArray, directions: FloatArray) -> FloatArray:
         """Distance [m] along each ray (n, 3) to its surface, inf for rays that miss it or start inside."""

@@ -9,17 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
-from mbf_abstract.arithmetic import plane_rotation, rotated
 from mbf_abstract.geometry import Pose
-from terrain.kinematic_robot import TIME_STEP, KinematicRobot, KinematicWorld
+from terrain.kinematic_robot import KinematicRobot
+from terrain.kinematic_world import TIME_STEP, KinematicWorld
 from terrain.occupancy import OccupancyGrid
-from terrain.table1.robot import CARRIER, HALF_LENGTH, HALF_WIDTH
+from terrain.table1.robot import CARRIER
 from terrain.table1.traffic import Box, Shuttle
 
 CONTACT_PAUSE = 1.0  # s without contact after which the next one counts anew
-OUTLINE_SPACING = 0.05  # m between the points of the outline that are looked up on the map
 
 OnContact = Callable[[str, str], None]
 
@@ -52,9 +49,9 @@ class WarehouseWorld(KinematicWorld):
             if any(shuttle.box.overlaps(box) for box in ours):
                 shuttle.state = before
                 shuttle.halt()
-                self.contact("robot", "they")
+                self.contact_began("robot", "they")
 
-    def contact(self, with_what: str, who_moved: str) -> None:
+    def contact_began(self, with_what: str, who_moved: str) -> None:
         """Note a contact; tell it if it is a new one."""
         last = self._last_contact.get((with_what, who_moved), -math.inf)
         self._last_contact[with_what, who_moved] = self.time
@@ -63,14 +60,13 @@ class WarehouseWorld(KinematicWorld):
 
 
 class WarehouseRobot(KinematicRobot):
-    """Our robot: its whole outline counts, against racks and against the shuttles."""
+    """Our robot: the racks and the shuttles stop it."""
 
     world: WarehouseWorld
 
     def __init__(self, world: WarehouseWorld, pose: Pose) -> None:
         super().__init__(world, CARRIER, pose)
         self.distance = 0.0
-        self._outline = _outline_points()
 
     @property
     def box(self) -> Box:
@@ -81,31 +77,11 @@ class WarehouseRobot(KinematicRobot):
         """Move on by one small time step, unless that would touch something."""
         before = self._x, self._y, self._yaw
         super().advance(seconds)
-        touched = self._touched()
-        if touched:
+        if self._blocked:
+            self.world.contact_began("rack", "we")
+        if any(self.box.overlaps(shuttle.box) for shuttle in self.world.shuttles):
             self._x, self._y, self._yaw = before
             self._vx = self._wz = 0.0
             self._blocked = True
-            self.world.contact(touched, "we")
+            self.world.contact_began("robot", "we")
         self.distance += math.hypot(self._x - before[0], self._y - before[1])
-
-    def _touched(self) -> str:
-        box = self.box
-        if any(box.overlaps(shuttle.box) for shuttle in self.world.shuttles):
-            return "robot"
-        if self.world.clearance_at(self._x, self._y) > CARRIER.circumscribed_radius + 0.05:
-            return ""
-        building = self.world.building
-        assert building is not None
-        points = rotated(plane_rotation(self._yaw), self._outline) + np.array([self._x, self._y])
-        cells = np.floor((points - (building.origin_x, building.origin_y)) / building.resolution).astype(int)
-        return "rack" if building.occupied[cells[:, 1], cells[:, 0]].any() else ""
-
-
-def _outline_points() -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Points (n, 2) [m] around the outline in base_link."""
-    along = np.linspace(-HALF_LENGTH, HALF_LENGTH, round(2.0 * HALF_LENGTH / OUTLINE_SPACING) + 1)
-    across = np.linspace(-HALF_WIDTH, HALF_WIDTH, round(2.0 * HALF_WIDTH / OUTLINE_SPACING) + 1)
-    sides = [np.column_stack([along, np.full(len(along), y)]) for y in (-HALF_WIDTH, HALF_WIDTH)]
-    ends = [np.column_stack([np.full(len(across), x), across]) for x in (-HALF_LENGTH, HALF_LENGTH)]
-    return np.concatenate([*sides, *ends])

@@ -59,6 +59,16 @@ def test_the_robot_gets_the_limited_command_and_the_event_tells_both():
         assert clamped[0].data == {"requested": [2.0, 0.0, 1.0], "sent": [0.4, 0.0, 0.2]}
 
 
+def test_a_car_that_is_driven_with_twists_gets_no_curve_tighter_than_its_own():
+    with Bench(min_turning_radius=1.0) as bench:
+        bench.controller.play(drive(0.5, 1.0))
+        handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
+        bench.clock.sleep(0.5)
+        handle.cancel()
+        handle.wait()
+        assert {(command.vx, command.wz) for _, command in bench.robot.moved_after(-1.0)} == {(0.5, 0.5)}
+
+
 def test_a_car_is_limited_in_speed_and_steering_angle():
     with Bench(max_vx=0.4, max_steering_angle=0.3) as bench:
         bench.controller.play(ControlResult(0, "go", AckermannCommand(2.0, 1.0)))

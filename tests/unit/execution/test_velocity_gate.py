@@ -224,6 +224,33 @@ def test_a_robot_that_can_not_reverse_stands_when_told_to():
     assert VelocityLimits(min_vx=0.0).apply(Twist.planar(-0.5, wz=0.3)) == Twist()
 
 
+@settings(deadline=None)
+@given(speeds, speeds, st.floats(0.05, 20.0))
+def test_a_curve_tighter_than_the_turning_circle_is_widened_at_the_same_speed(vx, wz, radius):
+    limited = VelocityLimits(min_turning_radius=radius).apply(Twist.planar(vx, wz=wz))
+    assert limited.vx == vx
+    assert abs(limited.wz) == pytest.approx(min(abs(wz), abs(vx) / radius), rel=1e-5)
+    assert limited.wz * wz >= 0.0
+
+
+@settings(deadline=None)
+@given(speeds, speeds, st.floats(0.05, 20.0))
+def test_no_limit_that_is_applied_with_a_turning_circle_breaks_it(vx, wz, radius):
+    limits = VelocityLimits(max_vx=1.0, min_vx=-0.2, max_wz=2.0, min_turning_radius=radius)
+    limited = limits.apply(Twist.planar(vx, wz=wz))
+    assert -0.2 - 1e-12 <= limited.vx <= 1.0 + 1e-12 and abs(limited.wz) <= 2.0 + 1e-12
+    assert abs(limited.wz) * radius <= abs(limited.vx) * (1.0 + 2e-6) + 1e-12
+
+
+def test_a_robot_with_a_turning_circle_does_not_turn_on_the_spot():
+    assert VelocityLimits(min_turning_radius=0.5).apply(Twist.planar(wz=1.0)) == Twist()
+
+
+def test_a_curve_on_the_turning_circle_itself_is_passed_as_it_is():
+    command = Twist.planar(0.3, wz=0.3 / 0.7)
+    assert VelocityLimits(min_turning_radius=0.7).apply(command) is command
+
+
 def test_a_limited_command_is_sent_and_recorded(scene):
     scene.gate.limits = LIMITS
     scene.gate.acquire("a").send(Twist.planar(2.0, wz=1.0))

@@ -11,7 +11,8 @@ from terrain.command_delay import CommandDelay
 from terrain.ego_sensors import Localization
 from terrain.generate import flat_terrain
 from terrain.heightfield import Heightfield
-from terrain.kinematic_robot import KinematicRobot, KinematicWorld
+from terrain.kinematic_robot import KinematicRobot
+from terrain.kinematic_world import KinematicWorld
 from terrain.mishaps import tilt_of
 from terrain.occupancy import OccupancyGrid
 from terrain.robot_models import HUSKY, TURTLEBOT

@@ -10,7 +10,8 @@ from mbf_abstract.findings import ConfigError
 from mbf_abstract.geometry import Pose
 from mbf_abstract.sensing import RangeScan
 from terrain.ego_sensors import Localization
-from terrain.kinematic_robot import KinematicRobot, KinematicWorld
+from terrain.kinematic_robot import KinematicRobot
+from terrain.kinematic_world import KinematicWorld
 from terrain.map_files import MapFiles
 from terrain.mishaps import MishapKind
 from terrain.robot_models import TURTLEBOT

@@ -8,7 +8,7 @@ import pytest
 from mbf_abstract.geometry import Pose, Twist
 from terrain.ego_sensors import Imu, Localization, WheelOdometry
 from terrain.generate import fractal_terrain
-from terrain.kinematic_robot import KinematicWorld
+from terrain.kinematic_world import KinematicWorld
 from terrain.rays import MovingRays, StaticRays
 from terrain.robot_models import TURTLEBOT
 from terrain.robots import WheeledRobot

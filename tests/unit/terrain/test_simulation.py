@@ -12,9 +12,10 @@ from terrain.ego_sensors import Imu, WheelOdometry
 from terrain.floor_plan import OFFICE_MAP
 from terrain.heightfield import Heightfield
 from terrain.indoor import add_building
-from terrain.kinematic_robot import KinematicRobot, KinematicWorld
+from terrain.kinematic_robot import KinematicRobot
+from terrain.kinematic_world import KinematicWorld
 from terrain.mishaps import MishapKind, Thing
-from terrain.occupancy import read_occupancy
+from terrain.occupancy import OccupancyGrid, read_occupancy
 from terrain.rays import MovingRays, StaticRays
 from terrain.recording import RobotShape
 from terrain.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
@@ -108,6 +109,98 @@ def test_walls_stop_the_kinematic_robot() -> None:
     robot.send_command(Twist.planar(-0.5))
     simulation.advance_to(6.0)
     assert robot.pose().y < 10.6
+
+
+def test_the_nose_of_a_kinematic_car_stops_at_the_wall_and_not_its_axle() -> None:
+    occupied = np.zeros((80, 160), dtype=bool)
+    occupied[:, 100:] = True  # a wall from x = 5 m on
+    world = KinematicWorld(building=OccupancyGrid(occupied, ~occupied, 0.05))
+    robot = KinematicRobot(world, CAR, Pose.planar(2.0, 2.0), command_timeout=math.inf)
+    robot.send_command(Twist.planar(1.0))
+    simulation = Simulation(world, robot)
+    simulation.advance_to(6.0)
+    assert 4.9 < robot.pose().x + 0.75 <= 5.0
+    assert simulation.monitor.counts[MishapKind.COLLISION_WITH_WALL] == 1
+    robot.send_command(Twist.planar(-1.0))
+    simulation.advance_to(8.0)
+    assert robot.pose().x < 3.0
+
+
+def test_a_long_robot_cannot_turn_its_corners_through_a_wall() -> None:
+    occupied = np.zeros((80, 160), dtype=bool)
+    occupied[:30] = occupied[50:] = True  # a corridor of one metre
+    world = KinematicWorld(building=OccupancyGrid(occupied, ~occupied, 0.05))
+    robot = KinematicRobot(world, HUSKY, Pose.planar(3.0, 2.0), command_timeout=math.inf)
+    robot.send_command(Twist.planar(0.0, 0.0, 0.5))
+    simulation = Simulation(world, robot)
+    simulation.advance_to(6.0)
+    assert 0.1 < robot.pose().yaw < math.radians(60.0)  # its diagonal of 1.21 m does not fit across
+    assert simulation.monitor.counts[MishapKind.COLLISION_WITH_WALL] >= 1
+    robot.send_command(Twist.planar(0.0, 0.0, -0.5))
+    simulation.advance_to(6.5)
+    assert robot.velocity().wz < -0.4
+
+
+@pytest.mark.parametrize("shape", ["box", "cylinder"])
+def test_a_robot_that_something_has_moved_into_may_move_away_but_not_deeper(shape: str) -> None:
+    world = KinematicWorld()
+    pose = Pose.planar(0.6, 0.0)
+    body = world.add_box(pose, (0.4, 0.4, 1.0)) if shape == "box" else world.add_cylinder(pose, 0.2, 1.0)
+    world.things[body] = Thing.PERSON
+    robot = KinematicRobot(world, HUSKY, Pose.planar(0.0, 0.0), command_timeout=math.inf)
+    assert robot.motion_sample().touched == {Thing.PERSON}
+    robot.send_command(Twist.planar(0.5))
+    for _ in range(60):
+        world.step()
+    assert robot.pose().x == 0.0
+    robot.send_command(Twist.planar(-0.5))
+    for _ in range(60):
+        world.step()
+    robot.motion_sample()
+    assert robot.pose().x < -0.2 and not robot.motion_sample().touched
+
+
+def test_a_short_touch_between_two_samples_is_not_missed() -> None:
+    world = KinematicWorld()
+    world.add_box(Pose.planar(1.0, 0.0), (0.4, 0.4, 1.0))
+    robot = KinematicRobot(world, HUSKY, Pose.planar(0.295, 0.0), command_timeout=math.inf)
+    robot.send_command(Twist.planar(1.0))
+    for _ in range(30):
+        world.step()
+    robot.send_command(Twist.planar(-1.0))
+    for _ in range(15):
+        world.step()
+    assert robot.motion_sample().touched == {Thing.WALL}
+    assert not robot.motion_sample().touched
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_kinematic_car_never_drives_a_tighter_curve_than_its_turning_circle(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    world = KinematicWorld()
+    robot = KinematicRobot(world, CAR, Pose.planar(0.0, 0.0), command_timeout=math.inf)
+    tightest = 1.0 / CAR.min_turning_radius
+    for _ in range(200):
+        vx, wz = rng.uniform(-1.5, 1.5), rng.uniform(-3.0, 3.0)
+        robot.send_command(Twist.planar(vx, 0.0, wz) if rng.uniform() < 0.7 else AckermannCommand(vx, wz))
+        for _ in range(rng.integers(1, 20)):
+            before = robot.pose()
+            world.step()
+            velocity, after = robot.velocity(), robot.pose()
+            assert abs(velocity.wz) <= tightest * abs(velocity.vx) + 1e-12
+            assert abs(after.yaw - before.yaw) % (2.0 * math.pi) <= tightest * after.distance_to(before) * 1.001 + 1e-9
+
+
+def test_a_kinematic_car_that_reverses_turns_its_wheels_before_it_turns() -> None:
+    world = KinematicWorld()
+    robot = KinematicRobot(world, CAR, Pose.planar(0.0, 0.0), command_timeout=math.inf)
+    simulation = Simulation(world, robot)
+    robot.send_command(Twist.planar(1.0, 0.0, 0.9))
+    simulation.advance_to(2.0)
+    robot.send_command(Twist.planar(-1.0, 0.0, 0.9))
+    while robot.velocity().vx > -0.9:
+        world.step()
+        assert abs(robot.velocity().wz) <= abs(robot.velocity().vx) / CAR.min_turning_radius + 1e-12
 
 
 def test_a_walker_is_where_its_speed_says_and_comes_back() -> None:
