@@ -12,13 +12,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.arithmetic import plane_rotation, rotated
+
 FloatArray = NDArray[np.float64]
 
 
 def placed(corners: FloatArray, x: float, y: float, yaw: float) -> FloatArray:
     """Corners (n, 2) [m] of an outline in the map, its base at (x, y) with heading ``yaw``."""
-    c, s = math.cos(yaw), math.sin(yaw)
-    return np.column_stack([c * corners[:, 0] - s * corners[:, 1] + x, s * corners[:, 0] + c * corners[:, 1] + y])
+    return np.asarray(rotated(plane_rotation(yaw), corners) + np.array([x, y]))
 
 
 def depth_in_polygon(corners: FloatArray, other: FloatArray) -> float:

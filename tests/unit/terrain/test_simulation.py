@@ -248,7 +248,7 @@ def test_whom_the_robot_hits_is_told(thing: Thing) -> None:
         robot.send_command(Twist.planar(0.4))
         simulation.advance_to(3.0)
     kinds = {mishap.kind.value for mishap in simulation.mishaps}
-    assert {kind for kind in kinds if kind.startswith("collision_")} == {f"collision_with_{thing.value}"}
+    assert {kind for kind in kinds if kind.startswith("collision_with_")} == {f"collision_with_{thing.value}"}
 
 
 @pytest.mark.parametrize("spec", ROBOTS.values(), ids=lambda spec: spec.name)
