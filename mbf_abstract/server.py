@@ -7,9 +7,6 @@ driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_co
 
 from __future__ import annotations
 
-import atexit
-import os
-import weakref
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
@@ -35,6 +32,7 @@ from mbf_abstract.navigation_parameters import NavigationParameters
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugin_host import PluginHost
 from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
+from mbf_abstract.process_end import ProcessEndWatch
 from mbf_abstract.robot import Robot, RobotInformation
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.sim_clock import SimClock
@@ -76,6 +74,7 @@ class AbstractNavigationServer(PluginHost):
         self.config = config
         self._closed = False
         super().__init__(self._make_runtime(config.parameters, robot, clock, transforms, events), seed)
+        self._process_end = ProcessEndWatch(self.runtime.gate)
         try:
             self.load_map(config)
             for spec in config.plugins:
@@ -88,7 +87,6 @@ class AbstractNavigationServer(PluginHost):
         self.recovery = RecoveryAction(self.runtime, self.plugins)
         self.refine_path = RefinePathAction(self.runtime, self.plugins)
         self.move_base = MoveBaseAction(self.runtime, self.plugins, self.get_path, self.exe_path, self.recovery)
-        self._exit_hook = _close_at_exit(self)
 
     # --------------------------------------------------------------------------- hooks for a map's server
     @abstractmethod
@@ -199,8 +197,7 @@ class AbstractNavigationServer(PluginHost):
             return
         self._closed = True
         self.runtime.gate.close()
-        if hasattr(self, "_exit_hook"):
-            atexit.unregister(self._exit_hook)
+        self._process_end.end()
         for action in self._actions():
             action.close()
         if isinstance(self.runtime.clock, SimClock):
@@ -258,16 +255,3 @@ class AbstractNavigationServer(PluginHost):
 def _limits(parameters: NavigationParameters) -> VelocityLimits:
     given = {limit.name: getattr(parameters, limit.name) for limit in fields(VelocityLimits)}
     return VelocityLimits(**{name: value for name, value in given.items() if value is not None})
-
-
-def _close_at_exit(server: AbstractNavigationServer) -> Callable[[], None]:
-    """Stop the robot when the interpreter ends, without keeping the server alive until then."""
-    reference, process = weakref.ref(server), os.getpid()
-
-    def close() -> None:
-        alive = reference()
-        if alive is not None and os.getpid() == process:  # a forked child must not touch the parent's robot
-            alive.runtime.gate.close("the process ends")
-
-    atexit.register(close)
-    return close

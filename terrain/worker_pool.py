@@ -67,12 +67,17 @@ def _run_in_pool(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Itera
 
 
 def _end_with_the_parent(parent: int) -> None:
-    """Let a worker end soon after its parent was killed; it would wait for work for ever."""
+    """Let a worker end soon after its parent was killed; it would wait for work for ever.
+
+    It also ends at once when it is told to, so that its job is given to another one: what a navigation server would do
+    first, stop its robot, is of no use to a simulated one.
+    """
 
     def check(number: int, frame: FrameType | None) -> None:
         if os.getppid() != parent:
             os._exit(1)
 
+    signal.signal(signal.SIGTERM, lambda number, frame: os._exit(128 + number))
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, check)
         signal.setitimer(signal.ITIMER_REAL, PARENT_CHECK, PARENT_CHECK)

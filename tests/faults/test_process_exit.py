@@ -1,4 +1,4 @@
-"""Fault table, row 32: Ctrl-C, an exception in the main thread, the end of the interpreter, a fork.
+"""Fault table, row 32: Ctrl-C, SIGTERM, SIGHUP, an exception in the main thread, the end of the interpreter, a fork.
 
 Each test runs a small robot program in a process of its own. Its robot writes every command to a file at once, so the
 file tells what the robot was told last, however the process ended.
@@ -78,6 +78,90 @@ def test_ctrl_c_stops_the_robot(tmp_path):
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=20)
     assert velocities(log)[-1] == 0.0
+
+
+WAITS = {
+    "sleep": "bench = run(sys.argv[1]); bench.clock.sleep(60.0)",
+    "context manager": "\nwith run(sys.argv[1]) as bench:\n    bench.clock.sleep(60.0)",
+    "wait": "bench = run(sys.argv[1]); bench.server.exe_path.unfinished[0].wait()",
+    "hanging plugin": "bench = run(sys.argv[1], hang=True); bench.clock.sleep(60.0)",
+    "asyncio": """
+import asyncio
+async def main():
+    await bench.server.exe_path.unfinished[0]
+bench = run(sys.argv[1])
+asyncio.run(main())
+""",
+    "lock of the gate": """
+bench = run(sys.argv[1])
+with bench.server.runtime.gate._condition:  # as if the signal came in the middle of a command
+    bench.clock.sleep(60.0)
+""",
+    "exit that is refused": """
+bench = run(sys.argv[1])
+while True:
+    try:
+        bench.clock.sleep(60.0)
+    except SystemExit:
+        os.write(1, b"refused\\n")
+        bench.clock.sleep(1.0)
+        os._exit(7)  # neither with, nor finally, nor atexit
+""",
+}
+
+
+@pytest.mark.parametrize("wait", WAITS)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_that_ends_the_process_stops_the_robot_first(tmp_path, number, wait):
+    log = tmp_path / "commands"
+    with start(WAITS[wait], log) as process:
+        assert process.stdout.readline().strip() == "driving"
+        process.send_signal(number)
+        process.communicate(timeout=20)
+    assert velocities(log)[-1] == 0.0
+    assert process.returncode == (7 if "refused" in wait else 128 + number)
+
+
+def test_a_handler_of_the_program_itself_is_left_alone_and_comes_back_after_the_last_server(tmp_path):
+    log = tmp_path / "commands"
+    program = """
+own = lambda number, frame: os.write(1, b"mine\\n")
+signal.signal(signal.SIGHUP, own)
+bench = run(sys.argv[1])
+os.kill(os.getpid(), signal.SIGHUP)
+other = Bench(clock=WallClock())
+print(signal.getsignal(signal.SIGTERM) is signal.SIG_DFL, flush=True)
+bench.close()
+print(signal.getsignal(signal.SIGTERM) is signal.SIG_DFL, flush=True)
+other.close()
+print(signal.getsignal(signal.SIGTERM) is signal.SIG_DFL, signal.getsignal(signal.SIGHUP) is own, flush=True)
+"""
+    with start(program, log) as process:
+        output, _ = process.communicate(timeout=20)
+    assert output.split() == ["driving", "mine", "False", "False", "True", "True"]
+
+
+def test_a_forked_child_that_is_told_to_end_ends_and_its_parents_robot_drives_on(tmp_path):
+    log = tmp_path / "commands"
+    program = """
+import time
+bench = run(sys.argv[1])
+child = os.fork()
+if child == 0:
+    time.sleep(60.0)
+    os._exit(0)
+os.kill(child, signal.SIGTERM)
+_, status = os.waitpid(child, 0)
+print(os.WTERMSIG(status), flush=True)
+os.write(bench.server.runtime.gate._robot.file, b"9\\n")
+bench.clock.sleep(0.2)
+"""
+    with start(program, log) as process:
+        output, _ = process.communicate(timeout=20)
+    told = velocities(log)
+    assert output.split() == ["driving", str(int(signal.SIGTERM))]
+    assert 0.0 not in told[: told.index(9.0)]
+    assert told[-1] == 0.0
 
 
 def test_a_forked_child_that_ends_does_not_stop_or_drive_the_robot(tmp_path):
