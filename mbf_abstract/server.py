@@ -23,6 +23,7 @@ from mbf_abstract.clock import Clock
 from mbf_abstract.config import Config
 from mbf_abstract.events import EventBus, EventKind
 from mbf_abstract.execution.callbacks import CallbackThread
+from mbf_abstract.execution.process_end import ProcessEndWatch
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.geometry import Path, Pose, Twist
@@ -32,7 +33,6 @@ from mbf_abstract.navigation_parameters import NavigationParameters
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugin_host import PluginHost
 from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
-from mbf_abstract.process_end import ProcessEndWatch
 from mbf_abstract.robot import Robot, RobotInformation
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.sim_clock import SimClock
