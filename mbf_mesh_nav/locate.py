@@ -134,4 +134,4 @@ def _locality_order(points: FloatArray) -> NDArray[np.int64]:
     known = np.where(np.isfinite(points), points, 0.0)
     lower = known.min(axis=0)
     cell = max(float((known.max(axis=0) - lower).max()), 1e-12) / (2**21 - 1)
-    return np.argsort(morton_codes(known, lower, cell))
+    return np.argsort(morton_codes(known, lower, cell), kind="stable")

@@ -151,7 +151,7 @@ def write_lvr2_map(path: Path, mesh_map: MeshMap, part: str = "mesh", layout: st
         raise MeshError(str(path), ["a layer is called 'vertex_normals': the file has the normals under that name"])
     source = mesh_map.internal_to_input.astype(np.int64)
     order = np.argsort(np.where(source >= 0, source, np.iinfo(np.int64).max), kind="stable")
-    position = np.argsort(order)
+    position = np.argsort(order, kind="stable")
     attributes: dict[str, NDArray[Any]] = {name: layer.costs[order] for name, layer in mesh_map.layers.items()}
     attributes["vertex_normals"] = mesh_map.vertex_normals[order]
     write_lvr2_mesh(path, mesh_map.vertices[order], position[mesh_map.faces], attributes, part, layout)

@@ -205,7 +205,7 @@ class BulletWorld:
         mass : float
             0 fixes the box; above [kg], wheels can push it.
         moving : bool
-            True for a fixed-mass box that is set to new poses by an actor: seen by Bullet rays, not by Embree.
+            True for a fixed-mass box that an actor sets to new poses: ``MovingRays`` see it, ``StaticRays`` do not.
         """
         half = [0.5 * length for length in size]
         shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client)

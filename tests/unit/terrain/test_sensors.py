@@ -69,17 +69,17 @@ def test_moving_bodies_hide_what_is_behind_them_and_the_own_robot_is_not_seen() 
     assert np.linalg.norm(scan.points[:, :2], axis=1).min() > 1.2
 
 
-def test_embree_and_bullet_agree_on_rough_ground() -> None:
+def test_the_ray_tree_and_bullet_agree_on_rough_ground() -> None:
     hills = fractal_terrain(20.0, 20.0, 0.2, rng(3), median_slope=12.0, roughness=0.05)
     directions = ring_directions()
     origins = np.tile([10.0, 10.0, float(hills.height_at(10.0, 10.0)) + 1.0], (len(directions), 1))
     with BulletWorld() as world:
         world.add_mesh(*hills.triangles())
         bullet = world.cast_rays(origins, origins + 15.0 * directions)
-        embree = StaticRays(*world.static_triangles()).distances(origins, directions, 15.0)
-    both = bullet.hit & np.isfinite(embree)
-    assert both.sum() > 1000 and (bullet.hit != np.isfinite(embree)).mean() < 0.002
-    assert np.abs(np.linalg.norm(bullet.points - origins, axis=1) - embree)[both].max() < 2e-3
+        tree = StaticRays(*world.static_triangles()).distances(origins, directions, 15.0)
+    both = bullet.hit & np.isfinite(tree)
+    assert both.sum() > 1000 and (bullet.hit != np.isfinite(tree)).mean() < 0.002
+    assert np.abs(np.linalg.norm(bullet.points - origins, axis=1) - tree)[both].max() < 2e-3
 
 
 def test_noise_has_its_spread_and_drop_out_its_share_by_seed() -> None:

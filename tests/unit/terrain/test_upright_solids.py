@@ -1,4 +1,4 @@
-"""Boxes and cylinders of the kinematic world against Embree and Bullet's answers to the same questions."""
+"""Boxes and cylinders of the kinematic world against the ray tree and Bullet's answers to the same questions."""
 
 import numpy as np
 import pytest
@@ -27,12 +27,12 @@ def test_rays_meet_a_solid_where_they_meet_its_triangles(name: str, seed: int, y
         vertices = vertices + np.array([1.0, -2.0, 0.8])
 
     ours = SolidRays([solid]).distances(starts, aims, 10.0)
-    embree = StaticRays(vertices, faces).distances(starts, aims, 10.0)
+    tree = StaticRays(vertices, faces).distances(starts, aims, 10.0)
 
-    both = np.isfinite(ours) & np.isfinite(embree)
+    both = np.isfinite(ours) & np.isfinite(tree)
     assert both.sum() > 50
-    assert (np.isfinite(ours) != np.isfinite(embree)).sum() <= 2  # rays that graze an edge
-    assert np.sort(np.abs(ours[both] - embree[both]))[:-2].max() < 2e-3
+    assert (np.isfinite(ours) != np.isfinite(tree)).sum() <= 2  # rays that graze an edge
+    assert np.sort(np.abs(ours[both] - tree[both]))[:-2].max() < 2e-3
 
 
 @given(x=st.floats(-3.0, 3.0), y=st.floats(-3.0, 3.0), yaw=st.floats(-3.1, 3.1))

@@ -1,0 +1,1 @@
+"""Kernels of the simulated world: arrays in, arrays out."""

@@ -1,0 +1,51 @@
+"""Drives, a sweep and legs of Table I, each with the SHA-256 of all that its robot did.
+
+    python tests/determinism/drives.py indoor switchback table1/B sweep
+
+prints one JSON object, name -> digest. Run it under other environments (``test_same_bytes.py`` does) and compare.
+"""
+
+import hashlib
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+from terrain.runner import RunOptions, run_scenario
+from terrain.scenario import load_scenario, shipped_scenarios
+from terrain.table1.arms import ARMS
+from terrain.table1.repetition import run_repetition
+from terrain.table1.world import WAREHOUSE
+
+TABLE_1 = "table1/"
+SWEEP = "sweep"
+ALL_DRIVES = (*sorted(shipped_scenarios()), f"{TABLE_1}S1", f"{TABLE_1}B", SWEEP)
+
+
+def drive(name: str, seed: int | None = None) -> str:
+    """Digest of the shipped scenario ``name``, its outcome included."""
+    with tempfile.TemporaryDirectory() as folder:
+        result = run_scenario(load_scenario(name), RunOptions(Path(folder), draw=False, seed=seed))
+    return f"{result.metrics['digest']}"
+
+
+def table_1_leg(arm: str) -> str:
+    """Digest of one leg among other robots, with the track driven to the last bit."""
+    run = run_repetition(ARMS[arm], WAREHOUSE, seed=101, legs=1)
+    return hashlib.sha256(run.digest.encode() + run.track.tobytes()).hexdigest()
+
+
+def sweep() -> str:
+    """Digest of three seeds of a scenario with noise, as a sweep runs them."""
+    return hashlib.sha256("".join(drive("post_forest", seed) for seed in (1, 2, 3)).encode()).hexdigest()
+
+
+def digest_of(name: str) -> str:
+    """Digest of one of ``ALL_DRIVES``."""
+    if name == SWEEP:
+        return sweep()
+    return table_1_leg(name.removeprefix(TABLE_1)) if name.startswith(TABLE_1) else drive(name)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps({name: digest_of(name) for name in sys.argv[1:] or ALL_DRIVES}) + "\n")

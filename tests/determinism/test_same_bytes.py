@@ -1,0 +1,62 @@
+"""The same scenario and seed is the same drive, to the last bit, on every CPU, locale, hash seed and folder.
+
+Other CPUs are emulated: OpenBLAS and numpy can be told to use what an older one has, numba to compile for any. With
+MBF_SAME_BYTES=all every drive is repeated in every environment, kernels compiled anew for a generic CPU included, as
+``.ci/run`` does; without it a few drives in fewer environments.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+
+pytestmark = pytest.mark.timeout(1800)
+
+DRIVES = Path(__file__).with_name("drives.py")
+EVERYTHING = os.environ.get("MBF_SAME_BYTES") == "all"
+NAMES = [] if EVERYTHING else ["crowded_corridor", "rubble_field", "table1/B"]  # none named: all
+
+VECTOR_UNITS = [name for name in __cpu_dispatch__ if __cpu_features__[name]]
+AVX_512 = [name for name in VECTOR_UNITS if name.startswith(("AVX512", "X86_V4"))]
+NO_AVX_512 = {"NPY_DISABLE_CPU_FEATURES": " ".join(AVX_512)}
+OLDEST = {"OPENBLAS_CORETYPE": "Prescott", "NPY_DISABLE_CPU_FEATURES": " ".join(VECTOR_UNITS)}
+ABROAD = {"LC_ALL": "de_DE.UTF-8", "TZ": "Asia/Kolkata"}
+
+ENVIRONMENTS = {
+    "an old CPU": OLDEST | {"PYTHONHASHSEED": "1", "OPENBLAS_NUM_THREADS": "1"},
+    "Haswell": NO_AVX_512 | {"OPENBLAS_CORETYPE": "Haswell", "PYTHONHASHSEED": "2", "OPENBLAS_NUM_THREADS": "2"},
+    "Zen, abroad": NO_AVX_512 | ABROAD | {"OPENBLAS_CORETYPE": "Zen", "PYTHONHASHSEED": "3"},
+}
+IN_CI = {
+    "Skylake-X": {"OPENBLAS_CORETYPE": "SkylakeX", "PYTHONHASHSEED": "4"},
+    "kernels compiled anew for a generic CPU": OLDEST | ABROAD | {"NUMBA_CPU_NAME": "generic"},
+}
+
+
+def digests(environment, folder):
+    """Digests of the drives in a process of its own."""
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith(("OPENBLAS_", "NPY_"))}
+    command = [sys.executable, str(DRIVES), *NAMES]
+    done = subprocess.run(command, env=inherited | environment, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory):
+    """Digests on this CPU as it is."""
+    return digests({}, tmp_path_factory.mktemp("here"))
+
+
+@pytest.mark.parametrize("name", [*ENVIRONMENTS, *(IN_CI if EVERYTHING else ())])
+def test_drives_are_the_same_to_the_last_bit_elsewhere(name, here, tmp_path):
+    environment = {**ENVIRONMENTS, **IN_CI}[name]
+    if "NUMBA_CPU_NAME" in environment:
+        environment = environment | {"NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    elsewhere = digests(environment, tmp_path)
+    assert elsewhere.keys() == here.keys() and len(here) >= 3
+    assert not [drive for drive in here if here[drive] != elsewhere[drive]]
