@@ -22,7 +22,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,7 +33,8 @@ from mbf_mesh_nav.densify import densify
 from mbf_mesh_nav.layer import LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.layer_cache import LayerCache
 from mbf_mesh_nav.layer_graph import LayerGraph, LayerGraphError, dependency_order
-from mbf_mesh_nav.mesh_io import SPLIT_CORNERS, read_mesh
+from mbf_mesh_nav.map_findings import frame_findings, map_findings
+from mbf_mesh_nav.mesh_io import MAX_FACES, SPLIT_CORNERS, read_mesh
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.repair import REPAIRS, Finding, checked_mesh
 from mbf_mesh_nav.topology import build_topology
@@ -75,6 +76,20 @@ class MeshMapParameters(ParameterModel):
 
     mesh_file: str = parameter("", "File of the mesh; empty if the mesh is given as arrays.", dynamic=False)
     mesh_part: str = parameter("", "Part of the file: path through the scene graph, or HDF5 group.", dynamic=False)
+    up_axis: Literal["", "x", "y", "z"] = parameter(
+        "",
+        "Axis of the file that points up; empty = what the file says (COLLADA) or its format (glTF: y, others: z).",
+        dynamic=False,
+    )
+    unit: float = parameter(
+        0.0,
+        "Length of the file's unit; 0 = what the file says (COLLADA), or 1.",
+        unit="m",
+        ge=0.0,
+        le=1e6,
+        dynamic=False,
+    )
+    max_faces: int = parameter(MAX_FACES, "Larger files are refused before they are read.", ge=1, dynamic=False)
     repair: tuple[str, ...] = parameter(
         (),
         "Defects of the mesh that may be repaired (see Mesh files). Files of formats without shared corners (STL, OBJ, "
@@ -200,7 +215,8 @@ def build_mesh_map(
     file = ""
     if vertices is None or faces is None:
         file = parameters.mesh_file
-        vertices, faces = read_mesh(file, parameters.mesh_part)
+        part, up_axis, unit = parameters.mesh_part, parameters.up_axis, parameters.unit
+        vertices, faces = read_mesh(file, part, parameters.max_faces, up_axis=up_axis, unit=unit)
     repair = parameters.repairs_for(file)
     mesh, report = checked_mesh(vertices, faces, repair, file or "arrays", parameters.join_distance)
     if parameters.densify > 0.0:
@@ -211,7 +227,7 @@ def build_mesh_map(
         graph = _compute_layers(mesh_map, plan, parameters.cache_dir)
         default = parameters.default_layer or parameters.layers[-1].name
         mesh_map.set_layers(graph, default, parameters.edge_cost_factor)
-    _warn_if_coarse(mesh_map)
+    report.findings += [*frame_findings(file, parameters.up_axis, parameters.unit), *map_findings(mesh_map)]
     return mesh_map
 
 
@@ -286,22 +302,3 @@ def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer], cache_dir: 
         text = f"layers cannot be kept in {cache_dir}: {complaint}; they are computed at every start"
         mesh_map.report.findings.append(Finding("cache", text, np.zeros(0, dtype=np.int64), harmless=True))
     return LayerGraph(list(layers.values()))
-
-
-def _warn_if_coarse(mesh_map: MeshMap) -> None:
-    """Report a mesh whose edges are too long for the robot's radius or for the neighbourhood of a layer."""
-    mean_edge = mesh_map.topology.mean_edge_length
-    limits = {"half the inscribed radius": 0.5 * mesh_map.inscribed_radius}
-    for name, layer in mesh_map.layers.items():
-        limits[f"the radius of layer '{name}'"] = float(getattr(layer.parameters, "radius", 0.0))
-        if mesh_map.inscribed_radius == 0.0:  # then that of an inflation is all that is known of the robot
-            inscribed = float(getattr(layer.parameters, "inscribed_radius", 0.0))
-            limits[f"half the inscribed radius of layer '{name}'"] = 0.5 * inscribed
-    for what, limit in limits.items():
-        if 0.0 < limit < mean_edge:
-            text = (
-                f"edges are {mean_edge:.3g} m long on average, more than {what} ({limit:.3g} m); "
-                "layers may miss obstacles, consider densify"
-            )
-            everywhere = np.flatnonzero(np.diff(mesh_map.neighbour_offsets) > 0)
-            mesh_map.report.findings.append(Finding("coarse", text, everywhere, harmless=True))

@@ -75,9 +75,12 @@ class MeshError(ValueError):
     file : str
         The file, or "arrays".
     reasons : list of str
+    hint : str
+        How the mesh could be used all the same; empty if there is no way.
     """
 
-    def __init__(self, file: str, reasons: Sequence[str]) -> None:
+    def __init__(self, file: str, reasons: Sequence[str], hint: str = "") -> None:
         self.file = file
         self.reasons = list(reasons)
-        super().__init__(f"{file}: " + "; ".join(self.reasons))
+        self.hint = hint
+        super().__init__(f"{file}: " + "; ".join(self.reasons) + (f". {hint}" if hint else ""))

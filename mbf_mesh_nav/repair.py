@@ -1,7 +1,8 @@
 """What is wrong with a mesh, and the repairs a configuration may allow.
 
-A mesh with a defect is refused unless its name stands in the configuration's ``repair`` list; the report says what
-was found and done, with counts and indices in the caller's numbering. The caller's arrays and files are never changed.
+A mesh with a defect is refused unless its name stands in the configuration's ``repair`` list; only faces wound against
+their neighbours are turned round unasked, if all can agree. The report says what was found and done, with counts and
+indices in the caller's numbering. The caller's arrays and files are never changed.
 
 ``REPAIRS`` maps each defect that can be repaired to what the repair does. Harmless findings (unreferenced vertices,
 vertices of holes, several components, a component that faces down, groups of faces that touch in a point) never
@@ -41,7 +42,7 @@ REPAIRS: dict[str, str] = {
     "zero_area": "flip faces without area away and join their neighbours; drop those that cannot be",
     "duplicate_faces": "drop faces with the same corners as an earlier one",
     "non_manifold": "drop the third and further faces at an edge, in index order",
-    "flipped_winding": "turn faces round whose neighbours are wound the other way",
+    "flipped_winding": "turn faces round whose neighbours are wound the other way, also where not all can agree",
     "facing_down": "turn every component round that faces down",
     "point_contacts": "give each of the groups of faces that touch in a point a vertex of its own",
     "unreferenced": "drop vertices without a face",
@@ -102,8 +103,15 @@ def checked_mesh(
     if len(mesh.faces) == 0:
         reasons.append("no face is left")
     if reasons:
-        raise MeshError(file, reasons)
+        raise MeshError(file, reasons, _way_out(check.report, repair) if len(mesh.faces) else "")
     return mesh, check.report
+
+
+def _way_out(report: MeshReport, repair: Sequence[str]) -> str:
+    """How to allow the repairs that a refused mesh needs."""
+    needed = [finding.name for finding in report.refusals]
+    listed = ", ".join([*repair, *(name for name in needed if name not in repair)])
+    return f"To have it repaired when it is loaded, configure mesh_map: {{repair: [{listed}]}}"
 
 
 def _shaped(vertices: ArrayLike, faces: ArrayLike, file: str) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -136,10 +144,13 @@ class _Check:
             self._incidence = faces_of_vertices(mesh.faces, len(mesh.vertices))
         return self._incidence
 
-    def found(self, name: str, text: str, indices: NDArray[np.integer], harmless: bool = False) -> None:
+    def found(
+        self, name: str, text: str, indices: NDArray[np.integer], harmless: bool = False, always_repaired: bool = False
+    ) -> None:
         if len(indices):
             text = text.format(count=len(indices))
-            finding = Finding(name, text, indices.astype(np.int64), name in self.repair, harmless)
+            repaired = always_repaired or name in self.repair
+            finding = Finding(name, text, indices.astype(np.int64), repaired, harmless)
             self.report.findings.append(finding)
 
     def indices(self, points: FloatArray, corners: NDArray[np.int64]) -> CheckedMesh:
@@ -202,7 +213,8 @@ class _Check:
         text = "{count} faces are wound against their neighbours"
         if contradictions:
             text += f", and {contradictions} edges of a one-sided surface cannot agree"
-        self.found("flipped_winding", text, mesh.face_source[flips])
+        # Where all neighbours can agree, only one answer makes sense; a one-sided surface has none.
+        self.found("flipped_winding", text, mesh.face_source[flips], always_repaired=not contradictions)
         if flips.any():
             mesh = replace(mesh, faces=np.where(flips[:, None], mesh.faces[:, ::-1], mesh.faces))
         return self.facing_down(mesh, np.where(flips, -shapes[:, 2], shapes[:, 2]), shapes[:, 3], patches)

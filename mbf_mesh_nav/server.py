@@ -28,7 +28,7 @@ from mbf_abstract.server import AbstractNavigationServer
 from mbf_mesh_nav.ground import ground_heights
 from mbf_mesh_nav.layer_graph import LayerGraphError
 from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
-from mbf_mesh_nav.mesh_io import known_endings
+from mbf_mesh_nav.mesh_io import known_endings, read_mesh
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.mesh_report import SHOWN_INDICES
 from mbf_mesh_nav.plugins import MeshContext
@@ -69,6 +69,9 @@ class MeshNavigationServer(AbstractNavigationServer):
 
     backend: ClassVar[str] = "mesh"
     config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {"mesh_map": MeshMapParameters}
+
+    read_mesh = staticmethod(read_mesh)
+    """The reader of mesh files, for packages that know this one by its server only."""
 
     mesh_map: MeshMap
 

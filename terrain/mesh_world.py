@@ -1,54 +1,44 @@
 """Any triangle mesh file as a world: a scan of a building, a garage, a game level.
 
-Wheels roll on every face of it, and faces that stand steeply are its walls. Z must be up and lengths in metres; a file
-that is not is brought there by ``scale`` and ``y_up``.
+Wheels roll on every face of it, and faces that stand steeply are its walls. The mesh server's reader reads it, so that
+world and map agree on the axes and the unit of a file.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import trimesh
 
+from mbf_abstract.registry import PluginError, PluginRegistry
 from terrain.sheets import TriangleMesh
 
 
 class MeshFileError(Exception):
     """A mesh file cannot be used as a world; the text names the file and the reason."""
 
-    def __init__(self, path: str | Path, reason: str) -> None:
-        super().__init__(f"{path}: {reason}")
 
-
-def read_mesh_world(path: str | Path, scale: float = 1.0, y_up: bool = False) -> TriangleMesh:
-    """Read the triangles of a mesh file in any format that trimesh knows.
+def read_mesh_world(path: str | Path, up_axis: str = "", unit: float = 0.0) -> TriangleMesh:
+    """Read the triangles of a mesh file in any format that the mesh server reads.
 
     Parameters
     ----------
-    scale : float
-        Metres per unit of the file.
-    y_up : bool
-        The file's y axis points up, as in most files of computer graphics; turned to z up.
+    up_axis : str
+        Axis of the file that points up, "x", "y" or "z"; "" = what the file or its format says.
+    unit : float
+        Length of the file's unit [m]; 0 = what the file says, or 1.
 
     Raises
     ------
     MeshFileError
-        No such file, no triangles in it, or a coordinate that is not finite.
+        No such file, no triangles in it, or a coordinate that is not finite; or no mesh server is installed.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise MeshFileError(path, "no such file")
     try:
-        loaded = trimesh.load(path, force="mesh", process=False)
-    except Exception as error:  # trimesh raises whatever its many format readers raise
-        raise MeshFileError(path, f"cannot be read: {type(error).__name__}: {error}") from error
-    vertices = np.asarray(getattr(loaded, "vertices", []), dtype=np.float64).reshape(-1, 3) * scale
-    faces = np.asarray(getattr(loaded, "faces", []), dtype=np.int32).reshape(-1, 3)
-    if not len(faces):
-        raise MeshFileError(path, "holds no triangles")
+        server: Any = PluginRegistry().load("servers", "mesh")
+        vertices, faces = server.read_mesh(path, up_axis=up_axis, unit=unit)
+    except (PluginError, ValueError) as error:
+        raise MeshFileError(str(error)) from error
     if not np.isfinite(vertices).all():
-        raise MeshFileError(path, f"vertex {int(np.argwhere(~np.isfinite(vertices))[0, 0])} is not finite")
-    if y_up:
-        vertices = np.column_stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]])
-    return TriangleMesh(vertices, faces)
+        raise MeshFileError(f"{path}: vertex {int(np.argwhere(~np.isfinite(vertices))[0, 0])} is not finite")
+    return TriangleMesh(vertices, faces.astype(np.int32))

@@ -164,14 +164,16 @@ class MeshWorld(LevelsWorld):
     """Any triangle mesh; wheels roll on every face of it."""
 
     type: Literal["mesh"]
-    file: Path = parameter(..., "The mesh file, in any format that trimesh reads.")
-    scale: float = parameter(1.0, "Metres per unit of the file.", gt=0.0)
-    y_up: bool = parameter(False, "Whether the file's y axis points up.")
+    file: Path = parameter(..., "The mesh file, in any format that the mesh server reads.")
+    up_axis: Literal["", "x", "y", "z"] = parameter(
+        "", "Axis of the file that points up; empty = what the file or its format says."
+    )
+    unit: float = parameter(0.0, "Length of the file's unit; 0 = what the file says, or 1.", unit="m", ge=0.0, le=1e6)
 
     def levels(self) -> MultiLevelWorld:
         """Read the file."""
         nothing = TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32))
-        return MultiLevelWorld(read_mesh_world(self.file, self.scale, self.y_up), nothing, {})
+        return MultiLevelWorld(read_mesh_world(self.file, self.up_axis, self.unit), nothing, {})
 
 
 World = Annotated[

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from mbf_mesh_nav import map_builder, repair
+from mbf_mesh_nav import map_builder, map_findings, repair
 from mbf_mesh_nav.mesh_io import SPLIT_CORNERS, known_endings
 from mbf_mesh_nav.repair import REPAIRS
 
@@ -27,6 +27,6 @@ def test_the_formats_that_are_joined_are_marked_so():
 
 
 def test_every_repair_and_every_finding_of_the_checks_is_on_the_page():
-    sources = Path(repair.__file__).read_text("utf-8") + Path(map_builder.__file__).read_text("utf-8")
+    sources = "".join(Path(module.__file__).read_text("utf-8") for module in (repair, map_builder, map_findings))
     found = set(re.findall(r'(?:self\.found|Finding)\("(\w+)"', sources)) - {"components"}
     assert set(first_column("Findings and repairs")) == found | set(REPAIRS)

@@ -74,6 +74,20 @@ def all_faces_turned_over():
     return vertices, faces[:, ::-1].copy()
 
 
+def moebius_strip():
+    """A strip of squares, its end joined to its beginning with a half turn."""
+    turns = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    rims = [
+        np.stack([(2 + s * np.cos(turns / 2)) * np.cos(turns), (2 + s * np.cos(turns / 2)) * np.sin(turns)], axis=1)
+        for s in (-0.4, 0.4)
+    ]
+    heights = [s * np.sin(turns / 2) for s in (-0.4, 0.4)]
+    vertices = np.vstack([np.column_stack([rim, height]) for rim, height in zip(rims, heights, strict=True)])
+    low, high = np.arange(24), np.arange(24) + 24
+    next_low, next_high = np.append(low[1:], high[0]), np.append(high[1:], low[0])
+    return vertices, np.vstack([np.stack([low, next_low, next_high], 1), np.stack([low, next_high, high], 1)])
+
+
 DEFECTS = [
     (nan_vertex, "non_finite", [5]),
     (infinite_vertex, "non_finite", [0]),
@@ -83,7 +97,6 @@ DEFECTS = [
     (twice_the_same_corner, "zero_area", [18]),
     (duplicate_face, "duplicate_faces", [18]),
     (third_face_at_an_edge, "non_manifold", [18]),
-    (one_face_turned_over, "flipped_winding", [8]),
     (all_faces_turned_over, "facing_down", list(range(18))),
 ]
 
@@ -111,6 +124,35 @@ def test_defect_is_repaired_on_request_and_the_input_is_left_alone(make, name, i
     np.testing.assert_array_equal(faces, before[1])
     _, second = checked_mesh(mesh.vertices, mesh.faces)
     assert not second.refusals
+
+
+def test_a_face_wound_against_its_neighbours_is_turned_round_unasked_and_told():
+    vertices, faces = one_face_turned_over()
+
+    mesh, report = checked_mesh(vertices, faces)
+
+    assert str(report["flipped_winding"]) == (
+        "flipped_winding: 1 faces are wound against their neighbours (indices 8) - repaired"
+    )
+    np.testing.assert_array_equal(mesh.faces, good()[1])
+
+
+def test_a_one_sided_surface_is_refused_and_the_way_to_have_it_all_the_same_is_told():
+    vertices, faces = moebius_strip()
+
+    with pytest.raises(MeshError, match="edges of a one-sided surface cannot agree") as error:
+        checked_mesh(vertices, faces)
+
+    assert error.value.hint.endswith("mesh_map: {repair: [flipped_winding, facing_down]}")
+    assert len(checked_mesh(vertices, faces, ["flipped_winding", "facing_down"])[0].faces) == len(faces)
+
+
+@pytest.mark.parametrize(("make", "name", "indices"), DEFECTS, ids=lambda value: getattr(value, "__name__", None))
+def test_the_error_says_how_to_have_the_defect_repaired(make, name, indices):
+    with pytest.raises(MeshError, match=rf"mesh_map: {{repair: \[small_components, {name}\]}}$") as error:
+        checked_mesh(*make(), repair=["small_components"])
+    listed = error.value.hint.partition("[")[2].rstrip("]}").split(", ")
+    checked_mesh(*make(), repair=listed)
 
 
 def test_all_defects_are_reported_at_once():

@@ -90,7 +90,7 @@ def test_a_part_that_its_node_mirrors_faces_up_like_the_others(tmp_path):
     mirrored = np.diag([-1.0, 1.0, 1.0, 1.0])
     scene_of(np.eye(4), mirrored).export(tmp_path / "mirrored.glb")
 
-    mesh = build_mesh_map(MeshMapParameters(mesh_file=str(tmp_path / "mirrored.glb")))
+    mesh = build_mesh_map(MeshMapParameters(mesh_file=str(tmp_path / "mirrored.glb"), up_axis="z"))
 
     assert len(read_mesh(tmp_path / "mirrored.glb")[1]) == 2 * len(TILE[1])
     assert (mesh.face_normals[:, 2] > 0.99).all()

@@ -265,9 +265,9 @@ def test_coarse_mesh_is_reported_and_densify_mends_it():
 @pytest.mark.parametrize("ending", ["ply", "obj", "stl", "off", "glb", "dae"])
 def test_mesh_survives_a_round_trip_through_every_format(tmp_path, ending):
     file = tmp_path / f"mesh.{ending}"
-    trimesh.Trimesh(VERTICES, FACES, process=False).export(file)
+    trimesh.Trimesh(VERTICES, FACES, process=False).export(file)  # as it stands, whatever the format says of axes
 
-    mesh = build_mesh_map(MeshMapParameters(mesh_file=str(file)))
+    mesh = build_mesh_map(MeshMapParameters(mesh_file=str(file), up_axis="z"))
 
     assert len(mesh.vertices) == len(VERTICES)
     assert len(mesh.faces) == len(FACES)
@@ -284,7 +284,7 @@ def test_parts_of_a_scene_are_found_by_name_and_moved_into_place(tmp_path):
     file = tmp_path / "house.glb"
     scene.export(file)
 
-    roof, faces = read_mesh(file, "roof")
+    roof, faces = read_mesh(file, "roof", up_axis="z")
 
     assert len(faces) == len(FACES)
     assert roof[:, 2].min() >= 5.0

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from terrain.mesh_world import MeshFileError, read_mesh_world
 from terrain.world import BulletWorld
@@ -12,12 +13,18 @@ from terrain.world import BulletWorld
 def test_a_mesh_with_y_up_is_turned_and_scaled(tmp_path: Path) -> None:
     file = tmp_path / "ramp.obj"
     file.write_text("v 0 100 0\nv 200 100 0\nv 0 100 -200\nf 1 2 3\n")
-    mesh = read_mesh_world(file, scale=0.01, y_up=True)
+    mesh = read_mesh_world(file, "y", 0.01)
     assert np.allclose(mesh.vertices, [[0, 0, 1], [2, 0, 1], [0, 2, 1]]) and mesh.faces.tolist() == [[0, 1, 2]]
 
 
+def test_a_gltf_stands_as_its_format_says(tmp_path: Path) -> None:
+    corners, faces = np.array([[0.0, 1.0, 0.0], [2.0, 1.0, 0.0], [0.0, 1.0, -2.0]]), [[0, 1, 2]]
+    trimesh.Trimesh(corners, faces, process=False).export(tmp_path / "ramp.glb")
+    assert np.allclose(read_mesh_world(tmp_path / "ramp.glb").vertices, [[0, 0, 1], [2, 0, 1], [0, 2, 1]])
+
+
 def test_a_real_level_stands_in_the_world(shared_data: Path) -> None:
-    mesh = read_mesh_world(shared_data / "terrain/recast/nav_test.obj", y_up=True)
+    mesh = read_mesh_world(shared_data / "terrain/recast/nav_test.obj", "y")
     assert len(mesh.faces) == 1612
     with BulletWorld() as world:
         world.add_mesh(mesh.vertices, mesh.faces)
@@ -29,10 +36,10 @@ def test_a_real_level_stands_in_the_world(shared_data: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "reason"),
     [
-        ("a.obj", "", "triangles"),
-        ("a.obj", "v 0 0 0\nv 1 0 0\n", "triangles"),
+        ("a.obj", "", "no face"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\n", "no face"),
         ("a.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertex 0"),
-        ("a.xyzw", "what", "cannot be read"),
+        ("a.xyzw", "what", "unknown ending"),
         ("a.ply", "ply\nwhat", "cannot be read"),
     ],
 )
@@ -41,5 +48,5 @@ def test_a_bad_mesh_is_refused_with_its_name_and_reason(tmp_path: Path, name: st
     with pytest.raises(MeshFileError, match=reason) as caught:
         read_mesh_world(tmp_path / name)
     assert name in str(caught.value)
-    with pytest.raises(MeshFileError, match="no such file"):
+    with pytest.raises(MeshFileError, match="there is no such file"):
         read_mesh_world(tmp_path / "missing.obj")
