@@ -9,31 +9,38 @@ frame.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 
 
-class GoalArea(Protocol):
+class GoalArea(ABC):
     """Where a goal may end."""
 
     @property
+    @abstractmethod
     def frame_id(self) -> str:
         """Frame the area is given in."""
 
     def contains(self, pose: Pose) -> bool:
         """Whether a robot at ``pose`` is inside."""
+        return self.depth(pose) >= 0.0
 
+    @abstractmethod
+    def depth(self, pose: Pose) -> float:
+        """How far [m] a robot at ``pose`` can move any way and stays inside; negative where it is outside."""
+
+    @abstractmethod
     def members(self) -> tuple[Pose, ...]:
         """Poses inside that a planner is asked for; never empty."""
 
 
 @dataclass(frozen=True)
-class DiscArea:
+class DiscArea(GoalArea):
     """All places within ``radius`` [m], in 3D, of a centre; any heading."""
 
     center: Pose
@@ -48,21 +55,21 @@ class DiscArea:
         """Frame of the centre."""
         return self.center.frame_id
 
-    def contains(self, pose: Pose) -> bool:
-        """Whether the position is in the disc."""
-        return pose.distance_to(self.center) <= self.radius
+    def depth(self, pose: Pose) -> float:
+        """Distance [m] from the circle."""
+        return self.radius - pose.distance_to(self.center)
 
     def members(self) -> tuple[Pose, ...]:
-        """The centre, and eight poses on the circle of 0.9 radius for centres that cannot be reached."""
+        """The centre, and eight poses at two thirds of the radius for centres that cannot be reached."""
         x, y, z = self.center.position
-        ring = 0.9 * self.radius
+        ring = self.radius * 2.0 / 3.0
         angles = [k * math.pi / 4.0 for k in range(8)]
         around = [(x + ring * math.cos(angle), y + ring * math.sin(angle), z) for angle in angles]
         return (self.center, *(replace(self.center, position=position) for position in around))
 
 
 @dataclass(frozen=True)
-class PolygonArea:
+class PolygonArea(GoalArea):
     """The inside of a simple polygon, seen from above; any height and heading.
 
     Parameters
@@ -80,18 +87,22 @@ class PolygonArea:
         if not abs(self._area()) > 0.0:
             raise ValueError("the polygon encloses no area")
 
-    def contains(self, pose: Pose) -> bool:
-        """Whether the position is inside, by the even-odd rule."""
-        inside = False
+    def depth(self, pose: Pose) -> float:
+        """Distance [m] from the nearest edge; what is inside says the even-odd rule."""
+        inside, nearest = False, math.inf
         for (x1, y1, _), (x2, y2, _) in zip(self.corners, self.corners[1:] + self.corners[:1], strict=True):
             if (y1 > pose.y) != (y2 > pose.y) and pose.x < x1 + (pose.y - y1) / (y2 - y1) * (x2 - x1):
                 inside = not inside
-        return inside
+            dx, dy, px, py = x2 - x1, y2 - y1, pose.x - x1, pose.y - y1
+            share = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-18), 0.0), 1.0)
+            nearest = min(nearest, math.hypot(px - share * dx, py - share * dy))
+        return nearest if inside else -nearest
 
     def members(self) -> tuple[Pose, ...]:
-        """Poses of a 5 x 5 grid over the bounding box that are inside; of a thin polygon the middle of one ear.
+        """Poses of a 5 x 5 grid over the bounding box that are well inside; of a thin polygon the middle of one ear.
 
         An ear is a triangle of three neighbouring corners that lies inside; every simple polygon has at least two.
+        Well inside is half as deep as the deepest: a robot that stops a little before the pose is inside too.
         """
         xs, ys, zs = zip(*self.corners, strict=True)
         z = sum(zs) / len(zs)
@@ -101,8 +112,10 @@ class PolygonArea:
             for a in steps
             for b in steps
         ]
-        inside = tuple(pose for pose in grid if self.contains(pose))
-        return inside or tuple(pose for pose in self._triangle_centres(z) if self.contains(pose))[:1]
+        deepest = max(self.depth(pose) for pose in grid)
+        if deepest > 0.0:
+            return tuple(pose for pose in grid if self.depth(pose) >= 0.5 * deepest)
+        return (max(self._triangle_centres(z), key=self.depth),)
 
     def _area(self) -> float:
         edges = zip(self.corners, self.corners[1:] + self.corners[:1], strict=True)
@@ -119,7 +132,7 @@ class PolygonArea:
 
 
 @dataclass(frozen=True)
-class PoseSetArea:
+class PoseSetArea(GoalArea):
     """One of several poses, within tolerances [m, rad]."""
 
     poses: tuple[Pose, ...]
@@ -135,12 +148,11 @@ class PoseSetArea:
         """Frame of the poses."""
         return self.poses[0].frame_id
 
-    def contains(self, pose: Pose) -> bool:
-        """Whether ``pose`` is at one of the members."""
-        return any(
-            pose.distance_to(member) <= self.dist_tolerance and pose.angle_to(member) <= self.angle_tolerance
-            for member in self.poses
-        )
+    def depth(self, pose: Pose) -> float:
+        """What is left [m] of the tolerance at the nearest member; one with another heading is out of reach."""
+        headings = [pose.angle_to(member) <= self.angle_tolerance for member in self.poses]
+        gaps = [pose.distance_to(member) for member, looks in zip(self.poses, headings, strict=True) if looks]
+        return self.dist_tolerance - min(gaps, default=math.inf)
 
     def members(self) -> tuple[Pose, ...]:
         """The poses."""

@@ -90,6 +90,13 @@ class NavigationParameters(ParameterModel):
         0.0, "Time without progress that counts as oscillation; 0 = never.", unit="s", ge=0.0, le=60.0
     )
     oscillation_distance: float = parameter(0.5, "Moving this far is progress.", unit="m", ge=0.0, le=10.0)
+    progress_timeout: float = parameter(
+        60.0,
+        "Time in which a robot must come 0.1 m farther along its path, or turn 0.1 rad to its goal; 0 = never.",
+        unit="s",
+        ge=0.0,
+        le=3600.0,
+    )
     oscillation_angle: float = parameter(3.14, "Turning this far is progress.", unit="rad", ge=0.0, le=6.28)
 
     # Robot, frames and odometry

@@ -43,7 +43,7 @@ class PathTracker:
     Parameters
     ----------
     path : Path
-        At least one pose.
+        One without poses has no length, and must not be updated.
     dimensions : {2, 3}
         2 = seen from above, heights do not count.
 
@@ -85,7 +85,7 @@ class PathTracker:
     @property
     def length(self) -> float:
         """Length of the path [m]."""
-        return float(self.lengths[-1])
+        return float(self.lengths[-1]) if len(self.lengths) else 0.0
 
     @property
     def remaining(self) -> float:
@@ -196,6 +196,8 @@ class PathTracker:
     def _turns_back(self) -> FloatArray:
         """Lengths along the path [m] of the poses at which it turns back on itself: one, the sharpest, a turn."""
         inner = self.lengths[(self.lengths >= ARM) & (self.lengths <= self.length - ARM)]
+        if not len(inner):
+            return inner
         before, behind = self.points_at(inner - ARM), self.points_at(inner + ARM)
         gained = norm(behind - before)
         turning, gained = inner[gained < GAINED], gained[gained < GAINED]
@@ -206,7 +208,7 @@ class PathTracker:
 def polyline_lengths(points: FloatArray) -> FloatArray:
     """(n,) length [m] along a polyline (n, k) from its first point to each point."""
     steps = np.diff(points, axis=0)
-    return np.concatenate([[0.0], np.cumsum(norm(steps))])
+    return np.concatenate([[0.0], np.cumsum(norm(steps))])[: len(points)]
 
 
 def _norm(components: Iterable[float]) -> float:

@@ -133,14 +133,14 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
     def _follow(
         self, following: Following, plugin: LoadedPlugin[AbstractController], first_plan: Plan
     ) -> ExePathResult:
-        progress = PathProgress(self.runtime.clock, first_plan.path)
+        progress = PathProgress(self.runtime.clock, first_plan.tracker)
         plans = [first_plan]
 
         def take_new_plan() -> Plan | None:
             goal = None if plans else self._take_offer(following, run)
             if goal is not None:
                 plans.append(self._plan(goal))
-                progress.restart(plans[0].path)
+                progress.restart(plans[0].tracker)
             return plans.pop() if plans else None
 
         def publish(cycle: Cycle) -> None:

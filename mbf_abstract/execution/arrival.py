@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goal_area import GoalArea
+from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.relaxation import Slack
 
 ToleranceCheck = Literal["plugin", "either", "exclusive"]
+
+STRAYING = 2.0
+"""So many times its distance from the path a robot may be short of the path's end: a controller may leave the path."""
+DEPTH_SHARE = 0.9
+"""Share of the end's depth in an area that a controller may stop short of it."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +27,8 @@ class ArrivalCheck:
     goal : Pose
         Last pose of the path, in the global frame.
     dist_tolerance, angle_tolerance : float
-        Largest 3D distance [m] and rotation [rad], exclusive.
+        Largest 3D distance [m] and rotation [rad], exclusive; told to the controller whoever decides, so that it does
+        not stop short. With an area the distance is at most what keeps a robot at the end of the path inside.
     check : {"plugin", "either", "exclusive"}
         Who decides: the controller; the controller or the server; the server alone.
     area : GoalArea, optional
@@ -35,23 +41,31 @@ class ArrivalCheck:
     check: ToleranceCheck = "plugin"
     area: GoalArea | None = None
 
+    def __post_init__(self) -> None:
+        depth = self.area.depth(self.goal) if self.area is not None else 0.0
+        if depth > 0.0:
+            object.__setattr__(self, "dist_tolerance", min(self.dist_tolerance, DEPTH_SHARE * depth))
+
     def relaxed(self, slack: Slack) -> ArrivalCheck:
-        """Return the same rule with tolerances at least as wide as the slack."""
+        """Return the same rule with tolerances at least as wide as the slack; an area is tolerance enough."""
+        if self.area is not None:
+            return self
         return replace(
             self,
             dist_tolerance=max(self.dist_tolerance, slack.arrival_distance),
             angle_tolerance=max(self.angle_tolerance, slack.arrival_angle),
         )
 
-    def reached(self, pose: Pose, ask_plugin: Callable[[], bool]) -> bool:
-        """Apply the rule; ``ask_plugin`` is called only where its answer counts."""
+    def reached(self, pose: Pose, tracker: PathTracker, plugin_agrees: bool) -> bool:
+        """Apply the rule to a pose, the progress on the path, and the controller's answer."""
         if self.area is not None:
             return self.area.contains(pose)
         if self.check == "exclusive":
-            return self.within(pose)
-        return ask_plugin() or (self.check == "either" and self.within(pose))
+            return self.within(pose, tracker)
+        return plugin_agrees or (self.check == "either" and self.within(pose, tracker))
 
-    def within(self, pose: Pose) -> bool:
-        """Whether ``pose`` is inside both tolerances."""
+    def within(self, pose: Pose, tracker: PathTracker) -> bool:
+        """Whether ``pose`` is inside both tolerances, at the end of the path and not where it comes by earlier."""
         close = pose.distance_to(self.goal) < self.dist_tolerance
-        return close and pose.angle_to(self.goal) < self.angle_tolerance
+        driven = tracker.has_arrived(self.dist_tolerance + STRAYING * tracker.deviation)
+        return close and driven and pose.angle_to(self.goal) < self.angle_tolerance

@@ -8,7 +8,7 @@ Whatever ends the loop, the lease is given back and the robot stands. Difference
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from mbf_abstract.clock import Stopwatch
@@ -17,8 +17,10 @@ from mbf_abstract.execution.arrival import ArrivalCheck
 from mbf_abstract.execution.loaded_plugin import PluginFault, PluginNonFinite, checked_answer
 from mbf_abstract.execution.oscillation import OscillationDetector
 from mbf_abstract.execution.plugin_run import PluginRun
+from mbf_abstract.execution.progress import ProgressDetector
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
 from mbf_abstract.robot import RobotStateError
 from mbf_abstract.transforms import TransformError
@@ -69,10 +71,14 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Plan:
-    """A path in the global frame with the arrival rule of its goal."""
+    """A path in the global frame with the arrival rule of its goal, and the robot's progress on it."""
 
     path: Path
     arrival: ArrivalCheck
+    tracker: PathTracker = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tracker", PathTracker(self.path))
 
 
 class ControllerExecution:
@@ -107,6 +113,7 @@ class ControllerExecution:
         self._hold_reason: tuple[int, str] | None = None
         self._ignored = Stopwatch(run.runtime.clock)
         self._oscillation = OscillationDetector(run.runtime.clock)
+        self._progress = ProgressDetector(run.runtime.clock)
         self._graceful_stop: Stopwatch | None = None
         self._lease: Lease | None = None
         self.state = ControllerState.INITIALIZED
@@ -212,13 +219,13 @@ class ControllerExecution:
         if not self._run.handle.paused:
             if lease.paused:
                 lease.resume()
-                self._ignored.resume()
-                self._oscillation.stopwatch.resume()
+                for watch in (self._ignored, self._oscillation.stopwatch, self._progress.stopwatch):
+                    watch.resume()
             return False
         if not lease.paused:
             lease.pause()
-            self._ignored.pause()
-            self._oscillation.stopwatch.pause()
+            for watch in (self._ignored, self._oscillation.stopwatch, self._progress.stopwatch):
+                watch.pause()
             self._enter(ControllerState.PAUSED)
         return True
 
@@ -255,14 +262,12 @@ class ControllerExecution:
             return True
         slack = self._runtime.relaxation.slack(self._runtime.clock.now())
         arrival, controller = self._plan.arrival.relaxed(slack), self._run.plugin.instance
-
-        def ask_plugin() -> bool:
-            return self._run.call(
-                "is_goal_reached",
-                lambda: bool(controller.is_goal_reached(pose, arrival.dist_tolerance, arrival.angle_tolerance)),
-            )
-
-        return arrival.reached(pose, ask_plugin)
+        self._plan.tracker.update(pose.position)
+        plugin_agrees = self._run.call(
+            "is_goal_reached",
+            lambda: bool(controller.is_goal_reached(pose, arrival.dist_tolerance, arrival.angle_tolerance)),
+        )
+        return arrival.reached(pose, self._plan.tracker, plugin_agrees)
 
     def _come_to_rest(self, velocity: Twist, lease: Lease) -> ControllerEnd | None:
         """At the goal: with ``force_stop_at_goal`` the goal succeeds once the robot stands, else at once."""
@@ -342,6 +347,11 @@ class ControllerExecution:
                 f"the robot has not moved {parameters.oscillation_distance:g} m "
                 f"nor turned {parameters.oscillation_angle:g} rad in {parameters.oscillation_timeout:g} s"
             )
+            return self._end(ControllerState.OSCILLATING, ExePathOutcome.OSCILLATION, text)
+        assert self._plan is not None
+        tracker = self._plan.tracker
+        if self._progress.check(pose, tracker, parameters.progress_timeout):
+            text = f"no progress in {parameters.progress_timeout:g} s, {tracker.remaining:.2f} m before the path's end"
             return self._end(ControllerState.OSCILLATING, ExePathOutcome.OSCILLATION, text)
         return None
 

@@ -1,48 +1,41 @@
-"""How far along its path the robot is: the numbers of the feedback."""
+"""How far along its path the robot is: the numbers of the feedback, and the end of a robot that gets no farther."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from mbf_abstract.actions.goals import ExePathFeedback
-from mbf_abstract.arithmetic import norm
 from mbf_abstract.clock import Clock, Stopwatch
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import ControlResult
 
-SEARCH_AHEAD = 3.0  # m along the path; a path that comes back past the robot is not short-cut
+LEAST_PROGRESS = 0.1
+"""Progress along the path [m], or rotation towards the final heading [rad], that counts."""
+NEAR_END = 0.5
+"""Length [m] left of the path below which turning to the final heading is progress."""
 
 
 class PathProgress:
-    """Follows the robot along a path; the nearest pose is searched ahead of the last one only."""
+    """Feedback of a robot that is tracked along one path after the other."""
 
-    def __init__(self, clock: Clock, path: Path) -> None:
+    def __init__(self, clock: Clock, tracker: PathTracker) -> None:
         self._watch = Stopwatch(clock)
-        self.restart(path)
+        self.restart(tracker)
 
-    def restart(self, path: Path) -> None:
+    def restart(self, tracker: PathTracker) -> None:
         """Begin on a new path."""
-        self.path = path
-        self._remaining = path.remaining_lengths
-        self._index = 0
+        self._tracker = tracker
         self._start_distance: float | None = None
         self._watch.restart()
 
-    def distance_along_path(self, pose: Pose) -> float:
-        """Distance to go [m]: straight to the nearest pose or the one after it, then along the path."""
-        horizon = self._remaining[self._index] - SEARCH_AHEAD
-        end = int(np.searchsorted(-self._remaining, -horizon, side="right")) + 1
-        window = self.path.positions[self._index : max(end, self._index + 2)]
-        distances = norm(window - np.asarray(pose.position))
-        nearest = int(np.argmin(distances))
-        to_go = distances[nearest : nearest + 2] + self._remaining[self._index + nearest :][:2]
-        self._index += nearest
-        return float(to_go.min())
+    @property
+    def path(self) -> Path:
+        """The path of now."""
+        return self._tracker.path
 
     def feedback(self, pose: Pose, result: ControlResult) -> ExePathFeedback:
         """Feedback of one control cycle."""
         goal = self.path[-1]
-        to_go = self.distance_along_path(pose)
+        to_go = self._tracker.deviation + self._tracker.remaining
         if self._start_distance is None:
             self._start_distance = to_go
         done, elapsed = self._start_distance - to_go, self._watch.elapsed
@@ -57,3 +50,32 @@ class PathProgress:
             time_to_goal=time_to_goal,
             last_command=result.command,
         )
+
+
+class ProgressDetector:
+    """Fires when a robot has come no farther for some time, whatever it does meanwhile.
+
+    Farther is ``LEAST_PROGRESS`` along its path, also where a new one replaces it on the way, or as much nearer to the
+    final heading at its end. Turning, driving to and fro and driving back are none.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self.stopwatch = Stopwatch(clock)
+        self._tracker: PathTracker | None = None
+        self._last = 0.0
+        self._advanced = 0.0
+        self._least_turn = float("inf")
+
+    def check(self, pose: Pose, tracker: PathTracker, timeout: float) -> bool:
+        """Take in this cycle's pose and progress; True if it is time to end. A ``timeout`` of 0 switches it off."""
+        if self._tracker is None:
+            self.stopwatch.restart()
+        if self._tracker is not tracker:
+            self._tracker, self._last = tracker, 0.0
+        self._advanced += tracker.progress - self._last
+        self._last = tracker.progress
+        turn = pose.angle_to(tracker.goal) if tracker.remaining <= NEAR_END else float("inf")
+        if self._advanced >= LEAST_PROGRESS or turn < self._least_turn - LEAST_PROGRESS:
+            self._advanced, self._least_turn = 0.0, min(turn, self._least_turn)
+            self.stopwatch.restart()
+        return 0.0 < timeout <= self.stopwatch.elapsed

@@ -23,7 +23,7 @@ def send(bench, area, kind=GetPathGoal):
     return bench.navigator.send(kind(NOT_LOOKED_AT, goal_area=area))
 
 
-@pytest.mark.parametrize(("area", "length"), [(DISC, 2.1), (SQUARE, 2.2), (STATIONS, 2.0)])
+@pytest.mark.parametrize(("area", "length"), [(DISC, 7 / 3), (SQUARE, 2.6), (STATIONS, 2.0)])
 def test_the_path_leads_to_the_nearest_member(make_bench, area, length):
     bench = make_bench()
     result = send(bench, area).wait()

@@ -7,6 +7,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.arrival import ArrivalCheck
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome as Outcome
+from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import ControlResult
 from mbf_abstract.robot import Odometry
 from mbf_abstract.testing.faulty import drive
@@ -81,6 +82,31 @@ def test_who_decides_that_the_robot_has_arrived(make_bench, parameters, plugin_s
 
 
 # F086 to F092: a goal checker's tolerances. Upstream MBF compares strictly (mbf.md 4.4), so the limit is not inside.
+def driven_to_its_end():
+    return PathTracker(Path.from_poses([Pose.planar(0.0, 0.0)]))
+
+
+@pytest.mark.parametrize("parameters", [{"mbf_tolerance_check": True}, {"mbf_tolerance_exclusive": True}, {}])
+def test_a_path_that_ends_where_it_begins_is_driven_before_the_robot_has_arrived(make_bench, parameters):
+    bench = make_bench(**parameters)
+    bench.controller.is_goal_reached = lambda pose, distance, angle: not parameters and bench.clock.now() > 9.0
+    there_and_back = [0.5] * 60 + [-0.5] * 60
+    bench.controller.play(*(ControlResult(Outcome.SUCCESS, "", Twist.planar(speed)) for speed in there_and_back))
+    out_and_back = Path.from_points([(0, 0, 0), (1.5, 0, 0), (0, 0, 0)])
+    assert bench.navigator.exe_path(out_and_back, dist_tolerance=0.1, angle_tolerance=4.0).success
+    assert max(command.vx for _, command in bench.robot.commands) == 0.5
+    assert bench.clock.now() > 5.5
+
+
+def test_a_robot_that_turns_and_drives_without_getting_farther_is_ended_by_default(make_bench):
+    bench = make_bench()
+    to_and_fro = [Twist.planar(0.3, wz=1.0)] * 20 + [Twist.planar(-0.3, wz=1.0)] * 20
+    bench.controller.play(*(ControlResult(Outcome.SUCCESS, "", command) for command in to_and_fro * 50))
+    result = bench.navigator.exe_path(Path.from_points([(0, 0, 0), (5, 0, 0)]))
+    assert result.outcome == Outcome.OSCILLATION
+    assert "no progress in 60 s" in result.message
+
+
 @pytest.mark.parametrize(
     ("x", "y", "yaw", "arrived"),
     [
@@ -95,11 +121,12 @@ def test_who_decides_that_the_robot_has_arrived(make_bench, parameters, plugin_s
 )
 def test_a_pose_is_inside_the_tolerances_or_not(x, y, yaw, arrived):
     check = ArrivalCheck(Pose.planar(0.0, 0.0), 0.25, 0.25, "exclusive")
-    assert check.reached(Pose.planar(x, y, yaw), lambda: pytest.fail("the plugin is not asked")) is arrived
+    for plugin_agrees in (True, False):
+        assert check.reached(Pose.planar(x, y, yaw), driven_to_its_end(), plugin_agrees) is arrived
 
 
 def test_f088_headings_are_compared_around_the_circle():
-    assert ArrivalCheck(Pose.planar(0, 0, 3.14), 0.25, 0.25).within(Pose.planar(0, 0, -3.14))
+    assert ArrivalCheck(Pose.planar(0, 0, 3.14), 0.25, 0.25).within(Pose.planar(0, 0, -3.14), driven_to_its_end())
 
 
 @pytest.mark.parametrize("velocity", [Twist.planar(1.0), Twist.planar(0.0, 1.0), Twist.planar(wz=1.0)])
