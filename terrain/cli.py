@@ -41,8 +41,12 @@ def run(
     view: bool = typer.Option(False, "--view", help="Serve a page to watch and steer the run, until Ctrl-C."),
     view_port: int = typer.Option(8080, "--view-port", min=1, max=65535, help="Port of the page; the next free one."),
     view_host: str = typer.Option(
-        "127.0.0.1", "--view-host", help="Interface of the page; who can reach it can drive the robot."
+        "127.0.0.1", "--view-host", help="Interface of the page; others than loopback are not encrypted."
     ),
+    view_token: bool = typer.Option(
+        True, "--view-token/--no-view-token", help="A token in the page's address, so that only who has it gets in."
+    ),
+    view_read_only: bool = typer.Option(False, "--view-read-only", help="Let nobody steer, only watch."),
     view_speed: float = typer.Option(
         1.0, "--view-speed", min=0.0, help="With --view: at most so many times real time; 0 = no limit."
     ),
@@ -73,7 +77,7 @@ def run(
                 on_note=live.note,
                 executive=executive,
                 on_page=lambda address: live.note(f"live view at {address}"),
-                view=ViewOptions(view_host, view_port, view_speed, stay) if view else None,
+                view=ViewOptions(view_host, view_port, view_speed, stay, view_token, view_read_only) if view else None,
             )
             result = run_scenario(loaded, options)
     _tell(result, as_json)

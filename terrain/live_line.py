@@ -31,7 +31,7 @@ class LiveLine:
 
     def __init__(self, show: bool = True, console: Console | None = None) -> None:
         self._console = console or Console(stderr=True, highlight=False)
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
+        columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(20), TimeElapsedColumn())
         hidden = not (show and self._console.is_terminal)
         self._bar = Progress(*columns, console=self._console, transient=True, disable=hidden)
         self._task = self._bar.add_task("starting", total=None)
@@ -53,7 +53,7 @@ class LiveLine:
 
     def note(self, text: str) -> None:
         """Leave a line in the terminal that stays, also where nothing else is shown."""
-        self._console.print(text)
+        self._console.print(text, markup=False, soft_wrap=True)
 
     def progress(self, progress: RunProgress) -> None:
         """Tell how the drive goes; the bar shows how much of the longest way to the goal is done."""

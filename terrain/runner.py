@@ -161,7 +161,7 @@ def _live_view(bench: Bench, tour: GoalTour, options: RunOptions) -> AbstractCon
         return nullcontext()
     from terrain.viewer.live.session import LiveSession
 
-    return LiveSession(bench, tour, options.view, options.on_page)
+    return LiveSession(bench, tour, options.view, options.on_page, options.on_note)
 
 
 class _ProgressReporter:

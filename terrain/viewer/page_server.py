@@ -8,14 +8,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from typing import Any
 
+from terrain.viewer.page_access import NOBODY, PageAccess
+from terrain.viewer.page_guard import PageGuard
 from terrain.viewer.picture import ViewerMissing
-
-LOOPBACK = "127.0.0.1"
 
 
 @contextmanager
-def page_server(port: int, host: str = LOOPBACK, label: str | None = None) -> Iterator[Any]:
-    """Start a viser server and stop it afterwards.
+def page_server(port: int, access: PageAccess = NOBODY, label: str | None = None) -> Iterator[Any]:
+    """Start a viser server that only those see whom ``access`` lets in, and stop it afterwards.
 
     Raises
     ------
@@ -26,13 +26,17 @@ def page_server(port: int, host: str = LOOPBACK, label: str | None = None) -> It
         import viser
     except ImportError as error:
         raise ViewerMissing(f"a page of a run needs viser: pip install 'mbf-flex[sim]' ({error})") from error
-    _check_interface(host)
+    _check_interface(access.host)
+    guard = PageGuard(access)
     try:
-        with redirect_stdout(io.StringIO()):  # viser prints a banner, which is not for those who asked for JSON
-            server = viser.ViserServer(host=host, port=port, label=label, verbose=False)
+        with redirect_stdout(io.StringIO()), guard.installed():  # viser's banner is not for those who asked for JSON
+            server = viser.ViserServer(host=access.host, port=port, label=label, verbose=False)
     except (OSError, RuntimeError) as error:
         raise ViewerMissing(f"viser cannot start a server on this machine: {error}") from error
     try:
+        if not guard.is_installed:
+            raise ViewerMissing(f"viser {viser.__version__} cannot be guarded against strangers, so it is not used")
+        guard.controls = server.gui._gui_input_handle_from_uuid
         yield server
     finally:
         with redirect_stdout(io.StringIO()):

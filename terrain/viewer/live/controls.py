@@ -56,7 +56,11 @@ class LiveControls:
     def work_off(self) -> None:
         """Do what was asked for; on the simulator's thread."""
         while self._waiting:
-            self._waiting.popleft()()
+            command = self._waiting.popleft()
+            try:
+                command()
+            except Exception as error:  # whatever a page has asked for, the world goes on
+                self._tell("refused", message=f"{type(error).__name__}: {error}")
         if self.holding:
             self._server.pause_all()  # again and again, for goals that an executive has sent meanwhile
 

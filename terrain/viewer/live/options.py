@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from terrain.viewer.page_access import LOOPBACK, PageAccess, is_loopback
+
 
 @dataclass(frozen=True)
 class ViewOptions:
@@ -12,20 +14,38 @@ class ViewOptions:
     Attributes
     ----------
     host : str
-        Interface to listen at. Whoever can reach it can drive the robot, so it is loopback unless told otherwise.
+        Interface to listen at, loopback unless told otherwise.
     port : int
         The first one tried; the next free one is taken.
     speed : float
         Simulated seconds per second at most; 0 = as fast as possible.
     stay : bool
         Wait for further goals after those of the scenario, until Ctrl-C.
+    token : bool
+        Let only those in who know the address, which has a token in it; without, whoever can reach it.
+    read_only : bool
+        Let nobody steer; else there are two addresses, one to steer and one to watch.
+
+    Raises
+    ------
+    ValueError
+        A negative speed, or no token on an interface that other machines can reach.
     """
 
-    host: str = "127.0.0.1"
+    host: str = LOOPBACK
     port: int = 8080
     speed: float = 1.0
     stay: bool = True
+    token: bool = True
+    read_only: bool = False
 
     def __post_init__(self) -> None:
         if self.speed < 0.0:
             raise ValueError(f"speed must not be negative, got {self.speed}")
+        if not self.token and not is_loopback(self.host):
+            raise ValueError(f"without a token a page is served at loopback only, not at {self.host!r}")
+
+    def access(self) -> PageAccess:
+        """Decide who gets in, with new tokens each time."""
+        make = PageAccess.by_token if self.token else PageAccess.open
+        return make(self.host, self.read_only)

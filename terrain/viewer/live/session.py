@@ -22,6 +22,7 @@ from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.pace import Pace
 from terrain.viewer.live.page import LivePage, tilt_of
 from terrain.viewer.live.plots import PERIOD, UNWATCHED_PERIOD, History
+from terrain.viewer.page_access import Role, is_loopback
 from terrain.viewer.page_server import page_server
 
 FRAME_PERIOD = 0.1  # s of wall time between two drawings
@@ -38,11 +39,14 @@ class LiveSession:
     options : ViewOptions
     tell : callable
         Told where the page is.
+    warn : callable
+        Told what the user must know about who can reach it.
 
     Attributes
     ----------
-    address : str
-        Where the page is, once the context has been entered.
+    address, watching_address : str
+        Where the page is for who steers it, and for who only watches, once the context has been entered; empty where
+        there is none.
     controls : LiveControls
         What the page may ask for.
 
@@ -53,14 +57,20 @@ class LiveSession:
     """
 
     def __init__(
-        self, bench: Bench, tour: GoalTour, options: ViewOptions, tell: Callable[[str], None] = lambda text: None
+        self,
+        bench: Bench,
+        tour: GoalTour,
+        options: ViewOptions,
+        tell: Callable[[str], None] = lambda text: None,
+        warn: Callable[[str], None] = lambda text: None,
     ) -> None:
-        self.address = ""
+        self.address = self.watching_address = ""
         self.controls = LiveControls(bench, tour)
         self._bench = bench
         self._tour = tour
         self._options = options
         self._tell = tell
+        self._warn = warn
         self._log = LiveLog()
         self._history = History()
         self._wall = WallClock()
@@ -70,18 +80,29 @@ class LiveSession:
         self._exits = ExitStack()
 
     def __enter__(self) -> LiveSession:
-        bench, options = self._bench, self._options
+        bench, access = self._bench, self._options.access()
         with ExitStack() as exits:
-            server = exits.enter_context(page_server(options.port, options.host, "mbf " + bench.scenario.name))
+            server = exits.enter_context(page_server(self._options.port, access, "mbf " + bench.scenario.name))
             self._page = page = LivePage(server, bench, self._tour, self.controls, self._log)
             exits.enter_context(_ctrl_c(lambda: self.controls.post(lambda: self.controls.end("Ctrl-C"))))
-            self.address = f"http://{options.host}:{server.get_port()}"
+            self.address = access.address(server.get_port(), Role.STEER) or ""
+            self.watching_address = access.address(server.get_port(), Role.WATCH) or ""
             self._exits = exits.pop_all()
         self._tour.on_goal.append(page.things.show_goal)
         bench.events.add_sink(self._log)
         bench.loop.on_tick.append(self._after_step)
-        self._tell(self.address)
+        self._tell_addresses()
         return self
+
+    def _tell_addresses(self) -> None:
+        self._tell(self.address or self.watching_address)
+        if self.address and self.watching_address:
+            self._warn(f"for those who may only watch: {self.watching_address}")
+        if not is_loopback(self._options.host):
+            self._warn(
+                f"warning: other machines can reach the page at {self._options.host}, and it is not encrypted; who has "
+                "or overhears the address can drive the robot"
+            )
 
     def __exit__(self, *exc: object) -> None:
         self._bench.loop.on_tick.remove(self._after_step)

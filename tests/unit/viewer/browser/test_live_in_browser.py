@@ -76,7 +76,7 @@ def test_the_page_shows_the_run_and_steers_it(chromium, served_run, tmp_path):
     (tmp_path / "live_view.png").write_bytes(png)
     assert errors == []
     assert_the_log_tells_what_was_asked_for(list(read_events(folder / "events.jsonl")))
-    assert answer["outcome_name"] == "CANCELED"
+    assert answer["outcome"] == "CANCELED"
     assert (folder / "replay.html").is_file()
     assert_the_ground_and_the_person_are_seen(png)
 
