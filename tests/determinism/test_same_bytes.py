@@ -12,7 +12,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+
+try:
+    from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+except ImportError:  # numpy before 2
+    from numpy.core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 pytestmark = pytest.mark.timeout(1800)
 

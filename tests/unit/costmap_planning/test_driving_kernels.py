@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from mbf_costmap_nav.controllers.mppi import smoothing_matrix
 from mbf_costmap_nav.costmap import Costmap
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.footprint_check import FootprintCheck
@@ -19,6 +20,7 @@ from mbf_costmap_nav.kernels.critics import (
 )
 from mbf_costmap_nav.kernels.footprint_cost import OUTSIDE, footprint_cost
 from mbf_costmap_nav.kernels.line_cells import cost_along
+from mbf_costmap_nav.kernels.rollout import blend
 from mbf_costmap_nav.kernels.smoothing import relax_path
 from mbf_costmap_nav.kernels.sonar import FADE_DISTANCE, LEAST_PROBABILITY, occupied_given_reading, update_cone
 
@@ -141,3 +143,15 @@ def test_cells_take_a_reading_by_bayes_rule(seed, x, y, reading, bearing):
         in_box = x0 <= ix < x1 and y0 <= iy < y1
         assert after[iy, ix] == pytest.approx(expected if in_box else prior[iy, ix], abs=1e-4)
         assert in_box or says == 0.5
+
+
+@given(st.integers(1, 200), st.floats(0.05, 5.0), st.integers(0, 2**32 - 1))
+def test_the_blended_motion_is_the_mean_by_weight_then_smoothed(samples, temperature, seed):
+    rng = np.random.default_rng(seed)
+    velocities = rng.normal(size=(3, 5, samples)).astype(np.float32)
+    costs = rng.uniform(0.0, 20.0, samples).astype(np.float32)
+    smoothing = smoothing_matrix(5)
+    weights = [math.exp(-(cost - min(costs.tolist())) / temperature) for cost in costs.tolist()]
+    mean = np.average(velocities.astype(np.float64), axis=2, weights=weights)
+    blended = blend(velocities, costs, temperature, smoothing)
+    assert blended == pytest.approx(mean @ smoothing.astype(np.float64), abs=1e-5)
