@@ -1,9 +1,10 @@
 """Runs a scenario from start to last goal with ``move_base``, or another executive, and writes what happened.
 
 In the folder: ``events.jsonl``, ``metrics.json``, ``recording.npz``, ``picture.png``, ``report.html``, ``replay.html``,
-``run.mcap``, ``navigation.yaml`` and the world's map files. On simulated time the same scenario and seed write the same
-``events.jsonl``, byte for byte, and the same ``digest`` in ``metrics.json``, which covers poses and commands too (see
-``terrain.run_digest``); how long the run took on the wall stands in ``timing.json``.
+``run.mcap``, ``navigation.yaml``, ``versions.json`` and the world's map files. On simulated time the same scenario and
+seed write the same ``events.jsonl``, byte for byte, and the same ``digest`` in ``metrics.json``, which covers poses and
+commands too (see ``terrain.run_digest``), on every CPU with the versions that ``versions.json`` names; how long the run
+took on the wall stands in ``timing.json``.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from terrain.scenario import Scenario
 from terrain.scenario_world import ScenarioWorld
 from terrain.shortest_way import shortest_way
 from terrain.verdict import Verdict, judge
+from terrain.versions import write_versions
 from terrain.viewer.live.options import ViewOptions
 
 
@@ -115,6 +117,7 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
         The scenario has no configuration for the backend, or that configuration is wrong; all findings.
     """
     options.folder.mkdir(parents=True, exist_ok=True)
+    write_versions(options.folder)
     log = JsonLinesSink(options.folder / "events.jsonl")
     bench = Bench(
         scenario,

@@ -1,0 +1,43 @@
+"""What a run was made with: the same scenario and seed is promised to be the same drive for equal versions only."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+FILE = "versions.json"
+
+DECISIVE = (
+    *("mbf-flex", "numpy", "scipy", "numba", "llvmlite", "pybullet", "trimesh", "networkx", "rtree", "h5py", "pillow"),
+    *("pydantic", "pyyaml", "py_trees"),
+)
+"""Distributions whose code can change how a robot drives."""
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, of the C library and of every decisive distribution; the operating system and the CPU."""
+    found = {"python": platform.python_version(), "libc": " ".join(platform.libc_ver()).strip()}
+    for distribution in DECISIVE:
+        try:
+            found[distribution] = version(distribution)
+        except PackageNotFoundError:
+            found[distribution] = "not installed"
+    return {**found, "system": f"{platform.system()} {platform.machine()}", "cpu": _cpu(), "cores": str(os.cpu_count())}
+
+
+def write_versions(folder: Path) -> None:
+    """Write ``versions.json`` into the folder of a run."""
+    (folder / FILE).write_text(json.dumps(versions(), indent=2) + "\n", encoding="utf-8")
+
+
+def _cpu() -> str:
+    """Name of the CPU; where Linux does not tell, what Python knows."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()
