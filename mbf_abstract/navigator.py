@@ -15,14 +15,16 @@ Example
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable
 from typing import Any, overload
 
 from mbf_abstract.actions.goals import (
     ExePathFeedback,
     ExePathGoal,
     ExePathResult,
+    FollowWaypointsFeedback,
+    FollowWaypointsGoal,
+    FollowWaypointsResult,
     GetPathGoal,
     GetPathResult,
     MoveBaseGoal,
@@ -32,6 +34,7 @@ from mbf_abstract.actions.goals import (
     RecoveryResultMessage,
     RefinePathGoal,
     RefinePathResult,
+    WaypointTask,
 )
 from mbf_abstract.actions.handle import GoalHandle
 from mbf_abstract.clock import Clock, WallClock
@@ -41,25 +44,6 @@ from mbf_abstract.robot import Robot
 from mbf_abstract.server import AbstractNavigationServer
 from mbf_abstract.server_factory import make_server
 from mbf_abstract.transforms import TransformBuffer
-
-WaypointTask = Callable[[int, Pose], None]
-
-
-@dataclass(frozen=True)
-class WaypointsResult:
-    """What became of a waypoint tour: one result per visit, in order of visits."""
-
-    results: tuple[MoveBaseResult, ...]
-
-    @property
-    def success(self) -> bool:
-        """Whether every visit succeeded."""
-        return all(result.success for result in self.results)
-
-    @property
-    def failed(self) -> tuple[int, ...]:
-        """Indices of the visits that failed."""
-        return tuple(i for i, result in enumerate(self.results) if not result.success)
 
 
 class Navigator:
@@ -91,6 +75,10 @@ class Navigator:
     def send(self, goal: RefinePathGoal) -> GoalHandle[RefinePathGoal, RefinePathResult, NoFeedback]: ...
     @overload
     def send(self, goal: MoveBaseGoal) -> GoalHandle[MoveBaseGoal, MoveBaseResult, ExePathFeedback]: ...
+    @overload
+    def send(
+        self, goal: FollowWaypointsGoal
+    ) -> GoalHandle[FollowWaypointsGoal, FollowWaypointsResult, FollowWaypointsFeedback]: ...
     def send(self, goal: Any) -> Any:
         """Send any goal to its action and return the handle at once."""
         server = self.server
@@ -100,6 +88,7 @@ class Navigator:
             RecoveryGoal: server.recovery,
             RefinePathGoal: server.refine_path,
             MoveBaseGoal: server.move_base,
+            FollowWaypointsGoal: server.follow_waypoints,
         }
         action: Any = actions.get(type(goal))
         if action is None:
@@ -134,32 +123,9 @@ class Navigator:
         stop_on_failure: bool = True,
         task: WaypointTask | None = None,
         **fields: Any,
-    ) -> WaypointsResult:
-        """Visit poses in order with ``move_base``.
-
-        Parameters
-        ----------
-        waypoints : iterable of Pose
-        loops : int
-            How often the whole list is visited.
-        stop_on_failure : bool
-            End the tour at the first visit that fails; otherwise go on to the next pose.
-        task : callable
-            Called as ``task(index, pose)`` at every pose that was reached, while the robot stands there.
-        **fields
-            Further fields of every ``MoveBaseGoal``.
-        """
-        if loops < 1:
-            raise ValueError(f"loops must be at least 1, got {loops}")
-        poses, results = list(waypoints), []
-        for index, pose in list(enumerate(poses)) * loops:
-            result = self.go_to(pose, **fields)
-            results.append(result)
-            if result.success and task is not None:
-                task(index, pose)
-            if not result.success and stop_on_failure:
-                break
-        return WaypointsResult(tuple(results))
+    ) -> FollowWaypointsResult:
+        """Visit poses in order with ``move_base`` and wait; all arguments are fields of ``FollowWaypointsGoal``."""
+        return self.send(FollowWaypointsGoal(tuple(waypoints), loops, stop_on_failure, task, **fields)).wait()
 
     def robot_pose(self) -> Pose:
         """Fresh robot pose in the global frame; raises RobotStateError."""

@@ -1,4 +1,4 @@
-"""The abstract navigation server: owns the runtime, the plugins and the five actions. It knows no map.
+"""The abstract navigation server: owns the runtime, the plugins and the six actions. It knows no map.
 
 A server of a map derives it and overrides hooks only: make the map, make a plugin's context, say whether the map may be
 driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_costmap_nav.server``,
@@ -15,6 +15,7 @@ from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
 from mbf_abstract.actions.exe_path import ExePathAction
+from mbf_abstract.actions.follow_waypoints import FollowWaypointsAction
 from mbf_abstract.actions.get_path import GetPathAction
 from mbf_abstract.actions.move_base import MoveBaseAction
 from mbf_abstract.actions.recovery import RecoveryAction
@@ -87,6 +88,7 @@ class AbstractNavigationServer(PluginHost):
         self.recovery = RecoveryAction(self.runtime, self.plugins)
         self.refine_path = RefinePathAction(self.runtime, self.plugins)
         self.move_base = MoveBaseAction(self.runtime, self.plugins, self.get_path, self.exe_path, self.recovery)
+        self.follow_waypoints = FollowWaypointsAction(self.runtime, self.move_base)
 
     # --------------------------------------------------------------------------- hooks for a map's server
     @abstractmethod
@@ -213,7 +215,7 @@ class AbstractNavigationServer(PluginHost):
         self.close()
 
     def _actions(self) -> list[Any]:
-        names = ("move_base", "get_path", "exe_path", "recovery", "refine_path")
+        names = ("follow_waypoints", "move_base", "get_path", "exe_path", "recovery", "refine_path")
         return [getattr(self, name) for name in names if hasattr(self, name)]
 
     def _make_runtime(

@@ -98,7 +98,7 @@ class Action(ABC, Generic[G, R, F]):
         handle: GoalHandle[G, R, F] = GoalHandle(next(self.runtime.goal_ids), self.name, goal, self.runtime)
         if on_done is not None:
             handle.add_done_callback(on_done)
-        rejection = self._rejection(goal)
+        rejection = self.rejection(goal)
         if rejection is not None:
             outcome, message = rejection
             self.runtime.events.emit(EventKind.GOAL_REJECTED, self.name, goal_id=handle.id, message=message)
@@ -195,7 +195,8 @@ class Action(ABC, Generic[G, R, F]):
     def _is_cancel(self, handle: GoalHandle[G, R, F], outcome: int) -> bool:
         return outcome == self.canceled_outcome
 
-    def _rejection(self, goal: G) -> tuple[int, str] | None:
+    def rejection(self, goal: G) -> tuple[int, str] | None:
+        """Why the goal would be rejected if it came now, as outcome and text; None if it would not."""
         if self._closed:
             return self.internal_error_outcome, SHUT_DOWN
         slot = self._slot(goal)

@@ -6,11 +6,15 @@ a goal object can be sent any number of times.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from mbf_abstract.geometry import Command, Path, Pose
 from mbf_abstract.goal_area import GoalArea
 from mbf_abstract.outcomes import is_success, outcome_name
+
+WaypointTask = Callable[[int, Pose], None]
+"""What is done at a waypoint, called with its index and pose."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +105,56 @@ class MoveBaseGoal:
 
 
 @dataclass(frozen=True)
+class FollowWaypointsGoal:
+    """Visit poses in order, each with a ``move_base`` goal.
+
+    Attributes
+    ----------
+    waypoints : tuple of Pose
+    loops : int
+        How often the whole list is visited; ValueError if it is not at least 1.
+    stop_on_failure : bool
+        End the tour at the first visit that fails; otherwise go on to the next pose.
+    task : callable, optional
+        Called as ``task(index, pose)`` at every pose that was reached, while the robot stands there. It may take its
+        time; one that raises ends the tour with INTERNAL_ERROR.
+    planner, controller, recovery_behaviors, dist_tolerance, angle_tolerance
+        As in ``MoveBaseGoal``.
+    """
+
+    waypoints: tuple[Pose, ...]
+    loops: int = 1
+    stop_on_failure: bool = True
+    task: WaypointTask | None = None
+    planner: str = ""
+    controller: str = ""
+    recovery_behaviors: tuple[str, ...] | None = None
+    dist_tolerance: float | None = None
+    angle_tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "waypoints", tuple(self.waypoints))
+        if self.loops < 1:
+            raise ValueError(f"loops must be at least 1, got {self.loops}")
+
+    @property
+    def visits(self) -> int:
+        """How many visits the tour has."""
+        return len(self.waypoints) * self.loops
+
+    def visit(self, number: int) -> MoveBaseGoal:
+        """Return the goal of one visit, counted from 0 over all loops."""
+        return MoveBaseGoal(
+            self.waypoints[number % len(self.waypoints)],
+            self.planner,
+            self.controller,
+            self.recovery_behaviors,
+            self.dist_tolerance,
+            self.angle_tolerance,
+        )
+
+
+@dataclass(frozen=True)
 class ActionResult:
     """What every result has: an outcome code (success < 10) and a text that is never empty."""
 
@@ -176,6 +230,22 @@ class MoveBaseResult(ActionResult):
 
 
 @dataclass(frozen=True)
+class FollowWaypointsResult(ActionResult):
+    """What became of a tour: one result per visit, in order of visits.
+
+    The outcome is SUCCESS if every visit succeeded, else that of the first one that failed; CANCELED and INTERNAL_ERROR
+    are the tour's own.
+    """
+
+    results: tuple[MoveBaseResult, ...] = ()
+
+    @property
+    def failed(self) -> tuple[int, ...]:
+        """Numbers of the visits that failed."""
+        return tuple(number for number, result in enumerate(self.results) if not result.success)
+
+
+@dataclass(frozen=True)
 class ExePathFeedback:
     """One observed control cycle.
 
@@ -201,6 +271,26 @@ class ExePathFeedback:
     distance_along_path: float
     time_to_goal: float
     last_command: Command | None = None
+
+
+@dataclass(frozen=True)
+class FollowWaypointsFeedback:
+    """Where a tour is.
+
+    Attributes
+    ----------
+    visit, waypoint : int
+        The present visit, counted from 0 over all loops, and the index of its pose.
+    results : tuple of MoveBaseResult
+        The visits that have ended.
+    driving : ExePathFeedback, optional
+        How the present visit gets on; None when it has just ended.
+    """
+
+    visit: int
+    waypoint: int
+    results: tuple[MoveBaseResult, ...]
+    driving: ExePathFeedback | None
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,24 @@
-"""Tours over waypoints, one move_base goal after the other."""
+"""Tours over waypoints, one move_base goal after the other: order, failures, feedback, cancel, pause, tasks."""
+
+import asyncio
 
 import pytest
 
+from mbf_abstract.actions.goals import FollowWaypointsGoal, MoveBaseGoal
+from mbf_abstract.actions.handle import GoalStatus
+from mbf_abstract.clock import WallClock
 from mbf_abstract.geometry import Pose
-from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.plugins import PlanResult
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
+from mbf_abstract.plugins import ControlResult, PlanResult
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.faulty import Hang
+from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
 from mbf_abstract.testing.scripted import straight_plan
 
 NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
+NEAR = (Pose.planar(0.3, 0.0), Pose.planar(0.6, 0.0), Pose.planar(0.9, 0.0))
+FAR = tuple(Pose.planar(x, 0.0) for x in (50.0, 100.0, 150.0))
+EVERY_WAY = [True, False]
 
 
 def test_waypoints_are_visited_in_order_with_a_task_at_each(make_bench):
@@ -27,12 +38,174 @@ def test_waypoints_are_visited_in_order_with_a_task_at_each(make_bench):
 def test_a_failed_waypoint_ends_the_tour_or_not(make_bench, stop, visits):
     bench = make_bench(recovery_enabled=False, planner_max_retries=0)
     bench.planner.play(straight_plan, NO_PATH, straight_plan)
-    tour = bench.navigator.follow_waypoints([Pose.planar(x, 0.0) for x in (0.3, 0.6, 0.9)], stop_on_failure=stop)
+    tour = bench.navigator.follow_waypoints(NEAR, stop_on_failure=stop)
     assert len(tour.results) == visits
     assert tour.failed == (1,)
-    assert not tour.success
+    assert (tour.success, tour.outcome) == (False, GetPathOutcome.NO_PATH_FOUND)
+    assert "1 of 3 visit(s) failed, first visit 1: walled in" in tour.message
 
 
-def test_a_tour_of_no_loops_is_refused(make_bench):
+def test_a_tour_of_no_loops_is_refused_and_one_of_no_waypoints_is_over_at_once(make_bench):
+    bench = make_bench()
     with pytest.raises(ValueError, match="loops"):
-        make_bench().navigator.follow_waypoints([], loops=0)
+        bench.navigator.follow_waypoints([], loops=0)
+    assert bench.navigator.follow_waypoints([]).success
+
+
+@pytest.mark.parametrize("fields", [{"planner": "none"}, {"controller": "none"}, {"dist_tolerance": -1.0}])
+def test_a_tour_whose_visits_would_be_rejected_is_rejected(make_bench, fields):
+    handle = make_bench().navigator.send(FollowWaypointsGoal(NEAR, **fields))
+    assert (handle.status, handle.result.outcome) == (GoalStatus.REJECTED, MoveBaseOutcome.FAILURE)
+
+
+def test_feedback_tells_the_visit_and_how_it_gets_on(make_bench):
+    bench = make_bench()
+    seen = []
+    handle = bench.navigator.send(FollowWaypointsGoal(NEAR[:2], loops=2))
+    handle.add_feedback_callback(seen.append)
+    handle.wait()
+    bench.clock.sleep(0.1)
+    assert list(dict.fromkeys((told.visit, told.waypoint) for told in seen)) == [(0, 0), (1, 1), (2, 0), (3, 1)]
+    assert all(told.driving is not None or len(told.results) == told.visit + 1 for told in seen)
+    first = [told.driving.dist_to_goal for told in seen if told.driving is not None and told.visit == 0]
+    assert first[0] > first[-1]
+
+
+# ----------------------------------------------------------------------------------------------------- cancel
+@pytest.mark.parametrize("stop", EVERY_WAY)
+@pytest.mark.parametrize("end", ["cancel", "cancel_all", "preempt", "close", "asyncio"])
+def test_whatever_cancels_the_tour_the_robot_stands_and_sets_off_no_more(make_bench, stop, end):
+    bench = make_bench()
+    handle = bench.navigator.send(FollowWaypointsGoal(FAR, stop_on_failure=stop))
+    bench.clock.sleep(2.0)
+    assert not bench.robot.command.is_stopped()
+
+    async def give_up():
+        task = asyncio.ensure_future(handle)
+        await asyncio.sleep(0.0)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    {
+        "cancel": handle.cancel,
+        "cancel_all": bench.navigator.cancel_all,
+        "preempt": lambda: bench.navigator.send(FollowWaypointsGoal(())),
+        "close": bench.server.close,
+        "asyncio": lambda: asyncio.run(give_up()),
+    }[end]()
+    result = handle.wait(2.0)
+    ended = bench.clock.now()
+    assert (handle.status, result.outcome) == (GoalStatus.CANCELED, MoveBaseOutcome.CANCELED)
+    assert len(result.results) == 1
+    bench.clock.sleep(5.0)
+    assert not bench.robot.moved_after(ended)
+    assert bench.robot.command.is_stopped()
+    assert_ended_once(bench, handle)
+
+
+@pytest.mark.parametrize("stop", EVERY_WAY)
+def test_a_goal_that_takes_the_robot_away_ends_the_tour(make_bench, stop):
+    bench = make_bench()
+    handle = bench.navigator.send(FollowWaypointsGoal(FAR, stop_on_failure=stop))
+    bench.clock.sleep(2.0)
+    other = bench.navigator.send(MoveBaseGoal(Pose.planar(2.0, 0.0)))
+    assert other.wait().success
+    assert handle.wait().message == "visit 0 was canceled: preempted by a new goal"
+    assert handle.status is GoalStatus.CANCELED
+    bench.clock.sleep(5.0)
+    assert bench.robot.pose.x < 2.2
+
+
+def test_a_visit_that_its_controller_gives_up_is_a_failure_not_a_cancel(make_bench):
+    bench = make_bench(recovery_enabled=False, controller_max_retries=0)
+    blocked = ControlResult(ExePathOutcome.BLOCKED_PATH, "no")
+    bench.controller.play(blocked, bench.controller.follow)
+    tour = bench.navigator.follow_waypoints(NEAR, stop_on_failure=False)
+    assert tour.failed == (0,)
+    assert len(tour.results) == 3
+
+
+def test_a_rejected_visit_ends_the_tour_whatever_it_says(make_bench):
+    bench = make_bench(max_quarantined=1)
+    tour = bench.navigator.send(
+        FollowWaypointsGoal(NEAR, 10**6, False, lambda *_: setattr(bench.server.runtime, "quarantined", 1))
+    )
+    result = tour.wait(60.0)
+    assert [visit.success for visit in result.results] == [True, False]
+    assert "plugin calls hang" in result.message
+
+
+# ------------------------------------------------------------------------------------------------------ pause
+@pytest.mark.parametrize("clock", [SimClock, WallClock])
+def test_a_paused_tour_holds_and_goes_on_also_after_pausing_all(make_bench, clock):
+    bench = make_bench(clock=clock())
+    handle = bench.navigator.send(FollowWaypointsGoal(NEAR))
+    for pause in (handle.pause, bench.server.pause_all):
+        bench.clock.sleep(0.2)
+        pause()
+        bench.clock.sleep(0.3)
+        here = bench.robot.pose
+        bench.clock.sleep(0.3)
+        assert bench.robot.pose.position == here.position
+        handle.resume()
+    assert handle.wait(60.0).success
+
+
+def test_a_tour_paused_during_its_task_does_not_set_off(make_bench):
+    bench = make_bench()
+    handle = bench.navigator.send(FollowWaypointsGoal(NEAR, task=lambda index, pose: handle.pause()))
+    for visit in range(2):
+        bench.clock.sleep(10.0)
+        assert (handle.status, len(handle.feedback.results)) == (GoalStatus.PAUSED, visit + 1)
+        handle.resume()
+    assert handle.wait(10.0).success
+
+
+# ------------------------------------------------------------------------------------------------------- task
+@pytest.mark.parametrize("error", [ValueError("no box here"), SystemExit("no box here")])
+def test_a_task_that_raises_ends_the_tour_and_the_next_one_works(make_bench, error):
+    def task(index, pose):
+        raise error
+
+    bench = make_bench()
+    tour = bench.navigator.follow_waypoints(NEAR, task=task)
+    assert tour.outcome == MoveBaseOutcome.INTERNAL_ERROR
+    assert tour.message == f"the task at waypoint 0 raised {type(error).__name__}: no box here"
+    assert bench.navigator.follow_waypoints(NEAR).success
+
+
+def test_a_task_may_use_the_navigator(make_bench):
+    bench = make_bench()
+
+    def task(index, pose):
+        assert bench.navigator.recover().success
+        assert bench.navigator.exe_path(bench.path_to(pose.x, 0.2)).success
+
+    assert bench.navigator.follow_waypoints(NEAR, task=task).success
+
+
+def test_a_task_that_cancels_all_ends_the_tour_after_itself(make_bench):
+    bench = make_bench()
+    tour = bench.navigator.follow_waypoints(
+        NEAR, stop_on_failure=False, task=lambda index, pose: bench.navigator.cancel_all()
+    )
+    assert (tour.outcome, len(tour.results)) == (MoveBaseOutcome.CANCELED, 1)
+
+
+def test_a_cancel_waits_for_a_hanging_task_no_longer_than_the_grace(make_bench):
+    bench = make_bench(cancel_grace=0.5)
+    hang = Hang(bench.clock)
+    handle = bench.navigator.send(FollowWaypointsGoal(NEAR, task=lambda index, pose: hang(pose)))
+    bench.clock.sleep(20.0)
+    assert (hang.entered, handle.done) == (1, False)
+    handle.cancel("enough")
+    result = handle.wait(0.6)
+    assert (handle.status, len(result.results)) == (GoalStatus.CANCELED, 1)
+    assert result.message == "enough; the task at waypoint 0 has not ended yet"
+    assert bench.navigator.follow_waypoints(NEAR).success
+    assert bench.server.runtime.quarantined == 1
+    hang.release()
+    bench.clock.sleep(0.1)
+    assert bench.server.runtime.quarantined == 0
+    assert_ended_once(bench, handle)
+    assert_next_goals_work(bench)
