@@ -66,22 +66,35 @@ def _read(path: Path, part: str, max_faces: int) -> MeshArrays:
     if not nodes and scene.graph.nodes_geometry:
         parts = sorted("/".join(_names_above(scene, node)) for node in scene.graph.nodes_geometry)
         raise MeshError(str(path), [f"no part '{part}', the parts are: {', '.join(parts)}"])
-    placed = [scene.graph[node] for node in nodes]
-    meshes = [(transform, scene.geometry[name]) for transform, name in placed]
-    meshes = [(transform, mesh) for transform, mesh in meshes if hasattr(mesh, "faces")]
+    meshes = [(node, scene.geometry[scene.graph[node][1]]) for node in nodes]
+    meshes = [(node, mesh) for node, mesh in meshes if hasattr(mesh, "faces")]
     if (count := sum(len(mesh.faces) for _, mesh in meshes)) > max_faces:
         raise MeshError(str(path), [f"{count} faces, the limit is {max_faces} (max_faces)"])
     vertices, faces = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)]
     offset = 0
-    for transform, mesh in meshes:
-        points = np.asarray(mesh.vertices, dtype=np.float64)
-        vertices.append(rotated(transform[:3, :3], points) + transform[:3, 3])
+    for node, mesh in meshes:
+        points, mirrored = _placed(scene, node, np.asarray(mesh.vertices, dtype=np.float64))
         corners = np.asarray(mesh.faces, dtype=np.int64) + offset
-        x_axis, y_axis, z_axis = transform[:3, :3].T
-        mirrored = float(scalar_products(np.cross(x_axis, y_axis), z_axis)) < 0.0
+        vertices.append(points)
         faces.append(corners[:, ::-1] if mirrored else corners)  # mirrored parts are inside out
         offset += len(points)
     return np.vstack(vertices), np.vstack(faces)
+
+
+def _placed(scene: Any, node: str, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool]:
+    """Points (n, 3) of a node in the scene's frame, and whether they are mirrored.
+
+    They go from node to node: trimesh would multiply the transforms, in an order of sums that depends on the CPU.
+    """
+    forest, mirrored = scene.graph.transforms, False
+    while node != scene.graph.base_frame and node in forest.parents:
+        parent = forest.parents[node]
+        transform = np.asarray(forest.edge_data[parent, node].get("matrix", np.eye(4)), dtype=np.float64)
+        points = rotated(transform[:3, :3], points) + transform[:3, 3]
+        x_axis, y_axis, z_axis = transform[:3, :3].T
+        mirrored ^= float(scalar_products(np.cross(x_axis, y_axis), z_axis)) < 0.0
+        node = parent
+    return points, mirrored
 
 
 def _loaded(path: Path, part: str) -> Any:
