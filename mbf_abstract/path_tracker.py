@@ -9,7 +9,7 @@ path turns back on itself, the search waits until the robot has come to it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from copy import copy
 
 import numpy as np
@@ -34,6 +34,8 @@ ARM, GAINED = 0.2, 0.2
 
 That is a turn of 120 degrees; on a smooth bend, one of a radius below 0.11 m.
 """
+CHUNK = 32
+"""So many segments are looked at in one go."""
 _POSITION_NOISE = 1e-9  # [m]
 
 
@@ -74,8 +76,6 @@ class PathTracker:
         self.deviation = 0.0
         self._joined = False
         self._segment = 0
-        self._corners: list[list[float]] = self.points.tolist()
-        self._sides: list[list[float]] = np.diff(self.points, axis=0).tolist()
 
     @property
     def goal(self) -> Pose:
@@ -160,20 +160,27 @@ class PathTracker:
         """
         best, least = self.progress, math.inf
         factor, margin = LEADS_AWAY
-        for i in range(self._segment, len(self._corners) - 1):
-            if self.lengths[i] >= end and least < math.inf:
+        for begin, length, corner, following in self._segments_from(self._segment):
+            if begin >= end and least < math.inf:
                 break
-            start, side = self._corners[i], self._sides[i]
-            begin, length = float(self.lengths[i]), float(self.lengths[i + 1] - self.lengths[i])
-            along = sum((r - s) * d for r, s, d in zip(robot, start, side, strict=True)) / max(length, _POSITION_NOISE)
+            scale = max(length, _POSITION_NOISE)
+            side = [(f - c) / scale for c, f in zip(corner, following, strict=True)]
+            along = sum((r - c) * s for r, c, s in zip(robot, corner, side, strict=True))
             along = min(max(along, self.progress - begin), end - begin, length)
-            share = along / max(length, _POSITION_NOISE)
-            gap = _norm(r - s - share * d for r, s, d in zip(robot, start, side, strict=True))
+            gap = _norm(r - c - along * s for r, c, s in zip(robot, corner, side, strict=True))
             if gap < least - _POSITION_NOISE:
                 best, least = begin + along, gap
-            if _norm(r - c for r, c in zip(robot, self._corners[i + 1], strict=True)) > factor * least + margin:
+            if _norm(r - f for r, f in zip(robot, following, strict=True)) > factor * least + margin:
                 break
         return max(best, self.progress)
+
+    def _segments_from(self, first: int) -> Iterator[tuple[float, float, list[float], list[float]]]:
+        """Segments from one on: length of the path before it [m], its own [m], its two ends."""
+        for chunk in range(first, len(self.points) - 1, CHUNK):
+            corners, lengths = self.points[chunk : chunk + CHUNK + 1], self.lengths[chunk : chunk + CHUNK + 1]
+            ends, begins = corners.tolist(), lengths.tolist()
+            for k in range(len(ends) - 1):
+                yield begins[k], begins[k + 1] - begins[k], ends[k], ends[k + 1]
 
     def _stretch(self, end: float) -> FloatArray:
         """Points of the path from the progress to ``end`` [m] along it."""

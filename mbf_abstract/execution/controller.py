@@ -15,9 +15,8 @@ from mbf_abstract.clock import Stopwatch
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.arrival import ArrivalCheck
 from mbf_abstract.execution.loaded_plugin import PluginFault, PluginNonFinite, checked_answer
-from mbf_abstract.execution.oscillation import OscillationDetector
+from mbf_abstract.execution.motion_watch import MotionWatch
 from mbf_abstract.execution.plugin_run import PluginRun
-from mbf_abstract.execution.progress import ProgressDetector
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.path_tracker import PathTracker
@@ -111,9 +110,7 @@ class ControllerExecution:
         self._failed_cycles = 0
         self._last_result: ControlResult | None = None
         self._hold_reason: tuple[int, str] | None = None
-        self._ignored = Stopwatch(run.runtime.clock)
-        self._oscillation = OscillationDetector(run.runtime.clock)
-        self._progress = ProgressDetector(run.runtime.clock)
+        self._motion = MotionWatch(run.runtime)
         self._graceful_stop: Stopwatch | None = None
         self._lease: Lease | None = None
         self.state = ControllerState.INITIALIZED
@@ -219,13 +216,11 @@ class ControllerExecution:
         if not self._run.handle.paused:
             if lease.paused:
                 lease.resume()
-                for watch in (self._ignored, self._oscillation.stopwatch, self._progress.stopwatch):
-                    watch.resume()
+                self._motion.resume()
             return False
         if not lease.paused:
             lease.pause()
-            for watch in (self._ignored, self._oscillation.stopwatch, self._progress.stopwatch):
-                watch.pause()
+            self._motion.pause()
             self._enter(ControllerState.PAUSED)
         return True
 
@@ -313,8 +308,7 @@ class ControllerExecution:
             self._failures = 0
             self._run.patience_watch.restart()
             self._enter(ControllerState.GOT_LOCAL_CMD)
-            if self._runtime.gate.last_command.is_stopped():
-                self._ignored.restart()  # it stood because it was told to, e.g. by the watchdog in a long call
+            self._motion.told_to_move()
             lease.send(result.command)
             return None
         parameters = self._runtime.parameters
@@ -332,28 +326,12 @@ class ControllerExecution:
         return None
 
     def _watch_motion(self, pose: Pose, velocity: Twist) -> ControllerEnd | None:
-        """Find a robot that ignores its commands, or one that moves without getting anywhere."""
-        parameters = self._runtime.parameters
-        told_to_move = not self._runtime.gate.last_command.is_stopped()
-        if not (told_to_move and self._runtime.robot.has_odometry and velocity.is_stopped()):
-            self._ignored.restart()
-        elif 0.0 < parameters.cmd_vel_ignored_tolerance < self._ignored.elapsed:
-            text = f"the robot has ignored its commands for {self._ignored.elapsed:.1f} s"
-            return self._end(ControllerState.ROBOT_DISABLED, ExePathOutcome.ROBOT_STUCK, text)
-        if self._oscillation.check(
-            pose, parameters.oscillation_timeout, parameters.oscillation_distance, parameters.oscillation_angle
-        ):
-            text = (
-                f"the robot has not moved {parameters.oscillation_distance:g} m "
-                f"nor turned {parameters.oscillation_angle:g} rad in {parameters.oscillation_timeout:g} s"
-            )
-            return self._end(ControllerState.OSCILLATING, ExePathOutcome.OSCILLATION, text)
         assert self._plan is not None
-        tracker = self._plan.tracker
-        if self._progress.check(pose, tracker, parameters.progress_timeout):
-            text = f"no progress in {parameters.progress_timeout:g} s, {tracker.remaining:.2f} m before the path's end"
-            return self._end(ControllerState.OSCILLATING, ExePathOutcome.OSCILLATION, text)
-        return None
+        problem = self._motion.problem(pose, velocity, self._plan.tracker)
+        if problem is None:
+            return None
+        stuck = problem[0] == ExePathOutcome.ROBOT_STUCK
+        return self._end(ControllerState.ROBOT_DISABLED if stuck else ControllerState.OSCILLATING, *problem)
 
     # ------------------------------------------------------------------------------------------- ends
     def _canceled(self, last_words: str = "") -> ControllerEnd:
