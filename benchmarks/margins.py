@@ -44,7 +44,7 @@ PERTURBED = Perturbation(
 )
 VARIANTS = {"plain": None, "perturbed": PERTURBED}
 QUICK_SCENARIOS = ("door_closes", "bridge")
-KEPT = ("success", "outcome", "failures", "mishaps", "time_s", "max_tilt_deg", "message", "digest")
+KEPT = ("success", "outcome", "failures", "time_s", "max_tilt_deg", "verdict", "digest")
 
 Job = tuple[str, str, int]  # scenario, variant, seed
 
@@ -134,7 +134,7 @@ def main() -> None:
         for row in run_jobs(jobs, options.workers, options.results or Path(folder) / "runs.jsonl"):
             rows.append(row)
             if not row["success"] and not options.json:
-                print(f"  {row['scenario']} {row['variant']} seed {row['seed']}: {row['message']}", flush=True)
+                print(f"  {row['scenario']} {row['variant']} seed {row['seed']}: {row['verdict']}", flush=True)
     lines = summarise(rows)
     if options.json:
         print(json.dumps(lines, indent=2))

@@ -30,7 +30,8 @@ FloatArray = NDArray[np.float64]
 AnyWorld = BulletWorld | KinematicWorld
 Triangles = tuple[FloatArray, NDArray[np.int32]]
 
-PERSON_RADIUS, PERSON_HEIGHT = 0.25, 1.7
+PERSON_RADIUS: float = 0.25  # m
+PERSON_HEIGHT: float = 1.7  # m
 PERSON_SIZE = (PERSON_RADIUS, PERSON_HEIGHT)
 MAX_ROUTE_DRAWS = 10_000
 COURTESY = 0.3  # m; who gives way stops this far from the robot

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from mbf_abstract.actions.goals import MoveBaseResult
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import MoveBaseOutcome
+from terrain.arrival import Arrival
 from terrain.bench import Bench
 from terrain.goal_drivers import GoalDriver
 
@@ -48,6 +49,8 @@ class GoalTour:
         The present goal.
     last_result : MoveBaseResult or None
         How the last goal has ended.
+    arrivals : list of Arrival
+        Where the robot was in truth when navigation said that a goal was reached, goal by goal.
     """
 
     def __init__(self, bench: Bench, driver: GoalDriver, stay: bool = False) -> None:
@@ -58,6 +61,7 @@ class GoalTour:
         self._bench = bench
         self._driver = driver
         self._stay = stay
+        self.arrivals: list[Arrival] = []
         self._condition = bench.clock.condition()
         self._next: AskedGoal | None = None
         self._ended = False
@@ -104,6 +108,8 @@ class GoalTour:
         self.target = goal.pose
         self.last_result = result = self._driver.drive(goal.pose, goal.planner, goal.controller)
         self.target = None
+        if result.success:
+            self.arrivals.append(Arrival.at(goal.pose, self._bench.simulation.track[-1], result))
         return result
 
     def _await_goal(self) -> AskedGoal | None:

@@ -17,13 +17,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from mbf_abstract.actions.goals import MoveBaseResult
 from mbf_abstract.clock import wall_seconds
 from mbf_abstract.events import JsonLinesSink
 from mbf_abstract.geometry import Pose
+from terrain.arrival import arrival_tolerance
 from terrain.bench import Bench
 from terrain.goal_drivers import make_goal_driver
-from terrain.goal_tour import GoalTour
+from terrain.goal_tour import NO_GOALS, GoalTour
 from terrain.metrics import measure
 from terrain.mishaps import MishapKind
 from terrain.recording import Recording
@@ -130,11 +130,11 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
         options.settings,
     )
     try:
-        result, wall_time = _drive(bench, options)
+        tour, wall_time = _drive(bench, options)
     finally:
         bench.close()
     recording = bench.recorder.finish(events=bench.memory.events, began=bench.loop.origin)
-    metrics = _measure(recording, bench)
+    metrics, result = _measure(recording, bench, tour), tour.last_result or NO_GOALS
     if options.geodesic and result.success:
         metrics |= _compare_with_geodesic(recording, bench.world)
     recording = replace(recording, verdict=judge(result, bench.scenario.limits, metrics))
@@ -144,14 +144,14 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     return RunResult(recording.verdict, options.folder, metrics)
 
 
-def _drive(bench: Bench, options: RunOptions) -> tuple[MoveBaseResult, float]:
-    """Visit the goals, watched or not; returns the last result and the wall time [s] it took."""
+def _drive(bench: Bench, options: RunOptions) -> tuple[GoalTour, float]:
+    """Visit the goals, watched or not; returns the finished tour and the wall time [s] it took."""
     tour = GoalTour(bench, make_goal_driver(options.executive, bench.navigator), stay=_stays(options))
     with _live_view(bench, tour, options):
         started = wall_seconds()
         bench.run(_ProgressReporter(bench, options.on_progress, started).report)
-        result = tour.visit_goals()
-        return result, wall_seconds() - started
+        tour.visit_goals()
+        return tour, wall_seconds() - started
 
 
 def _stays(options: RunOptions) -> bool:
@@ -193,13 +193,17 @@ class _ProgressReporter:
         )
 
 
-def _measure(recording: Recording, bench: Bench) -> dict[str, Any]:
+def _measure(recording: Recording, bench: Bench, tour: GoalTour) -> dict[str, Any]:
     """Return the numbers of a run: those of its recording, and those that only its simulation knows."""
     metrics = measure(recording).to_json()
     metrics["mishaps"] = sorted({mishap.kind.value for mishap in bench.simulation.mishaps})
     counts = bench.simulation.monitor.counts
     metrics["collisions"] = counts[MishapKind.COLLISION]
     metrics["collisions_while_moving"] = counts[MishapKind.COLLISION_WHILE_MOVING]
+    metrics["arrivals"] = [arrival.to_json() for arrival in tour.arrivals]
+    metrics["arrival_tolerance"] = arrival_tolerance(
+        bench.scenario.limits, bench.scenario.localization, bench.navigator.server.runtime.parameters
+    )
     metrics["tip_overs"] = counts[MishapKind.TIPPED_OVER]
     metrics["energy_j"] = round(bench.simulation.monitor.energy, 3)
     metrics["slipped_m"] = round(bench.simulation.monitor.slipped, 6)

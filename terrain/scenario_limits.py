@@ -14,6 +14,14 @@ class Limits(ParameterModel):
 
     max_tilt: float | None = parameter(None, "Largest tilt of the robot.", unit="deg", gt=0.0)
     max_path_length: float | None = parameter(None, "Longest track.", unit="m", gt=0.0)
+    goal_distance: float | None = parameter(
+        None,
+        "Largest true distance to a goal where navigation says it is reached; absent = the navigation's tolerance and "
+        "three standard deviations of the pose.",
+        unit="m",
+        gt=0.0,
+    )
+    goal_angle: float | None = parameter(None, "Largest true angle to it; absent likewise.", unit="deg", gt=0.0)
     forbidden: tuple[MishapKind, ...] = parameter((), "Mishaps that must not happen.")
 
 

@@ -1,7 +1,8 @@
 """Whether a run has succeeded: one answer, made once at the end of a run, which everything that tells of it shows.
 
-A run succeeds if navigation reached the last goal, no limit of the scenario was broken, and the robot touched nothing
-while it moved. What is wrong stands in ``Verdict.failures``, whatever navigation says.
+A run succeeds if navigation reached the last goal, the robot was at every goal in truth, no limit of the scenario was
+broken, and the robot touched nothing while it moved. What is wrong stands in ``Verdict.failures``, whatever navigation
+says.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import Any
 
 from mbf_abstract.actions.goals import MoveBaseResult
 from mbf_abstract.outcomes import is_success, outcome_name
+from terrain.arrival import missed_goals
 from terrain.scenario_limits import Limits, broken_limits
 
 TOUCHED = "collision_with_"
@@ -77,7 +79,8 @@ UNFINISHED = Verdict(None, "the run was cut short")
 
 def judge(result: MoveBaseResult, limits: Limits, metrics: Mapping[str, Any]) -> Verdict:
     """Return the verdict on a run: navigation's result, and what the metrics of the run break."""
-    return Verdict(int(result.outcome), result.message, (*broken_limits(limits, metrics), *_contacts(metrics)))
+    failures = (*missed_goals(metrics), *broken_limits(limits, metrics), *_contacts(metrics))
+    return Verdict(int(result.outcome), result.message, failures)
 
 
 def _contacts(metrics: Mapping[str, Any]) -> list[str]:

@@ -2,7 +2,8 @@
 
 The heights under the wheels are found by walking over the faces, seen from above, from one wheel position to the
 next; the walk cannot leave the storey. The body takes the plane of least squares through its four wheels, which for a
-rectangle has the slope of the mean heights of its sides.
+rectangle has the slope of the mean heights of its sides. A rigid body on uneven ground stands on three wheels: two of
+one axle or side and one of the other, so its slope is that of one side alone, and it may rock onto the other.
 """
 
 from __future__ import annotations
@@ -136,6 +137,12 @@ def vertices_below_the_belly(
     return int(size)
 
 
+@inner_kernel
+def steeper(one: float, other: float) -> float:
+    """Whichever of two slopes is farther from level."""
+    return one if abs(one) >= abs(other) else other
+
+
 @kernel
 def settle_footprints(
     vertices: FloatArray,
@@ -150,6 +157,7 @@ def settle_footprints(
     wheel_order: NDArray[np.int64],
     wheelbase: float,
     track: float,
+    rigid: bool,
 ) -> tuple[AngleArray, AngleArray, AngleArray]:
     """Settle a robot at every vertex and heading.
 
@@ -157,6 +165,8 @@ def settle_footprints(
     ----------
     wheel_angles, wheel_order : (4 heading_count,)
         Where the wheels of all headings stand, see ``wheel_directions``.
+    rigid : bool
+        Whether the body stands on three wheels; then roll and pitch are the steeper of the two ways to stand.
 
     Returns
     -------
@@ -196,6 +206,11 @@ def settle_footprints(
                 continue
             pitch[vertex, heading] = np.arctan(rise_forward)
             roll[vertex, heading] = np.arctan(rise_left)
+            if rigid:
+                left_side, right_side = front_left - rear_left, front_right - rear_right
+                pitch[vertex, heading] = np.arctan(steeper(left_side, right_side) / wheelbase)
+                front, rear = front_left - front_right, rear_left - rear_right
+                roll[vertex, heading] = np.arctan(steeper(front, rear) / track)
             # The greatest height of the surface above the wheels' plane, at the vertices inside the footprint.
             yaw = 2.0 * np.pi * heading / heading_count
             cosine, sine = np.cos(yaw), np.sin(yaw)

@@ -4,7 +4,8 @@ When to use: slopes near the robot's limits. It may drive straight up what it mu
 fall into a ditch narrower than its wheelbase that ``steepness`` forbids. When not: flat floors, tracked or legged
 robots, and meshes coarser than half the footprint. It replaces the guard of the border: where a wheel has no ground,
 the heading is not allowed. Planners that know no headings may come with any: let them need all (``needed_headings``).
-Rule: the four wheels stand on the surface, the body takes their plane of least squares (``footprint_settling``). A
+Rule: the four wheels stand on the surface, the body takes their plane of least squares (``footprint_settling``); a
+``rigid`` one stands on three of them, which on a skew ledge is some degrees steeper, and counts the worse stance. A
 heading is allowed if roll, pitch up and pitch down keep their limits, the slope in every direction stays
 ``tip_over_margin`` below the angle at which the centre of mass leaves the wheels, and no vertex inside the footprint
 comes higher than the belly. Wheel positions are taken in the plan view.
@@ -31,6 +32,9 @@ class TiltParameters(LayerParameters):
 
     wheelbase: float = parameter(0.5, "Distance of the front from the rear wheels.", unit="m", gt=0.0)
     track: float = parameter(0.4, "Distance of the left from the right wheels.", unit="m", gt=0.0)
+    rigid: bool = parameter(
+        False, "Whether no axle can swing and no spring gives: on uneven ground the robot stands on three wheels."
+    )
     max_roll: float = parameter(0.3, "Greatest slope across the heading.", unit="rad", gt=0.0, lt=1.57)
     max_pitch_up: float = parameter(0.45, "Greatest slope to climb.", unit="rad", gt=0.0, lt=1.57)
     max_pitch_down: float = parameter(0.45, "Greatest slope to descend.", unit="rad", gt=0.0, lt=1.57)
@@ -90,6 +94,7 @@ class TiltLayer(MeshLayer):
             *wheel_directions(HEADINGS, settings.wheelbase, settings.track),
             settings.wheelbase,
             settings.track,
+            settings.rigid,
         )
         usage = self._usage()
         self.allowed = (usage <= 1.0) & (bump < settings.ground_clearance)

@@ -10,7 +10,18 @@ from terrain.verdict import UNFINISHED, judge
 
 ARRIVED = MoveBaseResult(MoveBaseOutcome.SUCCESS, "goal reached")
 BLOCKED = MoveBaseResult(ExePathOutcome.BLOCKED_PATH, "a box")
-CALM = {"max_tilt_deg": 5.0, "path_length_m": 10.0, "mishaps": [], "collisions": 0, "collisions_while_moving": 0}
+NEAR = {"distance_m": 0.1, "angle_deg": 5.0, "believed_distance_m": 0.1, "believed_angle_deg": 5.0}
+CALM = {
+    "max_tilt_deg": 5.0,
+    "path_length_m": 10.0,
+    "mishaps": [],
+    "collisions": 0,
+    "collisions_while_moving": 0,
+    "arrivals": [NEAR],
+    "arrival_tolerance": (0.4, 180.0),
+}
+FAR = CALM | {"arrivals": [NEAR, NEAR | {"distance_m": 2.17}]}
+TURNED = CALM | {"arrivals": [NEAR | {"angle_deg": 40.0}], "arrival_tolerance": (0.4, 20.0)}
 HIT = CALM | {
     "mishaps": ["collision", "collision_while_moving", "collision_with_person", "collision_with_wall"],
     "collisions": 3,
@@ -24,6 +35,22 @@ PUSHED = CALM | {"mishaps": ["collision", "collision_with_person"], "collisions"
     [
         (ARRIVED, Limits(), CALM, True, "SUCCESS: goal reached"),
         (ARRIVED, Limits(), PUSHED, True, "SUCCESS: goal reached"),
+        (
+            ARRIVED,
+            Limits(),
+            FAR,
+            False,
+            "FAILED: goal 2 was missed by 2.17 m in truth, allowed are 0.40 m (believed 0.10 m) "
+            "(navigation: SUCCESS, goal reached)",
+        ),
+        (
+            ARRIVED,
+            Limits(),
+            TURNED,
+            False,
+            "FAILED: goal 1 was missed by 40 degrees in truth, allowed are 20 (believed 5.00 degrees) "
+            "(navigation: SUCCESS, goal reached)",
+        ),
         (BLOCKED, Limits(), CALM, False, "BLOCKED_PATH: a box"),
         (
             ARRIVED,

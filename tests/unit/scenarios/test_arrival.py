@@ -1,0 +1,56 @@
+"""Truth decides whether a robot has arrived; what it believed is told beside it."""
+
+import json
+import math
+
+import pytest
+
+from mbf_abstract.actions.goals import MoveBaseResult
+from mbf_abstract.geometry import Pose
+from mbf_abstract.navigation_parameters import NavigationParameters
+from mbf_abstract.outcomes import MoveBaseOutcome
+from terrain.arrival import Arrival, arrival_tolerance
+from terrain.runner import RunOptions, run_scenario
+from terrain.scenario import PlanarPose, load_scenario
+from terrain.scenario_faults import LocalizationJump
+from terrain.scenario_limits import Limits
+from terrain.scenario_noise import LocalizationNoise
+
+
+def test_an_arrival_compares_truth_and_belief_with_the_goal():
+    result = MoveBaseResult(MoveBaseOutcome.SUCCESS, "", None, 0.1, 0.2)
+    arrival = Arrival.at(Pose.planar(1.0, 0.0, math.pi - 0.05), Pose.planar(1.0, 0.5, 0.05 - math.pi), result)
+    assert (arrival.distance_m, arrival.believed_distance_m) == (0.5, 0.1)
+    assert arrival.angle_deg == pytest.approx(math.degrees(0.1))
+
+
+def test_what_an_executive_does_not_report_is_written_as_unknown():
+    result = MoveBaseResult(MoveBaseOutcome.SUCCESS, "")
+    assert Arrival.at(Pose.planar(0.0, 0.0), Pose.planar(0.3, 0.0), result).to_json()["believed_distance_m"] is None
+
+
+def test_a_robot_need_not_know_better_than_its_localisation_where_it_is():
+    parameters = NavigationParameters(dist_tolerance=0.2, angle_tolerance=0.1)
+    exact = arrival_tolerance(Limits(), LocalizationNoise(), parameters)
+    noisy = arrival_tolerance(Limits(), LocalizationNoise(position_noise=0.03, yaw_noise=1.0), parameters)
+    asked = arrival_tolerance(Limits(goal_distance=0.5, goal_angle=9.0), LocalizationNoise(), parameters)
+    assert exact == pytest.approx((0.2, math.degrees(0.1)))
+    assert noisy == pytest.approx((0.29, math.degrees(0.1) + 3.0))
+    assert asked == (0.5, 9.0)
+
+
+def test_a_run_whose_pose_has_jumped_fails_although_navigation_says_that_it_arrived(tmp_path):
+    scenario = load_scenario("crowded_corridor").model_copy(
+        update={
+            "physics": "kinematic",
+            "actors": (),
+            "goals": (PlanarPose(x=6.0, y=9.7),),
+            "faults": (LocalizationJump(type="jump", dx=0.8, start=1.0),),
+        }
+    )
+    result = run_scenario(scenario, RunOptions(tmp_path, draw=False))
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    (arrival,) = metrics["arrivals"]
+    assert metrics["outcome"] == "SUCCESS" and not result.success
+    assert arrival["believed_distance_m"] < 0.2 and arrival["distance_m"] > 0.6
+    assert "missed" in str(result.verdict) and "believed" in str(result.verdict)
