@@ -28,13 +28,18 @@ MAX_INTEGER_BITS = 63
 
 def error_text(error: BaseException) -> str:
     """Return what an exception says of itself, cut to ``MAX_TEXT``; its ``__str__`` may do what it likes."""
-    return shortened(_text_of(error))
+    return well_formed(shortened(_text_of(error)))
 
 
 def shortened(text: str) -> str:
     """Return ``text``, cut off after ``MAX_TEXT`` characters with a word on how many are missing."""
     missing = len(text) - MAX_TEXT
     return text if missing <= 0 else f"{text[:MAX_TEXT]} ... ({missing} more characters)"
+
+
+def well_formed(text: str) -> str:
+    """Return a text that every encoding of Unicode can hold: half of a surrogate pair is spelled out as its escape."""
+    return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def to_json_value(value: Any) -> JsonValue:
@@ -70,7 +75,7 @@ class _Converter:
             return round(value, FLOAT_DIGITS) + 0.0 if math.isfinite(value) else str(value)  # + 0.0: no "-0.0"
         if isinstance(value, (Mapping, np.ndarray, list, tuple)):
             return self._convert_collection(value, depth)
-        text = shortened(_text_of(value))
+        text = well_formed(shortened(_text_of(value)))
         self._left -= len(text) // CHARACTERS_PER_VALUE
         return text
 

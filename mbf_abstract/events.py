@@ -23,7 +23,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, Protocol, TextIO
 
-from mbf_abstract.event_values import FLOAT_DIGITS, JsonValue, error_text, to_json_value
+from mbf_abstract.event_values import FLOAT_DIGITS, JsonValue, error_text, to_json_value, well_formed
 
 DEFAULT_MEMORY_EVENTS = 10_000
 DEFAULT_MAX_FILE_BYTES = 256 * 1024 * 1024
@@ -152,7 +152,7 @@ class EventBus:
         """Record one event, stamped with the clock's time. Never raises."""
         with self._lock:
             fields = {key: to_json_value(value) for key, value in data.items()}
-            event = Event(round(self._now(), FLOAT_DIGITS), kind, source, fields)
+            event = Event(round(self._now(), FLOAT_DIGITS), kind, well_formed(source), fields)
             for sink in tuple(self._sinks):
                 try:
                     sink.write(event)

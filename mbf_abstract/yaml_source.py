@@ -1,7 +1,8 @@
 """Safe YAML with line numbers: plain values only, and for each key path the line where it stands.
 
 Only YAML's own types are read (mapping, list, text, number, bool, null). A file is refused if it is too large, nested
-too deep, expands too many aliases, holds a key twice, or is not a mapping at the top. Merge keys (``<<``) are refused,
+too deep, expands too many aliases, holds a key twice, or is not a mapping at the top. Half of a surrogate pair, which
+no file or page can hold, is spelled out as its escape. Merge keys (``<<``) are refused,
 because a key would then not have one line. Numbers such as ``1e-3`` are numbers, as in YAML 1.2.
 """
 
@@ -17,6 +18,7 @@ from typing import Any
 import yaml
 
 from mbf_abstract.bounded_files import special_file
+from mbf_abstract.event_values import well_formed
 from mbf_abstract.findings import ConfigError, Finding, KeyPath, describe_value, format_key_path
 
 MAX_BYTES = 1_000_000
@@ -194,7 +196,7 @@ class _Reader:
         if isinstance(value, int) and value.bit_length() > MAX_INT_BITS:
             self._report(line, path, f"a whole number of at most {MAX_INT_BITS} bits", describe_value(node.value))
             return None
-        return value
+        return well_formed(value) if isinstance(value, str) else value
 
     def _construct_mapping(self, node: yaml.MappingNode, path: KeyPath) -> dict[str, Any]:
         values: dict[str, Any] = {}
@@ -203,7 +205,7 @@ class _Reader:
             if key_node.tag != "tag:yaml.org,2002:str":
                 self._report(line, path, "a text as key", repr(key_node.value)[:60])
                 continue
-            key = key_node.value
+            key = well_formed(key_node.value)
             place = (*path, key)
             if key in values:
                 first = self._lines[place]

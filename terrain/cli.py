@@ -111,7 +111,9 @@ def replay(
 
         recording, metrics = read_run(folder)
         with LiveLine() as live:
-            write_results(folder, recording, metrics, live.step)
+            problems = write_results(folder, recording, metrics, live.step)
+            if problems:
+                raise RuntimeError("; ".join(problems))
             if rrd:
                 live.step("writing the recording for Rerun")
                 write_rrd(folder / "run.rrd", recording)
@@ -140,7 +142,7 @@ def compare(
 
         runs = read_run(left), read_run(right)
         names = (left.name, right.name) if left.name != right.name else (str(left), str(right))
-        table = Table("metric", *names, "difference")
+        table = Table("metric", *map(escape, names), "difference")
         for row in compare_metrics(runs[0][1], runs[1][1]):
             table.add_row(*map(escape, row))
         Console().print(table)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mbf_abstract.event_values import well_formed
 from mbf_abstract.events import Event
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.map_view import GridView, MapView, MeshView
@@ -95,8 +96,8 @@ class Recorder:
         """Return what was recorded; ``began`` [s] is the events' time at which the samples' time was 0."""
         rows = np.array(self._samples, dtype=np.float64).reshape(-1, 14)
         return Recording(
-            scenario=self.scenario,
-            backend=self.backend,
+            scenario=well_formed(self.scenario),
+            backend=well_formed(self.backend),
             robot=self.robot,
             ground=self.ground,
             walls=self.walls,

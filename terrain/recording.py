@@ -25,6 +25,7 @@ from terrain.recorded_grid import RecordedGrid, grid_arrays, grids_from
 from terrain.recorded_mesh import RecordedMesh, mesh_arrays, meshes_from
 from terrain.robot_models import Drive, RobotSpec
 from terrain.verdict import Verdict
+from terrain.whole_files import replacing
 
 FloatArray = NDArray[np.float64]
 StampedPoints = tuple[float, FloatArray]
@@ -175,7 +176,8 @@ class Recording:
             "events": [event.to_json() for event in self.events],
         }
         arrays["words"] = np.array(json.dumps(words))
-        np.savez_compressed(file, **arrays)
+        with replacing(file) as part, part.open("wb") as out:
+            np.savez_compressed(out, **arrays)
 
     @classmethod
     def load(cls, file: str | Path, max_bytes: int = MAX_BYTES) -> Recording:

@@ -33,6 +33,7 @@ from terrain.shortest_way import shortest_way
 from terrain.verdict import Verdict, judge
 from terrain.versions import write_versions
 from terrain.viewer.live.options import ViewOptions
+from terrain.whole_files import write_whole
 
 
 @dataclass(frozen=True)
@@ -217,7 +218,7 @@ def _write_numbers(recording: Recording, measured: Mapping[str, Any], wall_time:
     factor = recording.duration / wall_time if wall_time > 0.0 else 0.0
     timing = {"wall_time_s": round(wall_time, 3), "real_time_factor": round(factor, 2)}
     for name, numbers in (("metrics.json", metrics), ("timing.json", timing)):
-        (folder / name).write_text(json.dumps(numbers, indent=2, sort_keys=True) + "\n")
+        write_whole(folder / name, json.dumps(numbers, indent=2, sort_keys=True) + "\n")
     recording.save(folder / "recording.npz")
     return {**metrics, **timing}
 
@@ -234,11 +235,8 @@ def _compare_with_geodesic(recording: Recording, world: ScenarioWorld) -> dict[s
 
 
 def _draw(recording: Recording, metrics: dict[str, Any], options: RunOptions) -> None:
-    """Make everything that is looked at; without the packages that draw, a run still counts."""
-    from terrain.viewer.picture import ViewerMissing
+    """Make everything that is looked at; what cannot be made is told, and the run still counts."""
     from terrain.viewer.results import write_results
 
-    try:
-        write_results(options.folder, recording, metrics, options.on_step)
-    except ViewerMissing as missing:
-        options.on_note(str(missing))
+    for problem in write_results(options.folder, recording, metrics, options.on_step):
+        options.on_note(problem)

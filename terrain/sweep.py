@@ -14,8 +14,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from mbf_abstract.yaml_source import load_yaml
 from terrain.scenario import Scenario
 from terrain.worker_pool import run_in_workers
+
+MAX_NAME = 200  # bytes; a longer text is no file's name
 
 
 @dataclass(frozen=True)
@@ -31,19 +34,45 @@ class SweepRun:
         return " ".join(f"{key}={value}" for key, value in sorted(self.settings.items()))
 
     def key(self, scenario_hash: str) -> str:
-        """Return what tells this run from all others."""
-        return f"{scenario_hash}/{self.seed}/{self.variant}"
+        """Return what tells this run from all others; a file that a setting names counts with what it says."""
+        files = [_hash_of_file(file).hex()[:16] for file in _named_files(list(self.settings.values()), Path())]
+        return "/".join([scenario_hash, str(self.seed), self.variant, *files])
 
 
 Job = tuple[Scenario, SweepRun]
 
 
 def hash_of(scenario: Scenario) -> str:
-    """Return a short hash of everything a scenario's files say."""
+    """Return a short hash of everything a scenario's files say: maps, meshes and images too, and what those name."""
     digest = hashlib.sha256(scenario.model_dump_json(exclude={"navigation"}).encode())
     for backend, file in sorted(scenario.navigation.items()):
-        digest.update(backend.encode() + file.read_bytes())
+        digest.update(backend.encode() + _hash_of_file(file))
+    world_file: Path | None = getattr(scenario.world, "file", None)
+    if world_file is not None:
+        digest.update(_hash_of_file(world_file))
     return digest.hexdigest()[:16]
+
+
+def _hash_of_file(file: Path, above: tuple[Path, ...] = ()) -> bytes:
+    """Hash a file; a YAML file with the files that its texts name, but for those it is named by itself."""
+    digest = hashlib.sha256(file.read_bytes())
+    if file.suffix in (".yaml", ".yml"):
+        above = (*above, file.resolve())
+        for named in _named_files(load_yaml(file).data, file.parent):
+            if named.resolve() not in above:
+                digest.update(_hash_of_file(named, above))
+    return digest.digest()
+
+
+def _named_files(value: Any, folder: Path) -> Iterator[Path]:
+    if isinstance(value, Mapping):
+        value = list(value.values())
+    if isinstance(value, list):
+        for item in value:
+            yield from _named_files(item, folder)
+    elif isinstance(value, str) and 0 < len(value.encode()) < MAX_NAME and "\0" not in value:
+        if (folder / value).is_file():
+            yield folder / value
 
 
 def plan_sweep(seeds: Sequence[int], settings: Mapping[str, Sequence[str]]) -> list[SweepRun]:

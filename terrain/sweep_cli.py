@@ -29,9 +29,11 @@ def sweep(
     """Run a scenario with many seeds and variants and put all results into one table."""
     with readable_errors():
         from rich.console import Console
+        from rich.markup import escape
         from rich.progress import track
         from rich.table import Table
 
+        from mbf_abstract.event_values import well_formed
         from terrain.scenario import load_scenario
         from terrain.sweep import hash_of, plan_sweep, run_all
         from terrain.sweep_cluster import run_on_cluster
@@ -47,18 +49,19 @@ def sweep(
             jobs = [(loaded, run) for run in left]
             finished = run_all(jobs, workers) if scheduler is None else run_on_cluster(jobs, scheduler)
             for (_, run), metrics in track(
-                finished, loaded.name, len(left), console=console, disable=not console.is_terminal
+                finished, escape(well_formed(loaded.name)), len(left), console=console, disable=not console.is_terminal
             ):
                 log.append(run.key(hashed), {**metrics, "seed": run.seed, "variant": run.variant})
-                console.print(f"seed {run.seed} {run.variant}: {metrics['verdict']}", markup=False, highlight=False)
+                told = well_formed(f"seed {run.seed} {run.variant}: {metrics['verdict']}")
+                console.print(told, markup=False, highlight=False, soft_wrap=True)
             rows = [log.rows[run.key(hashed)] for run in planned]
         files = write_tables(f"{loaded.name}: {loaded.proves}", rows, out)
         summary = summarise(rows)
         table = Table(*summary[0])
         for line in summary:
-            table.add_row(*map(str, line.values()))
+            table.add_row(*(escape(well_formed(str(value))) for value in line.values()))
         console.print(table)
-        console.print("results in " + ", ".join(map(str, files)), soft_wrap=True)
+        console.print("results in " + ", ".join(map(str, files)), soft_wrap=True, markup=False)
 
 
 def parse_seeds(text: str) -> list[int]:

@@ -12,6 +12,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from mbf_abstract.findings import ConfigError, Finding, describe_value
+
 
 class SweepLog:
     """Finished runs by key, kept in a file; a context manager.
@@ -20,6 +22,11 @@ class SweepLog:
     ----------
     file : Path
         Made if it does not exist.
+
+    Raises
+    ------
+    ConfigError
+        A whole line of the file is no finished run.
 
     Attributes
     ----------
@@ -31,7 +38,11 @@ class SweepLog:
         self.rows: dict[str, dict[str, Any]] = {}
         file.parent.mkdir(parents=True, exist_ok=True)
         self._file = file.open("a+b")
-        self._read()
+        try:
+            self._read()
+        except BaseException:
+            self._file.close()
+            raise
 
     def _read(self) -> None:
         self._file.seek(0)
@@ -39,9 +50,19 @@ class SweepLog:
         whole = content.rfind(b"\n") + 1
         if whole < len(content):
             self._file.truncate(whole)
-        for line in content[:whole].splitlines():
-            row = json.loads(line)
+        for number, line in enumerate(content[:whole].split(b"\n")[:-1], start=1):
+            row = self._row(line, number)
             self.rows.setdefault(row["key"], row)
+
+    def _row(self, line: bytes, number: int) -> dict[str, Any]:
+        expected = "a JSON object with the text 'key'"
+        try:
+            row = json.loads(line)
+        except ValueError as error:  # UnicodeDecodeError is one, too
+            raise ConfigError([Finding(self._file.name, number, "", expected, str(error))]) from error
+        if not isinstance(row, dict) or not isinstance(row.get("key"), str):
+            raise ConfigError([Finding(self._file.name, number, "", expected, describe_value(row))])
+        return row
 
     def append(self, key: str, row: dict[str, Any]) -> None:
         """Add a finished run and wait until it is on the disk; a key that is there already changes nothing."""

@@ -11,6 +11,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from terrain.whole_files import replacing, write_whole
+
 COLUMNS = (
     "variant",
     "seed",
@@ -47,11 +49,11 @@ def write_tables(title: str, rows: Iterable[Row], folder: Path) -> list[Path]:
     """Write all tables of finished runs, sorted by variant and seed; return the files."""
     table = [_flat(row) for row in sorted(rows, key=lambda row: (row["variant"], row["seed"]))]
     files = [folder / "sweep.csv", folder / "sweep.html"]
-    with files[0].open("w", newline="", encoding="utf-8") as out:
+    with replacing(files[0]) as part, part.open("w", newline="", encoding="utf-8", errors="backslashreplace") as out:
         writer = csv.DictWriter(out, COLUMNS)
         writer.writeheader()
         writer.writerows(table)
-    files[1].write_text(_page(title, table), encoding="utf-8")
+    write_whole(files[1], _page(title, table))
     if importlib.util.find_spec("pyarrow") is not None:
         files.append(_write_parquet(table, folder / "sweep.parquet"))
     return files
@@ -90,7 +92,8 @@ def _flat(row: Row) -> dict[str, Any]:
 def _write_parquet(table: Sequence[Row], file: Path) -> Path:
     arrow, parquet = importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
     columns = {name: [None if row[name] == "" else row[name] for row in table] for name in COLUMNS}
-    parquet.write_table(arrow.table(columns), file)
+    with replacing(file) as part:
+        parquet.write_table(arrow.table(columns), part)
     return file
 
 

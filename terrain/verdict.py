@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbf_abstract.actions.goals import MoveBaseResult
+from mbf_abstract.event_values import well_formed
 from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.arrival import missed_goals
 from terrain.scenario_limits import Limits, broken_limits
@@ -80,7 +81,7 @@ UNFINISHED = Verdict(None, "the run was cut short")
 def judge(result: MoveBaseResult, limits: Limits, metrics: Mapping[str, Any]) -> Verdict:
     """Return the verdict on a run: navigation's result, and what the metrics of the run break."""
     failures = (*missed_goals(metrics), *broken_limits(limits, metrics), *_contacts(metrics))
-    return Verdict(int(result.outcome), result.message, failures)
+    return Verdict(int(result.outcome), well_formed(result.message), failures)
 
 
 def _contacts(metrics: Mapping[str, Any]) -> list[str]:

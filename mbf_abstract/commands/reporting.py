@@ -13,6 +13,13 @@ BAD_INPUT = 2
 TRACEBACK_VARIABLE = "MBF_TRACEBACK"
 
 
+def text_of(error: Exception) -> str:
+    """Return what an exception says, with its name where that is nothing or too little to understand."""
+    if isinstance(error, MemoryError):
+        return f"not enough memory for that: {error}".removesuffix(": ")
+    return str(error).strip() or type(error).__name__
+
+
 @contextmanager
 def readable_errors() -> Iterator[None]:
     """Turn every exception into a text and exit code 2; set the environment variable MBF_TRACEBACK=1 to see it all."""
@@ -29,5 +36,5 @@ def readable_errors() -> Iterator[None]:
             count = len(error.findings)
             typer.echo(f"{error}\n{count} mistake{'s' if count != 1 else ''} found", err=True)
         else:
-            typer.echo(f"error: {error or type(error).__name__}", err=True)
+            typer.echo(f"error: {text_of(error)}", err=True)
         raise typer.Exit(BAD_INPUT) from error

@@ -41,7 +41,7 @@ def draw_tracks(
         axis.set_ylabel("y [m]")
         for track in of_arm:
             axis.plot(*np.transpose(track), color="tab:blue", linewidth=0.6, alpha=0.6)
-        axis.set_title(f"{TITLES.get(name, name)}: {len(of_arm)} repetitions")
+        axis.set_title(f"{TITLES.get(name, name)}: {len(of_arm)} repetitions", parse_math=False)
     figure.tight_layout()
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, dpi=DOTS_PER_INCH)

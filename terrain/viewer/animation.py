@@ -22,6 +22,7 @@ from terrain.viewer.replay import status_text
 from terrain.viewer.scene import look_at_route
 from terrain.viewer.shading import AMBIENT, LIGHT, face_colours, face_normals
 from terrain.viewer.shapes import cut_walls, prism
+from terrain.whole_files import replacing
 
 FloatArray = NDArray[np.float64]
 
@@ -45,7 +46,8 @@ def write_animation(file: str | Path, recording: Recording) -> None:
     palette = _palette(frames[0])
     small = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     times = [FRAME_TIME] * (len(small) - 1) + [LAST_FRAME_TIME]
-    small[0].save(file, save_all=True, append_images=small[1:], duration=times, loop=0, optimize=True)
+    with replacing(file) as part:
+        small[0].save(part, save_all=True, append_images=small[1:], duration=times, loop=0, optimize=True)
 
 
 def _palette(frame: Image.Image) -> Image.Image:

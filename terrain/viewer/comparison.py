@@ -11,6 +11,7 @@ from terrain.recording import Recording
 from terrain.viewer import report
 from terrain.viewer.page import beside, cell, page, table
 from terrain.viewer.timeline import timeline_svg
+from terrain.whole_files import write_whole
 
 WIDTH = 1700  # pixels
 
@@ -19,7 +20,7 @@ Run = tuple[Recording, Mapping[str, Any]]
 
 def write_comparison(file: Path, names: tuple[str, str], left: Run, right: Run) -> None:
     """Write the page; raises ViewerMissing without matplotlib."""
-    file.write_text(comparison_html(names, left, right), encoding="utf-8")
+    write_whole(file, comparison_html(names, left, right))
 
 
 def comparison_html(names: tuple[str, str], left: Run, right: Run) -> str:

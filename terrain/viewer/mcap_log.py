@@ -16,11 +16,12 @@ from mcap_protobuf.schema import register_schema
 from terrain.recording import Recording
 from terrain.viewer.foxglove_messages import nanoseconds
 from terrain.viewer.run_messages import JsonMessage, messages_of
+from terrain.whole_files import replacing
 
 
 def write_mcap(file: str | Path, recording: Recording) -> None:
     """Write a recording, facts of the run as metadata ``run``; the same recording gives the same bytes."""
-    with Path(file).open("wb") as stream:
+    with replacing(file) as part, part.open("wb") as stream:
         writer = Writer(stream)
         writer.start(library="mbf-flex")
         facts = {"scenario": recording.scenario, "backend": recording.backend, "verdict": str(recording.verdict)}

@@ -7,6 +7,7 @@ triangles. For motion see ``terrain.viewer.replay``.
 from __future__ import annotations
 
 import io
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from mbf_abstract.geometry import Pose
 from terrain.recording import Recording, StampedPoints
 from terrain.viewer.colours import ACTORS, DRIVEN, GOAL, OBSTACLE, PLANNED, START, WALL, slope_legend
 from terrain.viewer.shading import shaded_triangles
+from terrain.whole_files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,6 +28,7 @@ FloatArray = NDArray[np.float64]
 
 LONG_SIDE = 9.0  # inches
 DOTS_PER_INCH = 130
+MAX_NAME = 60  # characters of a name in the title; the picture is as wide as its title
 HALO = 1.6  # points of white around lines, so that they show on any ground
 
 
@@ -35,7 +38,7 @@ class ViewerMissing(Exception):
 
 def write_picture(file: str | Path, recording: Recording) -> None:
     """Draw a recording and write it as PNG; raises ViewerMissing without matplotlib."""
-    Path(file).write_bytes(picture_png(recording))
+    write_whole(file, picture_png(recording))
 
 
 def picture_png(recording: Recording) -> bytes:
@@ -71,7 +74,9 @@ def new_figure(extent: tuple[float, float, float, float]) -> tuple[Figure, Axes]
 def png_bytes(figure: Figure) -> bytes:
     """Return the figure as a PNG file, cut to its contents."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", bbox_inches="tight", facecolor="white")
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)  # drawn as a box, which says enough
+        figure.savefig(buffer, format="png", bbox_inches="tight", facecolor="white")
     return buffer.getvalue()
 
 
@@ -164,9 +169,9 @@ def draw_marks(axes: Axes, start: Pose, goals: tuple[Pose, ...]) -> None:
 
 def _label(axes: Axes, recording: Recording) -> None:
     length = float(np.linalg.norm(np.diff(recording.poses[:, :3], axis=0), axis=1).sum())
-    title = f"{recording.scenario} · {recording.backend} · {recording.verdict.title}"
+    title = f"{recording.scenario[:MAX_NAME]} · {recording.backend[:MAX_NAME]} · {recording.verdict.title}"
     tilt = np.degrees(recording.tilt).max(initial=0.0)
     facts = f"{length:.1f} m driven in {recording.duration:.1f} s, tilt up to {tilt:.0f}°"
-    axes.set_title(f"{title}\n", loc="left", fontsize=12, fontweight="bold")
+    axes.set_title(f"{title}\n", loc="left", fontsize=12, fontweight="bold", parse_math=False)
     axes.text(0.0, 1.015, facts, transform=axes.transAxes, fontsize=9, color="#444444")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=6, frameon=False, fontsize=9)

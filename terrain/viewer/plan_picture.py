@@ -14,6 +14,7 @@ from terrain.recording import Surface
 from terrain.viewer.colours import FLOOR, WALL
 from terrain.viewer.picture import draw_marks, draw_paths, draw_triangles, new_figure, png_bytes
 from terrain.viewer.shading import shaded_triangles
+from terrain.whole_files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,9 +37,9 @@ def write_plan_picture(
         draw_paths(axes, [(0.0, path.positions)])
     draw_marks(axes, start, (goal,))
     length = "no path" if path is None else f"{path.length:.2f} m, {len(path)} poses"
-    axes.set_title(f"{title} · {length}", loc="left", fontsize=11, fontweight="bold")
+    axes.set_title(f"{title} · {length}", loc="left", fontsize=11, fontweight="bold", parse_math=False)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=3, frameon=False, fontsize=9)
-    Path(file).write_bytes(png_bytes(figure))
+    write_whole(file, png_bytes(figure))
 
 
 def cost_colours(costs: np.typing.NDArray[np.float32]) -> np.typing.NDArray[np.float64]:

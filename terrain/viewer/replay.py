@@ -30,6 +30,7 @@ from terrain.viewer.scene import (
     pin_height,
     wheel_angles,
 )
+from terrain.whole_files import write_whole
 
 FloatArray = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ OUTCOME_TIME = 3.0  # s for which the outcome is shown at the end
 
 def write_replay(file: str | Path, recording: Recording) -> None:
     """Write a recording as one HTML page; raises ViewerMissing where viser is not installed or cannot run."""
-    Path(file).write_text(replay_html(recording), encoding="utf-8")
+    write_whole(file, replay_html(recording))
 
 
 def replay_html(recording: Recording) -> str:

@@ -24,13 +24,14 @@ from terrain.viewer.event_text import NOTABLE, words
 from terrain.viewer.page import page, table
 from terrain.viewer.picture import ViewerMissing, picture_png
 from terrain.viewer.timeline import timeline_svg
+from terrain.whole_files import write_whole
 
 FloatArray = NDArray[np.float64]
 
 
 def write_report(file: str | Path, recording: Recording, metrics: Mapping[str, Any]) -> None:
     """Write the report; raises ViewerMissing without matplotlib."""
-    Path(file).write_text(report_html(recording, metrics), encoding="utf-8")
+    write_whole(file, report_html(recording, metrics))
 
 
 def report_html(recording: Recording, metrics: Mapping[str, Any]) -> str:

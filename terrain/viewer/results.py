@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from mbf_abstract.event_values import error_text
 from terrain.recording import Recording
 from terrain.viewer.picture import ViewerMissing, write_picture
 from terrain.viewer.replay import write_replay
@@ -14,16 +16,31 @@ from terrain.viewer.report import write_report
 
 def write_results(
     folder: Path, recording: Recording, metrics: Mapping[str, Any], on_step: Callable[[str], None] = lambda text: None
-) -> None:
-    """Write picture.png, report.html, replay.html and run.mcap; raises ViewerMissing without what they need."""
-    on_step("drawing the picture")
-    write_picture(folder / "picture.png", recording)
-    on_step("writing the report")
-    write_report(folder / "report.html", recording, metrics)
-    on_step("writing the replay")
-    write_replay(folder / "replay.html", recording)
-    on_step("writing the log for Foxglove")
-    _write_log(folder / "run.mcap", recording)
+) -> list[str]:
+    """Write picture.png, report.html, replay.html and run.mcap, each whole or not at all.
+
+    Returns
+    -------
+    problems : list of str
+        Why some could not be made: a package is missing, the disk is full, or one of them has a defect. What can be
+        made is made.
+    """
+    makers: list[tuple[str, str, Callable[[Path], None]]] = [
+        ("drawing the picture", "picture.png", partial(write_picture, recording=recording)),
+        ("writing the report", "report.html", partial(write_report, recording=recording, metrics=metrics)),
+        ("writing the replay", "replay.html", partial(write_replay, recording=recording)),
+        ("writing the log for Foxglove", "run.mcap", partial(_write_log, recording=recording)),
+    ]
+    problems: list[str] = []
+    for step, name, make in makers:
+        on_step(step)
+        try:
+            make(folder / name)
+        except ViewerMissing as missing:
+            problems.append(str(missing))
+        except Exception as error:  # a run counts whatever becomes of its pictures
+            problems.append(f"{name} could not be made: {type(error).__name__}: {error_text(error)}")
+    return list(dict.fromkeys(problems))
 
 
 def _write_log(file: Path, recording: Recording) -> None:

@@ -133,3 +133,13 @@ def test_workers_with_several_threads_are_refused():
     with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as local:
         with pytest.raises(ClusterError, match="one thread"):
             list(run_on_cluster([], local.scheduler_address))
+
+
+def test_settings_that_look_like_markup_neither_break_the_table_nor_vanish(arguments, tmp_path):
+    arguments[arguments.index("planner=dijkstra,astar")] = "planner=[/x],[red]"
+    arguments[arguments.index("0:2")] = "0:1"
+
+    finished = subprocess.run(arguments, capture_output=True, text=True, env={**os.environ, "COLUMNS": "200"})
+
+    assert (finished.returncode, finished.stderr) == (0, "")
+    assert finished.stdout.count("planner=[/x]") == finished.stdout.count("planner=[red]") == 2

@@ -5,7 +5,8 @@ import csv
 import pytest
 import typer
 
-from terrain.scenario import load_scenario
+from mbf_abstract.findings import ConfigError
+from terrain.scenario import MapWorld, load_scenario
 from terrain.sweep import SweepRun, hash_of, plan_sweep
 from terrain.sweep_cli import parse_seeds, parse_settings
 from terrain.sweep_log import SweepLog
@@ -39,6 +40,47 @@ def test_a_changed_scenario_or_configuration_has_another_hash(tmp_path):
     }
     assert len(hashes) == 3
     assert hash_of(scenario) == hash_of(load_scenario("bridge"))
+
+
+@pytest.fixture
+def mapped(tmp_path):
+    """A scenario in a building that is drawn in an image, which only the map's yaml names."""
+    (tmp_path / "map.yaml").write_text("image: floor.png\nresolution: 0.1\norigin: [0, 0, 0]\n")
+    (tmp_path / "floor.png").write_bytes(b"first")
+    config = tmp_path / "nav.yaml"
+    config.write_text("backend: costmap\nmasks: [{file: mask.png}, nav.yaml]\n")
+    (tmp_path / "mask.png").write_bytes(b"first")
+    world = MapWorld(type="map", file=tmp_path / "map.yaml")
+    return load_scenario("bridge").model_copy(update={"world": world, "navigation": {"costmap": config}})
+
+
+@pytest.mark.parametrize("file", ["map.yaml", "floor.png", "nav.yaml", "mask.png"])
+def test_a_changed_file_that_the_world_or_a_configuration_names_has_another_hash(mapped, tmp_path, file):
+    before = hash_of(mapped)
+    assert hash_of(mapped) == before
+    (tmp_path / file).write_bytes((tmp_path / file).read_bytes() + b"# changed")
+    assert hash_of(mapped) != before
+
+
+def test_a_changed_file_that_a_setting_names_is_another_run(tmp_path):
+    file = tmp_path / "other.png"
+    keys = set()
+    for content in (b"first", b"second"):
+        file.write_bytes(content)
+        keys.add(SweepRun(1, {"world.file": str(file), "planner": "cvp"}).key("x"))
+    assert len(keys) == 2
+
+
+@pytest.mark.parametrize(
+    "line", [b"nonsense", b"[1]", b'{"seed": 1}', b"\xff\xfe", b"", b'{"key": 5}', b'{"key": "a"}{"key": "b"}']
+)
+def test_a_damaged_line_is_named_with_its_number(tmp_path, line):
+    file = tmp_path / "runs.jsonl"
+    with SweepLog(file) as log:
+        log.append("a", {"seed": 1})
+    file.write_bytes(file.read_bytes() + line + b"\n" + file.read_bytes())
+    with pytest.raises(ConfigError, match=r"runs\.jsonl:2: expected a JSON object with the text 'key'"):
+        SweepLog(file)
 
 
 def test_the_log_keeps_what_it_was_given_over_a_restart(tmp_path):

@@ -1,0 +1,26 @@
+"""Files that are there whole or not at all: written beside their place and put there when they are finished."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def replacing(file: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a path of the same kind to write to; it takes the place of ``file`` when the block has ended well."""
+    file = Path(file)
+    part = file.with_name(f".{file.stem}.{os.getpid()}.part{file.suffix}")
+    try:
+        yield part
+        os.replace(part, file)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_whole(file: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write a file; text as UTF-8, with half of a surrogate pair, which is no Unicode, spelled out as its escape."""
+    with replacing(file) as part:
+        part.write_bytes(content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content)
