@@ -279,7 +279,10 @@ class AbstractRecovery(Plugin):
 # ---------------------------------------------------------------------------------------------------- refiner
 @dataclass(frozen=True)
 class RefineResult:
-    """Answer of a refiner: outcome of ``RefinePathOutcome``, text, and the refined path."""
+    """Answer of a refiner: outcome of ``RefinePathOutcome``, text, and the refined path.
+
+    Without success a client gets the path it gave, whatever stands here.
+    """
 
     outcome: int
     message: str = ""

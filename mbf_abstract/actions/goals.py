@@ -211,7 +211,10 @@ class RecoveryResultMessage(ActionResult):
 
 @dataclass(frozen=True)
 class RefinePathResult(ActionResult):
-    """The refined path, how far its end moved, and its length divided by the original's."""
+    """The refined path, how far its end moved, and its length divided by the original's.
+
+    Without success ``refined_path`` is the path of the goal: it can be driven, as it could before.
+    """
 
     refined_path: Path | None = None
     final_position_error: float = 0.0

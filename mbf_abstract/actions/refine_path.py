@@ -61,11 +61,11 @@ class RefinePathAction(Action[RefinePathGoal, RefinePathResult, NoFeedback]):
 
     def _measured(self, result: RefineResult, original: Path, refiner: str) -> RefinePathResult:
         if not result.success:
-            return RefinePathResult(int(result.outcome), result.message, refiner=refiner)
+            return RefinePathResult(int(result.outcome), result.message, refined_path=original, refiner=refiner)
         refined = result.path
         if refined is None or len(refined) == 0:
             text = f"refiner {refiner!r} reported success but gave no poses"
-            return RefinePathResult(RefinePathOutcome.INTERNAL_ERROR, text, refiner=refiner)
+            return RefinePathResult(RefinePathOutcome.INTERNAL_ERROR, text, refined_path=original, refiner=refiner)
         return RefinePathResult(
             int(result.outcome),
             result.message,
@@ -83,8 +83,8 @@ class RefinePathAction(Action[RefinePathGoal, RefinePathResult, NoFeedback]):
         return RefinePathOutcome.STOPPED, f"refiner {refiner!r} gave no answer within {patience:g} s and its grace"
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> RefinePathResult:
-        """Result without a path."""
-        return RefinePathResult(int(outcome), message, refiner=handle.goal.refiner)
+        """Result with the path as it was."""
+        return RefinePathResult(int(outcome), message, refined_path=handle.goal.path, refiner=handle.goal.refiner)
 
     def _tell(self, goal: RefinePathGoal) -> dict[str, Any]:
         return {"refiner": goal.refiner, "poses": len(goal.path)}

@@ -149,6 +149,16 @@ def car_curve(x: float, y: float, yaw: float, reversing: bool) -> NDArray[np.flo
 
 
 @kernel
+def curve_between(
+    start: NDArray[np.float64], end: NDArray[np.float64], radius: float, reversing: bool
+) -> NDArray[np.float64]:
+    """Shortest word (5, 2) of a car with the turning circle ``radius`` [m] between two poses (x, y, yaw)."""
+    c, s = np.cos(start[2]), np.sin(start[2])
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    return car_curve((c * dx + s * dy) / radius, (c * dy - s * dx) / radius, end[2] - start[2], reversing)
+
+
+@kernel
 def drive(x: float, y: float, yaw: float, steering: float, length: float, radius: float) -> tuple[float, float, float]:
     """Pose after a segment of ``length`` [m, negative = backward] at a steering of 1, 0 or -1 on ``radius`` [m]."""
     if steering == 0.0:

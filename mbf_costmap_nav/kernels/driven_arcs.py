@@ -1,24 +1,65 @@
-"""Arcs that a car drives over a costmap: whether it fits all along them, what they cost, and the poses on them.
+"""What a car drives, and what it costs: the arcs of ``hybrid_astar``, and the curves that join their ends.
 
 When to use: by ``hybrid_astar``, whose steps are longer than a cell where the turning circle is large. When not:
 trajectories of velocities in time, which ``rollout`` integrates.
 
-An arc is sampled every ``spacing`` [m]. The footprint is looked at at each sample, and the centre in every cell between
-two of them, so the path made of the same samples is free wherever it is drawn.
+The cost of a piece is its length times (1 + cost_factor * cost of the cells / 252), times a factor where it is driven
+backward and one where it is curved; each change of direction is added. Arcs and curves are sampled a cell apart: the
+footprint is looked at at each sample, and the centre in every cell between two of them, so the path made of the same
+samples is free wherever it is drawn.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_costmap_nav.kernels.car_curves import drive
+from mbf_costmap_nav.kernels.car_curves import drive, sample_word
+from mbf_costmap_nav.kernels.car_ground import Ground, driven_cost
 from mbf_costmap_nav.kernels.compiled import kernel
-from mbf_costmap_nav.kernels.footprint_cost import footprint_cost
-from mbf_costmap_nav.kernels.line_cells import cost_along
+from mbf_costmap_nav.kernels.state_tree import StateTree
+
+FloatArray = NDArray[np.float64]
 
 FORWARD_MOTIONS, MOTIONS = 3, 6
 """Motions 0-2 go right, straight and left; 3-5 do so backward."""
+NO_MOTION = -1
+"""Of the root of a tree."""
+FORWARD_SIDE, BACKWARD_SIDE = 1.0, -1.0
+"""Sides of a tree: the car drives from its root, or to it."""
+
+
+class Car(NamedTuple):
+    """How a car drives, and the costs that a search for its way weighs.
+
+    Attributes
+    ----------
+    radius : float
+        Of the turning circle [m].
+    reversing : bool
+    cost_factor, reverse_factor, turning_factor : float
+        What cells of cost 252 add to a length, in lengths; factors on lengths driven backward, and on those of curves.
+    change_cost : float
+        Of a change of direction [m].
+    bin_size : float
+        Side of the square [m] in which poses of one heading bin are the same for the search.
+    step : float
+        Length of an arc [m].
+    pieces : int
+        Samples on an arc.
+    """
+
+    radius: float
+    reversing: bool
+    cost_factor: float
+    reverse_factor: float
+    turning_factor: float
+    change_cost: float
+    bin_size: float
+    step: float
+    pieces: int
 
 
 @kernel
@@ -29,104 +70,74 @@ def steering_of(motion: int) -> float:
 
 @kernel
 def direction_of(motion: int) -> float:
-    """1 forward, -1 backward."""
+    """1 forward, -1 backward, 0 for no motion."""
+    if motion == NO_MOTION:
+        return 0.0
     return 1.0 if motion < FORWARD_MOTIONS else -1.0
 
 
 @kernel
-def pose_cost(
-    cells: NDArray[np.uint8],
-    unknown: int,
-    geometry: NDArray[np.float64],
-    samples: NDArray[np.float64],
-    pose: NDArray[np.float64],
-) -> int:
-    """Cost of the centre's cell at a pose (x, y, yaw), or -1 if the robot does not fit there.
-
-    ``geometry`` is (resolution, origin_x, origin_y); a centre in an unknown cell counts as ``unknown``.
-    """
-    ix = int(np.floor((pose[0] - geometry[1]) / geometry[0]))
-    iy = int(np.floor((pose[1] - geometry[2]) / geometry[0]))
-    if ix < 0 or iy < 0 or ix >= cells.shape[1] or iy >= cells.shape[0]:
-        return -1
-    cost = int(cells[iy, ix]) if cells[iy, ix] < 255 else unknown
-    if cost >= 253:
-        return -1
-    worst = footprint_cost(cells, geometry[0], geometry[1], geometry[2], samples, pose[0], pose[1], pose[2])
-    return -1 if worst == 254 or worst < 0 else cost
+def weight_of(car: Car, steering: float, direction: float) -> float:
+    """Factor on the length of a piece over free cells."""
+    weight = car.reverse_factor if direction < 0.0 else 1.0
+    return weight if steering == 0.0 else weight * car.turning_factor
 
 
 @kernel
-def driven_cost(
-    cells: NDArray[np.uint8],
-    unknown: int,
-    geometry: NDArray[np.float64],
-    samples: NDArray[np.float64],
-    start: NDArray[np.float64],
-    poses: NDArray[np.float64],
-) -> float:
-    """Mean cost of the centre over poses (n, 3) that are driven one after the other from ``start``, or -1.
-
-    -1: the robot does not fit at one of them, or its centre crosses a blocked cell on the way to it. 0 without poses.
-    """
-    total = 0.0
-    x, y = (start[0] - geometry[1]) / geometry[0], (start[1] - geometry[2]) / geometry[0]
-    for i in range(poses.shape[0]):
-        x_next, y_next = (poses[i, 0] - geometry[1]) / geometry[0], (poses[i, 1] - geometry[2]) / geometry[0]
-        if cost_along(cells, unknown, x, y, x_next, y_next) >= 253:
-            return -1.0
-        cost = pose_cost(cells, unknown, geometry, samples, poses[i])
-        if cost < 0:
-            return -1.0
-        total += cost
-        x, y = x_next, y_next
-    return float(total / max(1, poses.shape[0]))
+def change_of(car: Car, before: float, after: float) -> float:
+    """Cost [m] of driving in the direction ``after`` behind ``before``; 0 stands for none."""
+    return car.change_cost if before * after < 0.0 else 0.0
 
 
 @kernel
-def first_fit(
-    cells: NDArray[np.uint8],
-    unknown: int,
-    geometry: NDArray[np.float64],
-    samples: NDArray[np.float64],
-    poses: NDArray[np.float64],
-) -> int:
-    """Index of the first of the poses (n, 3) at which the robot fits, or -1."""
-    for i in range(poses.shape[0]):
-        if pose_cost(cells, unknown, geometry, samples, poses[i]) >= 0:
-            return i
-    return -1
+def sample_arc(pose: FloatArray, motion: int, side: float, car: Car, into: FloatArray) -> None:
+    """Fill ``into`` (pieces, 3) with poses evenly spaced over an arc from (or on the backward side to) a pose."""
+    signed, steering = side * direction_of(motion) * car.step, steering_of(motion)
+    for i in range(car.pieces):
+        share = (i + 1) / car.pieces
+        into[i, 0], into[i, 1], into[i, 2] = drive(pose[0], pose[1], pose[2], steering, signed * share, car.radius)
 
 
 @kernel
-def sample_arc(pose: NDArray[np.float64], motion: int, length: float, radius: float, into: NDArray[np.float64]) -> None:
-    """Fill ``into`` (n, 3) with poses evenly spaced over an arc of ``length`` [m], the start left out."""
-    signed, steering = direction_of(motion) * length, steering_of(motion)
-    for i in range(into.shape[0]):
-        share = (i + 1) / into.shape[0]
-        into[i, 0], into[i, 1], into[i, 2] = drive(pose[0], pose[1], pose[2], steering, signed * share, radius)
-
-
-@kernel
-def path_to(
-    poses: NDArray[np.float64],
-    parents: NDArray[np.int64],
-    motions: NDArray[np.int8],
-    last: int,
-    length: float,
-    radius: float,
-    pieces: int,
-) -> NDArray[np.float64]:
-    """Poses (n, 3) from the start to state ``last``: ``pieces`` on each arc of ``length`` [m] that led there."""
+def path_from_root(tree: StateTree, last: int, side: float, car: Car) -> FloatArray:
+    """Poses (n, 3) from the root of a tree to state ``last``, in the order of the tree on either side."""
     arcs, state = 0, last
-    while parents[state] >= 0:
+    while tree.parents[state] >= 0:
         arcs += 1
-        state = parents[state]
-    path = np.empty((1 + arcs * pieces, 3))
-    path[0] = poses[state]
+        state = tree.parents[state]
+    path = np.empty((1 + arcs * car.pieces, 3))
+    path[0] = tree.poses[state]
     state = last
     for arc in range(arcs - 1, -1, -1):
-        begin = 1 + arc * pieces
-        sample_arc(poses[parents[state]], motions[state], length, radius, path[begin : begin + pieces])
-        state = parents[state]
+        begin, parent = 1 + arc * car.pieces, tree.parents[state]
+        sample_arc(tree.poses[parent], tree.motions[state], side, car, path[begin : begin + car.pieces])
+        state = parent
     return path
+
+
+@kernel
+def curve_cost(
+    ground: Ground, car: Car, start: FloatArray, word: FloatArray, before: float, after: float, limit: float
+) -> float:
+    """Cost [m] of a curve driven from a pose, between the directions ``before`` and ``after`` (0 = standing).
+
+    inf if the car does not fit all along it, or as soon as it is not below ``limit``.
+    """
+    if np.abs(word[:, 1]).sum() * car.radius >= limit:
+        return np.inf
+    total, pose, previous = 0.0, start, before
+    for segment in range(word.shape[0]):
+        length = word[segment, 1] * car.radius
+        if abs(length) < 1e-9:
+            continue
+        direction = 1.0 if length > 0.0 else -1.0
+        total += change_of(car, previous, direction)
+        previous = direction
+        poses = sample_word(pose[0], pose[1], pose[2], word[segment : segment + 1], car.radius, ground.geometry[0])
+        cost = driven_cost(ground, pose, poses)
+        total += abs(length) * weight_of(car, word[segment, 0], direction) * (1.0 + car.cost_factor * cost / 252.0)
+        if cost < 0.0 or total >= limit:
+            return np.inf
+        pose = poses[poses.shape[0] - 1]
+    total += change_of(car, previous, after)
+    return total if total < limit else np.inf

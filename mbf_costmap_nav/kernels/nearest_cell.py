@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_costmap_nav.kernels.car_ground import pose_cost
 from mbf_costmap_nav.kernels.compiled import kernel
-from mbf_costmap_nav.kernels.driven_arcs import pose_cost
 
 SAME_DISTANCE = 1e-6
 """Cells whose distances [m] differ by less are told apart by their cost."""
@@ -37,7 +37,7 @@ def nearest_reached(
         Costs from the start on the grid padded by one cell on every side.
     cells : (height, width) uint8
     unknown, geometry, samples
-        As for ``driven_arcs.pose_cost``; without samples no robot has to fit anywhere.
+        As for ``car_ground.pose_cost``; without samples no robot has to fit anywhere.
     goal : (3,) float64
         x, y [m], and the heading [rad] at which the robot has to fit.
     tolerance : float

@@ -28,9 +28,11 @@ from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.costmap import LETHAL, Costmap
 from mbf_costmap_nav.footprint_check import FootprintCheck
 from mbf_costmap_nav.grid_planning import check_tolerance, heights_along, off_map
-from mbf_costmap_nav.kernels.driven_arcs import pose_cost
-from mbf_costmap_nav.kernels.grid_search import FOUND, search
-from mbf_costmap_nav.kernels.hybrid_astar import GAVE_UP, hybrid_search
+from mbf_costmap_nav.kernels.car_ground import ground_of, pose_cost
+from mbf_costmap_nav.kernels.driven_arcs import Car
+from mbf_costmap_nav.kernels.grid_search import CANCELED, FOUND, search
+from mbf_costmap_nav.kernels.hybrid_astar import GAVE_UP, HEADINGS, Target, hybrid_search
+from mbf_costmap_nav.kernels.shorter_drive import shortened
 from mbf_costmap_nav.plugins import CostmapPlanner
 from mbf_costmap_nav.search_grid import GridPlannerParameters, SearchGrid
 
@@ -38,6 +40,10 @@ FloatArray = NDArray[np.float64]
 
 UNKNOWN_AS = 252
 """Cost of the unknown cells that may be driven through, as for the other planners."""
+CELLS_OF_BINS = (2.0, 1.0, 0.5, 0.25)
+"""Sides [cells] of the bins: coarse ones first, an eighth of the states; what they cannot reach, finer ones may."""
+STATES_THAT_SHOW = 20_000
+"""With so many states tried in bins of a cell or less, finer ones are not asked: there is no way."""
 
 
 class HybridAStarParameters(PluginParameters):
@@ -50,7 +56,12 @@ class HybridAStarParameters(PluginParameters):
     reverse_penalty: float = parameter(2.0, "Factor on the length driven backward.", ge=1.0, le=100.0)
     change_penalty: float = parameter(0.3, "Cost of a change of direction.", unit="m", ge=0.0, le=100.0)
     turning_penalty: float = parameter(1.05, "Factor on the length of curves.", ge=1.0, le=100.0)
-    max_states: int = parameter(1_000_000, "Give up after so many states.", ge=100, le=100_000_000)
+    max_states: int = parameter(
+        5_000_000,
+        "Give up after so many states, of some 100 bytes each; patience ends most searches before.",
+        ge=100,
+        le=100_000_000,
+    )
 
 
 @dataclass(frozen=True)
@@ -71,10 +82,14 @@ class _World:
         return bool(cost >= 0)
 
     def field(self, source: Pose) -> NDArray[np.float32]:
-        """(n,) distance [cells] of the padded grid's cells from a pose's cell around what blocks the centre."""
+        """(n,) cost [cells] of the padded grid's cells from a pose's cell around what blocks the centre."""
         grid, first = self.grid, self.grid.index(self.grid.cell_of(source))
         _, g = search(grid.cells, grid.stride, grid.table, first, -1, 0.0, True, False, grid.token.flag)
         return g
+
+    def rows(self, field: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(height, width) of a field, without the padding."""
+        return field.reshape(-1, self.grid.stride)[1:-1, 1:-1]
 
 
 @dataclass(frozen=True)
@@ -119,39 +134,53 @@ class HybridAStarPlanner(CostmapPlanner):
 
     def _world(self, request: PlanRequest) -> _World:
         costmap, may_enter = self.costmap.snapshot(), self.parameters.allow_unknown
-        rules = GridPlannerParameters(cost_factor=0.0, allow_unknown=may_enter)
+        rules = GridPlannerParameters(cost_factor=self.parameters.cost_factor, allow_unknown=may_enter)
         samples = FootprintCheck(self.costmap.footprint, costmap.resolution).samples
         grid = SearchGrid.build(costmap, rules, request.cancel_token)
         return _World(grid, samples, UNKNOWN_AS if may_enter else LETHAL)
 
     def _search(self, world: _World, start: Pose, goal: Pose, tolerance: float) -> _Leg | None:
         """Search to the goal or, if it cannot be reached, to what can within the tolerance; None if nothing can."""
-        p, grid, wanted = self.parameters, world.grid, goal
-        field = world.field(goal) if world.fits(goal) else None
-        if field is None or math.isinf(field[grid.index(grid.cell_of(start))]):
-            from_start = None if grid.token.cancelled else world.field(start)
-            end = None if from_start is None else grid.nearest_reached(from_start, goal, tolerance, world.samples)
+        grid, wanted, from_start = world.grid, goal, world.field(start)
+        if not world.fits(goal) or math.isinf(from_start[grid.index(grid.cell_of(goal))]):
+            end = None if grid.token.cancelled else grid.nearest_reached(from_start, goal, tolerance, world.samples)
             if end is None:
                 return None
             goal = Pose((*world.costmap.cell_to_world(*end), goal.z), goal.orientation, goal.frame_id, goal.stamp)
-            field = world.field(goal)
-        status, poses, cost, states = hybrid_search(
-            world.costmap.cells,
-            world.unknown,
-            grid.geometry,
-            world.samples,
-            field.reshape(-1, grid.stride)[1:-1, 1:-1],
-            _planar(start),
-            _planar(goal),
-            _planar(wanted),
-            tolerance,
-            p.min_turning_radius,
-            p.allow_reversing,
-            np.array([p.cost_factor, p.reverse_penalty, p.change_penalty, p.turning_penalty]),
-            p.max_states,
-            grid.token.flag,
-        )
+        to_goal = Target(_planar(goal), world.rows(world.field(goal)))
+        to_start = Target(_planar(start), world.rows(from_start))
+        ground = ground_of(world.costmap.cells, world.unknown, grid.geometry, world.samples)
+        states = made = 0
+        for cells in CELLS_OF_BINS:
+            if cells < 1.0 and made > STATES_THAT_SHOW:
+                break
+            car = self._car(world.costmap.resolution, cells)
+            status, poses, cost, made = hybrid_search(
+                ground, car, to_goal, to_start, _planar(wanted), tolerance, self.parameters.max_states, grid.token.flag
+            )
+            states += made
+            if status in (FOUND, GAVE_UP, CANCELED):
+                break
+        if status == FOUND:
+            poses, cost = shortened(ground, car, poses, grid.token.flag)
         return _Leg(status, poses, cost, states)
+
+    def _car(self, resolution: float, cells: float) -> Car:
+        """The car as the search takes it, with bins of so many cells."""
+        p = self.parameters
+        # An arc leaves its bin, and turns by a bin of the headings at least.
+        step = max(1.5 * cells * resolution, 2.0 * math.pi / HEADINGS * p.min_turning_radius)
+        return Car(
+            radius=p.min_turning_radius,
+            reversing=p.allow_reversing,
+            cost_factor=p.cost_factor,
+            reverse_factor=p.reverse_penalty,
+            turning_factor=p.turning_penalty,
+            change_cost=p.change_penalty,
+            bin_size=cells * resolution,
+            step=step,
+            pieces=math.ceil(step / resolution - 1e-9),
+        )
 
     def _no_way(self, world: _World, start: Pose, goal: Pose, leg: _Leg | None, tolerance: float) -> PlanResult:
         """Say whether the goal is walled off, the car cannot get there, or the search gave up."""

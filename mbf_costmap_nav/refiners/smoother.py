@@ -6,13 +6,15 @@ When to use: behind a grid planner (A*, Theta*), before a controller that follow
 The end poses stay, and so do the heights along the path. A path in another frame than the costmap's is smoothed there
 and handed back in its own. A path that drives backward somewhere is handed back unchanged. With ``max_curvature`` the
 pull to the original path is lowered until the largest curvature of the path is below it; if that fails, or if the path
-runs through lethal cells before and after, the outcome is FAILURE and the message names the place.
+runs through lethal cells before and after, the outcome is FAILURE, the message names the place, and the path of the
+result is the one given.
 
 Formula: the gradient smoother of Dolgov et al. 2010 without its Voronoi term, with a hard limit of the cost instead.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -71,14 +73,14 @@ class SmootherRefiner(CostmapRefiner):
         try:
             T_costmap_path = self.transforms.lookup(costmap.frame_id, path.frame_id)
         except TransformError as error:
-            return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path cannot be laid on the costmap: {error}")
+            return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path cannot be laid on the costmap: {error}", path)
         there = T_costmap_path.apply_to_path(path)
         if not costmap.world_to_cells(there.positions)[1].all():
-            return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path leaves {costmap}")
+            return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path leaves {costmap}", path)
         points = resample(there.positions[:, :2], self.parameters.spacing)
         smoothed = self._drivable(costmap, points, cancel_token)
         if isinstance(smoothed, RefineResult):
-            return smoothed
+            return replace(smoothed, path=path)
         heights = np.interp(arc_lengths(points), arc_lengths(there.positions[:, :2]), there.positions[:, 2])
         flat = Path.from_points(np.column_stack([smoothed, np.zeros(len(smoothed))]))
         positions = np.column_stack([smoothed, heights])

@@ -1,7 +1,6 @@
 """Curves of a car, and the planner built on them."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from mbf_abstract.plugins import PlanRequest
 from mbf_costmap_nav.costmap import Costmap
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.kernels.car_curves import car_curve, sample_word
-from mbf_costmap_nav.kernels.driven_arcs import MOTIONS, direction_of, driven_cost, path_to, steering_of
 from mbf_costmap_nav.kernels.nearest_cell import nearest_reached
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
 
@@ -145,48 +143,6 @@ def test_the_path_is_free_between_its_poses_too_and_they_are_a_cell_apart(make_p
     assert not any(closed_loop.lethal_under(grid, vertices, state) for state in states)
 
 
-@settings(max_examples=50, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), radius=st.floats(0.3, 8.0))
-def test_arcs_are_joined_without_a_gap_and_turn_by_their_length(seed, radius):
-    rng = np.random.default_rng(seed)
-    motions = np.append(1, rng.integers(0, MOTIONS, 4)).astype(np.int8)
-    poses = np.empty((5, 3))
-    poses[0] = rng.uniform(-3.0, 3.0, 3)
-    for i, motion in enumerate(motions[1:].tolist()):
-        along, turn = 0.5 * direction_of(motion), 0.5 * direction_of(motion) * steering_of(motion) / radius
-        chord = along * np.sinc(turn / (2.0 * np.pi))  # of the circle, at half the turn
-        heading = poses[i, 2] + 0.5 * turn
-        poses[i + 1] = poses[i] + (chord * np.cos(heading), chord * np.sin(heading), turn)
-    path = path_to(poses, np.arange(-1, 4), motions, 4, 0.5, radius, 7)
-    assert path[::7] == pytest.approx(poses, abs=1e-9)
-    assert np.hypot(*np.diff(path[:, :2], axis=0).T).max() <= 0.5 / 7 + 1e-9
-
-
-@settings(max_examples=50, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1))
-def test_what_is_driven_costs_the_mean_of_its_poses_and_nothing_blocked_is_driven(seed):
-    rng = np.random.default_rng(seed)
-    cells = rng.choice(np.array([0, 0, 0, 0, 100, 254], dtype=np.uint8), (20, 20))
-    start, poses = rng.uniform(0.0, 2.0, 3), rng.uniform(0.0, 2.0, (2, 3))
-    cost = driven_cost(cells, 252, np.array([0.1, 0.0, 0.0]), np.zeros((1, 2)), start, poses)
-    corners = np.vstack([start, poses])[:, :2]
-    dense = np.concatenate([a + np.linspace(0, 1, 2001)[:, None] * (b - a) for a, b in pairwise(corners)])
-    crossed = cells[tuple((dense / 0.1).astype(int).T[::-1])]
-    if cost >= 0.0:
-        assert crossed.max() < 253
-        assert cost == pytest.approx(cells[tuple((poses[:, :2] / 0.1).astype(int).T[::-1])].mean())
-    else:
-        assert (crossed >= 253).any() or min_gap_to_blocked(cells, dense) < 2e-3
-
-
-def min_gap_to_blocked(cells, points):
-    """Least distance [m] from points to a blocked cell: lines may clip a corner between two samples."""
-    iy, ix = np.nonzero(cells >= 253)
-    low = np.column_stack([ix, iy]) * 0.1
-    gaps = np.maximum(np.maximum(low - points[:, None], points[:, None] - low - 0.1), 0.0)
-    return np.hypot(gaps[..., 0], gaps[..., 1]).min()
-
-
 @settings(max_examples=100, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
@@ -275,3 +231,32 @@ def test_the_heights_of_start_and_goal_are_kept(make_plugin):
     start, goal = (Pose((x, 3.0, z), (0.0, 0.0, 0.0, 1.0)) for x, z in ((1.0, 5.0), (5.0, 6.0)))
     heights = planner.make_plan(PlanRequest(start, goal)).path.positions[:, 2]
     assert (heights[0], heights[-1]) == (5.0, 6.0) and (np.diff(heights) > 0.0).all()
+
+
+def office():
+    """30 m x 20 m of rooms with doors of 1.2 m, and a car's inflation over the whole floor."""
+    cells = np.zeros((200, 300), dtype=np.uint8)
+    cells[[0, -1]] = cells[:, [0, -1]] = 254
+    for number, x in enumerate(range(50, 300, 50)):
+        cells[:, x] = 254
+        door = 20 if number % 2 else 160
+        cells[door : door + 12, x] = 0
+    return cells
+
+
+@pytest.mark.parametrize("goal", [(28.0, 3.0, 1.0), (28.0, 18.0, 3.1), (13.0, 18.5, 0.0)])
+def test_an_ordinary_route_through_an_office_takes_few_states_although_all_cells_cost(make_plugin, closed_loop, goal):
+    grid = Costmap(closed_loop.inflated(office(), 0.1, 0.2, 3.0, 1.0), 0.1)
+    planner = make_plugin(HybridAStarPlanner, grid, footprint=CAR, min_turning_radius=1.0, max_states=20_000)
+    result = plan(planner, (2.0, 2.0, -2.0), goal)
+    assert result.success and (result.path[-1].x, result.path[-1].y) == pytest.approx(goal[:2])
+    states = np.column_stack([result.path.positions[:, :2], [pose.yaw for pose in result.path]])
+    assert not any(closed_loop.lethal_under(grid, 0.999 * CAR.vertices, state) for state in states)
+
+
+def test_a_goal_in_a_closet_that_no_car_can_leave_is_told_by_the_few_states_around_it(make_plugin):
+    cells = closet()
+    cells[47:50, 57] = 0  # a point gets out, the car does not
+    planner = make_plugin(HybridAStarPlanner, cells, resolution=0.1, footprint=CAR, max_states=200_000)
+    result = plan(planner, (1, 5, 0), (4.9, 4.9, 0))
+    assert result.outcome == GetPathOutcome.NO_PATH_FOUND and "states were tried" in result.message

@@ -48,6 +48,7 @@ def test_the_curvature_limit_is_kept(make_plugin):
 def test_a_curvature_that_cannot_be_reached_is_a_failure_that_says_where(make_plugin):
     result = smooth(make_plugin(SmootherRefiner, FREE, max_curvature=0.01), CORNER)
     assert result.outcome == RefinePathOutcome.FAILURE and "curvature" in result.message
+    assert result.path is CORNER
 
 
 def test_the_smoothed_path_keeps_off_obstacles(make_plugin, room):
@@ -138,6 +139,7 @@ def test_a_path_in_a_frame_that_nobody_knows_is_refused(make_plugin):
     path = Path.from_points([(1, 1, 0), (4, 1, 0)], frame_id="nowhere")
     result = smooth(make_plugin(SmootherRefiner, FREE), path)
     assert result.outcome == RefinePathOutcome.MAP_ERROR and "nowhere" in result.message
+    assert result.path is path
 
 
 def test_a_path_through_a_wall_is_a_failure_that_says_where(make_plugin):
