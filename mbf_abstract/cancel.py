@@ -6,6 +6,7 @@ lock) and return their CANCELED outcome. A token that is set before the plugin s
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 
 import numpy as np
@@ -23,12 +24,13 @@ class CancelToken:
         Why, empty while the token is not set.
     """
 
-    __slots__ = ("_callbacks", "flag", "reason")
+    __slots__ = ("_callbacks", "_lock", "flag", "reason")
 
     def __init__(self) -> None:
         self.flag: NDArray[np.uint8] = np.zeros(1, dtype=np.uint8)
         self.reason = ""
         self._callbacks: list[Callable[[], None]] = []
+        self._lock = threading.Lock()  # held for a few assignments only, never while a callback runs
 
     @property
     def cancelled(self) -> bool:
@@ -37,18 +39,20 @@ class CancelToken:
 
     def on_cancel(self, callback: Callable[[], None]) -> None:
         """Call ``callback`` once when the token is set, at once if it is set already."""
-        if self.cancelled:
-            callback()
-        else:
-            self._callbacks.append(callback)
+        with self._lock:
+            if not self.cancelled:
+                self._callbacks.append(callback)
+                return
+        callback()
 
     def cancel(self, reason: str = "cancelled by the client") -> bool:
         """Set the token; return whether this call was the one that set it."""
-        if self.cancelled:
-            return False
-        self.reason = reason
-        self.flag[0] = 1
-        callbacks, self._callbacks = self._callbacks, []
+        with self._lock:
+            if self.cancelled:
+                return False
+            self.reason = reason
+            self.flag[0] = 1
+            callbacks, self._callbacks = self._callbacks, []
         for callback in callbacks:
             callback()
         return True

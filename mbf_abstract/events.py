@@ -149,14 +149,16 @@ class EventBus:
                 self._sinks.remove(sink)
 
     def emit(self, kind: EventKind, source: str, /, **data: Any) -> None:
-        """Record one event, stamped with the clock's time. Never raises."""
+        """Record one event, stamped with the clock's time. No sink and no value makes it raise."""
         with self._lock:
             fields = {key: to_json_value(value) for key, value in data.items()}
             event = Event(round(self._now(), FLOAT_DIGITS), kind, well_formed(source), fields)
             for sink in tuple(self._sinks):
                 try:
                     sink.write(event)
-                except Exception as error:
+                except BaseException as error:
+                    if _is_for_the_program(error):
+                        raise
                     self._drop(sink, event, error)
 
     def close(self) -> None:
@@ -166,7 +168,7 @@ class EventBus:
             for sink in sinks:
                 _close_quietly(sink)
 
-    def _drop(self, sink: EventSink, event: Event, error: Exception) -> None:
+    def _drop(self, sink: EventSink, event: Event, error: BaseException) -> None:
         if sink not in self._sinks:
             return
         self._sinks.remove(sink)
@@ -180,11 +182,19 @@ class EventBus:
         self.emit(EventKind.SINK_FAILED, "event_bus", sink=name, message=f"{type(error).__name__}: {error_text(error)}")
 
 
+def _is_for_the_program(error: BaseException) -> bool:
+    """Whether this is Ctrl-C or SIGTERM, which reach the main thread wherever it is, and no fault of a sink."""
+    on_main_thread = threading.current_thread() is threading.main_thread()
+    return on_main_thread and isinstance(error, (KeyboardInterrupt, SystemExit))
+
+
 def _close_quietly(sink: EventSink) -> None:
     """Close a sink that may be broken; closing a full disk's file raises once more, which is known already."""
     try:
         sink.close()
-    except Exception as error:
+    except BaseException as error:
+        if _is_for_the_program(error):
+            raise
         _logger.debug("closing event sink %s failed: %s", type(sink).__name__, error_text(error))
 
 
@@ -193,19 +203,22 @@ class MemorySink:
 
     def __init__(self, maxlen: int = DEFAULT_MEMORY_EVENTS) -> None:
         self._events: deque[Event] = deque(maxlen=maxlen)
+        self._lock = threading.Lock()
 
     @property
     def events(self) -> tuple[Event, ...]:
         """The kept events, oldest first."""
-        return tuple(self._events)
+        with self._lock:  # a deque cannot be read while another thread writes
+            return tuple(self._events)
 
     def of_kind(self, *kinds: EventKind) -> tuple[Event, ...]:
         """Return the kept events of the given kinds, oldest first."""
-        return tuple(event for event in self._events if event.kind in kinds)
+        return tuple(event for event in self.events if event.kind in kinds)
 
     def write(self, event: Event) -> None:
         """Keep one event, forgetting the oldest if full."""
-        self._events.append(event)
+        with self._lock:
+            self._events.append(event)
 
     def close(self) -> None:
         """Keep what is there."""

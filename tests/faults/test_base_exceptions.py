@@ -147,3 +147,29 @@ def test_on_the_wall_clock_the_slot_survives_too():
             bench.navigator.send(GetPathGoal(Pose.planar(3.0, 0.0))).wait(5.0).outcome == GetPathOutcome.INTERNAL_ERROR
         )
         assert_next_goals_work(bench)
+
+
+class Leaver:
+    """A sink of events that raises at the first event of a kind."""
+
+    def __init__(self, kind, error):
+        self.kind, self.error = kind, error
+
+    def write(self, event):
+        if event.kind is self.kind:
+            raise self.error
+
+    def close(self):
+        raise self.error
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
+@pytest.mark.parametrize("kind", [EventKind.GOAL_STARTED, EventKind.PLUGIN_CALL_ENDED, EventKind.GOAL_FINISHED])
+def test_a_sink_of_events_that_raises_it_is_removed_and_the_goal_ends(kind, error):
+    with Bench() as bench:
+        bench.bus.add_sink(Leaver(kind, error))
+        handle = bench.navigator.send(GetPathGoal(Pose.planar(3.0, 0.0)))
+        assert handle.wait(2.0).success
+        assert [event.data["sink"] for event in bench.events(EventKind.SINK_FAILED)] == ["Leaver"]
+        assert_ended_once(bench, handle)
+        assert_next_goals_work(bench)

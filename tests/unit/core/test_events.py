@@ -216,3 +216,17 @@ def test_events_of_many_threads_are_all_kept_in_one_order():
         thread.join()
     assert len(first.events) == 800
     assert first.events == second.events
+
+
+def test_memory_can_be_read_while_other_threads_write():
+    memory = MemorySink()
+    bus = bus_with(memory)
+    writers = [
+        threading.Thread(target=lambda: [bus.emit(EventKind.CUSTOM, "test", number=n) for n in range(2000)])
+        for _ in range(3)
+    ]
+    for writer in writers:
+        writer.start()
+    while any(writer.is_alive() for writer in writers):
+        assert len(memory.of_kind(EventKind.CUSTOM)) <= 6000
+    assert len(memory.events) == 6000
