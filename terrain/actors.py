@@ -189,11 +189,13 @@ class SlidingDoor:
         self._world.place_body(self.body, self.pose())
 
 
-def other_robot(world: AnyWorld, spec: RobotSpec, route: FloatArray, speed: float, start: float = 0.0) -> RouteWalker:
+def other_robot(
+    world: AnyWorld, spec: RobotSpec, route: FloatArray, speed: float, start: float = 0.0, gives_way: bool = False
+) -> RouteWalker:
     """Put in another robot that follows a route: a box as large as the model, with its body and wheels to look at."""
     length, width = np.ptp(spec.footprint_array(), axis=0).tolist()
     size = (length, width, spec.height)
-    return RouteWalker(world, route, speed, start, size, Thing.ROBOT, _robot_looks(spec, size))
+    return RouteWalker(world, route, speed, start, size, Thing.ROBOT, _robot_looks(spec, size), gives_way)
 
 
 def _robot_looks(spec: RobotSpec, size: tuple[float, float, float]) -> Triangles:

@@ -30,13 +30,14 @@ class Walker(ParameterModel):
 
 
 class OtherRobot(ParameterModel):
-    """Another robot that drives a closed route again and again, whatever is in its way."""
+    """Another robot that drives a closed route again and again."""
 
     type: Literal["robot"]
     model: Literal["husky", "turtlebot", "car"] = parameter("turtlebot", "Its size and looks.")
     route: tuple[tuple[float, float], ...] = parameter(..., "Corners; the last leg leads back to the first.", unit="m")
     speed: float = parameter(0.5, "Speed.", unit="m/s", ge=0.0, le=5.0)
     start: float = parameter(0.0, "How far along the route it starts.", unit="m", ge=0.0)
+    gives_way: bool = parameter(False, "Wait while our robot is just ahead, instead of pushing it.")
 
 
 class Crowd(ParameterModel):
@@ -81,7 +82,7 @@ def add_actors(
 
 def _on_route(world: ScenarioWorld, actor: Walker | OtherRobot, route: FloatArray) -> RouteWalker:
     if isinstance(actor, OtherRobot):
-        return other_robot(world.physics, ROBOTS[actor.model], route, actor.speed, actor.start)
+        return other_robot(world.physics, ROBOTS[actor.model], route, actor.speed, actor.start, actor.gives_way)
     size = (actor.radius, actor.height)
     return RouteWalker(world.physics, route, actor.speed, actor.start, size, gives_way=actor.gives_way)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from terrain.runner import RunOptions, run_scenario
 from terrain.scenario import SHIPPED, load_scenario
 from terrain.scenario_settings import apply_world_settings
 from terrain.sweep_cli import parse_seeds, parse_settings
@@ -13,14 +14,23 @@ from terrain.sweep_cli import parse_seeds, parse_settings
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "write_a_scenario.md"
 
 
-def test_the_scenario_of_the_page_is_read_without_a_finding(tmp_path):
-    (example,) = re.findall(r"```yml\n(.*?)```", PAGE.read_text(), re.DOTALL)
+@pytest.fixture
+def example(tmp_path):
+    """The scenario of the page, as a reader would put it into a file."""
+    (text,) = re.findall(r"```yml\n(.*?)```", PAGE.read_text(), re.DOTALL)
     (tmp_path / "config").symlink_to(SHIPPED / "config")
-    (tmp_path / "example.yaml").write_text(example)
+    (tmp_path / "example.yaml").write_text(text)
+    return load_scenario(tmp_path / "example.yaml")
 
-    scenario = load_scenario(tmp_path / "example.yaml")
 
-    assert (scenario.odometry, len(scenario.actors), len(scenario.faults)) == ("wheels", 1, 2)
+@pytest.mark.timeout(300)
+def test_the_scenario_of_the_page_succeeds(example, tmp_path):
+    result = run_scenario(example, RunOptions(tmp_path / "run", draw=False))
+    assert result.success, str(result.verdict)
+
+
+def test_the_scenario_of_the_page_is_read_without_a_finding(example):
+    assert (example.odometry, len(example.actors), len(example.faults)) == ("wheels", 1, 2)
 
 
 def test_every_setting_of_the_sweep_on_the_page_fits_its_scenario():
