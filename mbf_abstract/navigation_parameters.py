@@ -1,6 +1,7 @@
 """The parameters every server has, with Move Base Flex's names, defaults and meanings, and a few of our own.
 
-A parameter marked ``dynamic`` also takes effect on goals that are running; the others are read when a goal starts.
+A parameter marked ``dynamic`` also takes effect on goals that are running; the others are read when a goal starts, and
+those in ``READ_ONCE`` when the server is made.
 """
 
 from __future__ import annotations
@@ -11,6 +12,9 @@ from typing import Literal
 from pydantic import model_validator
 
 from mbf_abstract.parameters import ParameterModel, parameter
+
+READ_ONCE = ("global_frame", "robot_frame", "odom_topic", "tf_cache_time")
+"""What a running server cannot change; the attempt is an error."""
 
 
 class NavigationParameters(ParameterModel):
@@ -112,7 +116,7 @@ class NavigationParameters(ParameterModel):
 
     # Safety: the velocity gate and the limits of what a fault may cost
     command_timeout: float = parameter(
-        0.5, "Time after the last command at which the robot is stopped.", unit="s", gt=0.0, le=10.0, dynamic=False
+        0.5, "Time after the last command at which the robot is stopped.", unit="s", gt=0.0, le=10.0
     )
     cancel_grace: float = parameter(
         1.0, "Time a plugin has to obey a cancel before it is quarantined.", unit="s", ge=0.0, le=60.0
@@ -126,6 +130,9 @@ class NavigationParameters(ParameterModel):
     max_vx: float | None = parameter(None, "Forward limit of commands; absent = none.", unit="m/s", ge=0.0)
     min_vx: float | None = parameter(None, "Reverse limit of commands, negative or 0.", unit="m/s", le=0.0)
     max_vy: float | None = parameter(None, "Sideways limit of commands.", unit="m/s", ge=0.0)
+    max_vz: float | None = parameter(None, "Limit of commands upwards and downwards.", unit="m/s", ge=0.0)
+    max_wx: float | None = parameter(None, "Roll rate limit of commands.", unit="rad/s", ge=0.0)
+    max_wy: float | None = parameter(None, "Pitch rate limit of commands.", unit="rad/s", ge=0.0)
     max_wz: float | None = parameter(None, "Yaw rate limit of commands.", unit="rad/s", ge=0.0)
     max_steering_angle: float | None = parameter(
         None, "Limit of a car's steering angle.", unit="rad", gt=0.0, le=math.pi / 2.0

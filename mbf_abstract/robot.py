@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.clock import Clock
+from mbf_abstract.clock import Clock, ThreadDetached
+from mbf_abstract.event_values import error_text
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.transforms import TransformBuffer, TransformError
 
+MAX_ODOMETRY_LEAD = 0.2
+"""How far [s] odometry may be stamped in the future: what clocks of two computers differ by."""
 TRACK_SPACING = 0.05
 """Least distance [m] between two points of the driven track."""
 TRACK_POINTS = 200
@@ -35,14 +38,37 @@ class Odometry:
     stamp: float
 
 
+def odometry_problem(answer: object) -> str:
+    """Why this is no answer of a driver's ``odometry``; empty if it is one."""
+    if answer is None:
+        return ""
+    if not isinstance(answer, Odometry):
+        return f"the driver answered with {type(answer).__name__}, expected Odometry or None"
+    velocity: object = answer.velocity
+    if not isinstance(velocity, Twist):
+        return f"the driver's Odometry holds {type(velocity).__name__}, expected Twist"
+    try:
+        finite = all(math.isfinite(number) for number in (*velocity.linear, *velocity.angular, answer.stamp))
+    except TypeError:
+        finite = False
+    return "" if finite else f"the driver's Odometry is not finite: {velocity} at {answer.stamp} s"
+
+
 class Robot(Protocol):
-    """What a robot driver implements."""
+    """What a robot driver implements: two plain functions, called from several threads.
+
+    A driver built on asyncio hands a command to its loop with ``asyncio.run_coroutine_threadsafe`` and answers
+    ``odometry`` from a variable.
+    """
 
     def send_command(self, command: Command) -> None:
-        """Apply a command until the next one; called only by the velocity gate. Must not block."""
+        """Apply a command until the next one; called only by the velocity gate. Must not block.
+
+        Where a call blocks all the same, a stop comes from another thread while it lasts.
+        """
 
     def odometry(self) -> Odometry | None:
-        """Last measured velocity, or None if this robot has no odometry."""
+        """Last measured velocity, or None if this robot has no odometry. Must not block."""
 
 
 class RobotInformation:
@@ -52,6 +78,8 @@ class RobotInformation:
     ----------
     max_pose_age, max_velocity_age : float
         Age limits [s] of the robot's transform and odometry.
+    uses_odometry : bool
+        Without it the driver is never asked, and the robot counts as one that measures no velocity.
     """
 
     def __init__(
@@ -63,6 +91,7 @@ class RobotInformation:
         robot_frame: str = "base_link",
         max_pose_age: float = 3.0,
         max_velocity_age: float = 3.0,
+        uses_odometry: bool = True,
     ) -> None:
         self._robot = robot
         self._transforms = transforms
@@ -71,6 +100,7 @@ class RobotInformation:
         self.robot_frame = robot_frame
         self.max_pose_age = max_pose_age
         self.max_velocity_age = max_velocity_age
+        self._uses_odometry = uses_odometry
         self._track: tuple[tuple[float, float, float], ...] = ()
 
     def pose(self) -> Pose:
@@ -119,7 +149,7 @@ class RobotInformation:
         Raises
         ------
         RobotStateError
-            The last odometry is older than ``max_velocity_age``, or the driver raised.
+            The last odometry is older than ``max_velocity_age`` or from the future, or the driver raised.
         """
         odometry = self._odometry()
         if odometry is None:
@@ -127,10 +157,21 @@ class RobotInformation:
         age = self._clock.now() - odometry.stamp
         if age > self.max_velocity_age:
             raise RobotStateError(f"odometry is {age:.2f} s old, limit {self.max_velocity_age:.2f} s")
+        if not age >= -MAX_ODOMETRY_LEAD:
+            raise RobotStateError(f"odometry is stamped {-age:.2f} s in the future, limit {MAX_ODOMETRY_LEAD:.2f} s")
         return odometry.velocity
 
     def _odometry(self) -> Odometry | None:
+        if not self._uses_odometry:
+            return None
         try:
-            return self._robot.odometry()
-        except Exception as error:
-            raise RobotStateError(f"no odometry: the driver raised {type(error).__name__}: {error}") from error
+            answer: object = self._robot.odometry()
+        except ThreadDetached:
+            raise
+        except BaseException as error:
+            text = f"no odometry: the driver raised {type(error).__name__}: {error_text(error)}"
+            raise RobotStateError(text) from error
+        problem = odometry_problem(answer)
+        if problem:
+            raise RobotStateError(f"no odometry: {problem}")
+        return cast("Odometry | None", answer)

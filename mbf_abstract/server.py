@@ -24,13 +24,14 @@ from mbf_abstract.clock import Clock
 from mbf_abstract.config import Config
 from mbf_abstract.events import EventBus, EventKind
 from mbf_abstract.execution.callbacks import CallbackThread
+from mbf_abstract.execution.driver_check import check_driver
 from mbf_abstract.execution.process_end import ProcessEndWatch
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.map_queries import MapQueries
 from mbf_abstract.map_view import FieldView, MapView
-from mbf_abstract.navigation_parameters import NavigationParameters
+from mbf_abstract.navigation_parameters import READ_ONCE, NavigationParameters
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugin_host import PluginHost
 from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
@@ -49,7 +50,7 @@ class AbstractNavigationServer(PluginHost):
     config : Config
         A validated configuration.
     robot : Robot
-        The robot's driver.
+        The robot's driver; DriverError if it is none.
     clock : Clock
         ``WallClock`` for a real robot, ``SimClock`` for simulated time.
     transforms : TransformBuffer, optional
@@ -74,6 +75,7 @@ class AbstractNavigationServer(PluginHost):
     ) -> None:
         self.config = config
         self._closed = False
+        check_driver(robot, clock)
         super().__init__(self._make_runtime(config.parameters, robot, clock, transforms, events), seed)
         self._process_end = ProcessEndWatch(self.runtime.gate)
         try:
@@ -144,13 +146,31 @@ class AbstractNavigationServer(PluginHost):
 
     # --------------------------------------------------------------------------------------- parameters
     def set_parameters(self, **changes: Any) -> None:
-        """Change the server's parameters at run time, all or none; raises pydantic.ValidationError."""
+        """Change the server's parameters at run time, all or none.
+
+        Raises
+        ------
+        ValueError
+            A value is not legal (pydantic's ValidationError is one), or a parameter is read once, at the start.
+        """
         old = self.runtime.parameters
         base = self.config.parameters if changes.pop("restore_defaults", False) else old
         new = NavigationParameters.model_validate({**base.model_dump(), **changes})
+        fixed = [name for name in READ_ONCE if getattr(new, name) != getattr(old, name)]
+        if fixed:
+            raise ValueError(f"{', '.join(fixed)}: read once, at the start, and cannot be changed at run time")
         self.runtime.parameters = new
-        self.runtime.gate.limits = _limits(new)
+        self._put_into_effect(new)
         self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "server", **changes)
+
+    def _put_into_effect(self, parameters: NavigationParameters) -> None:
+        """Hand parameters to those parts that keep a copy."""
+        runtime = self.runtime
+        runtime.gate.limits = _limits(parameters)
+        runtime.gate.command_timeout = parameters.command_timeout
+        runtime.robot.max_pose_age = runtime.robot.max_velocity_age = parameters.tf_timeout
+        if isinstance(runtime.clock, SimClock):
+            runtime.clock.hang_guard = parameters.hang_guard
 
     def warm_up(self, start: Pose, goal: Pose, on_step: Callable[[str], None] = lambda text: None) -> None:
         """Call every planner and controller once, without moving, so that their kernels are compiled before a goal.
@@ -227,6 +247,7 @@ class AbstractNavigationServer(PluginHost):
         events: EventBus | None,
     ) -> Runtime:
         transforms = transforms or TransformBuffer(parameters.tf_cache_time)
+        transforms.follow_clock(clock.now)
         events = events or EventBus(clock.now)
         supervisor = Supervisor(clock, events)
         runtime = Runtime(
@@ -243,6 +264,7 @@ class AbstractNavigationServer(PluginHost):
                 parameters.robot_frame,
                 max_pose_age=parameters.tf_timeout,
                 max_velocity_age=parameters.tf_timeout,
+                uses_odometry=bool(parameters.odom_topic),
             ),
             transforms=transforms,
             parameters=parameters,

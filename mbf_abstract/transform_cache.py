@@ -6,6 +6,7 @@ with the same parent the transform is interpolated; where the parent changed, th
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from operator import attrgetter
@@ -29,6 +30,7 @@ class TransformCache:
     def __init__(self, window: float) -> None:
         self.window = window
         self._samples: list[Transform] = []  # oldest first; of equal stamps the last inserted comes last
+        self._heard = math.inf  # when the newest sample came
 
     def __len__(self) -> int:
         return len(self._samples)
@@ -47,13 +49,19 @@ class TransformCache:
         """The oldest kept sample."""
         return self._samples[0]
 
-    def insert(self, sample: Transform) -> bool:
-        """Keep a sample; False if it is a duplicate or already older than the window.
+    @property
+    def fresh_at(self) -> float:
+        """Time [s] up to which the newest sample is known to hold: its stamp, but never later than it came."""
+        return min(self.newest.stamp, self._heard)
+
+    def insert(self, sample: Transform, heard: float = math.inf) -> bool:
+        """Keep a sample that came at the time ``heard`` [s]; False if it is a duplicate or older than the window.
 
         A static transform replaces the history, and a moving one replaces a static one.
         """
         if not self._samples or sample.static or self.newest.static:
             self._samples = [sample]
+            self._heard = heard
             return True
         if sample.stamp < self.newest.stamp - self.window:
             return False
@@ -62,6 +70,8 @@ class TransformCache:
         if sample in self._samples[first:index]:
             return False
         self._samples.insert(index, sample)
+        if index == len(self._samples) - 1:
+            self._heard = heard
         self._prune()
         return True
 
@@ -79,6 +89,12 @@ class TransformCache:
             return None
         later = self._samples[index]
         return earlier.interpolate(later, stamp) if earlier.parent == later.parent else earlier
+
+    def forget_after(self, stamp: float) -> bool:
+        """Drop the moving samples later than ``stamp`` [s]; False if none is left."""
+        if not self.newest.static:
+            del self._samples[bisect_right(self._samples, stamp, key=_by_stamp) :]
+        return bool(self._samples)
 
     def _prune(self) -> None:
         limit = self.newest.stamp - self.window

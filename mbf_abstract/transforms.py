@@ -6,6 +6,7 @@ command depends on the answer: without them the newest transform is returned how
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -33,6 +34,8 @@ __all__ = [
     "UnknownFrameError",
 ]
 
+MAX_LEAD = 2.0
+"""How far [s] a transform may be stamped in the future. Localisations post-date theirs, commonly by up to a second."""
 MAX_LISTED_FRAMES = 20
 MAX_PENDING_REQUESTS = 1000
 
@@ -50,7 +53,7 @@ class ExtrapolationError(TransformError):
 
 
 class StaleTransformError(TransformError):
-    """The newest transform is older than the caller allows."""
+    """The newest transform is older than the caller allows, or from the future."""
 
 
 @dataclass(frozen=True)
@@ -78,11 +81,23 @@ class TransformBuffer:
         self.cache_time = cache_time
         self._caches: dict[str, TransformCache] = {}  # by child frame
         self._frame_names: dict[str, None] = {}  # an ordered set
+        self._refused: dict[str, str] = {}  # by child frame: the last transform from the future
+        self._now: Callable[[], float] | None = None
         self._requests: list[_Request] = []
         self._lock = threading.Lock()
 
+    def follow_clock(self, now: Callable[[], float]) -> None:
+        """Measure ages by this clock from now on, and forget what is stamped over ``MAX_LEAD`` after it.
+
+        With a clock a transform ages from when it came, where its stamp is later. The server gives it its own.
+        """
+        with self._lock:
+            self._now = now
+            limit = now() + MAX_LEAD
+            self._caches = {child: cache for child, cache in self._caches.items() if cache.forget_after(limit)}
+
     def set(self, transform: Transform) -> None:
-        """Add one transform. A sample older than the history, or known already, changes nothing.
+        """Add one transform. A sample older than the history, known already or from the future changes nothing.
 
         Raises
         ------
@@ -91,8 +106,14 @@ class TransformBuffer:
         """
         with self._lock:
             self._refuse_loop(transform)
+            heard = math.inf if self._now is None else self._now()
+            if not transform.static and transform.stamp > heard + MAX_LEAD:
+                ahead = f"{transform.stamp - heard:.3f} s ahead of the clock, limit {MAX_LEAD:.3f} s"
+                self._refused[transform.child] = f"{transform.parent}->{transform.child} ({ahead})"
+                return
+            self._refused.pop(transform.child, None)
             cache = self._caches.setdefault(transform.child, TransformCache(self.cache_time))
-            cache.insert(transform)
+            cache.insert(transform, heard)
             self._frame_names.update({transform.parent: None, transform.child: None})
             answered = self._take_answered_requests()
         for request, answer in answered:
@@ -103,6 +124,7 @@ class TransformBuffer:
         with self._lock:
             self._caches.clear()
             self._frame_names.clear()
+            self._refused.clear()
 
     def frames(self) -> list[str]:
         """Return the names of all known frames, sorted."""
@@ -127,7 +149,8 @@ class TransformBuffer:
         time : float, optional
             Time [s] of the answer; the newest common time if not given.
         now, max_age : float, optional
-            Refuse an answer whose stamp is older than ``max_age`` [s] at ``now``. Static transforms do not age.
+            Refuse an answer that is older than ``max_age`` [s] at ``now``, or stamped over ``MAX_LEAD`` after it. A
+            transform ages from its stamp, or from when it came if its stamp is later. Static ones do not age.
 
         Raises
         ------
@@ -195,12 +218,16 @@ class TransformBuffer:
         self, target: str, source: str, time: float | None, now: float | None = None, max_age: float | None = None
     ) -> Transform:
         target_parts, source_parts = self._parts(target, source, time, now)
-        stamps = [part.stamp for part in (*target_parts, *source_parts) if not part.static]
+        moving = [part for part in (*target_parts, *source_parts) if not part.static]
+        stamps = [part.stamp for part in moving]
+        asked = time
         if time is None:
             time = min(stamps) if stamps else now or 0.0
-        if stamps and now is not None and max_age is not None and now - time > max_age:
-            reason = f"the newest is {now - time:.3f} s old, limit {max_age:.3f} s"
-            raise StaleTransformError(self._text(target, source, reason, now))
+        if moving and now is not None and max_age is not None:
+            fresh_at = min(self._caches[part.child].fresh_at for part in moving) if asked is None else asked
+            problem = _age_problem(now - fresh_at, now - max(stamps), max_age)
+            if problem:
+                raise StaleTransformError(self._text(target, source, problem, now))
         if any(stamp != time for stamp in stamps):  # the newest of each frame are of different times
             target_parts, source_parts = self._parts(target, source, time, now)
         return _compose(target_parts, source_parts, time)
@@ -265,7 +292,8 @@ class TransformBuffer:
         existing = [_describe_cache(child, cache, now) for child, cache in sorted(self._caches.items())]
         more = f", and {len(existing) - MAX_LISTED_FRAMES} more" if len(existing) > MAX_LISTED_FRAMES else ""
         listed = ", ".join(existing[:MAX_LISTED_FRAMES]) + more if existing else "no transform at all"
-        return f"no transform from {source!r} to {target!r}: {reason}; there is {listed}"
+        refused = f"; refused: {', '.join(self._refused.values())}" if self._refused else ""
+        return f"no transform from {source!r} to {target!r}: {reason}; there is {listed}{refused}"
 
     def _gap_text(self, child: str, time: float | None) -> str:
         cache = self._caches[child]
@@ -274,6 +302,15 @@ class TransformBuffer:
         side = "past" if time is not None and time < cache.oldest.stamp else "future"
         span = f"{cache.oldest.stamp:.3f} s to {cache.newest.stamp:.3f} s"
         return f"asked for {time:.3f} s, an extrapolation into the {side}: {child!r} is known from {span}"
+
+
+def _age_problem(age: float, least_age: float, max_age: float) -> str:
+    """Why transforms of these ages [s] are not fresh; ``least_age`` is that of the latest stamp, negative if ahead."""
+    if age > max_age:
+        return f"the newest is {age:.3f} s old, limit {max_age:.3f} s"
+    if least_age < -MAX_LEAD:
+        return f"the newest is stamped {-least_age:.3f} s in the future, limit {MAX_LEAD:.3f} s"
+    return ""
 
 
 def _compose(target_steps: list[Transform], source_steps: list[Transform], time: float) -> Transform:

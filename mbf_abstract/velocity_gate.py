@@ -8,15 +8,18 @@ coming for ``command_timeout`` the watchdog sends zero.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from mbf_abstract.clock import Clock, Priority
-from mbf_abstract.event_values import error_text
+from mbf_abstract.clock import Clock, Priority, ThreadDetached
+from mbf_abstract.command_writer import CommandWriter
+from mbf_abstract.drive_commands import command_data, command_problem
 from mbf_abstract.events import EventBus, EventKind
 from mbf_abstract.geometry import AckermannCommand, Command, Twist
 from mbf_abstract.robot import Robot
 
 CURVATURE_TOLERANCE = 1e-6  # a controller that keeps to the same circle must not be corrected for its rounding
+CLOSING_TRIES = 3
+"""How often the watchdog of a closed gate still tries to stop a robot whose driver fails."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +32,10 @@ class VelocityLimits:
         Forward and (negative or zero) reverse limit [m/s].
     max_vy : float
         Sideways limit [m/s].
-    max_wz : float
-        Yaw rate limit [rad/s].
+    max_vz : float
+        Limit upwards and downwards [m/s].
+    max_wx, max_wy, max_wz : float
+        Roll, pitch and yaw rate limits [rad/s].
     max_steering_angle : float
         Limit of an Ackermann command's steering angle [rad], clamped on its own.
     min_turning_radius : float
@@ -41,6 +46,9 @@ class VelocityLimits:
     max_vx: float = math.inf
     min_vx: float = -math.inf
     max_vy: float = math.inf
+    max_vz: float = math.inf
+    max_wx: float = math.inf
+    max_wy: float = math.inf
     max_wz: float = math.inf
     max_steering_angle: float = math.inf
     min_turning_radius: float = 0.0
@@ -64,33 +72,23 @@ class VelocityLimits:
 
     def _scaled(self, command: Twist) -> Twist:
         """Slow down what is too fast, all components alike: the curve stays."""
+        vx, vy, vz = command.linear
+        wx, wy, wz = command.angular
         scale = min(
-            _scale(command.vx, self.max_vx if command.vx > 0.0 else -self.min_vx),
-            _scale(command.vy, self.max_vy),
-            _scale(command.wz, self.max_wz),
+            _scale(vx, self.max_vx if vx > 0.0 else -self.min_vx),
+            _scale(vy, self.max_vy),
+            _scale(vz, self.max_vz),
+            _scale(wx, self.max_wx),
+            _scale(wy, self.max_wy),
+            _scale(wz, self.max_wz),
         )
         if scale >= 1.0:
             return command
-        return Twist(
-            (command.linear[0] * scale, command.linear[1] * scale, command.linear[2] * scale),
-            (command.angular[0] * scale, command.angular[1] * scale, command.angular[2] * scale),
-        )
+        return Twist((vx * scale, vy * scale, vz * scale), (wx * scale, wy * scale, wz * scale))
 
 
 def _scale(value: float, limit: float) -> float:
     return 1.0 if abs(value) <= limit else limit / abs(value)
-
-
-def zero_like(command: Command) -> Command:
-    """The stop command of the same type; a car keeps its steering angle."""
-    return replace(command, speed=0.0) if isinstance(command, AckermannCommand) else Twist()
-
-
-def command_data(command: Command) -> list[float]:
-    """The command's numbers for an event: [vx, vy, wz], or [speed, steering angle]."""
-    if isinstance(command, AckermannCommand):
-        return [command.speed, command.steering_angle]
-    return [command.vx, command.vy, command.wz]
 
 
 class Lease:
@@ -100,6 +98,8 @@ class Lease:
         self._gate = gate
         self.owner = owner
         self.paused = False
+        self.problem = ""
+        """Why the last command through this lease did not reach the robot; empty if it did."""
 
     @property
     def active(self) -> bool:
@@ -126,6 +126,14 @@ class Lease:
         """Give the right back; sends zero unless ``stop`` is False (the watchdog then does, a little later)."""
         self._gate._release(self, stop, reason)
 
+    def ask_stop(self, reason: str) -> None:
+        """Have the watchdog send zero at once, keeping the lease; for other threads than the owner's, never waits."""
+        self._gate._ask_stop(self, reason)
+
+    def revoke(self, reason: str) -> None:
+        """Take the right away from its owner and have the watchdog send zero at once; never waits."""
+        self._gate._revoke(self, reason)
+
 
 class VelocityGate:
     """Guards one robot. Close it and the robot stands for good."""
@@ -133,17 +141,18 @@ class VelocityGate:
     def __init__(
         self, robot: Robot, clock: Clock, events: EventBus, limits: VelocityLimits, command_timeout: float
     ) -> None:
-        self._robot = robot
         self._clock = clock
         self._events = events
         self.limits = limits
-        self.command_timeout = command_timeout
+        self._command_timeout = command_timeout
         self._condition = clock.condition()
+        self._writer = CommandWriter(robot, clock, events, self._condition)
         self._lease: Lease | None = None
-        self._last_command: Command = Twist()
-        self._last_time = clock.now()
+        self._stop_asked = ""  # the reason
+        self._tried_at = -math.inf
         self._closed = False
-        self._watchdog = clock.spawn(self._watch, "velocity watchdog", Priority.WATCHDOG)
+        self._closing_tries = CLOSING_TRIES
+        self._spawn_watchdog()
 
     @property
     def holder(self) -> str:
@@ -154,7 +163,18 @@ class VelocityGate:
     @property
     def last_command(self) -> Command:
         """What the robot was told last."""
-        return self._last_command
+        return self._writer.last_command
+
+    @property
+    def command_timeout(self) -> float:
+        """Time after the last command at which the watchdog sends zero [s]."""
+        return self._command_timeout
+
+    @command_timeout.setter
+    def command_timeout(self, seconds: float) -> None:
+        with self._condition:
+            self._command_timeout = seconds
+            self._condition.notify_all()
 
     def acquire(self, owner: str) -> Lease | None:
         """Hand out the lease, or None while somebody holds it or the gate is closed."""
@@ -166,89 +186,133 @@ class VelocityGate:
             return self._lease
 
     def close(self, reason: str = "server shut down") -> None:
-        """Stop the robot for good: revoke the lease, refuse new ones, end the watchdog. Idempotent."""
+        """Stop the robot for good: revoke the lease, refuse new ones, end the watchdog. Idempotent.
+
+        Where another call of the driver is under way, zero follows it; that is waited for, at most ``command_timeout``.
+        """
         with self._condition:
             if self._closed:
                 return
             self._closed = True
             owner = self.holder
             self._lease = None
-            self._zero()
             self._events.emit(EventKind.GATE_CLOSED, "velocity_gate", holder=owner, reason=reason)
+            stop = self._writer.begin_stop()
             self._condition.notify_all()
+            if stop is None:
+                self._writer.wait_until_free(self._command_timeout)
+        self._writer.deliver(stop)
 
     # ------------------------------------------------------------------------------------ from leases
     def _send(self, lease: Lease, command: Command) -> bool:
         with self._condition:
-            if self._lease is not lease or lease.paused:
-                why = "the lease is paused" if self._lease is lease else "the lease is over"
-                self._events.emit(EventKind.COMMAND_DROPPED, lease.owner, command=command_data(command), reason=why)
-                return False
-            limited = self.limits.apply(command)
-            if limited is not command:
-                self._events.emit(
-                    EventKind.COMMAND_CLAMPED, lease.owner, requested=command_data(command), sent=command_data(limited)
-                )
-            return self._write(limited)
+            problem = command_problem(command)
+            if not problem and self._writer.busy and self._lease is lease:
+                self._writer.wait_until_free(self._command_timeout)
+            reason = problem or self._reason_to_drop(lease)
+            if reason:
+                told = [] if problem else command_data(command)
+                self._events.emit(EventKind.COMMAND_DROPPED, lease.owner, command=told, reason=reason)
+                begun = self._writer.begin_stop() if problem and self._lease is lease else None
+            else:
+                begun = self._writer.begin(self._limited(lease, command))
+        delivered = self._writer.deliver(begun) and not reason
+        lease.problem = "" if delivered else reason or self._writer.problem
+        return delivered
+
+    def _reason_to_drop(self, lease: Lease) -> str:
+        if self._lease is not lease:
+            return "the lease is over"
+        if lease.paused:
+            return "the lease is paused"
+        return "the robot's driver has not come back from an earlier command" if self._writer.busy else ""
+
+    def _limited(self, lease: Lease, command: Command) -> Command:
+        limited = self.limits.apply(command)
+        if limited is not command:
+            self._events.emit(
+                EventKind.COMMAND_CLAMPED, lease.owner, requested=command_data(command), sent=command_data(limited)
+            )
+        return limited
 
     def _stop(self, lease: Lease, reason: str) -> None:
         with self._condition:
-            if self._lease is lease and not self._last_command.is_stopped(0.0, 0.0):
-                self._zero()
-                self._events.emit(EventKind.ROBOT_STOPPED, lease.owner, reason=reason)
+            if self._lease is not lease or self._writer.stands:
+                return
+            self._events.emit(EventKind.ROBOT_STOPPED, lease.owner, reason=reason)
+            stop = self._writer.begin_stop()
+        self._writer.deliver(stop)
 
     def _pause(self, lease: Lease) -> None:
         with self._condition:
-            if self._lease is lease and not lease.paused:
-                lease.paused = True
-                self._zero()
-                self._events.emit(EventKind.ROBOT_STOPPED, lease.owner, reason="paused")
+            if self._lease is not lease or lease.paused:
+                return
+            lease.paused = True
+            self._events.emit(EventKind.ROBOT_STOPPED, lease.owner, reason="paused")
+            stop = self._writer.begin_stop()
+        self._writer.deliver(stop)
 
     def _release(self, lease: Lease, stop: bool, reason: str) -> None:
         with self._condition:
             if self._lease is not lease:
                 return
-            self._lease = None
-            if stop:
-                self._zero()
-            self._events.emit(EventKind.LEASE_REVOKED, "velocity_gate", holder=lease.owner, reason=reason)
+            self._end_lease(lease, reason)
+            zero = self._writer.begin_stop() if stop else None
+        self._writer.deliver(zero)
 
-    # ---------------------------------------------------------------------------------------- writing
-    def _write(self, command: Command) -> bool:
-        """Give one command to the driver; False, and an event, if the driver raises."""
-        delivered = True
-        try:
-            self._robot.send_command(command)
-        except BaseException as error:  # also sys.exit() in a driver: the watchdog must live on
-            delivered = False
-            self._events.emit(
-                EventKind.FAULT, "robot", where="send_command", type=type(error).__name__, message=error_text(error)
-            )
-        was_stopped = self._last_command.is_stopped(0.0, 0.0)
-        if delivered or not command.is_stopped(0.0, 0.0):
-            self._last_command = command  # a zero that was not delivered is tried again by the watchdog
-        self._last_time = self._clock.now()
-        if was_stopped:
-            self._condition.notify_all()  # the watchdog sleeps while the robot is told to stand
-        return delivered
+    def _ask_stop(self, lease: Lease, reason: str) -> None:
+        with self._condition:
+            if self._lease is lease and not self._writer.stands:
+                self._wake_watchdog(reason)
 
-    def _zero(self) -> None:
-        self._write(zero_like(self._last_command))
+    def _revoke(self, lease: Lease, reason: str) -> None:
+        with self._condition:
+            if self._lease is lease:
+                self._end_lease(lease, reason)
+                self._wake_watchdog(reason)
+
+    def _end_lease(self, lease: Lease, reason: str) -> None:
+        self._lease = None
+        self._events.emit(EventKind.LEASE_REVOKED, "velocity_gate", holder=lease.owner, reason=reason)
+
+    # ------------------------------------------------------------------------------------- the watchdog
+    def _wake_watchdog(self, reason: str) -> None:
+        self._stop_asked = reason
+        self._condition.notify_all()
+
+    def _spawn_watchdog(self) -> None:
+        self._clock.spawn(self._watch, "velocity watchdog", Priority.WATCHDOG)
 
     def _watch(self) -> None:
-        with self._condition:
-            while not self._closed:
-                if self._last_command.is_stopped(0.0, 0.0):
-                    self._condition.wait()
-                    continue
-                silence = self._clock.now() - self._last_time
-                if silence < self.command_timeout - 1e-9:
-                    self._condition.wait(self.command_timeout - silence)
-                    continue
-                self._zero()
-                self._events.emit(
-                    EventKind.ROBOT_STOPPED,
-                    "velocity_gate",
-                    reason=f"no command for {silence:.3f} s",
-                    holder=self.holder,
-                )
+        try:
+            while True:
+                with self._condition:
+                    reason = self._wait_for_reason()
+                    if not reason:
+                        return
+                    holder, overdue = self.holder, not self._stop_asked
+                    self._stop_asked = ""
+                    self._tried_at = self._clock.now()
+                    stop = self._writer.begin_stop(although_busy=overdue)
+                if self._writer.deliver(stop):
+                    self._events.emit(EventKind.ROBOT_STOPPED, "velocity_gate", reason=reason, holder=holder)
+        except ThreadDetached:  # the driver kept the processor busy: somebody else has to watch
+            self._spawn_watchdog()
+
+    def _wait_for_reason(self) -> str:
+        """Wait until the robot must be stopped and say why; empty once the gate is closed and nothing is left to do."""
+        while True:
+            if self._stop_asked:
+                return self._stop_asked
+            if self._writer.stands or (self._closed and not self._closing_tries):
+                if self._closed:
+                    return ""
+                self._condition.wait()
+                continue
+            now = self._clock.now()
+            remaining = max(self._writer.last_time, self._tried_at) + self._command_timeout - now
+            if remaining > 1e-9:
+                self._condition.wait(remaining)
+                continue
+            self._closing_tries -= self._closed
+            return f"no command for {now - self._writer.last_time:.3f} s"

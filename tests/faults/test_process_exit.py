@@ -170,7 +170,7 @@ child = os.fork()
 if child == 0:
     sys.exit(0)
 os.waitpid(child, 0)
-os.write(bench.server.runtime.gate._robot.file, b"9\\n")
+os.write(bench.server.runtime.gate._writer._robot.file, b"9\\n")
 bench.clock.sleep(0.2)
 """
     with start(program, log) as process:

@@ -88,3 +88,25 @@ def test_a_change_is_recorded_and_restore_defaults_brings_the_configured_values_
     bench.server.set_parameters(restore_defaults=True)
     assert bench.server.runtime.parameters.planner_patience == 7.0
     assert bench.server.runtime.gate.limits.max_vx == math.inf
+
+
+def test_parameters_that_a_part_keeps_reach_it(make_bench):
+    bench = make_bench()
+    bench.server.set_parameters(command_timeout=0.2, tf_timeout=0.7, hang_guard=9.0, max_vz=0.1)
+    runtime = bench.server.runtime
+    assert (runtime.gate.command_timeout, runtime.robot.max_pose_age, runtime.robot.max_velocity_age) == (0.2, 0.7, 0.7)
+    assert (bench.clock.hang_guard, runtime.gate.limits.max_vz) == (9.0, 0.1)
+
+
+@pytest.mark.parametrize("name", ["global_frame", "robot_frame", "odom_topic", "tf_cache_time"])
+def test_a_parameter_that_is_read_once_is_not_accepted_without_effect(make_bench, name):
+    bench = make_bench()
+    before = bench.server.runtime.parameters
+    with pytest.raises(ValueError, match=f"{name}: read once, at the start"):
+        bench.server.set_parameters(**{name: 3.0 if name == "tf_cache_time" else "other"}, planner_patience=1.0)
+    assert bench.server.runtime.parameters is before
+
+
+def test_a_robot_without_an_odometry_topic_counts_as_standing(make_bench):
+    bench = make_bench(odom_topic="")
+    assert not bench.server.runtime.robot.has_odometry

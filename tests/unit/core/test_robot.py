@@ -1,9 +1,12 @@
-"""The robot's state: fresh or refused, and the track it came by."""
+"""The robot's state: fresh or refused, also what comes from the future, and the track it came by."""
+
+import math
 
 import numpy as np
 import pytest
 
-from mbf_abstract.robot import TRACK_POINTS, TRACK_SPACING, RobotInformation, RobotStateError
+from mbf_abstract.geometry import Twist
+from mbf_abstract.robot import TRACK_POINTS, TRACK_SPACING, Odometry, RobotInformation, RobotStateError
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.transform import Transform
 from mbf_abstract.transforms import TransformBuffer
@@ -62,3 +65,66 @@ def test_a_long_way_forgets_its_oldest_part(drive):
     go(*[(0.1 * step, 1.0) for step in range(3 * TRACK_POINTS)])
     assert len(information.recent_track()) == TRACK_POINTS
     assert information.recent_track()[-1, 0] == pytest.approx(0.1 * (3 * TRACK_POINTS - 1))
+
+
+class Driver:
+    """Answers with what the test has set."""
+
+    answer = None
+
+    def send_command(self, command):
+        """Stay."""
+
+    def odometry(self):
+        return self.answer
+
+
+@pytest.fixture
+def driver():
+    """A driver, and the robot's information that asks it."""
+    one, clock = Driver(), SimClock()
+    clock.sleep(10.0)
+    return one, RobotInformation(one, TransformBuffer(), clock, max_velocity_age=3.0)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "text"),
+    [
+        (6.9, "3.10 s old"),
+        (10.3, "stamped 0.30 s in the future"),
+        (1e9, "stamped 999999990.00 s in the future"),
+        (math.nan, "not finite"),
+        (math.inf, "not finite"),
+        ("now", "not finite"),
+    ],
+)
+def test_odometry_of_another_time_is_refused(driver, stamp, text):
+    driver[0].answer = Odometry(Twist.planar(0.5), stamp)
+    with pytest.raises(RobotStateError, match=text):
+        driver[1].velocity()
+
+
+@pytest.mark.parametrize(
+    ("answer", "text"),
+    [
+        ((0.5, 0.0, 0.0), "answered with tuple"),
+        (Odometry((0.5, 0.0, 0.0), 10.0), "holds tuple"),
+        (Odometry(None, 10.0), "holds NoneType"),
+    ],
+)
+def test_odometry_of_a_wrong_type_is_no_odometry(driver, answer, text):
+    driver[0].answer = answer
+    with pytest.raises(RobotStateError, match=text):
+        driver[1].velocity()
+
+
+def test_odometry_a_little_ahead_is_two_clocks_that_differ(driver):
+    driver[0].answer = Odometry(Twist.planar(0.5), 10.1)
+    assert driver[1].velocity().vx == 0.5
+
+
+def test_a_robot_whose_odometry_is_not_used_is_not_asked():
+    one = Driver()
+    one.answer = "nonsense"
+    information = RobotInformation(one, TransformBuffer(), SimClock(), uses_odometry=False)
+    assert information.velocity() == Twist() and not information.has_odometry

@@ -1,0 +1,114 @@
+"""A robot's driver is checked when the server is made."""
+
+import threading
+
+import pytest
+
+from mbf_abstract.clock import WallClock
+from mbf_abstract.execution.driver_check import DriverError, check_driver
+from mbf_abstract.geometry import Twist
+from mbf_abstract.robot import Odometry
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.loopback import LoopbackRobot
+
+
+class Good:
+    """A driver without odometry; the bad ones replace one of its methods."""
+
+    def send_command(self, command):
+        """Stay."""
+
+    def odometry(self):
+        return None
+
+
+class AsyncSend(Good):
+    async def send_command(self, command):
+        pass
+
+
+class AsyncOdometry(Good):
+    async def odometry(self):
+        pass
+
+
+class HiddenAsyncOdometry(Good):
+    def odometry(self):
+        return AsyncOdometry().odometry()
+
+
+class NoArgument(Good):
+    def send_command(self):
+        pass
+
+
+class TupleOdometry(Good):
+    def odometry(self):
+        return (0.5, 0.0, 0.1)
+
+
+class TupleVelocity(Good):
+    def odometry(self):
+        return Odometry((0.5, 0.0, 0.1), 0.0)
+
+
+class NoOdometry:
+    def send_command(self, command):
+        pass
+
+
+class NumberForMethod(Good):
+    odometry = 3
+
+
+@pytest.mark.parametrize(
+    ("robot", "text"),
+    [
+        (object(), "object is no robot driver: send_command is missing"),
+        (None, "NoneType is no robot driver: send_command is missing"),
+        (LoopbackRobot, "must be a driver object, got the class LoopbackRobot"),
+        (NoOdometry(), "odometry is missing"),
+        (NumberForMethod(), "odometry is int, expected a method"),
+        (NoArgument(), "send_command must take 1 argument"),
+        (AsyncSend(), "send_command is a coroutine function"),
+        (AsyncOdometry(), "odometry is a coroutine function"),
+        (HiddenAsyncOdometry(), "answered with coroutine, expected Odometry or None"),
+        (TupleOdometry(), "answered with tuple, expected Odometry or None"),
+        (TupleVelocity(), "holds tuple, expected Twist"),
+    ],
+)
+@pytest.mark.parametrize("clock", [SimClock, WallClock])
+def test_what_is_no_driver_is_refused(robot, text, clock):
+    with pytest.raises(DriverError, match=text):
+        check_driver(robot, clock())
+
+
+def test_a_server_with_what_is_no_driver_is_not_made():
+    clock = SimClock()
+    with pytest.raises(DriverError, match="send_command is missing"):
+        Bench(clock=clock, robot=object())
+    clock.sleep(0.1)
+    assert {one.name for one in clock._known} == {"main", "loopback robot"}
+
+
+@pytest.mark.parametrize("answer", [None, Odometry(Twist(), 0.0), OSError("not connected yet")])
+def test_a_driver_that_answers_or_is_not_connected_yet_is_accepted(answer):
+    class Robot(Good):
+        def odometry(self):
+            if isinstance(answer, Exception):
+                raise answer
+            return answer
+
+    check_driver(Robot(), SimClock())
+
+
+def test_odometry_that_blocks_does_not_block_the_making_of_the_server():
+    blocked = threading.Event()
+
+    class Robot(Good):
+        def odometry(self):
+            blocked.wait()
+
+    check_driver(Robot(), WallClock())
+    blocked.set()
