@@ -30,6 +30,9 @@ class Priority(IntEnum):
 class ThreadDetached(BaseException):
     """Raised inside a thread that its clock has given up on (see ``SimClock``); it must end, silently.
 
+    Behind the guarded section in which that happened the thread may call into the clock again, to tidy up: it then
+    counts as a foreign one.
+
     A ``BaseException``, so that a plugin's ``except Exception`` does not swallow it.
     """
 
@@ -81,8 +84,12 @@ class Clock(Protocol):
         """Start a daemon thread that this clock knows."""
 
     @contextmanager
-    def guarded(self, label: str) -> Iterator[None]:
-        """Mark foreign code (a plugin call) in which the thread may hang."""
+    def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> Iterator[None]:
+        """Mark foreign code (a plugin call) in which the thread may hang; ``on_hang`` is told if the clock gives up.
+
+        ``ThreadDetached`` leaves the section only where the clock has really given up on the thread; one that the
+        foreign code made itself becomes a RuntimeError.
+        """
 
     @contextmanager
     def outside(self) -> Iterator[None]:
@@ -134,9 +141,12 @@ class WallClock:
         return _WallThread(target, name)
 
     @contextmanager
-    def guarded(self, label: str) -> Iterator[None]:
+    def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> Iterator[None]:
         """Do nothing: a thread that hangs does not stop real time."""
-        yield
+        try:
+            yield
+        except ThreadDetached as forged:
+            raise RuntimeError(f"{label} raised ThreadDetached: {forged}") from forged
 
     @contextmanager
     def outside(self) -> Iterator[None]:

@@ -89,16 +89,18 @@ class CommandWriter:
 
     def deliver(self, command: Command | None) -> bool:
         """Call the driver with an announced command, then with the zero that is due; whether the first got through."""
-        delivered = True
+        delivered, detached = True, None
         while command is not None:
-            problem = "it did not come back in time"
             try:
                 problem = self._call(command)
-            finally:
-                with self._condition:
-                    following = self._end_call(command, problem)
+            except ThreadDetached as error:  # what is due is still to be sent before this thread ends
+                problem, detached = "send_command kept the processor busy for too long", error
+            with self._condition:
+                following = self._end_call(command, problem)
             delivered = delivered and not problem
             command = following
+        if detached is not None:
+            raise detached
         return delivered
 
     def _call(self, command: Command) -> str:

@@ -152,7 +152,8 @@ class PluginHost(ABC):
         plugin = self._loaded(kind, name)
         instance = plugin.instance
         old, new = instance.parameters, with_changes(instance.parameters, changes)
-        if not plugin.acquire(self, lambda: True):
+        user = "a change of its parameters"
+        if not plugin.acquire(user, lambda: True):
             raise ServerError(f"{kind.name.lower()} {name!r} is in use")
         try:
             instance.parameters = new
@@ -161,7 +162,7 @@ class PluginHost(ABC):
             instance.parameters = old
             raise
         finally:
-            plugin.release(self)
+            plugin.release(user)
         self.runtime.events.emit(EventKind.PARAMETER_CHANGED, name, **changes)
 
 

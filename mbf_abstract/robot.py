@@ -144,7 +144,11 @@ class RobotInformation:
         return self._odometry() is not None
 
     def velocity(self) -> Twist:
-        """Measured velocity in the base frame; zero for a robot without odometry.
+        """Measured velocity in the base frame; zero for a robot without odometry. Raises RobotStateError."""
+        return self.measured_velocity() or Twist()
+
+    def measured_velocity(self) -> Twist | None:
+        """Measured velocity in the base frame; None for a robot without odometry.
 
         Raises
         ------
@@ -153,7 +157,7 @@ class RobotInformation:
         """
         odometry = self._odometry()
         if odometry is None:
-            return Twist()
+            return None
         age = self._clock.now() - odometry.stamp
         if age > self.max_velocity_age:
             raise RobotStateError(f"odometry is {age:.2f} s old, limit {self.max_velocity_age:.2f} s")

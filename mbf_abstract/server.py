@@ -39,7 +39,8 @@ from mbf_abstract.robot import Robot, RobotInformation
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.transforms import TransformBuffer
-from mbf_abstract.velocity_gate import VelocityGate, VelocityLimits
+from mbf_abstract.velocity_gate import VelocityGate
+from mbf_abstract.velocity_limits import VelocityLimits
 
 
 class AbstractNavigationServer(PluginHost):
@@ -222,8 +223,6 @@ class AbstractNavigationServer(PluginHost):
         self._process_end.end()
         for action in self._actions():
             action.close()
-        if isinstance(self.runtime.clock, SimClock):
-            self.runtime.clock.on_hang.remove(self.runtime.on_hang)
         self.runtime.callbacks.close()
         self.runtime.supervisor.close()
         self.close_map()
@@ -272,7 +271,6 @@ class AbstractNavigationServer(PluginHost):
         )
         if isinstance(clock, SimClock):
             clock.hang_guard = parameters.hang_guard
-            clock.on_hang.append(runtime.on_hang)
         return runtime
 
 

@@ -9,7 +9,8 @@ served too, but they run beside the lockstep and a run they touch is no longer r
 
 A plugin call that never waits freezes virtual time. A wall-clock guard therefore watches the sections marked by
 ``guarded``: after ``hang_guard`` wall seconds the thread is *detached*: time goes on without it, and its next call into
-the clock raises ``ThreadDetached``. This guard is the only place where a simulated run depends on the wall clock.
+the clock raises ``ThreadDetached``. Once out of the section it goes on as a foreign thread, so that it can tidy up.
+This guard is the only place where a simulated run depends on the wall clock.
 
 Use it for simulation and tests. For a real robot use ``WallClock``.
 """
@@ -26,7 +27,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from mbf_abstract.clock import ClockThread, Condition, Priority, ThreadDetached
-from mbf_abstract.sim_thread import Participant, SimCondition, SimThread
+from mbf_abstract.sim_thread import Participant, Section, SimCondition, SimThread
 
 DEFAULT_HANG_GUARD = 30.0
 
@@ -70,8 +71,6 @@ class SimClock:
         self._alone = threading.Event()
         self._schedule = schedule
         self._external = external
-        self.on_hang: list[Callable[[str], None]] = []
-        """Called (on the guard's thread) with the label of a section whose thread was detached."""
 
     # ------------------------------------------------------------------------------------------- public
     def now(self) -> float:
@@ -101,18 +100,30 @@ class SimClock:
         return SimThread(self, target, name, priority)
 
     @contextmanager
-    def guarded(self, label: str) -> Iterator[None]:
-        """Watch the section with the wall-clock guard."""
+    def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> Iterator[None]:
+        """Watch the section with the wall-clock guard, which calls ``on_hang`` on its own thread.
+
+        Sections may lie within each other; the time that counts is that of the outermost one.
+        """
         me = self._current()
-        me.resumed_at = time.monotonic()
-        me.guarded = label
+        if not me.sections:
+            me.resumed_at = time.monotonic()
+        me.sections.append(Section(label, on_hang))
         self._start_guard()
         try:
             yield
+        except ThreadDetached as error:
+            if not me.detached:
+                raise RuntimeError(f"{label} raised ThreadDetached: {error}") from error
         finally:
-            me.guarded = ""
+            me.sections.pop()
             if me.detached:
+                self._go_on_as_foreign(me)
                 raise ThreadDetached(label)
+
+    def _go_on_as_foreign(self, me: Participant) -> None:
+        if self._local.participant is me:
+            self._local.participant = Participant(me.name, me.priority, foreign=True)
 
     @contextmanager
     def outside(self) -> Iterator[None]:
@@ -225,7 +236,7 @@ class SimClock:
 
     def _await_baton(self, me: Participant) -> None:
         me.baton.acquire()
-        if me.guarded:
+        if me.sections:
             me.resumed_at = time.monotonic()
         if me.detached:
             raise ThreadDetached(me.name)
@@ -315,19 +326,20 @@ class SimClock:
     def _guard(self) -> None:
         """Look for hung threads until only the founder is left."""
         while not self._alone.wait(min(1.0, self.hang_guard / 4.0)):
-            label = self._detach_if_hung()
-            for callback in list(self.on_hang) if label else ():
-                callback(label)
+            for section in self._detach_if_hung():
+                if section.on_hang is not None:
+                    section.on_hang()
 
-    def _detach_if_hung(self) -> str:
+    def _detach_if_hung(self) -> tuple[Section, ...]:
+        """Give up on the running thread if it is due; the sections it hangs in, the outermost first."""
         with self._mutex:
             suspect = self._running
-            if suspect is None or not suspect.guarded or suspect is self._founder:
-                return ""
+            if suspect is None or not suspect.sections or suspect is self._founder:
+                return ()
             if time.monotonic() - suspect.resumed_at < self.hang_guard:
-                return ""
+                return ()
             suspect.detached = True
             self._known.discard(suspect)
             self._running = None
             self._dispatch()
-            return suspect.guarded
+            return tuple(suspect.sections)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from mbf_abstract.clock import ThreadDetached
 
@@ -15,12 +15,19 @@ if TYPE_CHECKING:
     from mbf_abstract.sim_clock import SimClock
 
 
+class Section(NamedTuple):
+    """One guarded section, and who is told if its thread hangs."""
+
+    label: str
+    on_hang: Callable[[], None] | None
+
+
 class Participant:
     """One known (or, while it waits, one foreign) thread."""
 
     __slots__ = (
-        "baton", "deadlock", "detached", "foreign", "guarded", "held_locks", "name", "notified", "outside_depth",
-        "priority", "resumed_at", "ticket", "waiting_on",
+        "baton", "deadlock", "detached", "foreign", "held_locks", "name", "notified", "outside_depth", "priority",
+        "resumed_at", "sections", "ticket", "waiting_on",
     )  # fmt: skip
 
     def __init__(self, name: str, priority: int, foreign: bool = False) -> None:
@@ -35,7 +42,7 @@ class Participant:
         self.deadlock = False
         self.held_locks = 0
         self.outside_depth = 0  # coroutines of this thread that are outside the lockstep
-        self.guarded = ""
+        self.sections: list[Section] = []  # the guarded ones it is in, the outermost first
         self.resumed_at = 0.0  # wall clock
         self.waiting_on: SimCondition | None = None
 
@@ -124,7 +131,7 @@ class SimThread:
             pass
         finally:
             if self._me.detached:
-                clock._local.participant = Participant(self._me.name, self._me.priority, foreign=True)
+                clock._go_on_as_foreign(self._me)
             with self._ended:
                 self._alive = False
                 self._ended.notify_all()

@@ -203,6 +203,6 @@ class Action(ABC, Generic[G, R, F]):
         if not 0 <= slot <= 255:
             return self.internal_error_outcome, f"concurrency_slot must be 0..255, got {slot}"
         limit = self.runtime.parameters.max_quarantined
-        if self.runtime.quarantined >= limit:
+        if len(self.runtime.hanging) >= limit:
             return self.internal_error_outcome, f"{limit} plugin calls hang; no more goals until one returns"
         return self._check(goal)

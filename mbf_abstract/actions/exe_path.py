@@ -14,7 +14,8 @@ from mbf_abstract.actions.goals import ExePathFeedback, ExePathGoal, ExePathResu
 from mbf_abstract.actions.handle import GoalHandle
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.arrival import ArrivalCheck, ToleranceCheck
-from mbf_abstract.execution.controller import ControllerEnd, ControllerExecution, Cycle, Plan
+from mbf_abstract.execution.controller import ControllerExecution
+from mbf_abstract.execution.controller_state import ControllerEnd, Cycle, Plan
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.plan_check import area_problem, path_in_global_frame
 from mbf_abstract.execution.plugin_run import PluginRun
@@ -151,7 +152,7 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
             plugin,
             following.job.handle,
             patience=lambda: self.runtime.parameters.controller_patience,
-            on_abandon=lambda: self._abandon(following),
+            on_abandon=lambda: self._abandon(following, run),
         )
         self._tell_started(following)
         with self.runtime.map_hooks.using_map(PluginKind.CONTROLLER), run:
@@ -177,18 +178,18 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
             return "exclusive"
         return "either" if parameters.mbf_tolerance_check else "plugin"
 
-    def _abandon(self, following: Following) -> None:
-        """The controller hangs: stop the robot, end the goal, free the slot."""
-        assert following.execution is not None
-        following.execution.stop_robot("the controller hangs")
+    def _abandon(self, following: Following, run: PluginRun[AbstractController]) -> None:
+        """A call of the controller, the driver or the map hangs: stop the robot, end the goal, free the slot."""
+        if following.execution is not None:
+            following.execution.stop_robot(f"{run.suspect} hangs")
         handle = following.job.handle
         self._end_following(following)
         if handle.cancel_requested:
-            text = f"{handle.cancel_reason}; controller {following.controller!r} has not ended yet"
+            text = f"{handle.cancel_reason}; {run.suspect} has not ended yet"
             following.job.abandon(ExePathOutcome.CANCELED, text)
         else:
             patience = self.runtime.parameters.controller_patience
-            text = f"controller {following.controller!r} gave no answer within {patience:g} s and its grace"
+            text = f"{run.suspect} gave no answer within {patience:g} s and its grace"
             following.job.abandon(ExePathOutcome.PAT_EXCEEDED, text)
 
     # ---------------------------------------------------------------------------------------- 4. results

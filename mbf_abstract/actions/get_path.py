@@ -68,12 +68,14 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
             plugin,
             handle,
             patience=lambda: self.runtime.parameters.planner_patience,
-            on_abandon=lambda: job.abandon(*self._hung(plugin.name, handle)),
+            on_abandon=lambda: job.abandon(*self._hung(run.suspect, handle)),
         )
         with self.runtime.map_hooks.using_map(PluginKind.PLANNER), run:
             execution = PlannerExecution(run, request, goal.goal_area)
             state = execution.execute()
         # 4. Judge how it ended.
+        if run.waited_for and not run.canceled:
+            return GetPathResult(GetPathOutcome.PAT_EXCEEDED, run.waiting_text(), planner=plugin.name)
         return self._result(state, execution.last_result, handle, request, plugin.name)
 
     def _request(self, goal: GetPathGoal, handle: Handle) -> PlanRequest:
@@ -132,11 +134,11 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
         )
         return GetPathResult(int(said.outcome), said.message or "plan found", path=path, cost=cost, **words)
 
-    def _hung(self, planner: str, handle: Handle) -> tuple[int, str]:
+    def _hung(self, suspect: str, handle: Handle) -> tuple[int, str]:
         if handle.cancel_requested:
-            return GetPathOutcome.CANCELED, f"{handle.cancel_reason}; planner {planner!r} has not ended yet"
+            return GetPathOutcome.CANCELED, f"{handle.cancel_reason}; {suspect} has not ended yet"
         patience = self.runtime.parameters.planner_patience
-        return GetPathOutcome.PAT_EXCEEDED, f"planner {planner!r} gave no answer within {patience:g} s and its grace"
+        return GetPathOutcome.PAT_EXCEEDED, f"{suspect} gave no answer within {patience:g} s and its grace"
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> GetPathResult:
         """Result without a path."""

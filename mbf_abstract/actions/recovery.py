@@ -51,7 +51,7 @@ class RecoveryAction(Action[RecoveryGoal, RecoveryResultMessage, NoFeedback]):
             plugin,
             handle,
             patience=lambda: self.runtime.parameters.recovery_patience,
-            on_abandon=lambda: self._abandon(job, execution),
+            on_abandon=lambda: self._abandon(job, run, execution),
         )
         execution = RecoveryExecution(run)
         with self.runtime.map_hooks.using_map(PluginKind.RECOVERY), run:
@@ -61,16 +61,15 @@ class RecoveryAction(Action[RecoveryGoal, RecoveryResultMessage, NoFeedback]):
         message = result.message or f"recovery {plugin.name!r} {verdict}"
         return RecoveryResultMessage(int(result.outcome), message, used_plugin=plugin.name)
 
-    def _abandon(self, job: Job, execution: RecoveryExecution) -> None:
+    def _abandon(self, job: Job, run: PluginRun[AbstractRecovery], execution: RecoveryExecution) -> None:
         """Stop the robot under a behaviour that hangs, then end its goal."""
-        execution.motion.close("the behaviour hangs")
-        name = job.handle.goal.behavior or "default"
+        execution.motion.revoke("the behaviour hangs")
         if job.handle.cancel_requested:
-            text = f"{job.handle.cancel_reason}; recovery {name!r} has not ended yet"
+            text = f"{job.handle.cancel_reason}; {run.suspect} has not ended yet"
             job.abandon(RecoveryOutcome.CANCELED, text)
         else:
             patience = self.runtime.parameters.recovery_patience
-            text = f"recovery {name!r} did not end within {patience:g} s and its grace"
+            text = f"{run.suspect} did not come back within {patience:g} s and its grace"
             job.abandon(RecoveryOutcome.PAT_EXCEEDED, text)
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> RecoveryResultMessage:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 
-from mbf_abstract.clock import Clock, Priority, ThreadDetached
+from mbf_abstract.clock import Clock, Priority
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventBus, EventKind
 from mbf_abstract.execution.supervisor import Supervisor
@@ -102,8 +102,6 @@ class CallbackThread:
             with self._clock.guarded("a user callback"):
                 call.callback()
         except BaseException as error:
-            if isinstance(error, ThreadDetached):
-                self._clock.sleep(0.0)  # raises it again where the clock has given up on this thread
             text = f"a user callback raised: {error_text(error)}"
             self._events.emit(EventKind.FAULT, "callbacks", type=type(error).__name__, message=text)
         self._supervisor.stop(watch)

@@ -8,76 +8,23 @@ Whatever ends the loop, the lease is given back and the robot stands. Difference
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from enum import Enum
+from typing import TypeVar
 
 from mbf_abstract.clock import Stopwatch
+from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
-from mbf_abstract.execution.arrival import ArrivalCheck
+from mbf_abstract.execution.controller_state import ControllerEnd, ControllerState, Cycle, Plan
 from mbf_abstract.execution.loaded_plugin import PluginFault, PluginNonFinite, checked_answer
 from mbf_abstract.execution.motion_watch import MotionWatch
-from mbf_abstract.execution.plugin_run import PluginRun
-from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.execution.plugin_run import Abandoned, PluginRun
+from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
 from mbf_abstract.robot import RobotStateError
 from mbf_abstract.transforms import TransformError
 from mbf_abstract.velocity_gate import Lease
 
-
-class ControllerState(Enum):
-    """Where a controller execution is."""
-
-    INITIALIZED = "initialized"
-    STARTED = "started"
-    CONTROLLING = "controlling"
-    GOT_LOCAL_CMD = "got_local_cmd"
-    NO_LOCAL_CMD = "no_local_cmd"
-    HOLDING = "holding"
-    PAUSED = "paused"
-    STOPPING = "stopping"
-    ARRIVED_GOAL = "arrived_goal"
-    NO_PLAN = "no_plan"
-    EMPTY_PLAN = "empty_plan"
-    INVALID_PLAN = "invalid_plan"
-    MAX_RETRIES = "max_retries"
-    PAT_EXCEEDED = "pat_exceeded"
-    CANCELED = "canceled"
-    OSCILLATING = "oscillating"
-    ROBOT_DISABLED = "robot_disabled"
-    STOPPED = "stopped"
-    INTERNAL_ERROR = "internal_error"
-
-
-@dataclass(frozen=True)
-class ControllerEnd:
-    """How the loop ended: its last state, the outcome for the goal, and a text."""
-
-    state: ControllerState
-    outcome: int
-    message: str
-
-
-@dataclass(frozen=True)
-class Cycle:
-    """What one cycle knew, for feedback."""
-
-    pose: Pose
-    velocity: Twist
-    result: ControlResult
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A path in the global frame with the arrival rule of its goal, and the robot's progress on it."""
-
-    path: Path
-    arrival: ArrivalCheck
-    tracker: PathTracker = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "tracker", PathTracker(self.path))
+T = TypeVar("T")
 
 
 class ControllerExecution:
@@ -124,7 +71,7 @@ class ControllerExecution:
         """Drive until the loop ends; the robot stands when this returns."""
         self._enter(ControllerState.STARTED)
         if not self._run.acquire_plugin():
-            return self._canceled() if self._run.canceled else self._patience_end()
+            return self._canceled() if self._run.canceled else self._waited_too_long()
         self._lease = lease = self._runtime.gate.acquire(f"exe_path {self._run.plugin.name}")
         if lease is None:
             holder = self._runtime.gate.holder or "nobody (the gate is closed)"
@@ -135,13 +82,19 @@ class ControllerExecution:
             end = self._loop(lease)
             return end
         finally:
-            lease.release(stop=self._stops_at(end.state), reason=end.state.value)
-            self._tell_cycles(began)
+            try:
+                self._tell_robot(lambda: lease.release(stop=self._stops_at(end.state), reason=end.state.value))
+            finally:
+                self._tell_cycles(began)
 
     def stop_robot(self, reason: str) -> None:
-        """Take the lease away from the loop, from another thread: its plugin hangs."""
+        """Take the lease away from the loop, from another thread: a call of it hangs. Never waits."""
         if self._lease is not None:
-            self._lease.release(reason=reason)
+            self._lease.revoke(reason)
+
+    def _tell_robot(self, tell: Callable[[], T]) -> T:
+        """Let the gate call the driver, supervised: it may block."""
+        return self._run.call_beside("the robot's send_command()", tell)
 
     # -------------------------------------------------------------------------------------- the cycle
     def _loop(self, lease: Lease) -> ControllerEnd:
@@ -169,10 +122,11 @@ class ControllerExecution:
         state = self._fresh_state(lease)
         if state is None:
             return self._holding_too_long()
-        pose, velocity = state
+        pose, measured = state
+        velocity = measured or Twist()
         if self._is_arrived(pose):
             return self._come_to_rest(velocity, lease)
-        end = self._watch_motion(pose, velocity)
+        end = self._watch_motion(pose, measured)
         if end is not None:
             return end
         result = self._compute(pose, velocity)
@@ -219,27 +173,38 @@ class ControllerExecution:
                 self._motion.resume()
             return False
         if not lease.paused:
-            lease.pause()
+            self._tell_robot(lease.pause)
             self._motion.pause()
             self._enter(ControllerState.PAUSED)
         return True
 
-    def _fresh_state(self, lease: Lease) -> tuple[Pose, Twist] | None:
-        """Pose and velocity, if the map is current too; else stop the robot and remember why it holds."""
-        problem = self._runtime.map_hooks.map_problem()
+    def _fresh_state(self, lease: Lease) -> tuple[Pose, Twist | None] | None:
+        """Pose and measured velocity, if the map is current too; else stop the robot and remember why it holds."""
+        problem = self._map_problem()
         if problem:
             self._hold(lease, ExePathOutcome.MAP_ERROR, problem)
             return None
+        robot = self._runtime.robot
         try:
-            state = self._runtime.robot.pose(), self._runtime.robot.velocity()
+            state = robot.pose(), self._run.call_beside("the robot's odometry()", robot.measured_velocity)
         except RobotStateError as error:
             self._hold(lease, ExePathOutcome.TF_ERROR, str(error))
             return None
         self._hold_reason = None
         return state
 
+    def _map_problem(self) -> str:
+        """Why the map must not be driven on; a map that cannot even say so must not."""
+        try:
+            problem: object = self._run.call_beside("the map's map_problem()", self._runtime.map_hooks.map_problem)
+        except Abandoned:
+            raise
+        except Exception as error:
+            return f"map_problem raised {type(error).__name__}: {error_text(error)}"
+        return str(problem) if problem else ""
+
     def _hold(self, lease: Lease, outcome: int, reason: str) -> None:
-        lease.stop()
+        self._tell_robot(lease.stop)
         self._enter(ControllerState.HOLDING)
         self._hold_reason = (outcome, reason)
 
@@ -273,7 +238,7 @@ class ControllerExecution:
         if self.state is not ControllerState.STOPPING:
             self._run.patience_watch.restart()
             self._enter(ControllerState.STOPPING)
-        lease.stop()
+        self._tell_robot(lease.stop)
         if self._run.is_patience_over():
             text = f"the robot is at its goal but still moves at {velocity.speed:.2f} m/s, {velocity.wz:.2f} rad/s"
             return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, text)
@@ -305,18 +270,27 @@ class ControllerExecution:
         if self._run.canceled and self._graceful_stop is None:  # while it computed; a new command is not wanted
             return self._handle_cancel()
         if result.success and result.command is not None:
-            self._failures = 0
-            self._run.patience_watch.restart()
-            self._enter(ControllerState.GOT_LOCAL_CMD)
             self._motion.told_to_move()
-            lease.send(result.command)
-            return None
+            if self._sent(result.command, lease):
+                self._failures = 0
+                self._run.patience_watch.restart()
+                self._enter(ControllerState.GOT_LOCAL_CMD)
+                return None
+            result = ControlResult(ExePathOutcome.FAILURE, f"the command did not reach the robot: {lease.problem}")
+            self._last_result = result
+        return self._count_failure(result, lease)
+
+    def _sent(self, command: Command, lease: Lease) -> bool:
+        return self._tell_robot(lambda: lease.send(command))
+
+    def _count_failure(self, result: ControlResult, lease: Lease) -> ControllerEnd | None:
+        """Stop after a failed cycle; the end, once there were too many or the patience is over."""
         parameters = self._runtime.parameters
         self._failures += 1
         if parameters.force_stop_on_retry or result.command is None:
-            lease.stop()
+            self._tell_robot(lease.stop)
         else:
-            lease.send(result.command)
+            self._sent(result.command, lease)
         if self._failures > parameters.controller_max_retries >= 0:
             text = result.message or f"{self._failures} failed cycle(s) in a row"
             return self._end(ControllerState.MAX_RETRIES, result.outcome, text)
@@ -325,9 +299,9 @@ class ControllerExecution:
         self._enter(ControllerState.NO_LOCAL_CMD)
         return None
 
-    def _watch_motion(self, pose: Pose, velocity: Twist) -> ControllerEnd | None:
+    def _watch_motion(self, pose: Pose, measured: Twist | None) -> ControllerEnd | None:
         assert self._plan is not None
-        problem = self._motion.problem(pose, velocity, self._plan.tracker)
+        problem = self._motion.problem(pose, measured, self._plan.tracker)
         if problem is None:
             return None
         stuck = problem[0] == ExePathOutcome.ROBOT_STUCK
@@ -337,6 +311,9 @@ class ControllerExecution:
     def _canceled(self, last_words: str = "") -> ControllerEnd:
         text = self._run.handle.cancel_reason or last_words or "the controller canceled"
         return self._end(ControllerState.CANCELED, ExePathOutcome.CANCELED, text)
+
+    def _waited_too_long(self) -> ControllerEnd:
+        return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, self._run.waiting_text())
 
     def _patience_end(self) -> ControllerEnd:
         last = self._last_result.message if self._last_result is not None else ""

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
-from mbf_abstract.clock import ThreadDetached
+from mbf_abstract.clock import Priority, ThreadDetached
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import NonFiniteError
@@ -66,6 +66,18 @@ class LoadedPlugin(Generic[P]):
         self._condition = runtime.clock.condition()
         self._user: object | None = None
         self._retired = False
+        self._canceling = False
+        self._cancel_for: tuple[object, int] | None = None
+
+    @property
+    def title(self) -> str:
+        """Kind and name, for messages."""
+        return f"{self.spec.kind.name.lower()} {self.name!r}"
+
+    @property
+    def user(self) -> str:
+        """Who is using the instance, for messages."""
+        return str(self._user)
 
     @property
     def in_use(self) -> bool:
@@ -74,6 +86,8 @@ class LoadedPlugin(Generic[P]):
 
     def acquire(self, user: object, give_up: Callable[[], bool]) -> bool:
         """Wait for exclusive use; False once ``give_up()``, asked 20 times a second, says so.
+
+        ``str(user)`` is what others are told who wait meanwhile.
 
         Raises
         ------
@@ -101,10 +115,45 @@ class LoadedPlugin(Generic[P]):
                 self._runtime.events.emit(EventKind.QUARANTINE, self.name, reason="ended: the late call came back")
             self._condition.notify_all()
 
-    def quarantine(self, reason: str) -> None:
-        """Mark the instance unavailable until its hung call returns."""
-        self.quarantined = reason
-        self._runtime.events.emit(EventKind.QUARANTINE, self.name, reason=reason)
+    def quarantine(self, user: object, reason: str) -> None:
+        """Mark the instance unavailable until the hung call by ``user`` returns; nothing if it just has."""
+        with self._condition:
+            if self._user is user:
+                self.quarantined = reason
+                self._runtime.events.emit(EventKind.QUARANTINE, self.name, reason=reason)
+
+    def ask_to_cancel(self, user: object, goal_id: int) -> None:
+        """Call the plugin's ``cancel`` for its present user on a thread of its own, since it may hang.
+
+        While an earlier call has not come back no other is made beside it; it is made up for then, if still wanted.
+        """
+        with self._condition:
+            if self._user is not user:
+                return
+            self._cancel_for = (user, goal_id)
+            if self._canceling:
+                return
+            self._canceling = True
+        self._runtime.clock.spawn(self._cancel, f"cancel {self.name}", Priority.WATCHDOG)
+
+    def _cancel(self) -> None:
+        while (goal_id := self._take_cancel()) is not None:
+            try:
+                with self._runtime.clock.guarded(f"{self.name}.cancel"):
+                    self.instance.cancel()
+            except ThreadDetached:
+                continue  # it hung and came back late: what was asked for meanwhile is still to be done
+            except BaseException as error:
+                self.report(goal_id, "cancel", error)
+
+    def _take_cancel(self) -> int | None:
+        """Id of the goal whose cancel is to be passed on now; None = there is nothing left to do."""
+        with self._condition:
+            wanted, self._cancel_for = self._cancel_for, None
+            if wanted is None or wanted[0] is not self._user:
+                self._canceling = False
+                return None
+            return wanted[1]
 
     def retire(self) -> bool:
         """Forbid further use, for unloading; False while in use."""
@@ -114,18 +163,18 @@ class LoadedPlugin(Generic[P]):
             self._retired = True
             return True
 
-    def call(self, goal_id: int, method: str, function: Callable[[], T], label: str) -> T:
-        """Call into the plugin, guarded as ``label``; what it raises becomes ``PluginFault`` and a traceback event."""
+    def call(self, goal_id: int, method: str, function: Callable[[], T], on_hang: Callable[[], None]) -> T:
+        """Call into the plugin, guarded; exceptions become ``PluginFault`` and an event with the traceback."""
         clock = self._runtime.clock
         started = clock.now()
         try:
-            with clock.guarded(label):
+            with clock.guarded(f"{self.name}.{method}", on_hang):
                 result = function()
                 self._take_modelled_time(started)
                 return result
+        except ThreadDetached:
+            raise
         except BaseException as error:  # sys.exit() in a plugin must end its goal, not the thread of its slot
-            if isinstance(error, ThreadDetached):
-                clock.sleep(0.0)  # raises it again where the clock has given up on this thread
             self.report(goal_id, method, error)
             fault = PluginNonFinite if isinstance(error, NonFiniteError) else PluginFault
             raise fault(

@@ -36,11 +36,11 @@ class MotionWatch:
         if self._runtime.gate.last_command.is_stopped():
             self._ignored.restart()
 
-    def problem(self, pose: Pose, velocity: Twist, tracker: PathTracker) -> tuple[ExePathOutcome, str] | None:
-        """Take in a cycle; why the loop shall end, if it shall."""
+    def problem(self, pose: Pose, measured: Twist | None, tracker: PathTracker) -> tuple[ExePathOutcome, str] | None:
+        """Take in a cycle, with the measured velocity of a robot that has odometry; why the loop shall end, if so."""
         parameters = self._runtime.parameters
         told_to_move = not self._runtime.gate.last_command.is_stopped()
-        if not (told_to_move and self._runtime.robot.has_odometry and velocity.is_stopped()):
+        if not (told_to_move and measured is not None and measured.is_stopped()):
             self._ignored.restart()
         elif 0.0 < parameters.cmd_vel_ignored_tolerance < self._ignored.elapsed:
             return ExePathOutcome.ROBOT_STUCK, f"the robot has ignored its commands for {self._ignored.elapsed:.1f} s"

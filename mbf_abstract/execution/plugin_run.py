@@ -3,17 +3,18 @@
 Patience runs from the start of the run (planner, recovery, refiner) or is restarted by progress (controller). When it
 is exceeded, or the client cancels, the plugin's token is set and its ``cancel`` called. A plugin that is still inside
 its call after ``cancel_grace`` more seconds is *abandoned*: the goal ends at once, the thread drains, and the
-instance stays quarantined until the call returns. While the goal is paused its patience stands still.
+instance stays quarantined until the call returns. While the goal is paused its patience stands still. The same holds
+for calls of the robot's driver and of the map that are made beside the plugin.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import count
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Generic, TypeVar
 
 from mbf_abstract.actions.handle import AnyGoalHandle
-from mbf_abstract.clock import Priority, Stopwatch, ThreadDetached
+from mbf_abstract.clock import Stopwatch
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.plugins import Plugin
@@ -23,7 +24,6 @@ T = TypeVar("T")
 
 IDLE_CHECK = 1.0  # s; how often a run without a patience limit is looked at
 SHORTEST_CHECK = 0.05  # s; how often one is whose patience is over, but that is not inside a call
-_call_numbers = count(1)  # unique in the process: servers on one clock hear of each other's hung calls
 
 
 class Abandoned(Exception):
@@ -31,14 +31,21 @@ class Abandoned(Exception):
 
 
 class PluginRun(Generic[P]):
-    """Supervises the calls that one goal makes into one plugin; used as a context manager.
+    """Supervises the calls that one goal makes into one plugin, and into driver and map beside it; a context manager.
 
     Parameters
     ----------
     patience : callable
         Answers the present limit [s]; 0 = none.
     on_abandon : callable
-        Ends the goal when the plugin hangs; called on the supervisor's thread.
+        Ends the goal when a call hangs; called once, on the supervisor's thread or on the one that comes back late.
+
+    Attributes
+    ----------
+    suspect : str
+        Who is being called, or was called last: the plugin, or a part of the driver or the map. For messages.
+    waited_for : str
+        Who had the plugin, if this run got tired of waiting for it.
     """
 
     def __init__(
@@ -55,8 +62,12 @@ class PluginRun(Generic[P]):
         self.patience_watch = Stopwatch(runtime.clock)
         self.patience_exceeded = False
         self.abandoned = False
+        self.suspect = plugin.title
+        self.waited_for = ""
         self._patience = patience
         self._on_abandon = on_abandon
+        self._condition = runtime.clock.condition()
+        self._over = False
         self._call_began: float | None = None
         self._call_label = ""
         self._stop_asked: float | None = None
@@ -64,16 +75,18 @@ class PluginRun(Generic[P]):
 
     def __enter__(self) -> PluginRun[P]:
         self._watch = self.runtime.supervisor.watch(self._check, self._patience() or IDLE_CHECK)
-        self.runtime.runs.add(self)
         self.adopt(self.handle)
         return self
 
     def __exit__(self, *exc: object) -> None:
-        self.runtime.runs.discard(self)
+        with self._condition:
+            self._over = True  # from now on nobody gives up on this run any more
         self.runtime.supervisor.stop(self._watch)
         self.plugin.release(self)
-        if self.abandoned:
-            self.runtime.quarantined -= 1
+        self.runtime.hanging.discard(self)
+
+    def __str__(self) -> str:
+        return f"{self.handle.action} goal {self.handle.id}"
 
     def adopt(self, handle: AnyGoalHandle) -> None:
         """Serve ``handle`` from now on (plan update): its cancel is the one that counts."""
@@ -94,18 +107,38 @@ class PluginRun(Generic[P]):
 
     def acquire_plugin(self) -> bool:
         """Get the instance for this run; False if canceled or out of patience before it was free."""
-        return self.plugin.acquire(self, lambda: self.canceled or self.is_patience_over())
+        acquired = self.plugin.acquire(self, lambda: self.canceled or self.is_patience_over())
+        self.waited_for = "" if acquired else self.plugin.user
+        return acquired
+
+    def waiting_text(self) -> str:
+        """What a goal that ran out of patience while it waited for the plugin has to say."""
+        return f"waited {self.patience:g} s for {self.plugin.title}, which {self.waited_for} uses"
 
     def call(self, method: str, function: Callable[[], T]) -> T:
         """Call into the plugin; raises PluginFault if it raises, Abandoned if the goal ended meanwhile."""
-        self._call_label = label = f"call {next(_call_numbers)}: {self.plugin.name}.{method}"
+        with self._supervised(self.plugin.title):
+            return self.plugin.call(self.handle.id, method, function, self._declare_hung)
+
+    def call_beside(self, who: str, function: Callable[[], T]) -> T:
+        """Call what is no plugin but may hang like one, the driver or the map; raises Abandoned as ``call`` does."""
+        with self._supervised(who), self.runtime.clock.guarded(who, self._declare_hung):
+            return function()
+
+    @contextmanager
+    def _supervised(self, who: str) -> Iterator[None]:
+        self.suspect = who
         self._call_began = self.runtime.clock.now()
         try:
-            return self.plugin.call(self.handle.id, method, function, label)
+            yield
         finally:
-            self._call_began = None
-            if self.abandoned and not self._hung:
-                raise Abandoned(self.plugin.name)
+            if self._hung:
+                self._abandon()  # the clock has given up on this thread, whoever comes first to say so
+            with self._condition:
+                self._call_began = None
+                abandoned = self.abandoned
+            if abandoned:
+                raise Abandoned(who)
 
     def is_patience_over(self) -> bool:
         """Whether the patience has run out, now or earlier."""
@@ -114,18 +147,15 @@ class PluginRun(Generic[P]):
             self.patience_exceeded = True
         return self.patience_exceeded
 
-    def declare_hung(self, label: str) -> None:
-        """Give up at once if the hung section is this run's call: its thread was detached from the clock."""
-        if self._call_began is not None and label == self._call_label:
-            self._hung = True
-            self.runtime.supervisor.poke(self._watch)
+    def _declare_hung(self) -> None:
+        """Give up at once: the thread of the present call was detached from its clock."""
+        self._hung = True
+        self.runtime.supervisor.poke(self._watch)
 
     def _check(self) -> float | None:
         """Supervisor: stop the plugin when due, and give up on it after the grace."""
         if self._hung:
-            self.patience_exceeded = not self.canceled
-            self._abandon()
-            return None
+            return self._abandon()
         if self.handle.paused:
             self.patience_watch.pause()
         else:
@@ -141,8 +171,7 @@ class PluginRun(Generic[P]):
         grace_left = self.runtime.parameters.cancel_grace + max(began, self._stop_asked) - self.runtime.clock.now()
         if grace_left > 1e-9:
             return grace_left
-        self._abandon()
-        return None
+        return self._abandon()
 
     def _next_check(self) -> float:
         """Seconds until the patience of the present call, or of one that begins soon, may be over."""
@@ -157,23 +186,27 @@ class PluginRun(Generic[P]):
     def _ask_to_stop(self, reason: str) -> None:
         self.handle.cancel_token.cancel(reason)
         overridden = type(self.plugin.instance).cancel is not Plugin.cancel
-        if self._call_began is not None and overridden:  # it may hang or raise: not on this thread
-            self.runtime.clock.spawn(self._cancel_plugin, f"cancel {self.plugin.name}", Priority.WATCHDOG)
+        if self._call_began is not None and overridden:
+            self.plugin.ask_to_cancel(self, self.handle.id)
 
-    def _cancel_plugin(self) -> None:
-        try:
-            with self.runtime.clock.guarded(f"{self.plugin.name}.cancel"):
-                self.plugin.instance.cancel()
-        except ThreadDetached:
-            raise
-        except BaseException as error:
-            self.plugin.report(self.handle.id, "cancel", error)
+    def _abandon(self) -> float | None:
+        """End the goal without its thread, unless the call has just come back; the answer to the supervisor.
 
-    def _abandon(self) -> None:
-        if self.abandoned:
-            return
-        self.abandoned = True
-        self.runtime.quarantined += 1
-        self.runtime.runs.discard(self)
-        self.plugin.quarantine("patience exceeded" if self.patience_exceeded else "did not end after a cancel")
+        An instance that the thread is not inside of is free at once.
+        """
+        with self._condition:
+            if self.abandoned or self._over:
+                return None
+            if self._call_began is None:
+                return IDLE_CHECK
+            self.abandoned = True
+            self.runtime.hanging.add(self)
+        self.patience_exceeded = self.patience_exceeded or not self.canceled
+        if self.suspect == self.plugin.title:
+            self.plugin.quarantine(
+                self, "patience exceeded" if self.patience_exceeded else "did not end after a cancel"
+            )
+        else:
+            self.plugin.release(self)
         self._on_abandon()
+        return None

@@ -60,9 +60,17 @@ class GatedMotion:
         if lease is not None:
             lease.release(reason=reason)
 
+    def revoke(self, reason: str) -> None:
+        """Do the same from another thread than the behaviour's, which hangs; never waits."""
+        with self._condition:
+            self._over = True
+            lease = self._lease
+        if lease is not None:
+            lease.revoke(reason)
+
     def _wake(self) -> None:
         if self._run.handle.paused and self._lease is not None:
-            self._lease.stop()
+            self._lease.ask_stop("paused")
         with self._condition:
             self._condition.notify_all()
 
@@ -83,7 +91,7 @@ class RecoveryExecution:
         except PluginFault as fault:
             return RecoveryResult(RecoveryOutcome.INTERNAL_ERROR, str(fault))
         finally:
-            self.motion.close("recovery over")
+            self._run.call_beside("the robot's send_command()", lambda: self.motion.close("recovery over"))
         if self._run.canceled or (self._run.patience_exceeded and not result.success):
             return self._ended_early(result.message)
         return result
@@ -92,6 +100,8 @@ class RecoveryExecution:
         name, tail = self._run.plugin.name, f"; it said: {last_words}" if last_words else ""
         if self._run.canceled:
             return RecoveryResult(RecoveryOutcome.CANCELED, f"recovery {name!r} canceled{tail}")
+        if self._run.waited_for:
+            return RecoveryResult(RecoveryOutcome.PAT_EXCEEDED, self._run.waiting_text())
         return RecoveryResult(
             RecoveryOutcome.PAT_EXCEEDED, f"recovery {name!r} took over {self._run.patience:g} s{tail}"
         )

@@ -18,7 +18,9 @@ class RefinerExecution:
 
     def execute(self) -> RefineResult:
         """Call the refiner until it succeeds or ``refiner_max_retries`` is used up (DEPLETED)."""
-        if not self._run.acquire_plugin() or self._run.canceled:
+        if not self._run.acquire_plugin() and not self._run.canceled:
+            return RefineResult(RefinePathOutcome.STOPPED, self._run.waiting_text())
+        if self._run.canceled:
             return RefineResult(RefinePathOutcome.CANCELED, "canceled while waiting for the refiner")
         calls = 0
         while True:

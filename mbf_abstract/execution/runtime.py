@@ -62,12 +62,5 @@ class Runtime:
     """Slack that recoveries grant for a while."""
     goal_ids: Iterator[int] = field(default_factory=lambda: count(1))
     """Goal ids, unique in this server."""
-    runs: set[PluginRun[Any]] = field(default_factory=set)
-    """The plugin runs in progress."""
-    quarantined: int = 0
-    """Threads that hang in a plugin right now; capped by ``max_quarantined``."""
-
-    def on_hang(self, label: str) -> None:
-        """Tell the run whose plugin call hangs; registered with a SimClock."""
-        for run in list(self.runs):
-            run.declare_hung(label)
+    hanging: set[PluginRun[Any]] = field(default_factory=set)
+    """Runs whose goals have ended without their threads; their number is capped by ``max_quarantined``."""

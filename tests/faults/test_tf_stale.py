@@ -2,7 +2,7 @@
 
 from mbf_abstract.actions.goals import ExePathGoal
 from mbf_abstract.events import EventKind
-from mbf_abstract.execution.controller import ControllerState
+from mbf_abstract.execution.controller_state import ControllerState
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops

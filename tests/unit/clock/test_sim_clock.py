@@ -216,11 +216,10 @@ def hung():
             self.release, self.ended = threading.Event(), threading.Event()
             self.caught = []
             self.labels = []
-            self.clock.on_hang.append(self.labels.append)
 
         def run(self):
             try:
-                with self.clock.guarded("slow.make_plan"):
+                with self.clock.guarded("slow.make_plan", lambda: self.labels.append("slow.make_plan")):
                     self.release.wait()
                 self.caught.append("nothing")
             except ThreadDetached as detached:

@@ -9,7 +9,8 @@ from mbf_abstract.drive_commands import command_problem, stands_still
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import AckermannCommand, Twist
 from mbf_abstract.sim_clock import SimClock
-from mbf_abstract.velocity_gate import VelocityGate, VelocityLimits
+from mbf_abstract.velocity_gate import VelocityGate
+from mbf_abstract.velocity_limits import VelocityLimits
 
 FORWARD = Twist.planar(0.5)
 

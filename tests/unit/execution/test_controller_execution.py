@@ -5,7 +5,8 @@ import pytest
 from mbf_abstract.actions.goals import ExePathGoal
 from mbf_abstract.actions.handle import GoalStatus
 from mbf_abstract.execution.arrival import ArrivalCheck
-from mbf_abstract.execution.controller import ControllerExecution, Plan
+from mbf_abstract.execution.controller import ControllerExecution
+from mbf_abstract.execution.controller_state import Plan
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome as Outcome

@@ -138,6 +138,7 @@ def test_a_pause_stops_the_robot_at_once_and_does_not_use_up_patience(make_bench
     handle = bench.navigator.send(RecoveryGoal())
     bench.clock.sleep(1.05)
     handle.pause()
+    bench.clock.sleep(0.0)
     assert bench.robot.command == Twist()
     assert handle.status is GoalStatus.PAUSED
     paused_at = bench.robot.pose.x

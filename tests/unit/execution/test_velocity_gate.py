@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import AckermannCommand, Twist
 from mbf_abstract.sim_clock import SimClock
-from mbf_abstract.velocity_gate import VelocityGate, VelocityLimits
+from mbf_abstract.velocity_gate import VelocityGate
+from mbf_abstract.velocity_limits import VelocityLimits
 
 FORWARD = Twist.planar(0.5)
 

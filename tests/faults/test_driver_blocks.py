@@ -1,0 +1,240 @@
+"""Fault table, row 35: a driver or a map's server that blocks while the robot drives, or takes no command."""
+
+import threading
+
+import pytest
+
+from mbf_abstract.actions.goals import ExePathGoal, RecoveryGoal
+from mbf_abstract.clock import WallClock
+from mbf_abstract.geometry import Twist
+from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
+from mbf_abstract.plugins import RecoveryResult
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops
+
+PLACES = {
+    "odometry": "the robot's odometry()",
+    "map_problem": "the map's map_problem()",
+    "send_command": "the robot's send_command()",
+}
+
+
+class ClockBlock:
+    """Blocks its caller on the clock, so that simulated time goes on."""
+
+    def __init__(self, clock):
+        self._condition, self.on = clock.condition(), False
+
+    def __call__(self):
+        with self._condition:
+            while self.on:
+                self._condition.wait()
+
+    def free(self):
+        with self._condition:
+            self.on = False
+            self._condition.notify_all()
+
+
+class BusyBlock:
+    """Blocks its caller without the clock, so that only the wall-clock guard gets time going again."""
+
+    def __init__(self, clock):
+        self._event, self.on = threading.Event(), False
+
+    def __call__(self):
+        if self.on:
+            self._event.wait()
+
+    def free(self):
+        self.on = False
+        self._event.set()
+
+
+class Site:
+    """A bench whose driver and map block in one place from ``block`` to ``free``."""
+
+    def __init__(self, place, clock, make_block, **parameters):
+        self.place, self.block_there = place, make_block(clock)
+        self.bench = Bench(clock=clock, robot=self, cancel_grace=0.3, command_timeout=0.2, **parameters)
+        self.bench.server.map_problem = self.map_problem
+
+    def _pass(self, place):
+        if place == self.place and hasattr(self, "bench"):
+            self.block_there()
+
+    def send_command(self, command):
+        self._pass("send_command")
+        self.bench.robot.send_command(command)
+
+    def odometry(self):
+        self._pass("odometry")
+        return self.bench.robot.odometry() if hasattr(self, "bench") else None
+
+    def map_problem(self):
+        self._pass("map_problem")
+        return ""
+
+    def block(self):
+        self.block_there.on = True
+
+    def free(self):
+        self.block_there.free()
+
+
+@pytest.fixture
+def drive_into():
+    """Drive on the given clock until a place blocks; the site and the goal's handle."""
+    sites = []
+
+    def drive(place, clock, make_block=ClockBlock, **parameters):
+        site = Site(place, clock, make_block, **parameters)
+        sites.append(site)
+        handle = site.bench.navigator.send(ExePathGoal(site.bench.path_to(50.0)))
+        clock.sleep(0.4)
+        assert not site.bench.robot.command.is_stopped()
+        site.block()
+        return site, handle
+
+    yield drive
+    for site in sites:
+        site.free()
+        site.bench.close()
+
+
+CLOCKS = [pytest.param(SimClock, ClockBlock, id="lockstep"), pytest.param(WallClock, BusyBlock, id="wall")]
+
+
+@pytest.mark.parametrize(("clock", "make_block"), CLOCKS)
+@pytest.mark.parametrize("place", PLACES)
+def test_the_goal_ends_after_patience_and_grace_and_the_robot_was_stopped_long_before(
+    drive_into, place, clock, make_block
+):
+    site, handle = drive_into(place, clock(), make_block, controller_patience=0.8)
+    bench, blocked_at = site.bench, site.bench.clock.now()
+    result = handle.wait(10.0)
+    assert result.outcome == ExePathOutcome.PAT_EXCEEDED
+    assert PLACES[place] in result.message
+    assert bench.clock.now() < blocked_at + 0.8 + 0.3 + 0.6  # the last figure is for a busy machine
+    if place != "send_command":
+        assert_stops(bench, blocked_at)
+    site.free()
+    bench.clock.sleep(0.5)
+    assert bench.robot.command.is_stopped()
+    assert_ended_once(bench, handle)
+    assert not bench.server.runtime.hanging
+    assert_next_goals_work(bench)
+
+
+@pytest.mark.parametrize(("clock", "make_block"), CLOCKS)
+@pytest.mark.parametrize("place", PLACES)
+def test_a_cancel_ends_the_goal_after_the_grace(drive_into, place, clock, make_block):
+    site, handle = drive_into(place, clock(), make_block, controller_patience=0.0)
+    site.bench.clock.sleep(0.2)
+    handle.cancel("enough")
+    result = handle.wait(5.0)
+    assert result.outcome == ExePathOutcome.CANCELED
+    assert result.message == f"enough; {PLACES[place]} has not ended yet"
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_what_keeps_the_processor_busy_in_lockstep_is_found_by_the_wall_clock_guard(drive_into, place):
+    site, handle = drive_into(place, SimClock(), BusyBlock, hang_guard=0.2)
+    result = handle.wait()
+    assert result.outcome == ExePathOutcome.PAT_EXCEEDED
+    assert PLACES[place] in result.message
+    site.free()
+    site.bench.clock.sleep(0.5)
+    runtime = site.bench.server.runtime
+    while runtime.hanging or runtime.gate._writer.busy:
+        site.bench.clock.sleep(0.01)  # the late threads are on the real processor's time
+    assert_next_goals_work(site.bench)
+
+
+@pytest.mark.parametrize("place", ["odometry", "map_problem"])
+def test_the_controller_is_free_for_the_next_goal_while_driver_or_map_still_hang(drive_into, place):
+    site, handle = drive_into(place, SimClock(), controller_patience=0.5)
+    handle.wait()
+    again = site.bench.navigator.send(ExePathGoal(site.bench.path_to(1.0))).wait()
+    assert again.outcome == ExePathOutcome.PAT_EXCEEDED
+    assert PLACES[place] in again.message  # the controller is not to blame
+    assert len(site.bench.server.runtime.hanging) == 2
+
+
+def test_a_goal_whose_driver_hangs_from_an_earlier_one_is_told_so(drive_into):
+    site, handle = drive_into("send_command", SimClock(), controller_patience=1.0)
+    handle.wait()
+    again = site.bench.navigator.send(ExePathGoal(site.bench.path_to(60.0))).wait()
+    assert again.outcome == ExePathOutcome.PAT_EXCEEDED
+    assert "the robot's driver has not come back from an earlier command" in again.message
+
+
+def test_a_server_closes_although_its_driver_blocks(drive_into):
+    site, _ = drive_into("send_command", WallClock(), BusyBlock)
+    site.bench.clock.sleep(0.1)
+    began = site.bench.clock.now()
+    site.bench.server.close()
+    assert site.bench.clock.now() < began + 2.0
+
+
+@pytest.mark.parametrize("error", [OSError("unplugged"), SystemExit(1)], ids=repr)
+def test_a_goal_none_of_whose_commands_arrives_ends_with_the_drivers_words(error):
+    class Robot:
+        def send_command(self, command):
+            if command != Twist():
+                raise error
+
+        def odometry(self):
+            return None
+
+    with Bench(robot=Robot(), controller_patience=1.0) as bench:
+        handle = bench.navigator.send(ExePathGoal(bench.path_to(5.0)))
+        result = handle.wait(5.0)
+        assert result.outcome == ExePathOutcome.PAT_EXCEEDED
+        assert f"send_command raised {type(error).__name__}: {error}" in result.message
+        assert_ended_once(bench, handle)
+
+
+def test_retries_count_commands_that_do_not_arrive():
+    class Robot:
+        def send_command(self, command):
+            raise OSError("unplugged")
+
+        def odometry(self):
+            return None
+
+    with Bench(robot=Robot(), controller_max_retries=3) as bench:
+        result = bench.navigator.send(ExePathGoal(bench.path_to(5.0))).wait(5.0)
+        assert result.outcome == ExePathOutcome.FAILURE
+        assert "unplugged" in result.message
+
+
+def test_a_map_that_raises_when_asked_counts_as_not_current():
+    with Bench(controller_patience=0.5) as bench:
+
+        def map_problem():
+            raise RuntimeError("no lock")
+
+        bench.server.map_problem = map_problem
+        result = bench.navigator.send(ExePathGoal(bench.path_to(5.0))).wait()
+        assert result.outcome == ExePathOutcome.MAP_ERROR
+        assert result.message == "map_problem raised RuntimeError: no lock"
+
+
+def test_a_recovery_whose_command_blocks_ends_too(drive_into):
+    site = Site("send_command", SimClock(), ClockBlock, recovery_patience=0.8)
+    bench = site.bench
+
+    def back_up(request):
+        request.motion.send(Twist.planar(-0.2))
+        return RecoveryResult(RecoveryOutcome.SUCCESS, "backed up")
+
+    bench.recovery.play(back_up)
+    site.block()
+    result = bench.navigator.send(RecoveryGoal()).wait(5.0)
+    assert result.outcome == RecoveryOutcome.PAT_EXCEEDED
+    site.free()
+    bench.clock.sleep(0.5)
+    assert bench.robot.command.is_stopped()
+    bench.close()
