@@ -98,11 +98,12 @@ with bench.server.runtime.gate._condition:  # as if the signal came in the middl
     bench.clock.sleep(60.0)
 """,
     "exit that is refused": """
+clock = WallClock()
 try:
     bench = run(sys.argv[1])
-    bench.clock.sleep(60.0)
+    clock.sleep(60.0)
 except SystemExit:
-    bench.clock.sleep(1.0)
+    clock.sleep(1.0)
     os._exit(7)  # neither with, nor finally, nor atexit
 """,
 }
@@ -151,7 +152,7 @@ if child == 0:
 os.kill(child, signal.SIGTERM)
 _, status = os.waitpid(child, 0)
 print(os.WTERMSIG(status), flush=True)
-os.write(bench.server.runtime.gate._robot.file, b"9\\n")
+os.write(bench.server.runtime.gate._writer._robot.file, b"9\\n")
 bench.clock.sleep(0.2)
 """
     with start(program, log) as process:
