@@ -178,7 +178,7 @@ class _TaskRun:
             self._runtime.events.emit(EventKind.FAULT, name, goal_id=goal_id, message=problem)
         supervisor.stop(watch)
         if self._abandoned:
-            self._runtime.quarantined -= 1
+            self._runtime.hanging.discard(self)
             raise Abandoned(self._job.action.name)
         return problem
 
@@ -193,7 +193,7 @@ class _TaskRun:
         if grace_left > 1e-9:
             return grace_left
         self._abandoned = True
-        self._runtime.quarantined += 1
+        self._runtime.hanging.add(self)
         text = f"{handle.cancel_reason}; the task at waypoint {self._waypoint} has not ended yet"
         self._job.abandon(MoveBaseOutcome.CANCELED, text)
         return None

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from itertools import count
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from mbf_abstract.clock import Clock
 from mbf_abstract.events import EventBus
@@ -20,7 +20,7 @@ from mbf_abstract.transforms import TransformBuffer
 from mbf_abstract.velocity_gate import VelocityGate
 
 if TYPE_CHECKING:
-    from mbf_abstract.execution.plugin_run import PluginRun
+    pass
 
 
 class MapHooks(Protocol):
@@ -62,5 +62,5 @@ class Runtime:
     """Slack that recoveries grant for a while."""
     goal_ids: Iterator[int] = field(default_factory=lambda: count(1))
     """Goal ids, unique in this server."""
-    hanging: set[PluginRun[Any]] = field(default_factory=set)
-    """Runs whose goals have ended without their threads; their number is capped by ``max_quarantined``."""
+    hanging: set[object] = field(default_factory=set)
+    """What runs on although its goal has ended: a call that does not come back; capped by ``max_quarantined``."""
