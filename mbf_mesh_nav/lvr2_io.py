@@ -10,6 +10,7 @@ does not say which parameters made it.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -31,6 +32,7 @@ LAYOUTS: dict[str, tuple[str, str]] = {
 """Groups below a part that hold its geometry and its per-vertex attributes."""
 GEOMETRY_CHANNELS = {"vertices": "fiu", "face_indices": "iu"}
 """Channels of the geometry and the kinds of numbers they may hold."""
+MAX_ATTRIBUTE_BYTES = 4 * 2**30
 
 
 def read_lvr2_mesh(path: Path, part: str, max_faces: int) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -44,13 +46,22 @@ def read_lvr2_mesh(path: Path, part: str, max_faces: int) -> tuple[FloatArray, N
     with _opened(path) as file:
         geometry = _geometry(file, path, part.strip("/"))
         faces, vertices = geometry["face_indices"], geometry["vertices"]
-        if faces.shape[0] > max_faces or vertices.shape[0] > 3 * max_faces:
-            raise MeshError(str(path), [f"{faces.shape[0]} faces, the limit is {max_faces}"])
+        if faces.shape[0] > max_faces:
+            raise MeshError(str(path), [f"{faces.shape[0]} faces, the limit is {max_faces} (max_faces)"])
+        if vertices.shape[0] > 3 * max_faces:
+            raise MeshError(str(path), [f"{vertices.shape[0]} vertices, the limit is {3 * max_faces} (3 max_faces)"])
         return vertices[()].astype(np.float64), faces[()].astype(np.int64)
 
 
-def read_lvr2_vertex_attributes(path: Path, part: str = "") -> dict[str, NDArray[np.float32]]:
+def read_lvr2_vertex_attributes(
+    path: Path, part: str = "", max_bytes: int = MAX_ATTRIBUTE_BYTES
+) -> dict[str, NDArray[np.float32]]:
     """Read all per-vertex numbers of a part, e.g. costs that mesh_navigation saved, in the file's numbering.
+
+    Parameters
+    ----------
+    max_bytes : int
+        Limit on what all of them take as float32; with more, the file is refused.
 
     Returns
     -------
@@ -66,11 +77,14 @@ def read_lvr2_vertex_attributes(path: Path, part: str = "") -> dict[str, NDArray
         geometry = _geometry(file, path, part.strip("/"))
         count = geometry["vertices"].shape[0]
         groups = [geometry.parent[name] for _, name in LAYOUTS.values() if name in geometry.parent]
-        return {
-            name: _without_last_axis(values[()].astype(np.float32))
+        found = {
+            name: values
             for name, values in (groups[0].items() if groups else ())
             if name not in GEOMETRY_CHANNELS and _is_numbers(values, "fiub") and values.shape[:1] == (count,)
         }
+        if (size := sum(4 * math.prod(values.shape) for values in found.values())) > max_bytes:
+            raise MeshError(str(path), [f"its attributes take {size} bytes, the limit is {max_bytes}"])
+        return {name: _without_last_axis(values[()].astype(np.float32)) for name, values in found.items()}
 
 
 def write_lvr2_mesh(
@@ -199,6 +213,8 @@ def _wrong_channel(geometry: Any, name: str, kinds: str) -> str:
     channel = geometry[name]
     if not isinstance(channel, h5py.Dataset):
         return f"{geometry.name}/{name} is a group, expected an array"
+    if channel.external or channel.is_virtual or channel.file.filename != geometry.file.filename:
+        return f"{geometry.name}/{name} lies in another file"
     if channel.ndim != 2 or channel.shape[1] != 3:
         return f"{geometry.name}/{name} has shape {channel.shape}, expected (n, 3)"
     wanted = "numbers" if "f" in kinds else "integers"
@@ -206,7 +222,7 @@ def _wrong_channel(geometry: Any, name: str, kinds: str) -> str:
 
 
 def _is_numbers(item: Any, kinds: str) -> bool:
-    return isinstance(item, h5py.Dataset) and item.dtype.kind in kinds
+    return isinstance(item, h5py.Dataset) and item.shape is not None and item.dtype.kind in kinds
 
 
 def _without_last_axis(values: NDArray[np.float32]) -> NDArray[np.float32]:

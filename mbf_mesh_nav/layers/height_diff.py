@@ -21,7 +21,7 @@ class HeightDiffParameters(LayerParameters):
     """Parameters of ``height_diff``."""
 
     threshold: float = parameter(0.185, "Lethal above this height difference.", unit="m", gt=0.0)
-    radius: float = parameter(0.3, "Radius of the neighbourhood, across the normal.", unit="m", gt=0.0)
+    radius: float = parameter(0.3, "Radius of the neighbourhood, across the normal.", unit="m", gt=0.0, le=5.0)
     height_limit: float = parameter(
         np.inf, "Half the height of the neighbourhood, along the normal.", unit="m", gt=0.0, allow_inf=True
     )

@@ -17,7 +17,7 @@ class RidgeParameters(LayerParameters):
     """Parameters of ``ridge``."""
 
     threshold: float = parameter(0.3, "Lethal above this value.", unit="m", gt=0.0)
-    radius: float = parameter(0.3, "Radius of the neighbourhood.", unit="m", gt=0.0)
+    radius: float = parameter(0.3, "Radius of the neighbourhood.", unit="m", gt=0.0, le=5.0)
 
 
 class RidgeLayer(MeshLayer):

@@ -16,7 +16,7 @@ class RoughnessParameters(LayerParameters):
     """Parameters of ``roughness``."""
 
     threshold: float = parameter(0.3, "Lethal above this roughness.", unit="rad", gt=0.0, le=3.1416)
-    radius: float = parameter(0.3, "Radius of the neighbourhood.", unit="m", gt=0.0)
+    radius: float = parameter(0.3, "Radius of the neighbourhood.", unit="m", gt=0.0, le=5.0)
 
 
 class RoughnessLayer(MeshLayer):

@@ -30,8 +30,8 @@ HEADINGS = 16
 class TiltParameters(LayerParameters):
     """Parameters of ``tilt``."""
 
-    wheelbase: float = parameter(0.5, "Distance of the front from the rear wheels.", unit="m", gt=0.0)
-    track: float = parameter(0.4, "Distance of the left from the right wheels.", unit="m", gt=0.0)
+    wheelbase: float = parameter(0.5, "Distance of the front from the rear wheels.", unit="m", gt=0.0, le=10.0)
+    track: float = parameter(0.4, "Distance of the left from the right wheels.", unit="m", gt=0.0, le=10.0)
     rigid: bool = parameter(
         False, "Whether no axle can swing and no spring gives: on uneven ground the robot stands on three wheels."
     )

@@ -2,7 +2,9 @@
 
 import os
 import tracemalloc
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from PIL import EpsImagePlugin
@@ -13,6 +15,7 @@ from mbf_abstract.server_factory import read_config
 from mbf_costmap_nav.map_description import MapError
 from mbf_costmap_nav.map_io import load_costmap, load_image, load_map
 from mbf_costmap_nav.zones import load_zones
+from mbf_mesh_nav.lvr2_io import read_lvr2_vertex_attributes, write_lvr2_mesh
 from mbf_mesh_nav.mesh_io import read_mesh
 from mbf_mesh_nav.repair import MeshError
 from terrain.dem_io import TerrainFileError, read_elevation
@@ -93,6 +96,63 @@ def test_a_small_recording_with_gigabytes_in_it_is_refused_in_small_memory(tmp_p
     error, peak = peak_of(Recording.load, tmp_path / "recording.npz", 10_000_000)
     assert isinstance(error, RecordingError) and "the limit is 10000000" in str(error)
     assert peak < 4_000_000
+
+
+def hdf5(file: Path, vertices: tuple, faces: tuple) -> Path:
+    """An HDF5 mesh whose arrays are promised, compressed and never written."""
+    with h5py.File(file, "w") as out:
+        for name, shape, kind in (("vertices", vertices, "f4"), ("face_indices", faces, "u4")):
+            out.create_dataset(f"mesh/geometry/{name}", shape, kind, chunks=True, compression="gzip")
+    return file
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "text"),
+    [
+        ((300, 3), (2_000_000_000, 3), "2000000000 faces, the limit is 10000000"),
+        ((2_000_000_000, 3), (100, 3), "2000000000 vertices, the limit is 30000000"),
+    ],
+)
+def test_a_small_hdf5_file_with_gigabytes_in_it_is_refused_in_small_memory(tmp_path, vertices, faces, text):
+    file = hdf5(tmp_path / "bomb.h5", vertices, faces)
+    assert file.stat().st_size < 20_000
+    error, peak = peak_of(read_mesh, file)
+    assert isinstance(error, MeshError) and text in str(error)
+    assert peak < 4_000_000
+
+
+def test_attributes_of_an_hdf5_file_are_bounded_too(tmp_path):
+    file = hdf5(tmp_path / "bomb.h5", (1000, 3), (100, 3))
+    with h5py.File(file, "a") as out:
+        out.create_dataset("mesh/vertex_attributes/cost", (1000, 1_000_000), "f4", chunks=True, compression="gzip")
+    error, peak = peak_of(read_lvr2_vertex_attributes, file, "", 1_000_000)
+    assert isinstance(error, MeshError) and "its attributes take 4000000000 bytes, the limit is 1000000" in str(error)
+    assert peak < 4_000_000
+
+
+def linked(out: h5py.File, secret: Path) -> None:
+    out["mesh/geometry/vertices"] = h5py.ExternalLink(str(secret), "mesh/geometry/vertices")
+
+
+def stored_elsewhere(out: h5py.File, secret: Path) -> None:
+    out.create_dataset("mesh/geometry/vertices", (4, 3), "f4", external=[(str(secret), 0, 48)])
+
+
+def virtual(out: h5py.File, secret: Path) -> None:
+    layout = h5py.VirtualLayout((4, 3), "f4")
+    layout[:] = h5py.VirtualSource(str(secret), "mesh/geometry/vertices", (4, 3))
+    out.create_virtual_dataset("mesh/geometry/vertices", layout)
+
+
+@pytest.mark.parametrize("smuggle", [linked, stored_elsewhere, virtual])
+def test_an_hdf5_mesh_takes_nothing_from_other_files(tmp_path, smuggle):
+    secret = tmp_path / "secret.h5"
+    write_lvr2_mesh(secret, np.eye(4, 3), np.array([[0, 1, 2]]))
+    with h5py.File(tmp_path / "mesh.h5", "w") as out:
+        out["mesh/geometry/face_indices"] = np.array([[0, 1, 2]], np.uint32)
+        smuggle(out, secret)
+    with pytest.raises(MeshError, match="geometry/vertices lies in another file"):
+        read_mesh(tmp_path / "mesh.h5")
 
 
 BACKEND = "backend: my_maps:Server\nallow_module_types: {}\n"

@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.layer import LayerContext
+from mbf_mesh_nav.layer_graph import LayerGraphError
 from mbf_mesh_nav.layers.tilt import HEADINGS, TiltLayer, TiltParameters, heading_index
+from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh_map import MeshMap
 
 CORNERS = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
@@ -189,3 +191,14 @@ def test_no_robot_stands_over_a_post_however_high_it_is(height):
     layer = computed(MeshMap.from_heights(heights, 0.1, 0.1))
     for sample in (20 * 41 + 21, 21 * 41 + 21):  # beside it and off its corner, with the post below the belly
         assert layer.lethal[layer.topology.input_to_internal[sample]]
+
+
+@pytest.mark.parametrize(
+    ("kind", "key"), [("tilt", "track"), ("tilt", "wheelbase"), ("ridge", "radius"), ("roughness", "radius")]
+)
+@pytest.mark.parametrize("value", [57.0, 1e308])
+def test_a_length_no_robot_has_is_refused_before_the_layer_is_computed(kind, key, value):
+    parameters = MeshMapParameters(layers=[{"name": "it", "type": kind}])
+    vertices, faces = heightfield_mesh(np.zeros((200, 200)), 0.1, 0.1)
+    with pytest.raises(LayerGraphError, match=rf"layer 'it': {key}: Input should be less than or equal to"):
+        build_mesh_map(parameters, {"it": {key: value}}, vertices=vertices, faces=faces)
