@@ -97,11 +97,11 @@ class Ledger:
 
     def __init__(self):
         self.handles = []
-        self.expected = Counter()
+        self.added = []
         self.calls = []
 
     def add_done_callback(self, handle):
-        self.expected[handle.id] += 1
+        self.added.append(handle.id)
         handle.add_done_callback(lambda done: self.calls.append((done.id, "done", done.done)))
 
     def take(self, handle):
@@ -114,7 +114,7 @@ class Ledger:
         return Counter(goal for goal, what, _ in list(self.calls) if what == "done")
 
     def missing(self):
-        return self.expected - self.done_calls()
+        return Counter(self.added) - self.done_calls()
 
     def late_feedback(self):
         over = set()
@@ -220,7 +220,7 @@ def verify(bench, ledger):
         "never ended": [goal for goal in accepted if goal not in ends],
         "without an end": [handle for handle in handles if not (handle.done and handle.result.message)],
         "done callbacks missing": list(ledger.missing()),
-        "done callbacks too many": list(ledger.done_calls() - ledger.expected),
+        "done callbacks too many": list(ledger.done_calls() - Counter(ledger.added)),
         "called before the end": [goal for goal, _, over in ledger.calls if not over],
         "feedback after the end": list(ledger.late_feedback()),
         "driving": [] if bench.robot.command.is_stopped() else [bench.robot.command],

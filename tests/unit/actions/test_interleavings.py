@@ -11,7 +11,7 @@ import os
 import numpy as np
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
+from mbf_abstract.actions.goals import ExePathGoal, FollowWaypointsGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
@@ -88,7 +88,8 @@ def random_goal(rng):
         ExePathGoal(NEAR if rng.random() < 0.5 else FAR, controller=controller),
         RecoveryGoal(concurrency_slot=slot),
         MoveBaseGoal(Pose.planar(float(rng.choice([0.2, 50.0])), 0.0), controller=controller),
-    ][int(rng.choice(4, p=[0.15, 0.35, 0.1, 0.4]))]
+        FollowWaypointsGoal((Pose.planar(0.2, 0.0), Pose.planar(0.0, 0.0)), stop_on_failure=bool(rng.random() < 0.5)),
+    ][int(rng.choice(5, p=[0.15, 0.3, 0.1, 0.35, 0.1]))]
 
 
 def client(bench, rng, handles, steps):
@@ -98,9 +99,11 @@ def client(bench, rng, handles, steps):
         act = rng.random()
         if act < 0.45 or not handles:
             handles.append(bench.navigator.send(random_goal(rng)))
+            handles[-1].add_done_callback(lambda handle: bench.called.append(handle.id))
         else:
-            handle = handles[int(rng.integers(len(handles)))]
-            [handle.cancel, handle.pause, handle.resume][int(rng.choice(3, p=[0.5, 0.25, 0.25]))]()
+            handle, server = handles[int(rng.integers(len(handles)))], bench.server
+            acts = [handle.cancel, handle.pause, handle.resume, server.pause_all, server.resume_all, server.cancel_all]
+            acts[int(rng.choice(6, p=[0.45, 0.2, 0.2, 0.06, 0.06, 0.03]))]()
 
 
 def run_schedule(seed):
@@ -120,6 +123,7 @@ def run_schedule(seed):
         controller_frequency=10.0,
     )
     bench.robot._period = 0.2
+    bench.called = []
     prepare(bench, rng)
     handles, helper_rng = [], np.random.default_rng(seed + 1)
     second = clock.spawn(lambda: client(bench, helper_rng, handles, 3), "second client")
@@ -142,6 +146,7 @@ def verify(seed, bench, handles):
     accepted = {event.data["goal_id"] for event in bench.events(EventKind.GOAL_ACCEPTED)}
     assert accepted <= set(ends), f"schedule {seed}: goals without an end: {accepted - set(ends)}"
     assert all(handle.done and handle.result.message for handle in handles), f"schedule {seed}: {handles}"
+    assert sorted(bench.called) == sorted(handle.id for handle in handles), f"schedule {seed}: callbacks {bench.called}"
     assert bench.robot.command.is_stopped(), f"schedule {seed}: the robot still drives"
     waiting = {who.name for who in bench.clock._known} - {"main"}
     assert not waiting, f"schedule {seed}: threads left: {waiting}"
