@@ -253,7 +253,7 @@ class LayeredCostmap:
             self._pending = self._geometry.box
             try:
                 layer.parameters_changed()
-            except Exception:
+            except BaseException:
                 layer.parameters = old
                 layer.parameters_changed()
                 raise

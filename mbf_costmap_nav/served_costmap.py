@@ -56,7 +56,7 @@ class ServedCostmap:
         old, new = self.parameters, with_changes(self.parameters, changes)
         try:
             self._apply(new)
-        except Exception:
+        except BaseException:
             self._apply(old)
             raise
         self._tell(self.name, changes)

@@ -174,7 +174,7 @@ class CostmapNavigationServer(AbstractNavigationServer):
         self._global.set_parameters(changes)
         try:
             self._local.set_parameters(changes)
-        except Exception:
+        except BaseException:
             self._global.set_parameters(old)
             raise
 

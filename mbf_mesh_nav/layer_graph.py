@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from mbf_abstract.event_values import error_text
 from mbf_mesh_nav.layer import NOTHING_CHANGED, IntArray, LayerParameters, MeshLayer
 
 
@@ -120,8 +121,8 @@ class LayerGraph(Mapping[str, MeshLayer]):
             from_inputs = union_of([changed[read.name] for read in layer.inputs if read.name in changed])
             try:
                 own = union_of([changed.get(name, NOTHING_CHANGED), self._follow(layer, from_inputs), event(layer)])
-            except Exception as error:
-                self.problem = f"layer '{name}' raised {type(error).__name__}: {error}"
+            except BaseException as error:  # sys.exit() in a layer must not pass for an update
+                self.problem = f"layer '{name}' raised {type(error).__name__}: {error_text(error)}"
                 self._interrupted.add(name)
                 self._owed = changed
                 raise
@@ -160,7 +161,7 @@ class LayerGraph(Mapping[str, MeshLayer]):
             if old.combination_weight != parameters.combination_weight:
                 changed = np.arange(len(layer.costs), dtype=np.int32)
             return self.apply(lambda visited: changed if visited is layer else NOTHING_CHANGED)
-        except Exception:
+        except BaseException:
             layer.parameters = old
             # Not always what the new ones had changed: inputs may have changed in the same pass.
             restored = layer.recompute()

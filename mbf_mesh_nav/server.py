@@ -15,6 +15,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from mbf_abstract.config import Config
+from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.ticker import Ticker
 from mbf_abstract.geometry import Path as PlannedPath
@@ -110,9 +111,10 @@ class MeshNavigationServer(AbstractNavigationServer):
             try:
                 specs = [(kind, replace(one.spec, parameters=one.instance.parameters)) for kind, one in loaded]
                 renewed = [(kind, self._construct(spec)) for kind, spec in specs]
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 self.mesh_map = old_map
-                raise ServerError(f"a plugin does not take {mesh_file}: {type(error).__name__}: {error}") from error
+                text = f"{type(error).__name__}: {error_text(error)}"
+                raise ServerError(f"a plugin does not take {mesh_file}: {text}") from error
             for kind, plugin in renewed:
                 self.plugins.replace(kind, plugin)
             self._tell_findings()

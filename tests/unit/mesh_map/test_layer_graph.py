@@ -102,22 +102,24 @@ class FailingLayer(MaxCombinationLayer):
     """Raises while the test wants it to."""
 
     fails = False
+    error: BaseException = RuntimeError("no idea")
 
     def update_from_inputs(self, changed):
         if self.fails:
-            raise RuntimeError("no idea")
+            raise self.error
         return super().update_from_inputs(changed)
 
 
-def test_what_changed_before_a_layer_raised_is_handed_on_by_the_next_pass():
+@pytest.mark.parametrize("error", [RuntimeError("no idea"), SystemExit("no idea"), GeneratorExit("no idea")])
+def test_what_changed_before_a_layer_raised_is_handed_on_by_the_next_pass(error):
     top = make(GivenLayer, "top")
     failing = make(FailingLayer, "failing", top)
     below, beside = make(MaxCombinationLayer, "below", failing), make(MaxCombinationLayer, "beside", top)
     graph = LayerGraph([top, failing, below, beside])
-    failing.fails = True
-    with pytest.raises(RuntimeError, match="no idea"):
+    failing.fails, failing.error = True, error
+    with pytest.raises(type(error), match="no idea"):
         graph.apply(event_of(top, lambda: top.give(0.7, [3])))
-    assert graph.problem == "layer 'failing' raised RuntimeError: no idea"
+    assert graph.problem == f"layer 'failing' raised {type(error).__name__}: no idea"
 
     failing.fails = False
     changed = graph.apply(lambda layer: NOTHING_CHANGED)
