@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+UNKNOWN_OCCUPANCY = 255
+"""Of cells that nobody has seen."""
+
 
 @dataclass(frozen=True, eq=False)
 class GridView:
@@ -22,6 +25,26 @@ class GridView:
 
     costs: NDArray[np.float32]
     extent: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class FloorMap:
+    """What a map file says of a floor, before any server works on it.
+
+    Attributes
+    ----------
+    occupancy : (height, width) uint8
+        0 free to 100 and above occupied, 255 unknown; row 0 at the smallest y.
+    resolution : float
+        Side of a cell [m].
+    origin_x, origin_y : float
+        Lower left corner of cell (0, 0) [m].
+    """
+
+    occupancy: NDArray[np.uint8]
+    resolution: float
+    origin_x: float
+    origin_y: float
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.map_queries import MapQueries
-from mbf_abstract.map_view import FieldView, MapView
+from mbf_abstract.map_view import FieldView, FloorMap, MapView
 from mbf_abstract.navigation_parameters import READ_ONCE, NavigationParameters
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugin_host import PluginHost
@@ -108,9 +108,26 @@ class AbstractNavigationServer(PluginHost):
         """Feed what a sensor saw into the map; in any known frame, raises TransformError where it is not known."""
 
     @classmethod
-    def config_for_map(cls, file: FilePath) -> str | None:
-        """YAML text of a sane configuration for a bare map file; None if this server does not read such files."""
+    def config_for_map(cls, file: FilePath, unknown_is_free: bool = True) -> str | None:
+        """YAML text of a sane configuration for a bare map file; None if this server does not read such files.
+
+        ``unknown_is_free`` tells whether plans may lead over what the map does not know, where it can say so.
+        """
         return None
+
+    @classmethod
+    def read_floor(cls, file: FilePath) -> FloorMap | None:
+        """What a map file says of a floor; None if this server does not read such files, or maps have no cells.
+
+        Raises
+        ------
+        ConfigError
+            The file is damaged, or too large.
+        """
+        return None
+
+    ground_is_level: ClassVar[bool] = False
+    """Whether all ground is at height 0, so that a place needs no z."""
 
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
         """Heights [m] of the ground at a place of the global frame, the best to stand on first; () without any."""

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.arithmetic import norm, plane_rotation, rotated, scalar_products
+from mbf_costmap_nav.outline_check import outline_problem
 
 FloatArray = NDArray[np.float64]
 
@@ -71,7 +72,8 @@ class Footprint:
         Raises
         ------
         ValueError
-            The text is no list of pairs of numbers, or has fewer than three points.
+            The text is no list of pairs of numbers, has fewer than three points, or they are no outline around the
+            base: sides cross, there is no area, or (0, 0) lies outside.
         """
         points = parse_number_lists(value) if isinstance(value, str) else value
         for i, point in enumerate(points):
@@ -79,7 +81,10 @@ class Footprint:
                 raise ValueError(f"point {i} of the footprint needs two numbers, got {list(point)}")
         if len(points) < 3:
             raise ValueError(f"a footprint needs at least 3 points, got {len(points)}")
-        return cls(points)
+        footprint = cls(points)
+        if problem := outline_problem(footprint.vertices):
+            raise ValueError(f"a footprint is {problem}")
+        return footprint
 
     def at(self, x: float, y: float, yaw: float) -> FloatArray:
         """Vertices (n, 2) [m] with the base at (x, y) [m], turned by ``yaw`` [rad]."""

@@ -1,8 +1,8 @@
 """Maps on disk in map_server's format: a YAML file that describes a grey image (pgm, png or bmp).
 
 Reading turns every grey value into an occupancy (see ``map_description``). Image rows run from top to bottom, map rows
-from bottom to top. Channels of a colour image are averaged, then rounded. In mode scale a pixel that is not opaque is
-unknown; elsewhere opacity is ignored.
+from bottom to top. The channels of an image are averaged, then rounded: in mode trinary those of colour and opacity,
+if there is one, as in map_server; else those of colour alone. In mode scale a pixel that is not opaque is unknown.
 
 Origins with a yaw are kept in ``OccupancyMap``. A ``Costmap`` has axes parallel to its frame, so ``to_costmap``
 resamples such a map onto the smallest upright grid around it (see ``turned_map``).
@@ -129,7 +129,12 @@ def _lies_in(file: Path, folder: Path) -> bool:
 def load_costmap(
     file: Path | str, frame_id: str = "map", track_unknown_space: bool = True, *, confined: bool = False
 ) -> Costmap:
-    """Read a map_server YAML file, or a bare image, as a costmap; see ``load_map`` and ``OccupancyMap.to_costmap``.
+    """Read a map_server YAML file, or a bare image, as a costmap, see ``OccupancyMap.to_costmap``."""
+    return load_map_file(file, confined=confined).to_costmap(frame_id, track_unknown_space)
+
+
+def load_map_file(file: Path | str, *, confined: bool = False) -> OccupancyMap:
+    """Read a map_server YAML file, or a bare image.
 
     A bare image is described by the YAML file of the same name beside it; without one its cells have
     ``BARE_IMAGE_RESOLUTION`` and its lower left corner is the origin.
@@ -137,8 +142,7 @@ def load_costmap(
     file = Path(file)
     description = file.with_suffix(".yaml") if file.suffix.lower() in IMAGE_SUFFIXES else file
     bare = description != file and not description.is_file()
-    content = load_image(file, BARE_IMAGE_RESOLUTION) if bare else load_map(description, confined=confined)
-    return content.to_costmap(frame_id, track_unknown_space)
+    return load_image(file, BARE_IMAGE_RESOLUTION) if bare else load_map(description, confined=confined)
 
 
 def load_image(
@@ -172,8 +176,8 @@ def load_image(
     return _decode(file, max_cells, validated_description(file, keys))
 
 
-def _read_pixels(file: Path, max_cells: int) -> NDArray[np.uint8]:
-    """Grey and opacity (height, width, 2) uint8 of an image, top row first."""
+def _read_pixels(file: Path, max_cells: int, mode: MapMode) -> NDArray[np.uint8]:
+    """Grey and opacity (height, width, 2) uint8 of an image, top row first; the mode says what grey is the mean of."""
     if kind := special_file(file):
         raise MapError(file, f"expected an image, got {kind}")
     try:
@@ -186,6 +190,7 @@ def _read_pixels(file: Path, max_cells: int) -> NDArray[np.uint8]:
                 raise MapError(file, f"{width} x {height} pixels are more than the limit of {max_cells} cells")
             if image.mode not in GREY_MODES:
                 raise MapError(file, f"has pixels of type {image.mode!r}; expected 8-bit grey or colour")
+            has_opacity = "A" in image.mode or "transparency" in image.info
             pixels = np.asarray(image.convert("RGBA"), dtype=np.uint8)
     except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
         raise MapError(file, f"has too many pixels: {error}") from error
@@ -193,12 +198,13 @@ def _read_pixels(file: Path, max_cells: int) -> NDArray[np.uint8]:
         raise MapError(file, "is no image that can be read (pgm, png, bmp)") from error
     except (OSError, ValueError, SyntaxError) as error:  # Pillow reports damaged files by any of these
         raise MapError(file, getattr(error, "strerror", None) or f"damaged image: {error}") from error
-    colour_sum = pixels[..., :3].sum(axis=2, dtype=np.uint16)
-    return np.stack([((colour_sum + 1) // 3).astype(np.uint8), pixels[..., 3]], axis=2)
+    channels = 4 if mode is MapMode.TRINARY and has_opacity else 3
+    total = pixels[..., :channels].sum(axis=2, dtype=np.uint16)
+    return np.stack([((total + channels // 2) // channels).astype(np.uint8), pixels[..., 3]], axis=2)
 
 
 def _decode(file: Path, max_cells: int, description: MapDescription) -> OccupancyMap:
-    pixels = _read_pixels(file, max_cells)
+    pixels = _read_pixels(file, max_cells, description.mode)
     try:
         upright_shape(pixels.shape[:2], description.origin[2], max_cells)
     except ValueError as error:

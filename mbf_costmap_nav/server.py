@@ -16,8 +16,9 @@ from typing import Any, ClassVar, Literal, cast
 import numpy as np
 
 from mbf_abstract.config import Config, PluginDeclaration
+from mbf_abstract.findings import ConfigError, Finding
 from mbf_abstract.map_queries import MapQueries
-from mbf_abstract.map_view import GridView
+from mbf_abstract.map_view import FloorMap, GridView
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PluginContext, PluginKind
@@ -27,6 +28,8 @@ from mbf_abstract.server import AbstractNavigationServer
 from mbf_costmap_nav.costmap import INSCRIBED, UNKNOWN
 from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.map_description import MapError
+from mbf_costmap_nav.map_io import load_map_file
 from mbf_costmap_nav.nav_core import wrap_nav_core
 from mbf_costmap_nav.plugins import CostmapContext
 from mbf_costmap_nav.queries import CostmapQueries
@@ -46,8 +49,12 @@ planners:
   - {{name: astar, type: astar}}
   - {{name: dijkstra, type: dijkstra}}
   - {{name: theta_star, type: theta_star}}
+astar: {{allow_unknown: {allow_unknown}}}
+dijkstra: {{allow_unknown: {allow_unknown}}}
+theta_star: {{allow_unknown: {allow_unknown}}}
 global_costmap:
   robot_radius: 0.25
+  track_unknown_space: {track_unknown}
   layers:
     - {{name: walls, type: static}}
     - {{name: inflation, type: inflation}}
@@ -119,6 +126,8 @@ class CostmapNavigationServer(AbstractNavigationServer):
     def take_scan(self, scan: RangeScan) -> None:
         """Feed a scan to every layer that listens to its source, as ``ScanIntake.take``, whose errors it raises."""
         self._scans.take(scan)
+
+    ground_is_level = True
 
     @property
     def map_views(self) -> tuple[str, ...]:
@@ -201,9 +210,23 @@ class CostmapNavigationServer(AbstractNavigationServer):
                 getattr(self, name).close()
 
     @classmethod
-    def config_for_map(cls, file: Path) -> str | None:
+    def config_for_map(cls, file: Path, unknown_is_free: bool = True) -> str | None:
         """Take every image format this package reads, and map_server's YAML."""
-        return BARE_MAP.format(file=json.dumps(str(file))) if file.suffix.lower() in MAP_SUFFIXES else None
+        if file.suffix.lower() not in MAP_SUFFIXES:
+            return None
+        words = {"allow_unknown": json.dumps(unknown_is_free), "track_unknown": json.dumps(not unknown_is_free)}
+        return BARE_MAP.format(file=json.dumps(str(file)), **words)
+
+    @classmethod
+    def read_floor(cls, file: Path) -> FloorMap | None:
+        """Read every image format this package reads, and map_server's YAML; a map with a yaw is laid upright."""
+        if file.suffix.lower() not in MAP_SUFFIXES:
+            return None
+        try:
+            content = load_map_file(file).upright()
+        except MapError as error:
+            raise ConfigError([Finding(str(error.file), 1, "", "a map", error.reason)]) from error
+        return FloorMap(content.occupancy, content.resolution, *content.origin[:2])
 
     def _serve(self, config: Config, key: str) -> ServedCostmap:
         section = config.sections[key]

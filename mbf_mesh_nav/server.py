@@ -263,6 +263,6 @@ class MeshNavigationServer(AbstractNavigationServer):
             self._decay.stop()
 
     @classmethod
-    def config_for_map(cls, file: Path) -> str | None:
+    def config_for_map(cls, file: Path, unknown_is_free: bool = True) -> str | None:
         """Take every mesh format this package reads."""
         return BARE_MESH.format(file=json.dumps(str(file))) if file.suffix.lower() in known_endings() else None

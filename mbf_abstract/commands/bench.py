@@ -8,10 +8,13 @@ from contextlib import contextmanager
 from importlib.metadata import entry_points
 from pathlib import Path
 
+import numpy as np
+
 from mbf_abstract.config import Config
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.findings import ConfigError, Finding
 from mbf_abstract.geometry import Command, Pose, Twist
+from mbf_abstract.map_view import UNKNOWN_OCCUPANCY, FloorMap
 from mbf_abstract.registry import PluginRegistry
 from mbf_abstract.robot import Odometry
 from mbf_abstract.server import AbstractNavigationServer
@@ -62,8 +65,19 @@ def place_robot(server: AbstractNavigationServer, pose: Pose) -> None:
     server.runtime.transforms.set(transform)
 
 
-def read_config_or_map(file: Path) -> tuple[type[AbstractNavigationServer], Config]:
+def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavigationServer], Config, list[str]]:
     """Read a configuration, or make a default one for a bare map or mesh file.
+
+    Parameters
+    ----------
+    unknown : {"", "free", "lethal"}
+        What cells that a bare map does not know shall be; "" is free, and a configuration says that itself.
+
+    Returns
+    -------
+    server, config
+    notes : list of str
+        What a user should know of the default configuration.
 
     Raises
     ------
@@ -73,14 +87,26 @@ def read_config_or_map(file: Path) -> tuple[type[AbstractNavigationServer], Conf
     if not file.is_file():
         raise ConfigError([Finding(str(file), 1, "", "a configuration, map or mesh file", "no such file")])
     if file.suffix.lower() in YAML_SUFFIXES and not _is_map_description(file):
-        return read_config(file)
+        if unknown:
+            expected = "a bare map: a configuration says itself what is unknown (track_unknown_space, allow_unknown)"
+            raise ConfigError([Finding(str(file), 1, "", expected, f"--unknown {unknown} with a configuration")])
+        return *read_config(file), []
     registry = PluginRegistry()
     for name in sorted({point.name for point in entry_points(group="mbf.servers")}):
         cls: type[AbstractNavigationServer] = registry.load("servers", name, AbstractNavigationServer)
-        text = cls.config_for_map(file.resolve())
+        text = cls.config_for_map(file.resolve(), unknown_is_free=unknown != "lethal")
         if text is not None:
-            return _read_config_text(text)
+            return *_read_config_text(text), _unknown_note(cls.read_floor(file), unknown)
     raise ConfigError([Finding(str(file), 1, "", "a format that an installed server reads", repr(file.suffix))])
+
+
+def _unknown_note(floor: FloorMap | None, unknown: str) -> list[str]:
+    """Say that cells of a bare map which nobody knows count as free, unless that was asked for."""
+    count = 0 if floor is None else int(np.count_nonzero(floor.occupancy == UNKNOWN_OCCUPANCY))
+    if floor is None or count == 0 or unknown:
+        return []
+    share = 100.0 * count / floor.occupancy.size
+    return [f"{count} cells ({share:.0f} %) are unknown and count as free; --unknown lethal keeps plans out of them"]
 
 
 def _is_map_description(file: Path) -> bool:

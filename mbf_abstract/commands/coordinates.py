@@ -1,4 +1,4 @@
-"""Options that take two to four numbers, ``--start X Y [Z] [YAW]``, negative ones included.
+"""Options that take two to four numbers, ``--start X Y [Z] [YAW]``, negative ones included; on a flat map X Y [YAW].
 
 Command line parsers give an option a fixed number of values and take ``-1.5`` for an option of its own. So the
 numbers that follow such an option are joined into one value before the parser sees them.
@@ -18,12 +18,16 @@ COORDINATE_OPTIONS = ("--start", "--goal")
 
 @dataclass(frozen=True)
 class Place:
-    """Where a pose shall be; ``z`` [m] is None where the ground decides. Yaw in radians."""
+    """Where a pose shall be; ``z`` [m] is None where the ground decides, ``yaw`` [rad] where it does not matter."""
 
     x: float
     y: float
     z: float | None = None
-    yaw: float = 0.0
+    yaw: float | None = None
+
+    def on_flat_map(self) -> Place:
+        """The same numbers for a map without heights: the third of three is the yaw."""
+        return self if self.yaw is not None else Place(self.x, self.y, None, self.z)
 
 
 class CoordinateCommand(TyperCommand):

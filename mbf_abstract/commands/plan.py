@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import ExitStack
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,13 @@ if TYPE_CHECKING:
     from mbf_abstract.server import AbstractNavigationServer
 
 
+class Unknown(str, Enum):
+    """What the cells that a map does not know are for a plan."""
+
+    FREE = "free"
+    LETHAL = "lethal"
+
+
 def register(app: typer.Typer) -> None:
     """Add the command."""
     app.command("plan", cls=CoordinateCommand)(plan)
@@ -31,9 +39,17 @@ def plan(
     planner: str = typer.Option("", "--planner", help="Name of the planner; the first one if not given."),
     tolerance: float = typer.Option(0.0, "--tolerance", min=0.0, help="How far from the goal the path may end [m]."),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object, with all poses."),
+    unknown: Unknown | None = typer.Option(
+        None,
+        "--unknown",
+        help="What a bare map does not know is free (as without this option, which says so), or lethal.",
+    ),
     png: Path | None = typer.Option(None, "--png", help="Draw map and path into this file."),
 ) -> None:
-    """Plan a path; exit code 0 only if there is one. Without Z the lowest free ground is taken."""
+    """Plan a path; exit code 0 only if there is one.
+
+    Without Z the lowest free ground is taken; on a flat map three numbers are X Y YAW.
+    """
     from_place, to_place = parse_place(start, "--start"), parse_place(goal, "--goal")
     with readable_errors():
         from mbf_abstract.actions.goals import GetPathGoal
@@ -42,11 +58,11 @@ def plan(
         from mbf_abstract.commands.plan_picture import draw_plan
         from mbf_abstract.navigator import Navigator
 
-        cls, checked = read_config_or_map(config)
+        cls, checked, notes = read_config_or_map(config, "" if unknown is None else unknown.value)
         with ExitStack() as open_server:
             with waiting("building the map and its layers"):
                 server = open_server.enter_context(standing_server(cls, checked))
-            notes = map_messages(server)
+            notes += map_messages(server)
             start_pose = _pose("start", from_place, server, notes)
             goal_pose = _pose("goal", to_place, server, notes)
             place_robot(server, start_pose)
@@ -67,15 +83,18 @@ def _pose(name: str, place: Place, server: AbstractNavigationServer, notes: list
     """Pose at a place; a note tells which storey was taken where there are several, or that there is no ground."""
     from mbf_abstract.geometry import Pose
 
+    if server.ground_is_level:
+        place = place.on_flat_map()
+    yaw = place.yaw or 0.0
     if place.z is not None:
-        return Pose.planar(place.x, place.y, place.yaw, place.z, frame_id=server.config.parameters.global_frame)
+        return Pose.planar(place.x, place.y, yaw, place.z, frame_id=server.config.parameters.global_frame)
     heights = server.ground_heights(place.x, place.y)
     if not heights:
         notes.append(f"there is no ground at the {name} ({place.x:g}, {place.y:g}); its z is taken as 0 m")
     if len(heights) > 1:
         others = ", ".join(f"{height:.2f}" for height in heights[1:])
         notes.append(f"the {name} is put on the ground at z = {heights[0]:.2f} m; there is more at {others} m: give Z")
-    return server.ground_pose(place.x, place.y, place.yaw)
+    return server.ground_pose(place.x, place.y, yaw)
 
 
 def _tell(result: GetPathResult, seconds: float, notes: list[str], as_json: bool) -> None:

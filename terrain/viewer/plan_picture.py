@@ -19,6 +19,8 @@ from terrain.whole_files import write_whole
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+MOST_PIXELS = 2000
+"""Rows and columns of a map that a picture shows; more would cost memory and not be seen."""
 COSTLY = (224, 120, 60)
 UNKNOWN = (170, 176, 186)
 
@@ -51,9 +53,27 @@ def cost_colours(costs: np.typing.NDArray[np.float32]) -> np.typing.NDArray[np.f
     return np.asarray(colours)
 
 
+def shrunk(view: GridView, most: int) -> GridView:
+    """A view of at most ``most`` rows and columns, of blocks that each have the highest cost in them.
+
+    A wall of one cell stays a wall; a block is unknown (nan) only as a whole. The last blocks may stand out of the map.
+    """
+    height, width = view.costs.shape
+    side = max(1, -(-max(height, width) // most))
+    if side == 1:
+        return view
+    columns = np.arange(0, width, side)
+    rows = [np.fmax.reduceat(np.fmax.reduce(view.costs[y : y + side]), columns) for y in range(0, height, side)]
+    x_min, x_max, y_min, y_max = view.extent
+    x_max = x_min + (x_max - x_min) * side * len(columns) / width
+    y_max = y_min + (y_max - y_min) * side * len(rows) / height
+    return GridView(np.array(rows, dtype=np.float32), (x_min, x_max, y_min, y_max))
+
+
 def _draw_grid(axes: Axes, view: GridView) -> None:
-    pixels = cost_colours(view.costs).astype(np.uint8)
-    axes.imshow(pixels, origin="lower", extent=view.extent, interpolation="nearest", zorder=1)
+    small = shrunk(view, MOST_PIXELS)
+    pixels = cost_colours(small.costs).astype(np.uint8)
+    axes.imshow(pixels, origin="lower", extent=small.extent, interpolation="nearest", zorder=1)
 
 
 def _extent(view: MapView | None, start: Pose, goal: Pose) -> tuple[float, float, float, float]:

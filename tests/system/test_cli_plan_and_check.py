@@ -1,6 +1,7 @@
 """The commands as a user calls them: what they print and how they exit."""
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -40,6 +41,44 @@ def test_a_plan_on_a_bare_map_is_told_and_succeeds():
 
     assert result.exit_code == 0, result.output
     assert "SUCCESS" in result.stdout and "length_m" in result.stdout
+
+
+@pytest.fixture(scope="module")
+def half_known(tmp_path_factory):
+    """A picture of 10 m x 5 m whose middle nobody has seen."""
+    pixels = np.full((100, 200), 254, dtype=np.uint8)
+    pixels[:, 90:110] = 205
+    file = tmp_path_factory.mktemp("maps") / "half.png"
+    Image.fromarray(pixels).save(file)
+    return file
+
+
+def test_unknown_cells_of_a_bare_map_count_as_free_and_this_is_said(half_known):
+    ends = ("--start", 1, 2, "--goal", 9, 2)
+    silent, free, lethal = (mbf("plan", half_known, *ends, *extra) for extra in ([], FREE, LETHAL))
+
+    assert silent.exit_code == 0 and "2000 cells (10 %) are unknown and count as free" in silent.stderr
+    assert free.exit_code == 0 and "unknown" not in free.stderr
+    assert lethal.exit_code == 1 and "NO_PATH_FOUND" in lethal.stdout
+
+
+FREE, LETHAL = ["--unknown", "free"], ["--unknown", "lethal"]
+
+
+def test_a_configuration_says_itself_what_unknown_is(tmp_path):
+    (tmp_path / "nav.yaml").write_text("backend: costmap\n")
+    result = mbf("plan", tmp_path / "nav.yaml", "--start", 1, 2, "--goal", 9, 2, *FREE)
+
+    assert result.exit_code == 2 and "track_unknown_space" in result.stderr
+
+
+def test_on_a_grid_the_third_of_three_numbers_is_the_yaw(half_known):
+    result = mbf("plan", half_known, "--start", 1, 2, 1.5, "--goal", 4, 2, -0.5, "--json", "--unknown", "free")
+
+    poses = json.loads(result.stdout)["poses"]
+    assert [pose[2] for pose in poses] == [0.0] * len(poses)
+    yaws = [2.0 * math.atan2(pose[5], pose[6]) for pose in (poses[0], poses[-1])]
+    assert yaws == pytest.approx([1.5, -0.5])
 
 
 def test_a_plan_on_a_bare_mesh_takes_the_height_of_the_ground(hill, tmp_path):

@@ -42,5 +42,17 @@ def test_too_few_too_many_or_no_numbers_are_refused(text):
 
 
 def test_two_numbers_leave_the_height_to_the_ground():
-    assert parse_place("1,2", "--start") == Place(1.0, 2.0, None, 0.0)
+    assert parse_place("1,2", "--start") == Place(1.0, 2.0, None, None)
     assert parse_place("1,2,3,0.5", "--start") == Place(1.0, 2.0, 3.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("1,2", Place(1.0, 2.0, None, None)),
+        ("1,2,0.5", Place(1.0, 2.0, None, 0.5)),
+        ("1,2,3,0.5", Place(1.0, 2.0, 3.0, 0.5)),
+    ],
+)
+def test_on_a_flat_map_the_third_of_three_numbers_is_the_yaw(text, place):
+    assert parse_place(text, "--start").on_flat_map() == place

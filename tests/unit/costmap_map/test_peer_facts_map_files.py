@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from mbf_costmap_nav import turned_map
-from mbf_costmap_nav.map_description import MapError, MapMode
+from mbf_costmap_nav.map_description import UNKNOWN_OCCUPANCY, MapError, MapMode
 from mbf_costmap_nav.map_io import OccupancyMap, load_image, load_map, save_map
 
 # yaml file: (width, height, resolution, free, occupied, other cells)
@@ -199,3 +199,28 @@ def test_occupancies_that_are_no_map_are_not_saved(tmp_path, occupancy):
 def test_a_mode_may_be_given_by_its_name(tmp_path, mode):
     save_map(tmp_path / "map.yaml", OccupancyMap(np.array([[0, 100]], np.uint8), 0.1), mode=mode)
     assert load_map(tmp_path / "map.yaml").occupancy.tolist() == [[0, 100]]
+
+
+@pytest.mark.parametrize(
+    ("pixel", "trinary", "raw"),
+    [
+        ((0, 0, 0, 255), 100, 0),
+        ((255, 255, 255, 255), 0, 255),
+        ((255, 255, 255, 0), UNKNOWN_OCCUPANCY, 255),
+        ((0, 0, 0, 0), 100, 0),
+        ((90, 90, 90, 255), UNKNOWN_OCCUPANCY, 90),
+    ],
+)
+def test_in_mode_trinary_opacity_is_averaged_in_with_the_colours_as_nav2_does(tmp_path, pixel, trinary, raw):
+    file = tmp_path / "pixel.png"
+    Image.new("RGBA", (1, 1), pixel).save(file)
+    assert load_image(file, 0.1).occupancy[0, 0] == trinary
+    assert load_image(file, 0.1, mode=MapMode.RAW).occupancy[0, 0] == raw
+
+
+@pytest.mark.parametrize(("grey", "expected"), [(70, UNKNOWN_OCCUPANCY), (30, 100)])
+def test_an_opaque_dark_pixel_of_an_image_with_opacity_is_lighter_than_it_looks(tmp_path, grey, expected):
+    for mode, pixel in (("RGBA", (grey, grey, grey, 255)), ("RGB", (grey, grey, grey))):
+        Image.new(mode, (1, 1), pixel).save(tmp_path / f"{mode}.png")
+    assert load_image(tmp_path / "RGB.png", 0.1).occupancy[0, 0] == 100
+    assert load_image(tmp_path / "RGBA.png", 0.1).occupancy[0, 0] == expected

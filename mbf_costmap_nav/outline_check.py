@@ -1,0 +1,62 @@
+"""Is a polygon the outline of a robot? Asked where a configuration is read, so that the rest may trust it.
+
+When to use: for outlines that people write. When not: outlines made by ``Footprint`` itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+LEAST_AREA = 1e-6
+"""[m2]; a square of a millimetre."""
+
+
+def outline_problem(corners: FloatArray) -> str:
+    """What keeps corners (n, 2) [m] from being the outline of a robot around its base; "" if nothing does.
+
+    A corner that is given twice in a row, also the first one again at the end, counts once.
+    """
+    points = corners[(corners != np.roll(corners, 1, axis=0)).any(axis=1)]
+    ends = np.roll(points, -1, axis=0)
+    area = 0.5 * float(abs(np.add.accumulate(_cross(points, ends))[-1])) if len(points) else 0.0
+    crossing = _crossing_sides(points, ends)
+    if crossing is not None:
+        return f"an outline whose sides do not cross, but side {crossing[0]} meets side {crossing[1]}"
+    if not area >= LEAST_AREA:
+        return f"an outline with an area of at least {LEAST_AREA:g} m2, not {area:g} m2"
+    if not _holds_origin(points, ends):
+        return "an outline around the base, (0, 0), which lies outside of it"
+    return ""
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Third component of the cross products of vectors (..., 2)."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _crossing_sides(points: FloatArray, ends: FloatArray) -> tuple[int, int] | None:
+    """First two sides, not next to each other, that share a point; None without such a pair."""
+    count = len(points)
+    for i in range(count - 2):
+        others = np.arange(i + 2, count - 1 if i == 0 else count)
+        a, b, c, d = points[i], ends[i], points[others], ends[others]
+        apart = (_cross(b - a, c - a) * _cross(b - a, d - a) > 0.0) | (
+            _cross(d - c, a - c) * _cross(d - c, b - c) > 0.0
+        )
+        low, high = np.minimum(c, d), np.maximum(c, d)
+        apart |= ((high < np.minimum(a, b)) | (low > np.maximum(a, b))).any(axis=1)
+        if not apart.all():
+            return i, int(others[int(np.argmin(apart))])
+    return None
+
+
+def _holds_origin(points: FloatArray, ends: FloatArray) -> bool:
+    """Whether the origin lies in a simple polygon or on its sides."""
+    turns = _cross(points, ends)
+    on_side = (turns == 0.0) & (points[:, 0] * ends[:, 0] + points[:, 1] * ends[:, 1] <= 0.0)
+    spans = (points[:, 1] > 0.0) != (ends[:, 1] > 0.0)
+    to_the_right = spans & ((turns > 0.0) == (ends[:, 1] > points[:, 1]))
+    return bool(on_side.any() or np.count_nonzero(to_the_right) % 2 == 1)
