@@ -56,7 +56,7 @@ class Ground(NamedTuple):
 
 def ground_of(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, samples: FloatArray) -> Ground:
     """Prepare a snapshot for a footprint's covering points (n, 2) [m]; the arguments are those of ``Ground``."""
-    order = np.argsort((np.arange(len(samples)) * GOLDEN_RATIO) % 1.0)
+    order = np.argsort((np.arange(len(samples)) * GOLDEN_RATIO) % 1.0, kind="stable")
     discs = _disc_centres(samples)
     gaps = np.hypot(samples[:, None, 0] - discs[None, :, 0], samples[:, None, 1] - discs[None, :, 1])
     radius = min(LARGEST_RADIUS, math.ceil(gaps.min(axis=1).max() / geometry[0] + CELL_DIAGONAL))
