@@ -98,8 +98,12 @@ class Bench:
         self._temporary = tempfile.TemporaryDirectory(prefix="mbf_bench_")  # removed with the bench, used or not
         self.folder = Path(self._temporary.name if folder is None else folder)
         self.folder.mkdir(parents=True, exist_ok=True)
-        on_step("building the world")
-        self.world, self._obstacles = set_stage(self.scenario, self.folder, self.seed)
+        try:
+            on_step("building the world")
+            self.world, self._obstacles = set_stage(self.scenario, self.folder, self.seed)
+        except BaseException:
+            self._temporary.cleanup()
+            raise
         try:
             self._start(wall_clock, sinks, on_step)
         except BaseException:

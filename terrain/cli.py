@@ -101,7 +101,7 @@ def replay(
     rrd: bool = typer.Option(False, "--rrd", help="Write run.rrd for Rerun too; needs the extra rerun."),
     gif: bool = typer.Option(False, "--gif", help="Write animation.gif too, for where no script may run."),
 ) -> None:
-    """Write picture, report, replay and MCAP log of a run again from its recording, and open the replay."""
+    """Write picture, report, replay and MCAP log of a run, also of one that was killed, and open the replay."""
     with readable_errors():
         from terrain.live_line import LiveLine
         from terrain.run_folder import read_run

@@ -30,6 +30,17 @@ MAX_MESH_VERTICES = 1_000_000  # nor are these
 MAX_MAP_COSTS = 200_000_000  # of all maps of a run together, a byte or two each; later ones are not recorded
 
 
+@dataclass(frozen=True)
+class Taken:
+    """How much of each kind has been taken from a recorder."""
+
+    samples: int = 0
+    paths: int = 0
+    scans: int = 0
+    grids: int = 0
+    meshes: int = 0
+
+
 @dataclass(eq=False)
 class Recorder:
     """Collects a run while it happens; everything given is copied.
@@ -64,6 +75,7 @@ class Recorder:
     _actor_poses: list[list[list[float]]] = field(default_factory=list)
     _next_map: float = -math.inf
     _samples: list[list[float]] = field(default_factory=list)
+    _taken: Taken = field(default_factory=Taken)
 
     def sample(self, time: float, pose: Pose, velocity: Twist, command: Command) -> None:
         """Add one sample; call at a steady rate (10 to 20 Hz). Commands of a car are its speed and zero turning."""
@@ -94,30 +106,50 @@ class Recorder:
 
     def finish(self, verdict: Verdict = UNFINISHED, events: Sequence[Event] = (), began: float = 0.0) -> Recording:
         """Return what was recorded; ``began`` [s] is the events' time at which the samples' time was 0."""
-        rows = np.array(self._samples, dtype=np.float64).reshape(-1, 14)
+        return self._recording(Taken(), verdict, events, began)
+
+    def take(self, events: Sequence[Event] = (), began: float = 0.0) -> Recording:
+        """Return what has come since this was called last, with these events; surfaces the first time only."""
+        before = self._taken
+        self._taken = Taken(
+            len(self._samples), len(self.paths), len(self.scans), len(self.grids), len(self.meshes)
+        )  # fmt: skip
+        return self._recording(before, UNFINISHED, events, began)
+
+    def _recording(self, before: Taken, verdict: Verdict, events: Sequence[Event], began: float) -> Recording:
+        """Return all but what has been taken before."""
+        rows = np.array(self._samples[before.samples :], dtype=np.float64).reshape(-1, 14)
+        meshes = self.meshes[before.meshes :]
+        if before.meshes:  # the surface has been taken
+            meshes = [replace(mesh, vertices=np.zeros((0, 3)), faces=np.zeros((0, 3), np.int32)) for mesh in meshes]
+        surfaces = (self.ground, self.walls, self.obstacles) if before == Taken() else (None, None, None)
         return Recording(
             scenario=well_formed(self.scenario),
             backend=well_formed(self.backend),
             robot=self.robot,
-            ground=self.ground,
-            walls=self.walls,
-            obstacles=self.obstacles,
+            ground=surfaces[0],
+            walls=surfaces[1],
+            obstacles=surfaces[2],
             start=self.start,
             goals=tuple(self.goals),
             times=rows[:, 0].copy(),
             poses=rows[:, 1:8].copy(),
             twists=rows[:, 8:11].copy(),
             commands=rows[:, 11:14].copy(),
-            paths=list(self.paths),
-            scans=list(self.scans),
+            paths=self.paths[before.paths :],
+            scans=self.scans[before.scans :],
             events=tuple(replace(event, time=max(0.0, round(event.time - began, 9))) for event in events),
             verdict=verdict,
-            grids=list(self.grids),
-            meshes=list(self.meshes),
-            actors=self.actor_tracks(),
+            grids=self.grids[before.grids :],
+            meshes=meshes,
+            actors=self._actor_tracks(before.samples),
         )
 
     def actor_tracks(self) -> list[ActorTrack]:
         """Return what moves by itself, and where it was at each sample so far."""
-        poses = np.array(self._actor_poses, dtype=np.float64).reshape(len(self._samples), len(self.actors), 7)
+        return self._actor_tracks(0)
+
+    def _actor_tracks(self, first: int) -> list[ActorTrack]:
+        rows = self._actor_poses[first:]
+        poses = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.actors), 7)
         return [ActorTrack(a.thing.value, *a.looks, poses[:, number]) for number, a in enumerate(self.actors)]

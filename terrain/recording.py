@@ -155,8 +155,8 @@ class Recording:
         """Simulated length of the run [s]."""
         return float(self.times[-1] - self.times[0]) if len(self.times) else 0.0
 
-    def save(self, file: str | Path) -> None:
-        """Write everything into one compressed npz file."""
+    def save(self, file: str | Path, compress: bool = True) -> None:
+        """Write everything into one npz file, which is there whole or not at all."""
         arrays: dict[str, Any] = {name: getattr(self, name) for name in ("times", "poses", "twists", "commands")}
         arrays |= {"footprint": self.robot.footprint, "wheels": self.robot.wheels}
         arrays["start"], arrays["goals"] = _pose_row(self.start), np.array([_pose_row(goal) for goal in self.goals])
@@ -177,7 +177,7 @@ class Recording:
         }
         arrays["words"] = np.array(json.dumps(words))
         with replacing(file) as part, part.open("wb") as out:
-            np.savez_compressed(out, **arrays)
+            (np.savez_compressed if compress else np.savez)(out, **arrays)
 
     @classmethod
     def load(cls, file: str | Path, max_bytes: int = MAX_BYTES) -> Recording:

@@ -27,6 +27,8 @@ from terrain.goal_tour import NO_GOALS, GoalTour
 from terrain.metrics import measure
 from terrain.mishaps import MishapKind
 from terrain.recording import Recording
+from terrain.recording_parts import RecordingParts, has_parts
+from terrain.run_folder import clear_results
 from terrain.scenario import Scenario
 from terrain.scenario_world import ScenarioWorld
 from terrain.shortest_way import shortest_way
@@ -118,6 +120,7 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
         The scenario has no configuration for the backend, or that configuration is wrong; all findings.
     """
     options.folder.mkdir(parents=True, exist_ok=True)
+    clear_results(options.folder)
     write_versions(options.folder)
     log = JsonLinesSink(options.folder / "events.jsonl")
     bench = Bench(
@@ -130,16 +133,26 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
         options.on_step,
         options.settings,
     )
+    parts = RecordingParts(
+        options.folder, bench.recorder, bench.events, bench.memory.events, lambda: bench.loop.origin
+    )  # fmt: skip
+    bench.loop.on_tick.append(parts.after_step)
     try:
         tour, wall_time = _drive(bench, options)
+    except BaseException:
+        if has_parts(options.folder):
+            options.on_note(f"the run was cut short; what happened until then: mbf replay {options.folder}")
+        raise
     finally:
         bench.close()
+        parts.end()
     recording = bench.recorder.finish(events=bench.memory.events, began=bench.loop.origin)
     metrics, result = _measure(recording, bench, tour), tour.last_result or NO_GOALS
     if options.geodesic and result.success:
         metrics |= _compare_with_geodesic(recording, bench.world)
     recording = replace(recording, verdict=judge(result, bench.scenario.limits, metrics))
     metrics = _write_numbers(recording, metrics, wall_time, options.folder)
+    parts.remove()
     if options.draw:
         _draw(recording, metrics, options)
     return RunResult(recording.verdict, options.folder, metrics)
