@@ -27,7 +27,15 @@ EXECUTIVES = ("move_base", "classic", *READY_TREES)
 
 
 class GoalDriver(ABC):
-    """Drives to one goal at a time."""
+    """Drives to one goal at a time.
+
+    Attributes
+    ----------
+    arrives : bool
+        Whether success means that the robot is there; one that only plans leaves it where it is.
+    """
+
+    arrives = True
 
     def __init__(self, navigator: Navigator) -> None:
         self.navigator = navigator
@@ -97,6 +105,7 @@ class TreeDriver(GoalDriver):
 
     def __init__(self, navigator: Navigator, tree: str) -> None:
         super().__init__(navigator)
+        self.arrives = tree != "planning"
         self._tree = tree
         self._executive: TreeExecutive | None = None
 

@@ -108,7 +108,7 @@ class GoalTour:
         self.target = goal.pose
         self.last_result = result = self._driver.drive(goal.pose, goal.planner, goal.controller)
         self.target = None
-        if result.success:
+        if result.success and self._driver.arrives:
             self.arrivals.append(Arrival.at(goal.pose, self._bench.simulation.track[-1], result))
         return result
 
