@@ -90,6 +90,13 @@ class NavigationParameters(ParameterModel):
     recovery_patience: float = parameter(
         15.0, "Longest run of a recovery behaviour; 0 = no limit.", unit="s", ge=0.0, le=1000.0
     )
+    max_tilt: float | None = parameter(
+        None,
+        "Tilt of the robot's pose at which a path is given up, before the robot tips over; absent = none.",
+        unit="rad",
+        gt=0.0,
+        le=math.pi / 2.0,
+    )
     oscillation_timeout: float = parameter(
         0.0, "Time without progress that counts as oscillation; 0 = never.", unit="s", ge=0.0, le=60.0
     )

@@ -109,12 +109,6 @@ class MishapLimits:
     stuck_hold: float = 3.0
 
 
-def tilt_of(pose: Pose) -> float:
-    """Angle [rad] between the robot's z axis and the vertical."""
-    x, y, _, _ = pose.orientation
-    return math.acos(max(-1.0, min(1.0, 1.0 - 2.0 * (x * x + y * y))))
-
-
 def roll_pitch(pose: Pose) -> tuple[float, float]:
     """Roll and pitch [rad] of the fixed-axis (REP-103) convention; nose down is positive pitch."""
     x, y, z, w = pose.orientation
@@ -211,7 +205,7 @@ class MishapMonitor:
         return True
 
     def _is_tipped(self, sample: MotionSample) -> bool:
-        return tilt_of(sample.pose) > self.limits.tilt
+        return sample.pose.tilt > self.limits.tilt
 
     def _standing_time(self, sample: MotionSample) -> float:
         """How long [s] the robot has been asked to move without getting anywhere; wheels that twitch do not count."""

@@ -10,7 +10,6 @@ took on the wall stands in ``timing.json``.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
@@ -201,7 +200,7 @@ class _ProgressReporter:
                 wall_time=wall_seconds() - self._started,
                 distance_left=feedback.distance_along_path if feedback else float("nan"),
                 speed=speed,
-                tilt=math.acos(min(max(float(pose.rotation[2, 2]), -1.0), 1.0)),
+                tilt=pose.tilt,
                 state=at_work[0] if at_work else "waiting",
             )
         )

@@ -1,6 +1,8 @@
-"""Finds a robot that ignores its commands, or one that moves without getting anywhere."""
+"""Finds a robot that tilts too far, ignores its commands, or moves without getting anywhere."""
 
 from __future__ import annotations
+
+import math
 
 from mbf_abstract.clock import Stopwatch
 from mbf_abstract.execution.oscillation import OscillationDetector
@@ -39,6 +41,11 @@ class MotionWatch:
     def problem(self, pose: Pose, measured: Twist | None, tracker: PathTracker) -> tuple[ExePathOutcome, str] | None:
         """Take in a cycle, with the measured velocity of a robot that has odometry; why the loop shall end, if so."""
         parameters = self._runtime.parameters
+        if parameters.max_tilt is not None and pose.tilt > parameters.max_tilt:
+            tilt, allowed = math.degrees(pose.tilt), math.degrees(parameters.max_tilt)
+            return ExePathOutcome.ROBOT_STUCK, (
+                f"the robot tilts by {tilt:.1f} degrees, allowed are {allowed:.1f}: the ground is steeper than planned"
+            )
         told_to_move = not self._runtime.gate.last_command.is_stopped()
         if not (told_to_move and measured is not None and measured.is_stopped()):
             self._ignored.restart()

@@ -1,5 +1,7 @@
 """The controller execution; F-numbers are facts of the upstream tests, with their ids. Every test ends standing."""
 
+import math
+
 import pytest
 
 from mbf_abstract.actions.goals import ExePathGoal
@@ -12,6 +14,7 @@ from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome as Outcome
 from mbf_abstract.plugins import ControlResult, PluginKind
 from mbf_abstract.testing.faulty import drive, nan_command, no_command, slow
+from mbf_abstract.transform import Transform
 
 FAILS = ControlResult(Outcome.BLOCKED_PATH, "a chair")
 FAILS_BUT_DRIVES = ControlResult(Outcome.BLOCKED_PATH, "a chair", Twist.planar(0.1))
@@ -297,6 +300,36 @@ def test_a_tolerance_of_zero_or_less_lets_the_robot_ignore_commands_for_ever(mak
     bench.robot.stuck = True
     handle = bench.navigator.send(ExePathGoal(bench.path_to(3.0)))
     bench.clock.sleep(60.0)
+    assert not handle.done
+    handle.cancel()
+    handle.wait()
+
+
+def tilted_frame(angle):
+    """Where odom lies in map once the ground under the robot is steeper than thought."""
+    return Transform((0.0, 0.0, 0.0), (math.sin(0.5 * angle), 0.0, 0.0, math.cos(0.5 * angle)), "map", "odom")
+
+
+def test_a_robot_that_tilts_too_far_stops_before_it_tips_over(make_bench, states):
+    bench = make_bench(max_tilt=0.5)
+    handle = bench.navigator.send(ExePathGoal(bench.path_to(30.0)))
+    bench.clock.sleep(2.0)
+    bench.robot.T_map_odom = tilted_frame(0.45)
+    bench.clock.sleep(2.0)
+    assert not handle.done
+    bench.robot.T_map_odom, tilted_at = tilted_frame(0.6), bench.clock.now()
+    result = handle.wait()
+    assert result.outcome == Outcome.ROBOT_STUCK
+    assert "tilts by 34.4 degrees, allowed are 28.6" in result.message
+    assert bench.clock.now() - tilted_at < 0.2 and bench.robot.command.is_stopped()
+    assert end_state(states, bench) == "robot_disabled"
+
+
+def test_without_max_tilt_a_robot_may_lean_as_far_as_it_will(make_bench):
+    bench = make_bench()
+    bench.robot.T_map_odom = tilted_frame(0.6)
+    handle = bench.navigator.send(ExePathGoal(bench.path_to(30.0)))
+    bench.clock.sleep(2.0)
     assert not handle.done
     handle.cancel()
     handle.wait()

@@ -13,7 +13,6 @@ from terrain.generate import flat_terrain
 from terrain.heightfield import Heightfield
 from terrain.kinematic_robot import KinematicRobot
 from terrain.kinematic_world import KinematicWorld
-from terrain.mishaps import tilt_of
 from terrain.occupancy import OccupancyGrid
 from terrain.robot_models import HUSKY, TURTLEBOT
 from terrain.robots import WheeledRobot
@@ -135,7 +134,7 @@ def test_the_noise_of_the_localisation_has_the_size_that_the_scenario_says_in_al
     assert offsets.mean(axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=0.002)
     assert offsets.std(axis=0) == pytest.approx([0.03, 0.03, 0.02], rel=0.05)
     assert np.degrees(np.std([pose.yaw for pose in poses])) == pytest.approx(2.0, rel=0.05)
-    tilts = np.degrees([tilt_of(pose) for pose in poses])
+    tilts = np.degrees([pose.tilt for pose in poses])
     assert np.sqrt(np.mean(tilts**2)) == pytest.approx(math.sqrt(2.0), rel=0.05)  # roll and pitch together
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose, Twist
-from terrain.mishaps import MishapKind, MishapMonitor, MotionSample, Thing, roll_pitch, tilt_of
+from terrain.mishaps import MishapKind, MishapMonitor, MotionSample, Thing, roll_pitch
 
 
 def rolled(angle: float, stamp: float = 0.0, x: float = 0.0) -> Pose:
@@ -24,7 +24,7 @@ def feed(monitor: MishapMonitor, seconds: float, start: float = 0.0, **fields: o
 
 
 def test_tilt_roll_and_pitch() -> None:
-    assert tilt_of(rolled(0.3)) == pytest.approx(0.3)
+    assert rolled(0.3).tilt == pytest.approx(0.3)
     assert roll_pitch(rolled(-0.3)) == pytest.approx((-0.3, 0.0))
     nose_down = Pose((0.0, 0.0, 0.0), (0.0, math.sin(0.2), 0.0, math.cos(0.2)))
     assert roll_pitch(nose_down) == pytest.approx((0.0, 0.4))
