@@ -53,11 +53,13 @@ def _lethal(mesh_map: MeshMap) -> Iterator[Finding]:
 
 
 def _coarse(mesh_map: MeshMap) -> Iterator[Finding]:
-    """Findings if the mesh's edges are too long for the robot's radius or for the neighbourhood of a layer."""
+    """Findings if the mesh's edges are too long for the robot's radius, the reach of a layer, or a robot's wheels."""
     mean_edge = mesh_map.topology.mean_edge_length
     limits = {"half the inscribed radius": 0.5 * mesh_map.inscribed_radius}
     for name, layer in mesh_map.layers.items():
         limits[f"the radius of layer '{name}'"] = float(getattr(layer.parameters, "radius", 0.0))
+        # Ledges between vertices a wheelbase apart are on no map: the robot tilts more than the layer knows.
+        limits[f"the wheelbase of layer '{name}'"] = float(getattr(layer.parameters, "wheelbase", 0.0))
         if mesh_map.inscribed_radius == 0.0:  # then that of an inflation is all that is known of the robot
             inscribed = float(getattr(layer.parameters, "inscribed_radius", 0.0))
             limits[f"half the inscribed radius of layer '{name}'"] = 0.5 * inscribed
@@ -65,7 +67,7 @@ def _coarse(mesh_map: MeshMap) -> Iterator[Finding]:
         if 0.0 < limit < mean_edge:
             text = (
                 f"edges are {mean_edge:.3g} m long on average, more than {what} ({limit:.3g} m); "
-                "layers may miss obstacles, consider densify"
+                "layers may miss obstacles and ledges; densify helps those that look around, a finer survey all"
             )
             everywhere = np.flatnonzero(np.diff(mesh_map.neighbour_offsets) > 0)
             yield Finding("coarse", text, everywhere, harmless=True)

@@ -252,6 +252,16 @@ def test_layers_whose_radius_is_shorter_than_the_edges_are_reported_by_name():
     assert "'near'" in mesh_map.report.findings[0].text
 
 
+def test_a_map_whose_edges_are_longer_than_a_robot_is_reported_with_its_tilt_layer():
+    vertices, faces = heightfield_mesh(np.zeros((9, 9)), 0.5, 0.5)
+    layers = [{"name": "stance", "type": "tilt"}]
+    for wheelbase, told in ((0.512, True), (0.7, False)):
+        parameters = MeshMapParameters(layers=layers)
+        mesh_map = build_mesh_map(parameters, {"stance": {"wheelbase": wheelbase}}, vertices=vertices, faces=faces)
+        texts = [finding.text for finding in mesh_map.report.findings if finding.name == "coarse"]
+        assert any("the wheelbase of layer 'stance' (0.512 m)" in text for text in texts) is told
+
+
 def test_coarse_mesh_is_reported_and_densify_mends_it():
     vertices, faces = heightfield_mesh(np.zeros((3, 3)), 2.0, 2.0)
     coarse = MeshMapParameters(inscribed_radius=0.4)
