@@ -180,12 +180,6 @@ class Pose:
         return yaw_from_quaternion(self.orientation)
 
     @property
-    def tilt(self) -> float:
-        """Angle [rad] between its z axis and the vertical."""
-        x, y, _, _ = self.orientation
-        return math.acos(max(-1.0, min(1.0, 1.0 - 2.0 * (x * x + y * y))))
-
-    @property
     def rotation(self) -> FloatArray:
         """(3, 3) rotation matrix; its columns are the pose's x, y and z axes in ``frame_id``."""
         return rotation_matrix(self.orientation)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.tilt import tilt_of
 
 
 class Thing(Enum):
@@ -205,7 +206,7 @@ class MishapMonitor:
         return True
 
     def _is_tipped(self, sample: MotionSample) -> bool:
-        return sample.pose.tilt > self.limits.tilt
+        return tilt_of(sample.pose) > self.limits.tilt
 
     def _standing_time(self, sample: MotionSample) -> float:
         """How long [s] the robot has been asked to move without getting anywhere; wheels that twitch do not count."""

@@ -19,6 +19,7 @@ from typing import Any
 from mbf_abstract.clock import wall_seconds
 from mbf_abstract.events import JsonLinesSink
 from mbf_abstract.geometry import Pose
+from mbf_abstract.tilt import tilt_of
 from terrain.arrival import arrival_tolerance
 from terrain.bench import Bench
 from terrain.goal_drivers import make_goal_driver
@@ -200,7 +201,7 @@ class _ProgressReporter:
                 wall_time=wall_seconds() - self._started,
                 distance_left=feedback.distance_along_path if feedback else float("nan"),
                 speed=speed,
-                tilt=pose.tilt,
+                tilt=tilt_of(pose),
                 state=at_work[0] if at_work else "waiting",
             )
         )

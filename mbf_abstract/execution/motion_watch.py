@@ -11,6 +11,7 @@ from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.path_tracker import PathTracker
+from mbf_abstract.tilt import tilt_of
 
 
 class MotionWatch:
@@ -41,10 +42,12 @@ class MotionWatch:
     def problem(self, pose: Pose, measured: Twist | None, tracker: PathTracker) -> tuple[ExePathOutcome, str] | None:
         """Take in a cycle, with the measured velocity of a robot that has odometry; why the loop shall end, if so."""
         parameters = self._runtime.parameters
-        if parameters.max_tilt is not None and pose.tilt > parameters.max_tilt:
-            tilt, allowed = math.degrees(pose.tilt), math.degrees(parameters.max_tilt)
+        tilt = tilt_of(pose)
+        if parameters.max_tilt is not None and tilt > parameters.max_tilt:
+            allowed = math.degrees(parameters.max_tilt)
             return ExePathOutcome.ROBOT_STUCK, (
-                f"the robot tilts by {tilt:.1f} degrees, allowed are {allowed:.1f}: the ground is steeper than planned"
+                f"the robot tilts by {math.degrees(tilt):.1f} degrees, allowed are {allowed:.1f}: "
+                "the ground is steeper than planned"
             )
         told_to_move = not self._runtime.gate.last_command.is_stopped()
         if not (told_to_move and measured is not None and measured.is_stopped()):

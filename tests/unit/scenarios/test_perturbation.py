@@ -7,6 +7,7 @@ import pytest
 
 from mbf_abstract.findings import ConfigError
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.tilt import tilt_of
 from terrain.command_delay import CommandDelay
 from terrain.ego_sensors import Localization
 from terrain.generate import flat_terrain
@@ -134,7 +135,7 @@ def test_the_noise_of_the_localisation_has_the_size_that_the_scenario_says_in_al
     assert offsets.mean(axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=0.002)
     assert offsets.std(axis=0) == pytest.approx([0.03, 0.03, 0.02], rel=0.05)
     assert np.degrees(np.std([pose.yaw for pose in poses])) == pytest.approx(2.0, rel=0.05)
-    tilts = np.degrees([pose.tilt for pose in poses])
+    tilts = np.degrees([tilt_of(pose) for pose in poses])
     assert np.sqrt(np.mean(tilts**2)) == pytest.approx(math.sqrt(2.0), rel=0.05)  # roll and pitch together
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.tilt import tilt_of
 from terrain.mishaps import MishapKind, MishapMonitor, MotionSample, Thing, roll_pitch
 
 
@@ -24,7 +25,7 @@ def feed(monitor: MishapMonitor, seconds: float, start: float = 0.0, **fields: o
 
 
 def test_tilt_roll_and_pitch() -> None:
-    assert rolled(0.3).tilt == pytest.approx(0.3)
+    assert tilt_of(rolled(0.3)) == pytest.approx(0.3)
     assert roll_pitch(rolled(-0.3)) == pytest.approx((-0.3, 0.0))
     nose_down = Pose((0.0, 0.0, 0.0), (0.0, math.sin(0.2), 0.0, math.cos(0.2)))
     assert roll_pitch(nose_down) == pytest.approx((0.0, 0.4))
