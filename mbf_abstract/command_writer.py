@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 
-from mbf_abstract.clock import Clock, Condition, ThreadDetached
+from mbf_abstract.clock import Clock, Condition, ThreadDetached, is_for_the_program
 from mbf_abstract.drive_commands import stands_still, zero_like
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventBus, EventKind
@@ -89,18 +89,22 @@ class CommandWriter:
 
     def deliver(self, command: Command | None) -> bool:
         """Call the driver with an announced command, then with the zero that is due; whether the first got through."""
-        delivered, detached = True, None
+        delivered = True
+        passing: BaseException | None = None
         while command is not None:
+            again = False
             try:
                 problem = self._call(command)
             except ThreadDetached as error:  # what is due is still to be sent before this thread ends
-                problem, detached = "send_command kept the processor busy for too long", error
+                problem, passing = "send_command kept the processor busy for too long", error
+            except BaseException as error:  # Ctrl-C or SIGTERM: passed on, but not before the robot was told to stand
+                problem, again, passing = f"{type(error).__name__} came in between", passing is None, error
             with self._condition:
-                following = self._end_call(command, problem)
+                following = self._end_call(command, problem, again)
             delivered = delivered and not problem
             command = following
-        if detached is not None:
-            raise detached
+        if passing is not None:
+            raise passing
         return delivered
 
     def _call(self, command: Command) -> str:
@@ -111,16 +115,16 @@ class CommandWriter:
             if inspect.iscoroutine(answer):
                 answer.close()
                 raise TypeError("it returned a coroutine, which nobody awaits")
-        except ThreadDetached:
-            raise
         except BaseException as error:
+            if isinstance(error, ThreadDetached) or is_for_the_program(error):
+                raise
             kind, text = type(error).__name__, error_text(error)
             self._events.emit(EventKind.FAULT, "robot", where="send_command", type=kind, message=text)
             return f"send_command raised {kind}: {text}"
         return ""
 
-    def _end_call(self, command: Command, problem: str) -> Command | None:
-        """Note how a call ended; the zero that is due after it, announced."""
+    def _end_call(self, command: Command, problem: str, again: bool) -> Command | None:
+        """Note how a call ended; the zero that is due after it, or wanted ``again``, announced."""
         self._calls -= 1
         self.problem = problem
         if not problem or not stands_still(command):
@@ -129,4 +133,4 @@ class CommandWriter:
             self.last_time = self._clock.now()
         if problem or self._stop_due or self._waiting or stands_still(command):
             self._condition.notify_all()
-        return self.begin_stop() if self._stop_due and not self.busy else None
+        return self.begin_stop() if (self._stop_due or again) and not self.busy else None

@@ -23,6 +23,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, Protocol, TextIO
 
+from mbf_abstract.clock import is_for_the_program
 from mbf_abstract.event_values import FLOAT_DIGITS, JsonValue, error_text, to_json_value, well_formed
 
 DEFAULT_MEMORY_EVENTS = 10_000
@@ -157,7 +158,7 @@ class EventBus:
                 try:
                     sink.write(event)
                 except BaseException as error:
-                    if _is_for_the_program(error):
+                    if is_for_the_program(error):
                         raise
                     self._drop(sink, event, error)
 
@@ -182,18 +183,12 @@ class EventBus:
         self.emit(EventKind.SINK_FAILED, "event_bus", sink=name, message=f"{type(error).__name__}: {error_text(error)}")
 
 
-def _is_for_the_program(error: BaseException) -> bool:
-    """Whether this is Ctrl-C or SIGTERM, which reach the main thread wherever it is, and no fault of a sink."""
-    on_main_thread = threading.current_thread() is threading.main_thread()
-    return on_main_thread and isinstance(error, (KeyboardInterrupt, SystemExit))
-
-
 def _close_quietly(sink: EventSink) -> None:
     """Close a sink that may be broken; closing a full disk's file raises once more, which is known already."""
     try:
         sink.close()
     except BaseException as error:
-        if _is_for_the_program(error):
+        if is_for_the_program(error):
             raise
         _logger.debug("closing event sink %s failed: %s", type(sink).__name__, error_text(error))
 

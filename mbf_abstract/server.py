@@ -236,13 +236,15 @@ class AbstractNavigationServer(PluginHost):
         if self._closed:
             return
         self._closed = True
-        self.runtime.gate.close()
-        self._process_end.end()
-        for action in self._actions():
-            action.close()
-        self.runtime.callbacks.close()
-        self.runtime.supervisor.close()
-        self.close_map()
+        try:
+            self.runtime.gate.close()
+        finally:  # also after a Ctrl-C that came just then
+            self._process_end.end()
+            for action in self._actions():
+                action.close()
+            self.runtime.callbacks.close()
+            self.runtime.supervisor.close()
+            self.close_map()
 
     def __enter__(self) -> AbstractNavigationServer:
         return self

@@ -90,8 +90,9 @@ class PluginRun(Generic[P]):
 
     def adopt(self, handle: AnyGoalHandle) -> None:
         """Serve ``handle`` from now on (plan update): its cancel is the one that counts."""
-        self.handle = handle
-        self._stop_asked = None  # a cancel of the goal before is none of this one
+        with self._condition:
+            self.handle = handle
+            self._stop_asked = None  # a cancel of the goal before is none of this one
         handle.on_wake(lambda: self.runtime.supervisor.poke(self._watch))
         self.runtime.supervisor.poke(self._watch)
 
@@ -160,18 +161,28 @@ class PluginRun(Generic[P]):
             self.patience_watch.pause()
         else:
             self.patience_watch.resume()
-        began = self._call_began
-        if self._stop_asked is None:
-            if not (self.canceled or (began is not None and self.is_patience_over())):
-                return self._next_check()
-            self._stop_asked = self.runtime.clock.now()
-            self._ask_to_stop("canceled" if self.canceled else "patience exceeded")
+        began, handle, asked, is_first = self._consider_stop()
+        if asked is None:
+            return self._next_check()
+        if is_first:
+            self._ask_to_stop(handle)
         if began is None:
             return IDLE_CHECK
-        grace_left = self.runtime.parameters.cancel_grace + max(began, self._stop_asked) - self.runtime.clock.now()
+        grace_left = self.runtime.parameters.cancel_grace + max(began, asked) - self.runtime.clock.now()
         if grace_left > 1e-9:
             return grace_left
-        return self._abandon()
+        return self._abandon(began)
+
+    def _consider_stop(self) -> tuple[float | None, AnyGoalHandle, float | None, bool]:
+        """Start of the present call, whose goal it is, when it was asked to stop, and whether that is to be done now.
+
+        All of one moment: a plan update may exchange the goal at any time, and the new one must not pay for the old.
+        """
+        with self._condition:
+            began, is_first = self._call_began, False
+            if self._stop_asked is None and (self.canceled or (began is not None and self.is_patience_over())):
+                self._stop_asked, is_first = self.runtime.clock.now(), True
+            return began, self.handle, self._stop_asked, is_first
 
     def _next_check(self) -> float:
         """Seconds until the patience of the present call, or of one that begins soon, may be over."""
@@ -183,22 +194,27 @@ class PluginRun(Generic[P]):
             return max(remaining, 0.0) + 1e-6
         return max(min(remaining, limit / 2.0), SHORTEST_CHECK)
 
-    def _ask_to_stop(self, reason: str) -> None:
-        self.handle.cancel_token.cancel(reason)
+    def _ask_to_stop(self, handle: AnyGoalHandle) -> None:
+        handle.cancel_token.cancel("canceled" if handle.cancel_requested else "patience exceeded")
         overridden = type(self.plugin.instance).cancel is not Plugin.cancel
         if self._call_began is not None and overridden:
-            self.plugin.ask_to_cancel(self, self.handle.id)
+            self.plugin.ask_to_cancel(self, handle.id)
 
-    def _abandon(self) -> float | None:
+    def _abandon(self, began: float | None = None) -> float | None:
         """End the goal without its thread, unless the call has just come back; the answer to the supervisor.
 
         An instance that the thread is not inside of is free at once.
+
+        Parameters
+        ----------
+        began : float, optional
+            Start [s] of the call that is to be given up; one that began since then is spared.
         """
         with self._condition:
             if self.abandoned or self._over:
                 return None
-            if self._call_began is None:
-                return IDLE_CHECK
+            if self._call_began is None or (began is not None and began != self._call_began):
+                return SHORTEST_CHECK
             self.abandoned = True
             self.runtime.hanging.add(self)
         self.patience_exceeded = self.patience_exceeded or not self.canceled

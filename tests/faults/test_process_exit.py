@@ -8,9 +8,13 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
+
+from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.testing.bench import Bench
 
 PROGRAM = """
 import os, signal, sys
@@ -180,3 +184,33 @@ bench.clock.sleep(0.2)
     child_ended = told.index(9.0)
     assert 0.0 not in told[:child_ended]
     assert told[-1] == 0.0
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit])
+def test_ctrl_c_in_the_middle_of_the_last_command_is_passed_on_and_zero_follows(error):
+    class Driver:
+        robot = None
+        interrupted = False
+
+        def send_command(self, command):
+            if threading.current_thread() is threading.main_thread() and not self.interrupted:
+                self.interrupted = True
+                raise error
+            self.robot.send_command(command)
+
+        def odometry(self):
+            return self.robot.odometry()
+
+    driver = Driver()
+    bench = Bench(robot=driver, command_timeout=0.2)
+    driver.robot = bench.robot
+    handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
+    bench.clock.sleep(1.0)
+    with pytest.raises(error):
+        bench.server.close()
+    assert driver.interrupted
+    assert handle.wait(2.0).message == "the server is shut down"
+    bench.clock.sleep(1.0)
+    assert bench.robot.command.is_stopped()
+    bench.close()
+    assert {who.name for who in bench.clock._known} == {"main"}
