@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-UNKNOWN_OCCUPANCY = 255
-"""Of cells that nobody has seen."""
+OCCUPIED, UNKNOWN_OCCUPANCY = 100, 255
+"""Occupancies of cells: from the one on surely occupied, but for the other, which nobody has seen."""
 
 
 @dataclass(frozen=True, eq=False)

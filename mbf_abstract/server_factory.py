@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any
 
 from mbf_abstract.clock import Clock
 from mbf_abstract.config import Config, RawConfig, load_config, validate_config
 from mbf_abstract.events import EventBus
-from mbf_abstract.findings import ConfigError
+from mbf_abstract.findings import ConfigError, Finding
+from mbf_abstract.map_view import FloorMap
 from mbf_abstract.registry import PluginError, PluginRegistry
 from mbf_abstract.robot import Robot
 from mbf_abstract.server import AbstractNavigationServer
@@ -35,6 +39,22 @@ def read_config(path: str | os.PathLike[str]) -> tuple[type[AbstractNavigationSe
     cls = server_class(raw)
     registry = cls.plugin_registry(raw.allow_module_types)
     return cls, validate_config(raw, cls.config_sections, registry, cls.plugin_declaration)
+
+
+def installed_servers() -> Iterator[type[AbstractNavigationServer]]:
+    """Server classes of all installed packages, by name; each is imported when its turn comes."""
+    registry = PluginRegistry()
+    for name in sorted({point.name for point in entry_points(group="mbf.servers")}):
+        yield registry.load("servers", name, AbstractNavigationServer)
+
+
+def read_floor(file: Path) -> FloorMap:
+    """Read a map file by the first installed server that knows its format; raises ConfigError if it cannot be used."""
+    for cls in installed_servers():
+        floor = cls.read_floor(file)
+        if floor is not None:
+            return floor
+    raise ConfigError([Finding(str(file), 1, "", "a map of cells that an installed server reads", repr(file.suffix))])
 
 
 def make_server(

@@ -15,7 +15,7 @@ import yaml
 from numpy.typing import NDArray
 from PIL import Image
 
-from terrain.occupancy import OccupancyGrid
+from terrain.occupancy import OccupancyGrid, all_digits
 
 BoolArray = NDArray[np.bool_]
 
@@ -152,7 +152,8 @@ def write_map(grid: OccupancyGrid, folder: str | Path, name: str) -> Path:
     Image.fromarray(pixels[::-1]).save(folder / f"{name}.png", optimize=True)
     yaml_path = folder / f"{name}.yaml"
     yaml_path.write_text(
-        f"image: {name}.png\nresolution: {grid.resolution:g}\norigin: [{grid.origin_x:g}, {grid.origin_y:g}, 0.0]\n"
+        f"image: {name}.png\nresolution: {all_digits(grid.resolution)}\n"
+        f"origin: [{all_digits(grid.origin_x)}, {all_digits(grid.origin_y)}, 0.0]\n"
         "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
         encoding="utf-8",
     )

@@ -8,8 +8,8 @@ from terrain.world import BulletWorld
 WALL_HEIGHT = 2.0
 
 
-def add_building(world: BulletWorld, grid: OccupancyGrid, wall_height: float = WALL_HEIGHT) -> int:
-    """Add floor and walls of a map; return the body of the walls.
+def add_building(world: BulletWorld, grid: OccupancyGrid, wall_height: float = WALL_HEIGHT) -> None:
+    """Add floor and walls of a map; one without an occupied cell has no walls.
 
     Parameters
     ----------
@@ -20,4 +20,5 @@ def add_building(world: BulletWorld, grid: OccupancyGrid, wall_height: float = W
         [m]
     """
     world.add_ground_plane(*grid.bounds)
-    return world.add_mesh(*wall_triangles(grid, wall_height), ground=False)
+    if grid.occupied.any():
+        world.add_mesh(*wall_triangles(grid, wall_height), ground=False)

@@ -1,7 +1,6 @@
-"""Occupancy grids as worlds need them: read from map_server files, turned into walls.
+"""Occupancy grids as worlds need them: read from map files by the server that knows them, turned into walls.
 
-The costmap server has its own, stricter reader; this small one keeps ``terrain`` free of it. Cells are indexed
-``[iy, ix]`` from the lower left corner, as on a map with y up.
+Cells are indexed ``[iy, ix]`` from the lower left corner, as on a map with y up.
 """
 
 from __future__ import annotations
@@ -9,27 +8,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
-from PIL import Image
 
-from mbf_abstract.bounded_files import special_file
+from mbf_abstract.map_view import OCCUPIED, UNKNOWN_OCCUPANCY
+from mbf_abstract.server_factory import read_floor
 from terrain.solids import BOX_CORNERS, BOX_FACES
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
-
-MAX_CELLS = 100_000_000
-
-
-class OccupancyFileError(Exception):
-    """A map file cannot be used; the text names the file and the reason."""
-
-    def __init__(self, path: str | Path, reason: str) -> None:
-        super().__init__(f"{path}: {reason}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,62 +56,23 @@ class OccupancyGrid:
 
 
 def read_occupancy(path: str | Path) -> OccupancyGrid:
-    """Read a map_server yaml and its image.
+    """Read a floor from a map file by the map server that knows its format: a map_server yaml, or a bare image.
 
-    Parameters
-    ----------
-    path : path
-        The yaml: ``image``, ``resolution``, ``origin``, ``negate``, ``occupied_thresh``, ``free_thresh``. A cell with
-        occupancy above the one threshold is occupied, below the other free (map_server's trinary mode).
+    Only what is surely free is free, and only what is surely occupied is a wall; all else is unknown.
 
     Raises
     ------
-    OccupancyFileError
-        A file is missing or is not what it should be, or the map is rotated.
+    ConfigError
+        A file is missing or is not what it should be, or no installed map server reads it.
     """
-    path = Path(path)
-    header = _read_header(path)
-    pixels = _read_image(path, path.parent / str(header["image"]))
-    occupancy = pixels if header.get("negate", 0) else 1.0 - pixels
-    occupancy = occupancy[::-1]  # the first row of an image is the far end of y
-    try:
-        resolution = float(header["resolution"])
-        origin = [float(value) for value in header["origin"]]
-        occupied_above, free_below = float(header["occupied_thresh"]), float(header["free_thresh"])
-    except (TypeError, ValueError) as error:
-        raise OccupancyFileError(path, f"has a value that is no number: {error}") from error
-    if not (math.isfinite(resolution) and resolution > 0.0):
-        raise OccupancyFileError(path, f"resolution must be positive, got {resolution}")
-    if len(origin) != 3 or origin[2] != 0.0:
-        raise OccupancyFileError(path, f"origin must be [x, y, 0], got {origin}")
-    return OccupancyGrid(occupancy > occupied_above, occupancy < free_below, resolution, origin[0], origin[1])
+    floor = read_floor(Path(path))
+    occupied = (floor.occupancy >= OCCUPIED) & (floor.occupancy != UNKNOWN_OCCUPANCY)
+    return OccupancyGrid(occupied, floor.occupancy == 0, floor.resolution, floor.origin_x, floor.origin_y)
 
 
-def _read_header(path: Path) -> dict[str, Any]:
-    try:
-        header = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise OccupancyFileError(path, f"cannot be read: {error}") from error
-    if not isinstance(header, dict):
-        raise OccupancyFileError(path, "is not a mapping of map_server keys")
-    needed = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
-    missing = [key for key in needed if key not in header]
-    if missing:
-        raise OccupancyFileError(path, f"lacks {', '.join(missing)}")
-    return header
-
-
-def _read_image(path: Path, image_path: Path) -> FloatArray:
-    """Brightness 0..1 of each pixel (ny, nx), row 0 on top."""
-    if kind := special_file(image_path):
-        raise OccupancyFileError(path, f"image {image_path.name} is {kind}")
-    try:
-        with Image.open(image_path, formats=("PPM", "PNG", "BMP")) as image:
-            if image.width * image.height > MAX_CELLS:
-                raise OccupancyFileError(path, f"image {image_path.name} has {image.width} x {image.height} pixels")
-            return np.asarray(image.convert("L"), dtype=np.float64) / 255.0
-    except (OSError, SyntaxError, ValueError) as error:
-        raise OccupancyFileError(path, f"image {image_path.name} cannot be read: {error}") from error
+def all_digits(value: float) -> str:
+    """All digits of a number for a map file, whole ones without a point."""
+    return repr(float(value)).removesuffix(".0")
 
 
 def merge_rectangles(occupied: NDArray[np.bool_]) -> IntArray:

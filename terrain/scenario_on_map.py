@@ -13,32 +13,35 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
 from mbf_abstract.findings import ConfigError, Finding
-from terrain.occupancy import OccupancyFileError, OccupancyGrid, read_occupancy
+from terrain.occupancy import OccupancyGrid, read_occupancy
 from terrain.robot_models import ROBOTS
 from terrain.scenario import MapWorld, PlanarPose, Scenario
 
 MARGIN = 0.15  # m kept free around the robot's outline
+NEAR_ZERO = 1000.0  # m; farther away single precision is coarser than a tenth of a millimetre
 
 
 def on_map(scenario: Scenario, file: Path) -> Scenario:
     """Return the scenario in the building of ``file``, from one end of its largest free region to the other.
+
+    A map far from zero is put at zero: the physics reckons in single precision.
 
     Raises
     ------
     ConfigError
         The file is no map, or there is no room for the robot in it.
     """
-    try:
-        grid = read_occupancy(file)
-    except OccupancyFileError as error:
-        raise ConfigError([Finding(str(file), 1, "", "a map_server map", str(error))]) from error
+    world = MapWorld(type="map", file=file.resolve())
+    corner = read_occupancy(file)
+    if max(abs(corner.origin_x), abs(corner.origin_y)) > NEAR_ZERO:
+        world = world.model_copy(update={"corner": (0.0, 0.0)})
+    grid = world.grid()
     radius = ROBOTS[scenario.robot].circumscribed_radius + MARGIN
     ends = far_apart_places(grid, radius)
     if ends is None:
         finding = Finding(str(file), 1, "", f"free space for a robot of radius {radius:.2f} m", "none")
         raise ConfigError([finding])
     start, goal = ends
-    world = MapWorld(type="map", file=file.resolve())
     changes = {"world": world, "start": start, "goals": (goal,), "obstacles": (), "name": file.stem}
     return scenario.model_copy(update=changes)
 

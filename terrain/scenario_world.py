@@ -139,7 +139,7 @@ def _build_terrain(terrain: Heightfield, lethal_slope: float, files: MapFiles, p
 def _build_building(world: BuildingWorld, grid: OccupancyGrid, files: MapFiles, physics: AnyWorld) -> ScenarioWorld:
     if isinstance(physics, BulletWorld):
         add_building(physics, grid)
-    walls = Surface(*wall_triangles(grid))
+    walls = Surface(*wall_triangles(grid)) if grid.occupied.any() else None
     return ScenarioWorld(
         physics, files.of_building(grid), lambda x, y: 0.0, _floor_surface(grid), walls, grid, world.places()
     )

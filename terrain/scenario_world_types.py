@@ -7,12 +7,14 @@ map whose occupied cells are walls; a ``LevelsWorld`` has several levels at one 
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
+from mbf_abstract.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.dem_io import jacksboro, read_dem
@@ -25,6 +27,9 @@ from terrain.occupancy import OccupancyGrid, read_occupancy
 from terrain.scenario_features import Feature
 from terrain.sheets import TriangleMesh
 from terrain.slope_map import LETHAL_SLOPE
+
+FARTHEST = 10_000.0
+"""Coordinates [m] at which the physics, in single precision, still tells a millimetre."""
 
 
 class TerrainWorld(ParameterModel):
@@ -125,10 +130,19 @@ class MapWorld(BuildingWorld):
 
     type: Literal["map"]
     file: Path = parameter(..., "The map's yaml file.")
+    corner: tuple[float, float] | None = parameter(
+        None, "Where the map's lower left corner is put in the world; not given = as in the file.", unit="m"
+    )
 
     def grid(self) -> OccupancyGrid:
         """Read the map."""
-        return read_occupancy(self.file)
+        grid = read_occupancy(self.file)
+        if self.corner is not None:
+            return replace(grid, origin_x=self.corner[0], origin_y=self.corner[1])
+        if max(abs(grid.origin_x), abs(grid.origin_y)) > FARTHEST:
+            expected = f"a map within {FARTHEST:g} m of zero, or corner: [0, 0] in the scenario's world"
+            raise ConfigError([Finding(str(self.file), 1, "origin", expected, f"{grid.origin_x}, {grid.origin_y}")])
+        return grid
 
 
 class LevelsWorld(ParameterModel):

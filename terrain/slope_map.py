@@ -15,7 +15,7 @@ from PIL import Image
 
 from mbf_abstract.arithmetic import arctan
 from terrain.heightfield import Heightfield
-from terrain.occupancy import OccupancyGrid
+from terrain.occupancy import OccupancyGrid, all_digits
 from terrain.smoothing import smoothed
 
 FloatArray = NDArray[np.float64]
@@ -67,7 +67,8 @@ def write_slope_map(
     Image.fromarray(slope_occupancy(terrain, resolution, lethal_slope)[::-1]).save(folder / f"{name}.png")
     yaml_path = folder / f"{name}.yaml"
     yaml_path.write_text(
-        f"image: {name}.png\nmode: raw\nresolution: {resolution:g}\norigin: [{terrain.x0:g}, {terrain.y0:g}, 0.0]\n"
+        f"image: {name}.png\nmode: raw\nresolution: {all_digits(resolution)}\n"
+        f"origin: [{all_digits(terrain.x0)}, {all_digits(terrain.y0)}, 0.0]\n"
         "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
         encoding="utf-8",
     )

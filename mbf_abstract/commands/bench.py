@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +14,9 @@ from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.findings import ConfigError, Finding
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.map_view import UNKNOWN_OCCUPANCY, FloorMap
-from mbf_abstract.registry import PluginRegistry
 from mbf_abstract.robot import Odometry
 from mbf_abstract.server import AbstractNavigationServer
-from mbf_abstract.server_factory import read_config
+from mbf_abstract.server_factory import installed_servers, read_config
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.transform import Transform
 from mbf_abstract.transforms import TransformBuffer
@@ -91,9 +89,7 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
             expected = "a bare map: a configuration says itself what is unknown (track_unknown_space, allow_unknown)"
             raise ConfigError([Finding(str(file), 1, "", expected, f"--unknown {unknown} with a configuration")])
         return *read_config(file), []
-    registry = PluginRegistry()
-    for name in sorted({point.name for point in entry_points(group="mbf.servers")}):
-        cls: type[AbstractNavigationServer] = registry.load("servers", name, AbstractNavigationServer)
+    for cls in installed_servers():
         text = cls.config_for_map(file.resolve(), unknown_is_free=unknown != "lethal")
         if text is not None:
             return *_read_config_text(text), _unknown_note(cls.read_floor(file), unknown)

@@ -43,7 +43,7 @@ class Table1World(ParameterModel):
         return self
 
     def grid(self) -> OccupancyGrid:
-        """Return the floor; raises FloorPlanError or OccupancyFileError."""
+        """Return the floor; raises FloorPlanError or ConfigError."""
         if self.map is not None:
             return read_occupancy(self.map)
         assert self.floor_plan is not None

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from mbf_abstract.findings import ConfigError
+from terrain.floor_plan import write_map
 from terrain.occupancy import OccupancyGrid
 from terrain.scenario import load_scenario
 from terrain.scenario_on_map import far_apart_places, on_map
+from terrain.scenario_world_types import MapWorld
 
 
 def test_start_and_goal_are_free_far_apart_and_in_one_room():
@@ -37,6 +39,25 @@ def test_a_shipped_scenario_moves_to_a_real_building(shared_data):
 
     assert moved.world.file == file.resolve()
     assert moved.obstacles == () and len(moved.goals) == 1
+
+
+def far_room(folder):
+    """A free room of 10 m x 6 m far from zero, and the files of its map."""
+    free = np.ones((60, 100), dtype=bool)
+    return write_map(OccupancyGrid(~free, free, 0.1, 4500123.62, 512345.6), folder, "far")
+
+
+def test_a_map_far_from_zero_is_put_at_zero_where_the_physics_is_precise(tmp_path):
+    moved = on_map(load_scenario("indoor"), far_room(tmp_path))
+
+    grid = moved.world.grid()
+    assert grid.bounds == pytest.approx((0.0, 10.0, 0.0, 6.0))
+    assert all(grid.is_free(place.x, place.y) for place in (moved.start, *moved.goals))
+
+
+def test_a_scenario_that_leaves_a_map_far_from_zero_is_told_what_to_write(tmp_path):
+    with pytest.raises(ConfigError, match=r"corner: \[0, 0\]"):
+        MapWorld(type="map", file=far_room(tmp_path)).grid()
 
 
 def test_a_file_that_is_no_map_is_a_finding(tmp_path):

@@ -1,5 +1,6 @@
 """Maps become walls: reading, merging, extruding, and the office that ships with the package."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,10 @@ from hypothesis.extra.numpy import arrays
 from PIL import Image
 from scipy import ndimage
 
+from mbf_abstract.findings import ConfigError
 from terrain.floor_plan import DATA_FOLDER, OFFICE_MAP, FloorPlanError, read_floor_plan, write_map, write_office_map
 from terrain.indoor import add_building
-from terrain.occupancy import OccupancyFileError, OccupancyGrid, merge_rectangles, read_occupancy, wall_triangles
+from terrain.occupancy import OccupancyGrid, merge_rectangles, read_occupancy, wall_triangles
 from terrain.robot_models import TURTLEBOT
 from terrain.world import BulletWorld
 
@@ -95,18 +97,48 @@ def test_a_narrow_or_misplaced_door_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("image: a.png\n", "lacks resolution"),
-        ("- 1\n", "not a mapping"),
-        ("image: a.png\nresolution: x\norigin: [0, 0, 0]\noccupied_thresh: 0.6\nfree_thresh: 0.2\n", "no number"),
-        ("image: a.png\nresolution: 0\norigin: [0, 0, 0]\noccupied_thresh: 0.6\nfree_thresh: 0.2\n", "positive"),
-        ("image: a.png\nresolution: 1\norigin: [0, 0, 1]\noccupied_thresh: 0.6\nfree_thresh: 0.2\n", "origin"),
-        ("image: b.png\nresolution: 1\norigin: [0, 0, 0]\noccupied_thresh: 0.6\nfree_thresh: 0.2\n", "b.png"),
-        ("a: [\n", "cannot be read"),
+        ("image: a.png\n", "resolution"),
+        ("- 1\n", "mapping"),
+        ("image: a.png\nresolution: x\norigin: [0, 0, 0]\n", "resolution"),
+        ("image: a.png\nresolution: 0\norigin: [0, 0, 0]\n", "resolution"),
+        ("image: b.png\nresolution: 1\norigin: [0, 0, 0]\n", "b.png"),
+        ("image: a.png\nresolution: 1\norigin: [0, 0, 0]\noccupied_thresh: 65\nfree_thresh: 19.6\n", "thresh"),
+        ("image: a.png\nresolution: 1\norigin: [0, 0, 0]\noccupied_thresh: 0.2\nfree_thresh: 0.6\n", "free_thresh"),
+        ("image: deep.png\nresolution: 1\norigin: [0, 0, 0]\n", "pixels of type"),
+        ("a: [\n", "map.yaml"),
     ],
 )
 def test_a_bad_map_is_refused_with_its_name_and_reason(tmp_path: Path, text: str, reason: str) -> None:
     Image.fromarray(np.zeros((3, 3), np.uint8)).save(tmp_path / "a.png")
+    Image.fromarray(np.zeros((3, 3), np.uint16)).save(tmp_path / "deep.png")
     (tmp_path / "map.yaml").write_text(text)
-    with pytest.raises(OccupancyFileError, match=reason) as caught:
+    with pytest.raises(ConfigError, match=reason) as caught:
         read_occupancy(tmp_path / "map.yaml")
-    assert "map.yaml" in str(caught.value)
+    assert "map.yaml" in str(caught.value) or reason == "b.png" or reason == "pixels of type"
+
+
+def test_worlds_read_a_map_as_the_costmap_server_does_raw_and_turned_ones_too(tmp_path: Path) -> None:
+    values = np.array([[0, 0, 100], [0, 255, 0]], dtype=np.uint8)  # occupancies of mode raw, top row first
+    Image.fromarray(values).save(tmp_path / "a.png")
+    description = "image: a.png\nresolution: 0.5\norigin: [1, 2, {yaw}]\nmode: raw\n"
+    (tmp_path / "raw.yaml").write_text(description.format(yaw=0))
+    (tmp_path / "turned.yaml").write_text(description.format(yaw=math.pi / 2))
+    grid, turned = read_occupancy(tmp_path / "raw.yaml"), read_occupancy(tmp_path / "turned.yaml")
+    assert grid.occupied.tolist() == [[False, False, False], [False, False, True]]
+    assert grid.free.tolist() == [[True, False, True], [True, True, False]]
+    assert turned.is_free(0.75, 2.25) and not turned.is_free(0.25, 3.25)
+    assert turned.bounds[:2] == pytest.approx((0.0, 1.0), abs=0.51)
+
+
+def test_a_far_map_keeps_all_digits_in_the_file_that_is_written(tmp_path: Path) -> None:
+    occupied = np.zeros((2, 3), dtype=bool)
+    grid = OccupancyGrid(occupied, ~occupied, 1.0 / 30.0, 4500123.62, -512345.678901)
+    written = read_occupancy(write_map(grid, tmp_path, "far"))
+    assert (written.resolution, written.origin_x, written.origin_y) == (1.0 / 30.0, 4500123.62, -512345.678901)
+
+
+def test_a_floor_without_walls_is_a_plane() -> None:
+    free = np.ones((4, 4), dtype=bool)
+    with BulletWorld() as world:
+        add_building(world, OccupancyGrid(~free, free, 1.0))
+        assert world.vertical_rays([[2.0, 2.0]])[0] == pytest.approx(0.0, abs=1e-6)
