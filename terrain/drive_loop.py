@@ -77,6 +77,10 @@ class DriveLoop:
     on_tick : list of callables
         Called with the simulated time [s] after each step, 60 times a second, on the simulator's thread: while one of
         them runs nothing else does and no simulated time passes.
+    on_failure : list of callables
+        Called once on that thread if the world or a listener raises; nothing is stepped after that.
+    failure : BaseException or None
+        What was raised.
     """
 
     def __init__(
@@ -101,6 +105,8 @@ class DriveLoop:
         self._thread: ClockThread | None = None
         self._origin = self._runtime.clock.now()
         self.on_tick: list[Callable[[float], None]] = []
+        self.on_failure: list[Callable[[], None]] = []
+        self.failure: BaseException | None = None
         simulation.on_measurement(self._take_measurement)
 
     @property
@@ -147,6 +153,15 @@ class DriveLoop:
             self._runtime.transforms.set(T_map_base @ T_odom_base.inverse())
 
     def _loop(self) -> None:
+        """Step until the end; a thread that died without a word would leave everybody waiting for the world."""
+        try:
+            self._step_on()
+        except BaseException as error:
+            self.failure = error
+            for listener in self.on_failure:
+                listener()
+
+    def _step_on(self) -> None:
         clock, tick = self._runtime.clock, 0
         while not self._stopped:
             self._simulation.advance_to(clock.now() - self._origin)

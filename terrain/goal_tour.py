@@ -67,6 +67,7 @@ class GoalTour:
         self._ended = False
         self._deadline = float("inf")
         bench.loop.on_tick.append(self._watch_time)
+        bench.loop.on_failure.append(lambda: self.end("the simulation has failed"))
 
     def visit_goals(self) -> MoveBaseResult:
         """Visit the goals of the scenario, and others if they come; returns the result of the last one."""

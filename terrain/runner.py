@@ -165,6 +165,8 @@ def _drive(bench: Bench, options: RunOptions) -> tuple[GoalTour, float]:
         started = wall_seconds()
         bench.run(_ProgressReporter(bench, options.on_progress, started).report)
         tour.visit_goals()
+        if bench.loop.failure is not None:
+            raise bench.loop.failure
         return tour, wall_seconds() - started
 
 

@@ -17,6 +17,7 @@ from terrain.viewer.event_text import words
 from terrain.viewer.picture import ViewerMissing
 from terrain.viewer.shading import vertex_colours
 from terrain.viewer.shapes import cut_walls, prism
+from terrain.whole_files import replacing
 
 TIMELINE = "run"
 LINE = 0.06  # m
@@ -30,10 +31,10 @@ def write_rrd(file: str | Path, recording: Recording) -> None:
         import rerun
     except ImportError as error:
         raise ViewerMissing(f"run.rrd needs rerun (Python >= 3.11): pip install 'mbf-flex[rerun]' ({error})") from error
-    with rerun.RecordingStream("mbf-flex", recording_id=recording.scenario) as stream:
+    with replacing(file) as part, rerun.RecordingStream("mbf-flex", recording_id=recording.scenario) as stream:
         stream.set_log_time_enabled(False)
         stream.set_log_tick_enabled(False)
-        stream.save(file)
+        stream.save(part)
         stream.log("/", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         stream.send_recording_name(f"{recording.scenario} on {recording.backend}: {recording.verdict.title}")
         _log_world(rerun, stream, recording)

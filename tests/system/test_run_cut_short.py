@@ -21,6 +21,7 @@ from terrain.run_folder import read_run
 from terrain.runner import RunOptions, run_scenario
 from terrain.scenario import PlanarPose, load_scenario
 from terrain.scenario_actors import Walker
+from terrain.viewer.live.options import ViewOptions
 
 pytestmark = pytest.mark.timeout(300)
 
@@ -160,3 +161,23 @@ def test_a_disk_that_takes_no_parts_is_told_once_and_the_run_goes_on(tmp_path):
     assert result.success, result.verdict
     lines = [json.loads(line) for line in (tmp_path / "events.jsonl").read_text().splitlines()]
     assert [line["source"] for line in lines if line["kind"] == "sink_failed"] == ["recording"]
+
+
+@pytest.mark.parametrize("stay", [False, True])
+def test_a_simulation_that_fails_ends_the_run_with_its_error(tmp_path, stay):
+    """And does not leave whoever waits for a goal, or for Ctrl-C to be heard, waiting for ever."""
+    scenario = load_scenario("crowded_corridor").model_copy(update={"physics": "kinematic", "actors": ()})
+
+    def fail(progress):
+        if progress.time > 3.0:
+            raise ValueError("the floor has gone")
+
+    notes = []
+    view = ViewOptions(port=18800, speed=0.0, stay=stay) if stay else None
+    with pytest.raises(ValueError, match="the floor has gone"):
+        run_scenario(
+            scenario, RunOptions(tmp_path, draw=False, on_progress=fail, view=view, on_note=notes.append)
+        )  # fmt: skip
+
+    assert "mbf replay" in notes[-1]
+    assert read_parts(tmp_path).duration > 2.9
