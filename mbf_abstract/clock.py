@@ -115,8 +115,15 @@ class _WallThread:
         return self._thread.is_alive()
 
     def join(self, timeout: float | None = None) -> bool:
-        self._thread.join(timeout)
+        self._thread.join(None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
         return not self._thread.is_alive()
+
+
+class _WallCondition(threading.Condition):
+    """A condition that takes any timeout; the operating system takes some 290 years, and infinity not at all."""
+
+    def wait(self, timeout: float | None = None) -> bool:
+        return super().wait(None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
 
 
 class WallClock:
@@ -132,15 +139,15 @@ class WallClock:
     def sleep(self, seconds: float) -> None:
         """Wait for ``seconds``; returns at once where it is not positive."""
         if seconds > 0.0:
-            time.sleep(seconds)
+            time.sleep(min(seconds, threading.TIMEOUT_MAX))
 
     def sleep_until(self, stamp: float) -> None:
         """Wait until ``now() >= stamp``."""
         self.sleep(stamp - self.now())
 
     def condition(self) -> Condition:
-        """Make a plain ``threading.Condition``."""
-        return threading.Condition(threading.Lock())
+        """Make a ``threading.Condition`` with a plain lock."""
+        return _WallCondition(threading.Lock())
 
     def spawn(self, target: Callable[[], None], name: str, priority: int = Priority.WORKER) -> ClockThread:
         """Start a daemon thread; the priority means nothing to the operating system."""

@@ -169,7 +169,7 @@ class SimClock:
             me.notified = False
             me.waiting_on = condition
             condition.waiters.append(me)
-            if timeout is not None:
+            if timeout is not None and timeout < math.inf:
                 self._add_timer(me, self._after(timeout))
             else:
                 me.ticket += 1

@@ -4,9 +4,11 @@ import pytest
 
 from mbf_abstract.actions.goals import RecoveryGoal, RefinePathGoal
 from mbf_abstract.actions.handle import GoalStatus
+from mbf_abstract.clock import WallClock
 from mbf_abstract.geometry import Path, Twist
 from mbf_abstract.outcomes import RecoveryOutcome, RefinePathOutcome
 from mbf_abstract.plugins import RecoveryResult, RefineResult
+from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.faulty import Hang, obedient, slow
 
 DONE = RecoveryResult(RecoveryOutcome.SUCCESS, "")
@@ -130,6 +132,18 @@ def test_a_behaviour_that_ignores_patience_but_succeeds_within_the_grace_succeed
     bench = make_bench(recovery_patience=1.0, cancel_grace=1.0)
     bench.recovery.play(slow(bench.clock, 1.5, DONE))
     assert bench.navigator.recover().success
+
+
+@pytest.mark.parametrize("clock", [SimClock, WallClock])
+@pytest.mark.parametrize("seconds", [float("inf"), 1e30])
+def test_a_behaviour_may_wait_for_ever_until_it_is_canceled(make_bench, clock, seconds):
+    bench = make_bench(clock=clock(), recovery_patience=0.0)
+    bench.recovery.play(wait_for(seconds))
+    handle = bench.navigator.send(RecoveryGoal())
+    bench.clock.sleep(0.1)
+    handle.cancel()
+    assert handle.wait(5.0).outcome == RecoveryOutcome.CANCELED
+    assert bench.clock.now() < 1e6
 
 
 def test_a_pause_stops_the_robot_at_once_and_does_not_use_up_patience(make_bench):
