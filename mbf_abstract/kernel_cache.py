@@ -23,6 +23,8 @@ from numba import config, njit
 from numba.core import event
 from numba.core.caching import IndexDataCacheFile
 
+from mbf_abstract.compilation import CompilerClock
+
 
 def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
     """Compile ``function`` at its first call, without the interpreter lock, and keep the machine code on disk.
@@ -58,19 +60,22 @@ def _sources(folder: Path) -> bytes:
     return digest.digest()
 
 
-class _CollectorPause(event.Listener):  # type: ignore[misc]
-    """Python's search for cyclic garbage waits while numba compiles: it cost a tenth of every compilation.
+class _CompilerWatch(event.Listener):  # type: ignore[misc]
+    """Tells who watches calls, and lets Python's search for cyclic garbage wait while numba compiles.
 
-    The compiler makes some hundred thousand objects and keeps them until it is done, so the collector searches them,
-    and all others of the process, again and again in vain. numba tells of start and end while it holds its lock, so one
-    count of the compilations within each other is right for all threads.
+    The search cost a tenth of every compilation. The compiler makes some hundred thousand objects and keeps them until
+    it is done, so the collector searches them, and all others of the process, again and again in vain. numba tells of
+    start and end while it holds its lock, so one count of the compilations within each other is right for all threads.
     """
 
     depth = 0
     was_enabled = False
+    clock = CompilerClock()
 
-    def on_start(self, _event: event.Event) -> None:
+    def on_start(self, event: event.Event) -> None:
         """A compilation begins, perhaps within another one."""
+        function = event.data["dispatcher"].py_func
+        self.clock.start(f"{function.__module__}.{function.__qualname__}")
         if self.depth == 0:
             self.was_enabled = gc.isenabled()
             gc.disable()
@@ -81,6 +86,7 @@ class _CollectorPause(event.Listener):  # type: ignore[misc]
         self.depth -= 1
         if self.depth == 0 and self.was_enabled:
             gc.enable()
+        self.clock.end()
 
 
-event.register("numba:compile", _CollectorPause())
+event.register("numba:compile", _CompilerWatch())

@@ -34,6 +34,10 @@ class GetPathOutcome(IntEnum):
     STOPPED = 65
 
 
+PERMANENT_OUTCOMES = frozenset([GetPathOutcome.OUT_OF_MAP, GetPathOutcome.INVALID_START, GetPathOutcome.INVALID_GOAL])
+"""What planning anew cannot change."""
+
+
 class ExePathOutcome(IntEnum):
     """What became of an ``exe_path`` goal (100..149)."""
 

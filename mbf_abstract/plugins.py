@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Command, FloatArray, Path, Pose, Twist
-from mbf_abstract.outcomes import is_success
+from mbf_abstract.outcomes import PERMANENT_OUTCOMES, is_success
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.relaxation import Relaxation
 
@@ -141,13 +141,19 @@ class PlanRequest:
 class PlanResult:
     """Answer of a planner: an outcome of ``GetPathOutcome`` (or a plugin's own), a text, the path and its cost.
 
-    A cost of exactly 0 is replaced by the path's length.
+    A cost of exactly 0 is replaced by the path's length. ``permanent`` says of a failure that the same question will
+    get no other answer, whatever the sensors see: the goal ends at once, without retries and recoveries. That is
+    understood of OUT_OF_MAP, INVALID_START and INVALID_GOAL.
     """
 
     outcome: int
     message: str = ""
     path: Path | None = None
     cost: float = 0.0
+    permanent: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "permanent", self.permanent or self.outcome in PERMANENT_OUTCOMES)
 
     @property
     def success(self) -> bool:

@@ -27,6 +27,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from mbf_abstract.clock import ClockThread, Condition, Priority, ThreadDetached
+from mbf_abstract.compilation import compiler_watched
 from mbf_abstract.sim_thread import Participant, Section, SimCondition, SimThread
 
 DEFAULT_HANG_GUARD = 30.0
@@ -103,15 +104,17 @@ class SimClock:
     def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> Iterator[None]:
         """Watch the section with the wall-clock guard, which calls ``on_hang`` on its own thread.
 
-        Sections may lie within each other; the time that counts is that of the outermost one.
+        Sections may lie within each other; the time that counts is that of the outermost one, without what numba's
+        compiler took of it.
         """
         me = self._current()
         if not me.sections:
-            me.resumed_at = time.monotonic()
+            me.start_counting()
         me.sections.append(Section(label, on_hang))
         self._start_guard()
         try:
-            yield
+            with compiler_watched(me.stop_counting, me.start_counting):
+                yield
         except ThreadDetached as error:
             if not me.detached:
                 raise RuntimeError(f"{label} raised ThreadDetached: {error}") from error
@@ -237,7 +240,7 @@ class SimClock:
     def _await_baton(self, me: Participant) -> None:
         me.baton.acquire()
         if me.sections:
-            me.resumed_at = time.monotonic()
+            me.start_counting()
         if me.detached:
             raise ThreadDetached(me.name)
         if me.deadlock:

@@ -5,7 +5,9 @@ Nobody but ``SimClock`` makes these; they share its mutex and its scheduler.
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -45,6 +47,14 @@ class Participant:
         self.sections: list[Section] = []  # the guarded ones it is in, the outermost first
         self.resumed_at = 0.0  # wall clock
         self.waiting_on: SimCondition | None = None
+
+    def start_counting(self) -> None:
+        """Let the hang guard's time begin anew."""
+        self.resumed_at = time.monotonic()
+
+    def stop_counting(self) -> None:
+        """Let the hang guard wait: the compiler is at work."""
+        self.resumed_at = math.inf
 
 
 class SimCondition:

@@ -168,7 +168,7 @@ class SurfacePlanner(MeshPlanner):
             f"the start is on component {home} ({sizes[0]} vertices), {position_text(stop.point)} on component "
             f"{other} ({sizes[1]} vertices); they do not touch"
         )
-        return PlanResult(GetPathOutcome.NO_PATH_FOUND, message)
+        return PlanResult(GetPathOutcome.NO_PATH_FOUND, message, permanent=True)
 
     def _no_path(self, start: SurfacePoint, goal: SurfacePoint, blocked: NDArray[np.bool_]) -> PlanResult:
         component = self.mesh_map.components == self.mesh_map.components[nearest_corner(self.mesh_map, start)]

@@ -115,7 +115,7 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
             patience = self.runtime.parameters.planner_patience
             tail = f"; the planner said last: {said.message}" if said.message else ""
             return GetPathResult(GetPathOutcome.PAT_EXCEEDED, f"no plan within {patience:g} s{tail}", **words)
-        return GetPathResult(int(said.outcome), said.message, cost=said.cost, **words)
+        return GetPathResult(int(said.outcome), said.message, cost=said.cost, permanent=said.permanent, **words)
 
     def _found(self, said: PlanResult, handle: Handle, request: PlanRequest, words: dict[str, Any]) -> GetPathResult:
         """5. Believe a plugin's success only after a look at its path."""

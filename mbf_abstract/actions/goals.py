@@ -181,6 +181,7 @@ class GetPathResult(ActionResult):
     """Path in the global frame and its cost (the path's length where the planner gives none).
 
     ``plugin_outcome`` and ``plugin_message`` are the planner's own last words, also where patience ran out.
+    ``permanent`` says of a failure that planning anew cannot change it.
     """
 
     path: Path | None = None
@@ -188,6 +189,7 @@ class GetPathResult(ActionResult):
     planner: str = ""
     plugin_outcome: int | None = None
     plugin_message: str = ""
+    permanent: bool = False
 
 
 @dataclass(frozen=True)

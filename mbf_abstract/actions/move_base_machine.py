@@ -188,7 +188,8 @@ class MoveBaseMachine:
             self._follow_path(result.path)
             return None
         if self._follow is None:
-            return self._recover_from(Trigger.PLAN, (result.outcome, result.message))
+            failure = (result.outcome, result.message)
+            return failure if result.permanent else self._recover_from(Trigger.PLAN, failure)
         return self._on_replan_failed(result)
 
     def _on_replan_failed(self, result: GetPathResult) -> End | None:
@@ -197,7 +198,7 @@ class MoveBaseMachine:
         if policy == "keep" and not taken_over:
             return None
         failure = (result.outcome, f"replanning failed: {result.message}")
-        if policy == "stop" and not taken_over:
+        if (policy == "stop" and not taken_over) or (result.permanent and taken_over):
             return self._end_after_stop(failure)
         self._stop_then_recover(Trigger.PLAN, failure)
         return None

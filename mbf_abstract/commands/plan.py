@@ -56,6 +56,7 @@ def plan(
         from mbf_abstract.clock import wall_seconds
         from mbf_abstract.commands.bench import map_messages, place_robot, read_config_or_map, standing_server
         from mbf_abstract.commands.plan_picture import draw_plan
+        from mbf_abstract.compilation import told_of_kernels
         from mbf_abstract.navigator import Navigator
 
         cls, checked, notes = read_config_or_map(config, "" if unknown is None else unknown.value)
@@ -67,13 +68,15 @@ def plan(
             goal_pose = _pose("goal", to_place, server, notes)
             place_robot(server, start_pose)
             began = wall_seconds()
-            with waiting("planning"):
+            with waiting("planning") as say, told_of_kernels(lambda name: say(f"compiling {name}, once")) as compiled:
                 goal_to_plan = GetPathGoal(goal_pose, planner=planner, dist_tolerance=tolerance)
                 result = Navigator(server).send(goal_to_plan).wait()
-            seconds = wall_seconds() - began
+            seconds = wall_seconds() - began - compiled.seconds
             if png is not None:
                 with waiting("drawing the picture"):
                     draw_plan(png, server, start_pose, goal_pose, result)
+    if compiled.kernels:
+        typer.echo(f"compiled once, kept on disk ({compiled.seconds:.1f} s): {', '.join(compiled.kernels)}", err=True)
     _tell(result, seconds, notes, as_json)
     if not result.success:
         raise typer.Exit(FAILURE)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def waiting(text: str, console: Console | None = None) -> Iterator[None]:
-    """Show ``text``, and for how long it has been so, while the block runs."""
+def waiting(text: str, console: Console | None = None) -> Iterator[Callable[[str], None]]:
+    """Show ``text``, and for how long it has been so, while the block runs; yields a function that changes the text."""
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     screen = console or Console(stderr=True)
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as progress:
-        progress.add_task(text)
-        yield
+        task = progress.add_task(text)
+        yield lambda news: progress.update(task, description=news)

@@ -3,7 +3,8 @@
 Patience runs from the start of the run (planner, recovery, refiner) or is restarted by progress (controller). When it
 is exceeded, or the client cancels, the plugin's token is set and its ``cancel`` called. A plugin that is still inside
 its call after ``cancel_grace`` more seconds is *abandoned*: the goal ends at once, the thread drains, and the
-instance stays quarantined until the call returns. While the goal is paused its patience stands still. The same holds
+instance stays quarantined until the call returns. While the goal is paused, or numba compiles a kernel at its first
+use, patience stands still. The same holds
 for calls of the robot's driver and of the map that are made beside the plugin.
 """
 
@@ -15,6 +16,7 @@ from typing import Generic, TypeVar
 
 from mbf_abstract.actions.handle import AnyGoalHandle
 from mbf_abstract.clock import Stopwatch
+from mbf_abstract.compilation import compiler_watched
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.plugins import Plugin
@@ -72,6 +74,7 @@ class PluginRun(Generic[P]):
         self._call_label = ""
         self._stop_asked: float | None = None
         self._hung = False
+        self._compiling = False
 
     def __enter__(self) -> PluginRun[P]:
         self._watch = self.runtime.supervisor.watch(self._check, self._patience() or IDLE_CHECK)
@@ -118,7 +121,7 @@ class PluginRun(Generic[P]):
 
     def call(self, method: str, function: Callable[[], T]) -> T:
         """Call into the plugin; raises PluginFault if it raises, Abandoned if the goal ended meanwhile."""
-        with self._supervised(self.plugin.title):
+        with self._supervised(self.plugin.title), compiler_watched(self._compiler_starts, self._compiler_ends):
             return self.plugin.call(self.handle.id, method, function, self._declare_hung)
 
     def call_beside(self, who: str, function: Callable[[], T]) -> T:
@@ -148,6 +151,14 @@ class PluginRun(Generic[P]):
             self.patience_exceeded = True
         return self.patience_exceeded
 
+    def _compiler_starts(self) -> None:
+        self._compiling = True
+        self.patience_watch.pause()
+
+    def _compiler_ends(self) -> None:
+        self._compiling = False
+        self.runtime.supervisor.poke(self._watch)
+
     def _declare_hung(self) -> None:
         """Give up at once: the thread of the present call was detached from its clock."""
         self._hung = True
@@ -157,7 +168,7 @@ class PluginRun(Generic[P]):
         """Supervisor: stop the plugin when due, and give up on it after the grace."""
         if self._hung:
             return self._abandon()
-        if self.handle.paused:
+        if self.handle.paused or self._compiling:
             self.patience_watch.pause()
         else:
             self.patience_watch.resume()
@@ -187,7 +198,7 @@ class PluginRun(Generic[P]):
     def _next_check(self) -> float:
         """Seconds until the patience of the present call, or of one that begins soon, may be over."""
         limit = self._patience()
-        if limit <= 0.0 or self.handle.paused:
+        if limit <= 0.0 or self.handle.paused or self._compiling:
             return IDLE_CHECK
         remaining = limit - self.patience_watch.elapsed
         if self._call_began is not None:

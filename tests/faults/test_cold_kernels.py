@@ -1,0 +1,102 @@
+"""Fault table, row 37: a plugin whose kernels are compiled at their first use, on a machine that is slow at it."""
+
+import numpy as np
+import pytest
+from numba import njit
+
+from mbf_abstract import kernel_cache
+from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal
+from mbf_abstract.clock import WallClock
+from mbf_abstract.compilation import told_of_kernels
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.faulty import BusyHang, drive
+from mbf_abstract.testing.promises import assert_ended_once, assert_stops
+from mbf_abstract.testing.scripted import straight_plan
+
+assert kernel_cache  # a map backend imports it with its kernels
+
+
+def cold_kernel():
+    """Make a kernel that takes well over a tenth of a second to compile, and nothing to run."""
+
+    @njit
+    def spread(values):
+        for _ in range(3):
+            values = np.sort(values[::-1]) + np.cumsum(values) * np.median(values)
+        return values.sum()
+
+    return lambda: spread(np.zeros(4))
+
+
+CLOCKS = [
+    pytest.param(lambda: SimClock(), {"hang_guard": 0.1}, id="lockstep"),
+    pytest.param(
+        lambda: WallClock(), {"planner_patience": 0.1, "controller_patience": 0.1, "cancel_grace": 0.05}, id="wall"
+    ),
+]
+
+
+@pytest.mark.parametrize(("make_clock", "limits"), CLOCKS)
+def test_the_compilers_time_counts_neither_for_the_planners_patience_nor_for_the_guard(make_clock, limits):
+    with Bench(clock=make_clock(), **limits) as bench, told_of_kernels(lambda name: None) as compiled:
+        kernel = cold_kernel()
+
+        def plan(request):
+            kernel()
+            return straight_plan(request)
+
+        bench.planner.play(plan)
+        handle = bench.navigator.send(GetPathGoal(Pose.planar(2.0, 0.0)))
+        assert handle.wait(60.0).success, handle.result
+        assert any(name.endswith("spread") for name in compiled.kernels)
+        assert compiled.seconds > 0.1
+        assert_ended_once(bench, handle)
+
+
+@pytest.mark.parametrize(("make_clock", "limits"), CLOCKS)
+def test_a_controller_that_compiles_while_the_robot_drives_stops_it_and_drives_on(make_clock, limits):
+    with Bench(clock=make_clock(), **limits) as bench:
+        kernel = cold_kernel()
+
+        def compile_first(request):
+            kernel()
+            return bench.controller.follow(request)
+
+        bench.controller.play(drive(0.2), compile_first)
+        assert bench.navigator.send(ExePathGoal(bench.path_to(0.3))).wait(60.0).success
+
+
+def test_a_hang_after_the_compilation_is_found_as_ever():
+    with Bench(hang_guard=0.1) as bench:
+        kernel, hang = cold_kernel(), BusyHang()
+
+        def compile_and_hang(request):
+            kernel()
+            hang(request)
+
+        bench.planner.play(compile_and_hang)
+        began = bench.clock.now()
+        assert bench.navigator.send(GetPathGoal(Pose.planar(2.0, 0.0))).wait().outcome == GetPathOutcome.PAT_EXCEEDED
+        hang.release.cancel()
+        assert_stops(bench, began)
+
+
+def test_a_cancel_during_the_compilation_ends_the_goal_after_the_grace():
+    with Bench(clock=WallClock(), cancel_grace=0.0) as bench:
+        kernel = cold_kernel()
+        compiling = []
+
+        def plan(request):
+            with told_of_kernels(compiling.append):
+                kernel()
+            return straight_plan(request)
+
+        bench.planner.play(plan)
+        handle = bench.navigator.send(GetPathGoal(Pose.planar(2.0, 0.0)))
+        while not compiling:
+            bench.clock.sleep(0.001)
+        handle.cancel("enough")
+        assert handle.wait(10.0).outcome == GetPathOutcome.CANCELED

@@ -1,0 +1,100 @@
+"""Fault table, rows 2 and 5: calls that hang, are given up, and come back after all; cancels that hang."""
+
+import threading
+
+import pytest
+
+from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal
+from mbf_abstract.clock import WallClock
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PlanResult
+from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.testing.bench import SCRIPTED, Bench
+from mbf_abstract.testing.faulty import BusyHang, Hang, drive, obedient
+from mbf_abstract.testing.promises import assert_next_goals_work
+from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
+
+GOAL = GetPathGoal(Pose.planar(3.0, 0.0))
+
+
+def wait_until_nothing_hangs(bench):
+    """Let the late threads, which are on the real processor's time, come back."""
+    while bench.server.runtime.hanging:
+        bench.clock.sleep(0.01)
+
+
+def test_plugins_that_the_wall_clock_guard_gave_up_are_back_after_their_calls_return():
+    with Bench(hang_guard=0.1, max_quarantined=2) as bench:
+        for _ in range(3):  # more than max_quarantined
+            hang = BusyHang()
+            bench.planner.play(hang)
+            assert bench.navigator.send(GOAL).wait().outcome == GetPathOutcome.PAT_EXCEEDED
+            hang.release.cancel()
+            wait_until_nothing_hangs(bench)
+            hang = BusyHang()
+            bench.controller.play(drive(), hang)
+            assert not bench.navigator.send(ExePathGoal(bench.path_to(50.0))).wait().success
+            hang.release.cancel()
+            wait_until_nothing_hangs(bench)
+            assert_next_goals_work(bench)
+
+
+class DeafPlanner(ScriptedPlanner):
+    """Obeys its token; its ``cancel`` hangs until ``release``."""
+
+    def __init__(self, context):
+        super().__init__(context)
+        self.released, self.entered = threading.Event(), 0
+
+    def cancel(self):
+        self.entered += 1
+        self.released.wait()
+        return True
+
+
+def test_a_cancel_that_hangs_costs_one_thread_however_many_goals_are_canceled():
+    with Bench({**SCRIPTED, "planner": DeafPlanner}, clock=WallClock(), planner_patience=0.0) as bench:
+        canceled = PlanResult(GetPathOutcome.CANCELED, "canceled")
+        bench.planner.play(obedient(bench.clock, 60.0, straight_plan, canceled))
+        threads = []
+        for _ in range(20):
+            handle = bench.navigator.send(GOAL)
+            while not bench.planner.requests:
+                bench.clock.sleep(0.001)
+            bench.planner.requests.clear()
+            handle.cancel()
+            assert handle.wait(5.0).outcome == GetPathOutcome.CANCELED
+            threads.append(threading.active_count())
+        assert max(threads) - min(threads) <= 1
+        assert bench.planner.entered == 1
+        bench.planner.released.set()
+        assert_next_goals_work(bench)
+
+
+@pytest.mark.parametrize("still_runs", [True, False])
+def test_a_cancel_that_comes_back_late_is_made_up_for_only_while_its_goal_still_runs(still_runs):
+    class SlowToCancel(ScriptedPlanner):
+        calls = 0
+
+        def cancel(self):
+            type(self).calls += 1
+            if self.calls == 1:
+                self.clock.sleep(3.0)
+            return True
+
+    with Bench(
+        {**SCRIPTED, "planner": SlowToCancel}, clock=SimClock(), planner_patience=0.0, cancel_grace=9.0
+    ) as bench:
+        ignored = Hang(bench.clock, then=straight_plan)
+        bench.planner.play(obedient(bench.clock, 60.0, straight_plan, straight_plan), ignored, straight_plan)
+        for _ in range(2):
+            handle = bench.navigator.send(GOAL)
+            bench.clock.sleep(0.5)
+            handle.cancel()
+            bench.clock.sleep(0.5)
+        if not still_runs:
+            ignored.release()
+        bench.clock.sleep(5.0)
+        assert SlowToCancel.calls == (2 if still_runs else 1)
+        ignored.release()

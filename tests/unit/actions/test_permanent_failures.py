@@ -1,0 +1,63 @@
+"""A failure of planning that cannot change ends the goal at once; one that can is tried again."""
+
+import pytest
+
+from mbf_abstract.actions.goals import GetPathGoal, MoveBaseGoal
+from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PlanResult
+from mbf_abstract.testing.scripted import straight_plan
+
+FAR = Pose.planar(900.0, 0.0)
+ANSWERS = [
+    PlanResult(GetPathOutcome.OUT_OF_MAP, "the goal is outside"),
+    PlanResult(GetPathOutcome.INVALID_START, "the start is no place"),
+    PlanResult(GetPathOutcome.INVALID_GOAL, "the goal is no place"),
+    PlanResult(GetPathOutcome.NO_PATH_FOUND, "an island", permanent=True),
+]
+
+
+@pytest.mark.parametrize("answer", ANSWERS, ids=lambda answer: answer.message)
+@pytest.mark.parametrize("retries", [-1, 0, 5])
+def test_get_path_asks_once_and_ends_with_the_planners_own_words(make_bench, answer, retries):
+    bench = make_bench(planner_max_retries=retries)
+    bench.planner.play(answer)
+    result = bench.navigator.send(GetPathGoal(FAR)).wait()
+    assert (result.outcome, result.message, result.permanent) == (answer.outcome, answer.message, True)
+    assert len(bench.planner.requests) == 1
+    assert bench.clock.now() == 0.0
+
+
+@pytest.mark.parametrize("answer", ANSWERS, ids=lambda answer: answer.message)
+def test_move_base_ends_at_once_without_recoveries(make_bench, answer):
+    bench = make_bench()
+    bench.planner.play(answer)
+    result = bench.navigator.send(MoveBaseGoal(FAR)).wait()
+    assert (result.outcome, result.message) == (answer.outcome, answer.message)
+    assert not bench.events(EventKind.RECOVERY)
+    assert bench.clock.now() == 0.0
+
+
+def test_a_new_goal_that_can_never_be_reached_stops_the_robot_and_ends(make_bench):
+    bench = make_bench()
+    bench.navigator.send(MoveBaseGoal(Pose.planar(50.0, 0.0)))
+    bench.clock.sleep(1.0)
+    bench.planner.play(ANSWERS[0])
+    result = bench.navigator.send(MoveBaseGoal(FAR)).wait()
+    assert result.outcome == GetPathOutcome.OUT_OF_MAP
+    assert bench.robot.command.is_stopped()
+    assert not bench.events(EventKind.RECOVERY)
+
+
+def test_a_replanning_that_fails_so_while_the_robot_drives_keeps_the_path(make_bench):
+    bench = make_bench(planner_frequency=2.0)
+    bench.planner.play(straight_plan, ANSWERS[0])
+    assert bench.navigator.send(MoveBaseGoal(Pose.planar(2.0, 0.0))).wait().success
+
+
+def test_what_may_change_is_tried_again(make_bench):
+    bench = make_bench()
+    bench.planner.play(PlanResult(GetPathOutcome.NO_PATH_FOUND, "somebody is in the way"), straight_plan)
+    assert bench.navigator.send(GetPathGoal(Pose.planar(2.0, 0.0))).wait().success
+    assert len(bench.planner.requests) == 2
