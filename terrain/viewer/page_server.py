@@ -46,7 +46,8 @@ def page_server(port: int, access: PageAccess = NOBODY, label: str | None = None
 def _check_interface(host: str) -> None:
     """Find out whether anything can listen there: viser would try port after port for ever."""
     try:
-        with socket.create_server((host, 0)):
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        with socket.create_server((host, 0), family=family):
             pass
     except OSError as error:
         raise ViewerMissing(f"cannot listen at {host!r}, which is no interface of this machine: {error}") from error

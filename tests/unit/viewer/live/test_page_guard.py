@@ -4,6 +4,7 @@ import asyncio
 import http.client
 import math
 import socket
+import urllib.request
 from contextlib import closing
 
 import msgspec
@@ -327,6 +328,25 @@ def test_only_loopback_goes_without_a_token(host, loopback):
     else:
         with pytest.raises(ValueError, match="needs a token"):
             PageAccess.open(host)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1"])
+def test_a_page_can_be_served_at_every_loopback_interface(host):
+    if host == "::1" and not has_ipv6_loopback():
+        pytest.skip("this machine has no IPv6")
+    access = PageAccess.by_token(host)
+    with page_server(PORT + 60, access) as server:
+        address = access.address(server.get_port(), Role.WATCH)
+        with urllib.request.urlopen(address, timeout=10.0) as answer:
+            assert b"<html" in answer.read().lower()
+
+
+def has_ipv6_loopback():
+    try:
+        with socket.create_server(("::1", 0), family=socket.AF_INET6):
+            return True
+    except OSError:
+        return False
 
 
 def test_a_page_for_other_machines_knows_numbers_and_its_own_name_but_no_other():
