@@ -1,6 +1,7 @@
 """The third robot: a car that cannot turn on the spot drives a scenario on paths it can follow."""
 
 import numpy as np
+import pytest
 
 from terrain.robot_models import CAR
 from terrain.runner import RunOptions, run_scenario
@@ -26,6 +27,7 @@ angle_tolerance: 0.5
 max_vx: 1.0
 min_vx: -0.6
 max_wz: 1.0
+min_turning_radius: 1.0
 planners: [{{name: hybrid, type: hybrid_astar}}]
 controllers: [{{name: pursuit, type: regulated_pure_pursuit}}]
 hybrid: {{min_turning_radius: 1.4}}
@@ -35,9 +37,10 @@ local_costmap: {COSTMAP}
 """
 
 
-def test_a_car_reaches_a_pose_behind_it_without_turning_on_the_spot(tmp_path):
+@pytest.mark.parametrize(("physics", "slip"), [("bullet", 1.3), ("kinematic", 1.0001)])
+def test_a_car_reaches_a_pose_behind_it_without_turning_on_the_spot(tmp_path, physics, slip):
     (tmp_path / "nav.yaml").write_text(NAVIGATION)
-    (tmp_path / "parking.yaml").write_text(SCENARIO)
+    (tmp_path / "parking.yaml").write_text(SCENARIO + f"physics: {physics}\n")
 
     result = run_scenario(load_scenario(tmp_path / "parking.yaml"), RunOptions(tmp_path / "run", draw=False))
 
@@ -46,5 +49,5 @@ def test_a_car_reaches_a_pose_behind_it_without_turning_on_the_spot(tmp_path):
         forward, turning = recording["twists"][:, 0], recording["twists"][:, 2]
     moving = np.abs(forward) > 0.1
     assert moving.sum() > 50
-    assert (np.abs(turning[moving] / forward[moving]) < 1.3 / CAR.min_turning_radius).all()
+    assert (np.abs(turning[moving] / forward[moving]) < slip / CAR.min_turning_radius).all()
     assert np.abs(turning[~moving]).max() < 0.3
