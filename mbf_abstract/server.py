@@ -129,6 +129,17 @@ class AbstractNavigationServer(PluginHost):
     ground_is_level: ClassVar[bool] = False
     """Whether all ground is at height 0, so that a place needs no z."""
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of the configuration: what was left out of it, and what the map server found."""
+        left_out = (
+            f"left out: optional {skipped.kind.name.lower()} {skipped.name!r}: {skipped.reason}"
+            for skipped in self.config.skipped
+        )
+        kept = self.runtime.events.memory
+        found = (str(event.data.get("message", "")) for event in (kept.of_kind(EventKind.MAP) if kept else ()))
+        return (*left_out, *found)
+
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
         """Heights [m] of the ground at a place of the global frame, the best to stand on first; () without any."""
         return (0.0,)

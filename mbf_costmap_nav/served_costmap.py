@@ -85,9 +85,9 @@ class ServedCostmap:
         self.tell_doubts()
 
     def tell_doubts(self) -> None:
-        """Put into the event log what is legal but hardly meant; the map runs on it all the same, as in Nav2."""
+        """Tell what is legal but hardly meant: in the event log, and to the user as a note of the server."""
         for doubt in self.costmap.doubts():
-            self._runtime.events.emit(EventKind.FAULT, self.name, where="configuration", message=doubt)
+            self._runtime.events.emit(EventKind.MAP, self.name, message=f"{self.name}: {doubt}")
 
     def close(self) -> None:
         """End the updates."""

@@ -251,6 +251,7 @@ def plan_layers(
             layer_class = load_layer(entry.type)
             planned[entry.name] = (entry, layer_class, _validated(layer_class, layer_blocks.get(entry.name, {})))
             findings += _wrong_inputs(entry, layer_class)
+            findings += _narrower_than_robot(entry, planned[entry.name][2], parameters.inscribed_radius)
         except ValidationError as error:
             findings += [f"layer '{entry.name}': {_place(item['loc'])}{item['msg']}" for item in error.errors()]
         except LayerGraphError as error:
@@ -269,6 +270,14 @@ def _validated(layer_class: type[MeshLayer], block: Mapping[str, Any] | LayerPar
     if isinstance(block, layer_class.Parameters):
         return block
     return layer_class.Parameters.model_validate(dict(block))
+
+
+def _narrower_than_robot(entry: LayerEntry, layer: LayerParameters, robot_radius: float) -> list[str]:
+    radius = getattr(layer, "inscribed_radius", robot_radius)
+    if radius >= robot_radius:
+        return []
+    least = f"inscribed_radius of at least the robot's (mesh_map.inscribed_radius), {robot_radius:g} m"
+    return [f"layer '{entry.name}': {least}: else ground the robot's body touches would be free, got {radius:g} m"]
 
 
 def _wrong_inputs(entry: LayerEntry, layer_class: type[MeshLayer]) -> list[str]:

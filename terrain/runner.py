@@ -138,6 +138,8 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     )  # fmt: skip
     bench.loop.on_tick.append(parts.after_step)
     try:
+        for note in bench.navigator.server.notes:
+            options.on_note(f"note: {note}")
         tour, wall_time = _drive(bench, options)
     except BaseException:
         if has_parts(options.folder):

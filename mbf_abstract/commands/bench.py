@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mbf_abstract.config import Config
-from mbf_abstract.events import EventBus, EventKind, MemorySink
+from mbf_abstract.events import EventBus, MemorySink
 from mbf_abstract.findings import ConfigError, Finding
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.map_view import UNKNOWN_OCCUPANCY, FloorMap
@@ -48,12 +48,6 @@ def standing_server(cls: type[AbstractNavigationServer], config: Config) -> Iter
     with cls(config, StandingRobot(clock), clock, transforms, events) as server:
         place_robot(server, Pose.planar(0.0, 0.0, frame_id=parameters.global_frame))
         yield server
-
-
-def map_messages(server: AbstractNavigationServer) -> list[str]:
-    """What the map server had to say while it loaded its map, such as defects of a mesh and their repairs."""
-    kept = server.runtime.events.memory
-    return [str(event.data.get("message", "")) for event in (kept.of_kind(EventKind.MAP) if kept else ())]
 
 
 def place_robot(server: AbstractNavigationServer, pose: Pose) -> None:

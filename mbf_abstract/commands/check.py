@@ -20,15 +20,13 @@ def check(
 ) -> None:
     """Check a configuration: all mistakes at once, exit code 2 if there is any. Tells what was found in its map."""
     with readable_errors():
-        from mbf_abstract.commands.bench import map_messages, standing_server
+        from mbf_abstract.commands.bench import standing_server
         from mbf_abstract.server_factory import read_config
 
         cls, checked = read_config(config)
-        for skipped in checked.skipped:
-            typer.echo(f"left out: optional {skipped.kind.name.lower()} {skipped.name!r}: {skipped.reason}")
         if load:
             with standing_server(cls, checked) as server:
-                for note in map_messages(server):
-                    typer.echo(f"map: {note}")
+                for note in server.notes:
+                    typer.echo(f"note: {note}")
     plugins = ", ".join(f"{spec.name} ({spec.type_name})" for spec in checked.plugins) or "none"
     typer.echo(f"{config}: good; backend {checked.backend}, plugins: {plugins}")

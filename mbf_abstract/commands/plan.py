@@ -54,7 +54,7 @@ def plan(
     with readable_errors():
         from mbf_abstract.actions.goals import GetPathGoal
         from mbf_abstract.clock import wall_seconds
-        from mbf_abstract.commands.bench import map_messages, place_robot, read_config_or_map, standing_server
+        from mbf_abstract.commands.bench import place_robot, read_config_or_map, standing_server
         from mbf_abstract.commands.plan_picture import draw_plan
         from mbf_abstract.compilation import told_of_kernels
         from mbf_abstract.navigator import Navigator
@@ -63,7 +63,7 @@ def plan(
         with ExitStack() as open_server:
             with waiting("building the map and its layers"):
                 server = open_server.enter_context(standing_server(cls, checked))
-            notes += map_messages(server)
+            notes += server.notes
             start_pose = _pose("start", from_place, server, notes)
             goal_pose = _pose("goal", to_place, server, notes)
             place_robot(server, start_pose)
@@ -114,10 +114,10 @@ def _tell(result: GetPathResult, seconds: float, notes: list[str], as_json: bool
     }
     if as_json:
         poses = [] if path is None else [[*pose.position, *pose.orientation] for pose in path]
-        typer.echo(json.dumps({**facts, "map": notes, "poses": poses}))
+        typer.echo(json.dumps({**facts, "notes": notes, "poses": poses}))
         return
     for note in notes:
-        typer.echo(f"map: {note}", err=True)
+        typer.echo(f"note: {note}", err=True)
     facts["poses"] = 0 if path is None else len(path)
     for key, value in facts.items():
         typer.echo(f"{key:13} {'-' if value is None else value}")

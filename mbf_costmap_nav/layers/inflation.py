@@ -2,7 +2,8 @@
 
 The rule is costmap_2d's: 254 at the obstacle; 253 up to the inscribed radius (the robot's centre there means contact
 whatever its heading); beyond it int(252 * exp(-cost_scaling_factor * (distance - inscribed_radius))); nothing beyond
-the inflation radius, which is rounded up to whole cells. Distances are exact Euclidean ones between cell centres.
+the inflation radius, which is rounded up to whole cells and is never less than the inscribed radius: cells the robot
+cannot stand on never look free. Distances are exact Euclidean ones between cell centres.
 
 When to use: after all layers that mark obstacles, in every map a planner works on. Layers listed after it are not
 inflated. When not: for pure length or any-angle tests, where a gradient of cost bends the paths. Cost: 1 to 2 ns a cell
@@ -75,18 +76,18 @@ class InflationLayer(CostmapLayer):
         self._relief = (factor, until)
 
     def doubt(self) -> str:
-        """Say that the radius is smaller than the robot, so that plans may lead through walls."""
+        """Say that the radius is smaller than the robot and is not kept to."""
         radius = self.parameters.inflation_radius
         if radius >= self._inscribed_radius:
             return ""
         return (
-            f"inflation_radius {radius:g} m is smaller than the inscribed radius of the footprint, "
-            f"{self._inscribed_radius:g} m: cells the robot cannot stand on look free"
+            f"inflation_radius {radius:g} m is smaller than the inscribed radius of the footprint and widened to it, "
+            f"{self._inscribed_radius:g} m: else cells the robot cannot stand on would look free"
         )
 
     def _tabulate(self) -> None:
         configured = self.parameters.inflation_radius
-        radius = min(configured, max(configured * self._factor, self._inscribed_radius))
+        radius = max(configured * self._factor, self._inscribed_radius)
         self._radius = math.ceil(radius / self.geometry.resolution)
         if self._radius > LARGEST_RADIUS:
             raise ValueError(

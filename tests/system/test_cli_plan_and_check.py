@@ -109,7 +109,7 @@ def test_a_plan_over_a_hole_says_that_there_is_no_ground(two_storeys):
     result = mbf("plan", two_storeys, "--start", 2, 3, "--goal", 1, 5, "--json")
     answer = json.loads(result.stdout)
     assert (result.exit_code, answer["outcome_name"]) == (1, "OUT_OF_MAP")
-    assert any("no ground at the start" in note for note in answer["map"])
+    assert any("no ground at the start" in note for note in answer["notes"])
 
 
 def test_a_plan_without_z_stays_on_the_lowest_free_floor_and_tells_of_the_others(two_storeys):
@@ -117,7 +117,9 @@ def test_a_plan_without_z_stays_on_the_lowest_free_floor_and_tells_of_the_others
     answer = json.loads(result.stdout)
     assert (result.exit_code, answer["outcome_name"]) == (0, "SUCCESS"), answer
     assert np.array(answer["poses"])[:, 2] == pytest.approx(0.0, abs=1e-6)
-    assert any("the goal is put on the ground at z = 0.00 m; there is more at 3.00 m" in note for note in answer["map"])
+    assert any(
+        "the goal is put on the ground at z = 0.00 m; there is more at 3.00 m" in note for note in answer["notes"]
+    )
 
 
 def test_a_bare_image_without_description_has_cells_of_five_centimetres(tmp_path):
@@ -180,9 +182,9 @@ def test_plan_and_check_tell_what_was_found_in_the_mesh_and_what_was_repaired(hi
 
     repaired = "duplicate_faces: 1 faces have the corners of an earlier face (indices 3200) - repaired"
     coarse = "more than half the inscribed radius (0.15 m)"
-    assert f"map: {repaired}" in plain.stderr and coarse in plain.stderr
-    assert repaired in json.loads(as_json.stdout)["map"]
-    assert f"map: {repaired}" in checked.stdout and coarse in checked.stdout
+    assert f"note: {repaired}" in plain.stderr and coarse in plain.stderr
+    assert repaired in json.loads(as_json.stdout)["notes"]
+    assert f"note: {repaired}" in checked.stdout and coarse in checked.stdout
     assert (plain.exit_code, checked.exit_code) == (0, 0)
 
 

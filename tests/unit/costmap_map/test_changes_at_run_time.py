@@ -146,9 +146,9 @@ def test_padding_and_age_of_one_map_change(site):
 def test_a_robot_too_large_for_the_inflation_is_told_of(site):
     server, _, told = site
     server.set_footprint(0.7)
-    faults = told.of_kind(EventKind.FAULT)
-    assert [fault.source for fault in faults] == ["global_costmap", "local_costmap"]
-    assert "smaller than the inscribed radius" in faults[0].data["message"]
+    notes = told.of_kind(EventKind.MAP)
+    assert [note.source for note in notes] == ["global_costmap", "local_costmap"]
+    assert "smaller than the inscribed radius" in notes[0].data["message"]
 
 
 @pytest.mark.parametrize(

@@ -124,7 +124,7 @@ def test_relaxing_leaves_every_cell_forbidden_on_which_the_robot_would_touch_som
     assert np.array_equal(costmap.snapshot().cells, before)
 
 
-def test_an_inflation_narrower_than_the_robot_is_doubted_until_the_robot_is_smaller(build):
+def test_an_inflation_narrower_than_the_robot_is_widened_and_told_until_the_robot_is_smaller(build):
     costmap = build("inflation", inflation={"inflation_radius": 0.3}, robot_radius=0.6)
     (doubt,) = costmap.doubts()
     assert doubt.startswith("layer 'inflation': inflation_radius 0.3 m is smaller than the inscribed radius")

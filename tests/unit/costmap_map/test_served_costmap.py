@@ -157,5 +157,5 @@ def test_a_recovery_stands_while_its_map_is_not_current(start):
 def test_a_map_whose_inflation_is_narrower_than_the_robot_is_served_but_told_of(start):
     events = EventBus(lambda: 0.0, [MemorySink()])
     start(local="{robot_radius: 0.6, layers: [{name: i, type: inflation}], i: {inflation_radius: 0.3}}", events=events)
-    (fault,) = events.memory.of_kind(EventKind.FAULT)
-    assert fault.source == "local_costmap" and "smaller than the inscribed radius" in fault.data["message"]
+    (note,) = events.memory.of_kind(EventKind.MAP)
+    assert note.source == "local_costmap" and "smaller than the inscribed radius" in note.data["message"]

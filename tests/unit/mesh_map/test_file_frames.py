@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from mbf_abstract.commands.bench import map_messages, standing_server
+from mbf_abstract.commands.bench import standing_server
 from mbf_abstract.server_factory import read_config
 from mbf_mesh_nav.file_frames import FileFrame, file_frame, on_the_map
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
@@ -133,7 +133,7 @@ def test_the_server_passes_these_findings_on(tmp_path):
         "mesh_map: {mesh_file: hill.glb, layers: [{name: slopes, type: steepness}], repair: [facing_down]}\n"
     )
     with standing_server(*read_config(tmp_path / "robot.yaml")) as server:
-        messages = "\n".join(map_messages(server))
+        messages = "\n".join(server.notes)
     assert "file_frame: the file has y up" in messages
     assert "lethal: nearly every vertex is lethal, so nothing can be planned (layers: slopes 100%)" in messages
 

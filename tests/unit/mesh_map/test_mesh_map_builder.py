@@ -239,8 +239,8 @@ def test_a_robot_of_whose_size_only_an_inflation_knows_is_told_that_the_mesh_is_
     blocks = {"near": {"inscribed_radius": 0.15}}
     unknown = build_mesh_map(MeshMapParameters(layers=layers), blocks, vertices=VERTICES, faces=FACES)
     assert "half the inscribed radius of layer 'near' (0.075 m)" in unknown.report["coarse"].text
-    known = MeshMapParameters(layers=layers, inscribed_radius=0.4)
-    assert "coarse" not in build_mesh_map(known, blocks, vertices=VERTICES, faces=FACES).report
+    known, wide = MeshMapParameters(layers=layers, inscribed_radius=0.4), {"near": {"inscribed_radius": 0.4}}
+    assert "coarse" not in build_mesh_map(known, wide, vertices=VERTICES, faces=FACES).report
 
 
 def test_layers_whose_radius_is_shorter_than_the_edges_are_reported_by_name():
