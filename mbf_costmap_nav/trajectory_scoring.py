@@ -44,14 +44,12 @@ def roll_out(
     dt : float
         Length of a step [s].
     reach : float
-        Farthest a sample can get [m]; the path is laid out a little beyond, but not past a change of direction.
+        Farthest a sample can get [m]; the path is laid out a little beyond.
     turning_radius : float
         Of the tightest curve the velocities hold [m]; 0 = they may turn on the spot.
     """
     pose, tracker = cycle.request.pose, cycle.tracker
-    length = min(1.3 * reach + 6 * PATH_SPACING, tracker.to_cusp)
-    lengths = tracker.progress + np.append(np.arange(0.0, length, PATH_SPACING), length)
-    points = tracker.points_at(lengths)
+    points, free = _path_ahead(cycle, 1.3 * reach + 6 * PATH_SPACING)
     goal = tracker.goal
     poses = np.empty_like(velocities) if poses is None else poses
     integrate(velocities, pose.yaw, dt, poses)
@@ -59,16 +57,36 @@ def roll_out(
         poses,
         velocities,
         (points - (pose.x, pose.y)).astype(np.float32),
-        _free_points(cycle, points),
+        free,
         PATH_SPACING,
         tracker.remaining,
         (goal.x - pose.x, goal.y - pose.y, goal.yaw),
+        tracker.on_last_section,
+        tracker.driving_backward,
         cycle.goal_tolerance,
         cycle.costmap,
         (pose.x, pose.y),
         footprint_discs(cycle.footprint.footprint),
         turning_radius,
     )
+
+
+def _path_ahead(cycle: ControlCycle, length: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Points (m, 2) of the path over ``length`` [m] from the progress on, or to its end, and which of them are free.
+
+    From a cusp they run straight on, and what lies there does not count.
+    """
+    tracker = cycle.tracker
+    on_path = min(length, tracker.to_cusp)
+    along = tracker.progress + np.append(np.arange(0.0, on_path, PATH_SPACING), on_path)
+    points = tracker.points_at(along)
+    free = _free_points(cycle, points)
+    if tracker.on_last_section or on_path == length:
+        return points, free
+    step = points[-1] - tracker.point_at(tracker.next_cusp - PATH_SPACING)
+    beyond = np.arange(1.0, math.ceil((length - on_path) / PATH_SPACING) + 1.0)
+    run_out = points[-1] + beyond[:, None] * step
+    return np.concatenate([points, run_out]), np.concatenate([free, np.ones(len(run_out), dtype=bool)])
 
 
 def _free_points(cycle: ControlCycle, points: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -80,15 +98,10 @@ def _free_points(cycle: ControlCycle, points: NDArray[np.float64]) -> NDArray[np
     return free
 
 
-def score(critics: Mapping[str, Critic], rollouts: Rollouts, driving_backward: bool) -> Float32Array:
-    """Sum (samples,) of the weighted critics; a collision costs ``COLLISION``.
-
-    Driving backward is not held against a robot on a part of the path that leads backward.
-    """
+def score(critics: Mapping[str, Critic], rollouts: Rollouts) -> Float32Array:
+    """Sum (samples,) of the weighted critics; a collision costs ``COLLISION``."""
     total = np.zeros(rollouts.samples, dtype=np.float32)
-    for name, critic in critics.items():
-        if name == "prefer_forward" and driving_backward:
-            continue
+    for critic in critics.values():
         cost = critic.score(rollouts)
         if cost is not None:
             total += np.float32(critic.weight) * cost

@@ -81,7 +81,7 @@ class DwaController(PathFollower):
         steps = max(2, round(p.sim_time / p.sim_step))
         velocities = self._ramps(cycle, candidates, steps)
         rollouts = roll_out(cycle, velocities, p.sim_step, p.max_vel_x * p.sim_time)
-        costs = score(self._critics, rollouts, cycle.tracker.driving_backward)
+        costs = score(self._critics, rollouts)
         checked_steps = round(p.footprint_check_time / cycle.limit_factor / p.sim_step)
         for sample in np.argsort(costs, kind="stable").tolist():
             if costs[sample] >= COLLISION:

@@ -4,9 +4,10 @@ When to use: the best of our controllers among obstacles; it swerves, backs up a
 a whole manoeuvre of ``time_steps``, not an arc. Differential, omnidirectional and Ackermann robots. When not: very
 small computers (a cycle of 2000 x 56 takes about 1 ms), or when the path must be followed to the centimetre.
 Known failure: two equally good ways around an obstacle can average to neither; the footprint check then falls back to
-the best single sample. A car turns onto a path it looks away from by a right angle, slowly where its turning radius is
-larger than the way it looks ahead (``vx_max * time_steps * model_dt``); one that looks back along its path drives it
-backward and ends with the wrong heading. Give it paths that begin with its heading, as ``costmap.hybrid_astar`` does.
+the best single sample. A robot that can turn on the spot turns to a path that begins behind it. A car turns onto a path
+it looks away from by a right angle, slowly where its turning radius is larger than the way it looks ahead
+(``vx_max * time_steps * model_dt``); one that looks back along its path drives it backward and ends with the wrong
+heading. Give it paths that begin with its heading, as ``costmap.hybrid_astar`` does; it drives their cusps.
 
 Formula: information-theoretic MPPI (Williams et al. 2018, algorithm 2), with Nav2's structure of critics; the noise
 comes from a pool drawn once from the plugin's generator, so that a cycle draws only an index. Deviation: the noise is
@@ -143,7 +144,7 @@ class MppiController(PathFollower):
         self._clip(cycle, velocities)
         reach = p.vx_max * p.model_dt * p.time_steps
         rollouts = roll_out(cycle, velocities, p.model_dt, reach, self._poses, self._radius)
-        costs = score(self._critics, rollouts, cycle.tracker.driving_backward)
+        costs = score(self._critics, rollouts)
         if rollouts.collided.all():
             return None
         controls = blend(velocities, costs + self._control_cost(velocities), p.temperature, self._smoothing)[:, :, None]

@@ -60,6 +60,9 @@ class RegulatedPurePursuitParameters(PluginParameters):
     )
     rotate_to_heading_vel: float = parameter(1.8, "Yaw rate of turning in place.", unit="rad/s", gt=0.0, le=20.0)
     max_angular_vel: float = parameter(1.8, "Largest yaw rate while driving.", unit="rad/s", gt=0.0, le=20.0)
+    min_turning_radius: float = parameter(
+        0.0, "Radius of the tightest arc, of a car-like robot; 0 = any.", unit="m", ge=0.0, le=100.0
+    )
     max_angular_accel: float = parameter(3.2, "Change of the yaw rate in place.", unit="rad/s^2", gt=0.0, le=100.0)
     allow_reversing: bool = parameter(True, "Drive backward where the poses of the path look against its direction.")
     max_cross_track: float = parameter(1.5, "Farther from the path than this it is missed.", unit="m", gt=0.0, le=100.0)
@@ -201,6 +204,8 @@ class RegulatedPurePursuitController(PathFollower):
         """Command along the arc through the carrot."""
         p, velocity = self.parameters, cycle.request.velocity
         curvature = 2.0 * carrot[1] / max(carrot[0] ** 2 + carrot[1] ** 2, 1e-6)
+        if p.min_turning_radius > 0.0:
+            curvature = min(max(curvature, -1.0 / p.min_turning_radius), 1.0 / p.min_turning_radius)
         cost = cycle.costmap.cost_at(cycle.request.pose.x, cycle.request.pose.y) or FREE
         regulated = min(self.regulated_speed(curvature, cost, cycle.tracker.to_cusp), cycle.speed_limit)
         wanted = -regulated if backward else regulated

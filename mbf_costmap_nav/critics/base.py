@@ -21,6 +21,9 @@ AHEAD = 4
 FACING = 0.785
 """Angle [rad] to that point below which the robot faces the path."""
 
+LOOKING_AWAY = 1.571
+"""Angle [rad] to that point above which driving in the wrong direction would bring the robot nearer to it."""
+
 
 class CriticParameters(ParameterModel):
     """Weights of the critics; a weight of 0 switches a critic off (obstacles still count as collisions)."""
@@ -31,7 +34,9 @@ class CriticParameters(ParameterModel):
     path_align: float = parameter(10.0, "Weight of the distance from the path.", unit="1/m", ge=0.0, le=1e4)
     path_follow: float = parameter(5.0, "Weight of the way still left on the path.", unit="1/m", ge=0.0, le=1e4)
     path_angle: float = parameter(2.0, "Weight of the heading towards the path.", unit="1/rad", ge=0.0, le=1e4)
-    prefer_forward: float = parameter(5.0, "Weight of driving backward.", unit="s/m", ge=0.0, le=1e4)
+    prefer_forward: float = parameter(
+        5.0, "Weight of driving the wrong way round, mostly backward.", unit="s/m", ge=0.0, le=1e4
+    )
     twirling: float = parameter(0.0, "Weight of turning; for omnidirectional robots.", unit="s/rad", ge=0.0, le=1e4)
 
 
@@ -46,7 +51,8 @@ class Rollouts:
     velocities : (3, steps, samples) float32
         vx, vy [m/s], wz [rad/s] of each step.
     path : (m, 2) float32
-        Points of the path ahead [m], ``path_spacing`` apart; the first is the robot's nearest point.
+        Points of the path ahead [m], ``path_spacing`` apart; the first is the robot's nearest. Beyond a cusp they run
+        straight on: the robot comes to it without creeping, and turns round when it is there.
     path_free : (m,) bool
         Whether the cell of each path point is below the inscribed cost.
     path_spacing : float
@@ -55,6 +61,10 @@ class Rollouts:
         Length [m] left to the end of the plan.
     goal : (x, y, yaw)
         End of the plan.
+    on_last_section : bool
+        Whether there is no cusp before it.
+    backward : bool
+        Whether the path is driven in reverse here.
     goal_tolerance : float
         How near [m] to the goal is near enough.
     costmap : Costmap
@@ -75,6 +85,8 @@ class Rollouts:
     path_spacing: float
     remaining: float
     goal: tuple[float, float, float]
+    on_last_section: bool
+    backward: bool
     goal_tolerance: float
     costmap: Costmap
     robot: tuple[float, float]
@@ -92,16 +104,29 @@ class Rollouts:
         """Number of trajectories."""
         return int(self.poses.shape[2])
 
+    def near_goal(self, distance: float) -> bool:
+        """Whether at most ``distance`` [m] are left of the whole path."""
+        return self.on_last_section and self.remaining <= distance
+
     @property
     def direction_ahead(self) -> float:
-        """Direction [rad] from the robot to the path point it should look at."""
+        """Direction [rad] in which the robot should look: to a path point ahead, in reverse away from it."""
         x, y = self.path[min(max(self.furthest, AHEAD) + AHEAD, len(self.path) - 1)].tolist()
-        return math.atan2(y, x)
+        return math.atan2(-y, -x) if self.backward else math.atan2(y, x)
 
     @property
     def faces_path(self) -> bool:
         """Whether the robot roughly looks along its path."""
-        return abs(normalize_angle(self.direction_ahead - float(self.poses[2, 0, 0]))) < FACING
+        return self._angle_off_path < FACING
+
+    @property
+    def has_to_turn(self) -> bool:
+        """Whether the robot looks away from its path and can turn on the spot, which it should before it drives."""
+        return self.turning_radius == 0.0 and self._angle_off_path > LOOKING_AWAY
+
+    @property
+    def _angle_off_path(self) -> float:
+        return abs(normalize_angle(self.direction_ahead - float(self.poses[2, 0, 0])))
 
 
 class Critic(ABC):

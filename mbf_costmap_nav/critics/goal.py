@@ -14,6 +14,6 @@ class GoalCritic(Critic):
 
     def score(self, rollouts: Rollouts) -> Float32Array | None:
         """Mean distance [m]."""
-        if rollouts.remaining > ACTIVE_WITHIN:
+        if not rollouts.near_goal(ACTIVE_WITHIN):
             return None
         return mean_distance_to_point(rollouts.poses, rollouts.goal[0], rollouts.goal[1])

@@ -13,5 +13,7 @@ class GoalAngleCritic(Critic):
 
     def score(self, rollouts: Rollouts) -> Float32Array | None:
         """Mean angle [rad]."""
+        if not rollouts.on_last_section:
+            return None
         near = math.hypot(rollouts.goal[0], rollouts.goal[1]) <= rollouts.goal_tolerance
         return mean_angle_to(rollouts.poses, rollouts.goal[2]) if near else None

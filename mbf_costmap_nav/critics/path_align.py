@@ -23,7 +23,7 @@ class PathAlignCritic(Critic):
 
     def score(self, rollouts: Rollouts) -> Float32Array | None:
         """Mean distance [m] over the steps."""
-        if rollouts.remaining <= ACTIVE_BEYOND or rollouts.path_free.mean() < LEAST_FREE:
+        if rollouts.near_goal(ACTIVE_BEYOND) or rollouts.path_free.mean() < LEAST_FREE:
             return None
         if rollouts.turning_radius > 0.0 and not rollouts.faces_path:
             return None

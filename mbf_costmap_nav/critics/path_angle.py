@@ -18,7 +18,7 @@ class PathAngleCritic(Critic):
 
     def score(self, rollouts: Rollouts) -> Float32Array | None:
         """Mean angle [rad] to the direction of the point ahead, for a car the last one."""
-        if rollouts.remaining <= ACTIVE_BEYOND or rollouts.faces_path:
+        if rollouts.near_goal(ACTIVE_BEYOND) or rollouts.faces_path:
             return None
         poses = rollouts.poses[:, -1:] if rollouts.turning_radius > 0.0 else rollouts.poses
         return mean_angle_to(poses, rollouts.direction_ahead)

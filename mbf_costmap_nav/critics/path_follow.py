@@ -1,4 +1,7 @@
-"""Drives on: distance from the trajectory's end to a free path point a little beyond what any sample reaches."""
+"""Drives on: distance from the trajectory's end to a free path point a little beyond what any sample reaches.
+
+Silent where a robot that can turn on the spot looks away from its path: it would drive the path the wrong way round.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ class PathFollowCritic(Critic):
 
     def score(self, rollouts: Rollouts) -> Float32Array | None:
         """Distance [m] of the last pose to the target point."""
-        if rollouts.remaining <= ACTIVE_BEYOND:
+        if rollouts.near_goal(ACTIVE_BEYOND) or rollouts.has_to_turn:
             return None
         index = min(rollouts.furthest + AHEAD, len(rollouts.path) - 1)
         free_beyond = np.flatnonzero(rollouts.path_free[index:])

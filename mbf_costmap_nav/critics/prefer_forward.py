@@ -1,4 +1,4 @@
-"""Prefers driving forward, where the sensors look."""
+"""Prefers driving forward, where the sensors look; in reverse where the poses of the path ask for that."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from mbf_costmap_nav.kernels.critics import mean_of
 
 
 class PreferForwardCritic(Critic):
-    """Speed backward."""
+    """Speed in the wrong direction."""
 
     def score(self, rollouts: Rollouts) -> Float32Array:
-        """Mean backward speed [m/s]."""
-        return mean_of(rollouts.velocities[0], True)
+        """Mean backward speed [m/s]; where the path is driven in reverse, the mean forward one."""
+        forward = rollouts.velocities[0]
+        return mean_of(-forward if rollouts.backward else forward, True)

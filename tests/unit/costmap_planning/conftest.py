@@ -198,6 +198,7 @@ def follow(controller, path, costmap, *, start, seconds=60.0, dist_tolerance=0.1
         if not result.success:
             return robot, result.outcome, cycle * robot.period
         controller.clock.time += robot.period
+        robot.commands.append(result.command)
         robot.drive(result.command)
     return robot, -1, seconds
 
