@@ -37,7 +37,7 @@ def circles():
 
 def figure_of_eight():
     t = np.linspace(0.0, 2.0 * np.pi, 160)
-    return Path.from_points(np.column_stack([2.5 * np.sin(t), 1.5 * np.sin(2.0 * t), 0.0 * t]))
+    return Path.from_points(np.column_stack([3.3 * np.sin(t), 0.9 * np.sin(2.0 * t), 0.0 * t]))
 
 
 def turn_in_three_points(radius=1.0, step=0.05):
@@ -63,13 +63,13 @@ SHAPES = {
 }
 
 
-def share_along(path, robot, reach=0.3):
-    """Share of points on the path, all of them visited in their order, that the robot came near to."""
+def share_along(path, robot, reach=0.45, soon=160):
+    """Share of points on the path that the robot came near to, in their order, each soon after the one before."""
     trace, here, seen = np.array(robot.trace)[:, :2], 0, 0
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path.positions[:, :2], axis=0).T))])
     wanted = np.arange(0.0, lengths[-1], 0.1)
     for point in np.column_stack([np.interp(wanted, lengths, path.positions[:, axis]) for axis in (0, 1)]):
-        near = np.flatnonzero(np.hypot(*(trace[here:] - point).T) < reach)
+        near = np.flatnonzero(np.hypot(*(trace[here : here + soon] - point).T) < reach)
         if near.size:
             here, seen = here + int(near[0]), seen + 1
     return seen / len(wanted)
