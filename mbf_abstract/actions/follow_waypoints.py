@@ -163,6 +163,8 @@ class _TaskRun:
         self._task = task
         self._waypoint = waypoint
         self._canceled_at: float | None = None
+        self._condition = self._runtime.clock.condition()
+        self._over = False
         self._abandoned = False
 
     def run(self, pose: Pose) -> str:
@@ -176,6 +178,8 @@ class _TaskRun:
             problem = f"the task at waypoint {self._waypoint} raised {type(error).__name__}: {error_text(error)}"
             name, goal_id = self._job.action.name, self._job.handle.id
             self._runtime.events.emit(EventKind.FAULT, name, goal_id=goal_id, message=problem)
+        with self._condition:
+            self._over = True  # from now on nobody gives up on it any more
         supervisor.stop(watch)
         if self._abandoned:
             self._runtime.hanging.discard(self)
@@ -192,8 +196,11 @@ class _TaskRun:
         grace_left = self._canceled_at + self._runtime.parameters.cancel_grace - now
         if grace_left > 1e-9:
             return grace_left
-        self._abandoned = True
-        self._runtime.hanging.add(self)
+        with self._condition:
+            if self._over:
+                return None
+            self._abandoned = True
+            self._runtime.hanging.add(self)
         text = f"{handle.cancel_reason}; the task at waypoint {self._waypoint} has not ended yet"
         self._job.abandon(MoveBaseOutcome.CANCELED, text)
         return None
