@@ -89,6 +89,9 @@ class Clock(Protocol):
     def spawn(self, target: Callable[[], None], name: str, priority: int = Priority.WORKER) -> ClockThread:
         """Start a daemon thread that this clock knows."""
 
+    def settle(self) -> None:
+        """Let threads that were told to end do so, where they need this thread to wait for it; moves no time."""
+
     @contextmanager
     def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> Iterator[None]:
         """Mark foreign code (a plugin call) in which the thread may hang; ``on_hang`` is told if the clock gives up.
@@ -152,6 +155,9 @@ class WallClock:
     def spawn(self, target: Callable[[], None], name: str, priority: int = Priority.WORKER) -> ClockThread:
         """Start a daemon thread; the priority means nothing to the operating system."""
         return _WallThread(target, name)
+
+    def settle(self) -> None:
+        """Do nothing: threads end by themselves."""
 
     @contextmanager
     def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> Iterator[None]:

@@ -256,6 +256,7 @@ class AbstractNavigationServer(PluginHost):
             self.runtime.callbacks.close()
             self.runtime.supervisor.close()
             self.close_map()
+        self.runtime.clock.settle()  # or the threads would stay for ever where nobody uses the clock any more
 
     def __enter__(self) -> AbstractNavigationServer:
         return self

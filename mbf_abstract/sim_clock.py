@@ -31,10 +31,11 @@ from mbf_abstract.compilation import compiler_watched
 from mbf_abstract.sim_thread import Participant, Section, SimCondition, SimThread
 
 DEFAULT_HANG_GUARD = 30.0
+STALLED_AFTER = 5.0  # real seconds; half the hang guard's, if that is less
 
 
 class ClockDeadlock(RuntimeError):
-    """Every known thread waits for a notification that nobody is left to send."""
+    """A wait can never end: nobody is left to notify it, or who should move time waits for something else."""
 
 
 class SimClock:
@@ -59,6 +60,7 @@ class SimClock:
         self._mutex = threading.Lock()
         self._now = 0.0
         self._sequence = 0
+        self._turns = 0  # how often the baton was handed on
         self._ready: list[tuple[int, int, Participant]] = []
         self._timers: list[tuple[float, int, int, int, Participant]] = []
         self._local = threading.local()
@@ -91,6 +93,12 @@ class SimClock:
             self._add_timer(me, max(stamp, self._now))
             self._release_baton(me)
         self._await_baton(me)
+
+    def settle(self) -> None:
+        """Let all that is ready at this instant run, if it is this thread's turn; moves no time."""
+        me = self._current()
+        if self._running is me and not me.held_locks:
+            self.sleep(0.0)
 
     def condition(self) -> Condition:
         """Make a condition whose waiting moves virtual time."""
@@ -238,7 +246,10 @@ class SimClock:
             self._dispatch()
 
     def _await_baton(self, me: Participant) -> None:
-        me.baton.acquire()
+        if me.foreign:
+            self._await_beside(me)
+        else:
+            me.baton.acquire()
         if me.sections:
             me.start_counting()
         if me.detached:
@@ -246,6 +257,30 @@ class SimClock:
         if me.deadlock:
             me.deadlock = False
             raise ClockDeadlock(self._describe_waiters())
+
+    def _await_beside(self, me: Participant) -> None:
+        """Wait as a foreign thread; raises ClockDeadlock where the one whose turn it is does not use the clock."""
+        limit, turns = min(STALLED_AFTER, self.hang_guard / 2.0) or STALLED_AFTER, self._turns
+        while not me.baton.acquire(timeout=limit):
+            with self._mutex:
+                holder, stalled = self._running, turns == self._turns
+                turns = self._turns
+                if holder is None or not stalled or not holder.is_blocked():
+                    continue
+                if me.baton.acquire(blocking=False):  # handed on in the very last moment
+                    return
+                self._withdraw(me)
+            raise ClockDeadlock(
+                f"thread {me.name!r} waits on the clock for thread {holder.name!r}, which waits for another thread "
+                "by other means, so that time stands still; let it do so within `with clock.outside():`"
+            )
+
+    def _withdraw(self, me: Participant) -> None:
+        """Forget a wait that has not ended; mutex held."""
+        me.ticket += 1
+        if me.waiting_on is not None:
+            me.waiting_on.waiters.remove(me)
+            me.waiting_on = None
 
     def _dispatch(self) -> None:
         """Choose who runs next, moving time if nobody is ready; mutex held, nobody running."""
@@ -259,6 +294,7 @@ class SimClock:
                 continue
             if not nxt.foreign:
                 self._running = nxt
+                self._turns += 1
                 nxt.baton.release()
                 return
             nxt.baton.release()  # a foreign thread goes its way beside the lockstep
@@ -308,6 +344,7 @@ class SimClock:
     # ----------------------------------------------------------------------------------- threads, guard
     def _enter_thread(self, me: Participant) -> None:
         self._local.participant = me
+        me.ident = threading.get_ident()
         self._await_baton(me)
 
     def _leave_thread(self, me: Participant) -> None:

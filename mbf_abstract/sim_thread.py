@@ -6,15 +6,20 @@ Nobody but ``SimClock`` makes these; they share its mutex and its scheduler.
 from __future__ import annotations
 
 import math
+import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import PurePath
 from typing import TYPE_CHECKING, NamedTuple
 
 from mbf_abstract.clock import ThreadDetached
 
 if TYPE_CHECKING:
     from mbf_abstract.sim_clock import SimClock
+
+WAITING_MODULES = ("threading.py", "selectors.py", "queue.py")
+"""Files of Python's library in which a thread waits for another one."""
 
 
 class Section(NamedTuple):
@@ -28,12 +33,13 @@ class Participant:
     """One known (or, while it waits, one foreign) thread."""
 
     __slots__ = (
-        "baton", "deadlock", "detached", "foreign", "held_locks", "name", "notified", "outside_depth", "priority",
-        "resumed_at", "sections", "ticket", "waiting_on",
+        "baton", "deadlock", "detached", "foreign", "held_locks", "ident", "name", "notified", "outside_depth",
+        "priority", "resumed_at", "sections", "ticket", "waiting_on",
     )  # fmt: skip
 
     def __init__(self, name: str, priority: int, foreign: bool = False) -> None:
         self.name = name
+        self.ident = threading.get_ident()  # of the thread that makes it; a SimThread sets its own when it starts
         self.priority = priority
         self.foreign = foreign
         self.baton = threading.Lock()  # released by whoever passes it on, so it is no lock in the usual sense
@@ -47,6 +53,11 @@ class Participant:
         self.sections: list[Section] = []  # the guarded ones it is in, the outermost first
         self.resumed_at = 0.0  # wall clock
         self.waiting_on: SimCondition | None = None
+
+    def is_blocked(self) -> bool:
+        """Whether it waits for another thread right now, by other means than the clock."""
+        frame = sys._current_frames().get(self.ident)
+        return frame is not None and PurePath(frame.f_code.co_filename).name in WAITING_MODULES
 
     def start_counting(self) -> None:
         """Let the hang guard's time begin anew."""
