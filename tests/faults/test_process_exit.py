@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ from mbf_abstract.testing.bench import Bench
 PROGRAM = """
 import os, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell lets its background jobs ignore it
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # and nohup lets its program ignore this one
 from mbf_abstract.actions.goals import ExePathGoal
 from mbf_abstract.clock import WallClock
 from mbf_abstract.testing.bench import Bench
@@ -53,12 +55,17 @@ ENDS = {
 }
 
 
+@contextmanager
 def start(program, log):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-c", PROGRAM + program, str(log)]
-    return subprocess.Popen(
+    with subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=Path.cwd()
-    )
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def velocities(log):
@@ -149,10 +156,13 @@ def test_a_forked_child_that_is_told_to_end_ends_and_its_parents_robot_drives_on
     program = """
 import time
 bench = run(sys.argv[1])
+begun, begin = os.pipe()
 child = os.fork()
 if child == 0:
+    os.write(begin, b"!")  # Python drops signals that come while it forks
     time.sleep(60.0)
     os._exit(0)
+os.read(begun, 1)
 os.kill(child, signal.SIGTERM)
 _, status = os.waitpid(child, 0)
 print(os.WTERMSIG(status), flush=True)
