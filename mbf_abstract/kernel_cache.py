@@ -14,6 +14,7 @@ from __future__ import annotations
 import gc
 import hashlib
 import inspect
+import warnings
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -29,6 +30,9 @@ from mbf_abstract.compilation import CompilerClock
 def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
     """Compile ``function`` at its first call, without the interpreter lock, and keep the machine code on disk.
 
+    Where neither the package's folder nor the user's home can be written to, as in a read-only installation, nothing is
+    kept: every process compiles anew, and a warning says so and what to set.
+
     Parameters
     ----------
     function : callable
@@ -43,12 +47,25 @@ def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
     """
     if config.DISABLE_JIT:
         return function
-    dispatcher = njit(cache=True, nogil=True, **options)(function)
+    try:
+        dispatcher = njit(cache=True, nogil=True, **options)(function)
+    except RuntimeError:  # numba found no folder that it may write to
+        _tell_that_nothing_is_kept()
+        return njit(nogil=True, **options)(function)
     cache = dispatcher._cache
     stamp = _sources(Path(inspect.getfile(function)).parent)
     # numba has no option for this; its own constructor makes the same object with the stamp of one file.
     cache._cache_file = IndexDataCacheFile(cache.cache_path, cache._impl.filename_base, stamp)
     return dispatcher
+
+
+@lru_cache
+def _tell_that_nothing_is_kept() -> None:
+    text = (
+        "compiled kernels cannot be kept, so every process compiles them anew: neither the folder of the package nor "
+        "the home folder can be written to; set NUMBA_CACHE_DIR to a folder of your own"
+    )
+    warnings.warn(text, stacklevel=3)
 
 
 @lru_cache

@@ -4,11 +4,13 @@ import gc
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numba
 import pytest
 
+from mbf_abstract import kernel_cache
 from mbf_abstract.kernel_cache import compile_lazily
 
 DECORATOR = "from mbf_abstract.kernel_cache import compile_lazily as kernel\n"
@@ -42,6 +44,17 @@ def test_a_kernel_is_compiled_anew_only_when_a_kernel_it_calls_from_another_file
     assert call_in_a_process_of_its_own(tmp_path) == (30, 0)
 
 
+def test_two_first_runs_at_once_both_come_out_right_and_leave_a_cache_that_is_used(tmp_path):
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "kernels" / "__init__.py").touch()
+    (tmp_path / "kernels" / "search.py").write_text(SEARCH)
+    (tmp_path / "kernels" / "step.py").write_text(STEP.format(1))
+    with ThreadPoolExecutor(2) as pool:
+        results = [pool.submit(call_in_a_process_of_its_own, tmp_path) for _ in range(2)]
+    assert [result.result()[0] for result in results] == [20, 20]
+    assert call_in_a_process_of_its_own(tmp_path) == (20, 1)
+
+
 def test_the_garbage_collector_pauses_for_a_compilation_and_goes_on_after_one_that_failed():
     during = []
 
@@ -54,3 +67,16 @@ def test_the_garbage_collector_pauses_for_a_compilation_and_goes_on_after_one_th
         failing(1)
     assert during and not any(during)
     assert gc.isenabled()
+
+
+def test_without_a_folder_to_write_to_kernels_are_compiled_anew_and_a_warning_says_what_to_set():
+    kernel_cache._tell_that_nothing_is_kept.cache_clear()
+    space: dict = {}
+    source = "def doubled(x):\n    return 2 * x\n\ndef halved(x):\n    return x / 2\n"
+    exec(compile(source, "/a/read-only/installation/kernels.py", "exec"), space)  # for numba a file without a folder
+
+    with pytest.warns(UserWarning, match="set NUMBA_CACHE_DIR to a folder of your own") as told:
+        doubled, halved = kernel_cache.compile_lazily(space["doubled"]), kernel_cache.compile_lazily(space["halved"])
+
+    assert len(told) == 1, "one word for all kernels"
+    assert doubled(4) == 8 and halved(4) == 2.0
