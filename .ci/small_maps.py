@@ -22,7 +22,7 @@ element vertex {len(vertices)}
 property float x
 property float y
 property float z
-element face {len(faces)}
+element face {2 * len(faces)}
 property list uchar int vertex_indices
 end_header
 """
