@@ -74,6 +74,8 @@ class DriveLoop:
 
     Attributes
     ----------
+    true_pose : Pose
+        Ground truth of the robot at the last step, which is no older than any pose that was published.
     on_tick : list of callables
         Called with the simulated time [s] after each step, 60 times a second, on the simulator's thread: while one of
         them runs nothing else does and no simulated time passes.
@@ -104,6 +106,7 @@ class DriveLoop:
         self._stopped = False
         self._thread: ClockThread | None = None
         self._origin = self._runtime.clock.now()
+        self.true_pose = simulation.robot.pose()
         self.on_tick: list[Callable[[float], None]] = []
         self.on_failure: list[Callable[[], None]] = []
         self.failure: BaseException | None = None
@@ -165,7 +168,8 @@ class DriveLoop:
         clock, tick = self._runtime.clock, 0
         while not self._stopped:
             self._simulation.advance_to(clock.now() - self._origin)
-            self._digest.pose(self._simulation.robot.pose())
+            self.true_pose = self._simulation.robot.pose()
+            self._digest.pose(self.true_pose)
             self.publish()
             if tick % TICKS_PER_SAMPLE == 0:
                 self._sample()

@@ -110,7 +110,7 @@ class GoalTour:
         self.last_result = result = self._driver.drive(goal.pose, goal.planner, goal.controller)
         self.target = None
         if result.success and self._driver.arrives:
-            self.arrivals.append(Arrival.at(goal.pose, self._bench.simulation.track[-1], result))
+            self.arrivals.append(Arrival.at(goal.pose, self._bench.loop.true_pose, result))
         return result
 
     def _await_goal(self) -> AskedGoal | None:

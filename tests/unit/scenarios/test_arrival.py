@@ -39,15 +39,28 @@ def test_a_robot_need_not_know_better_than_its_localisation_where_it_is():
     assert asked == (0.5, 9.0)
 
 
-def test_a_run_whose_pose_has_jumped_fails_although_navigation_says_that_it_arrived(tmp_path):
-    scenario = load_scenario("crowded_corridor").model_copy(
-        update={
-            "physics": "kinematic",
-            "actors": (),
-            "goals": (PlanarPose(x=6.0, y=9.7),),
-            "faults": (LocalizationJump(type="jump", dx=0.8, start=1.0),),
-        }
-    )
+@pytest.fixture
+def short_drive():
+    """Two metres of the corridor without people and physics; ``faults`` may befall the localisation."""
+
+    def make(*faults):
+        return load_scenario("crowded_corridor").model_copy(
+            update={"physics": "kinematic", "actors": (), "goals": (PlanarPose(x=6.0, y=9.7),), "faults": faults}
+        )
+
+    return make
+
+
+def test_truth_and_belief_are_one_where_the_pose_is_exact(short_drive, tmp_path):
+    result = run_scenario(short_drive(), RunOptions(tmp_path, draw=False))
+    (arrival,) = result.metrics["arrivals"]
+    assert result.success, result.verdict
+    assert arrival["distance_m"] <= 0.15
+    assert arrival["distance_m"] == pytest.approx(arrival["believed_distance_m"], abs=0.01)
+
+
+def test_a_run_whose_pose_has_jumped_fails_although_navigation_says_that_it_arrived(short_drive, tmp_path):
+    scenario = short_drive(LocalizationJump(type="jump", dx=0.8, start=1.0))
     result = run_scenario(scenario, RunOptions(tmp_path, draw=False))
     metrics = json.loads((tmp_path / "metrics.json").read_text())
     (arrival,) = metrics["arrivals"]
