@@ -42,12 +42,16 @@ class LegQuery:
 
 @dataclass(frozen=True)
 class Leg:
-    """A found leg: positions and surface normals (n, 3) from start to goal, its cost, what a controller may use."""
+    """A found leg: positions and surface normals (n, 3) from start to goal, its cost, what a controller may use.
+
+    The note is for the user.
+    """
 
     positions: NDArray[np.float64]
     normals: NDArray[np.float64]
     cost: float
     guidance: Any = None
+    note: str = ""
 
 
 def spread_from(

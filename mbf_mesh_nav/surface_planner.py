@@ -12,7 +12,6 @@ from __future__ import annotations
 import itertools
 from abc import abstractmethod
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,9 +57,6 @@ class SurfacePlanner(MeshPlanner):
 
     Parameters = SurfacePlannerParameters
     parameters: SurfacePlannerParameters
-
-    way: ClassVar[str] = "along edges"
-    """What a way of this planner consists of, for messages."""
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
@@ -112,8 +108,10 @@ class SurfacePlanner(MeshPlanner):
         if problem is not None:
             return problem
         path = self._assemble(legs, request.goal, not near_goal)
-        message = f"ends {path[-1].distance_to(request.goal):.2f} m from the goal" if near_goal else ""
-        return PlanResult(GetPathOutcome.SUCCESS, message, path, sum(leg.cost for leg in legs))
+        notes = [leg.note for leg in legs if leg.note]
+        if near_goal:
+            notes.append(f"ends {path[-1].distance_to(request.goal):.2f} m from the goal")
+        return PlanResult(GetPathOutcome.SUCCESS, "; ".join(notes), path, sum(leg.cost for leg in legs))
 
     def _locate_stops(
         self, request: PlanRequest, snapshot: MeshSnapshot, blocked: NDArray[np.bool_]
@@ -174,7 +172,7 @@ class SurfacePlanner(MeshPlanner):
         component = self.mesh_map.components == self.mesh_map.components[nearest_corner(self.mesh_map, start)]
         share = float(np.mean(blocked[component]))
         message = (
-            f"no free way {self.way} from {position_text(start.point)} to {position_text(goal.point)}: {share:.1%} of "
+            f"no free way from {position_text(start.point)} to {position_text(goal.point)}: {share:.1%} of "
             f"the surface between them is lethal or has cost >= {self.parameters.cost_limit:g}"
         )
         return PlanResult(GetPathOutcome.NO_PATH_FOUND, message)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.arithmetic import norm
+from mbf_mesh_nav.face_strip import FaceStrip
 from mbf_mesh_nav.kernels.corners import build_corner_ends, write_corner_weights
 from mbf_mesh_nav.kernels.cvp import ALONG_EDGE, propagate_wave
 from mbf_mesh_nav.kernels.descent import trace_descent
@@ -23,6 +25,8 @@ NEVER = np.zeros(1, dtype=np.uint8)
 """The flag of what is not cancelled."""
 STEP_SAMPLE = 64
 """The typical weight of an edge is the mean of one in so many."""
+COURSE_LOST = 0.005
+"""A path so much costlier than its field, as a share, is looked for once more. Fields are right to 0.3 %."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +39,15 @@ class Wave:
         Weighted distance [m] to the goal, inf where the wave did not come.
     predecessors, cut_records, bends : (V,) int32
         See ``kernels.cvp.propagate_wave``.
+    along_edges : bool
+        Whether no way over free faces leads to the start, so that the wave also walked along edges.
     """
 
     distances: NDArray[np.float32]
     predecessors: NDArray[np.int32]
     cut_records: NDArray[np.int32]
     bends: NDArray[np.int32]
+    along_edges: bool
 
 
 class _Weights(NamedTuple):
@@ -65,36 +72,70 @@ class WaveSearch:
         return self._corner_ends.nbytes + (self._weights.of_corners.nbytes if self._weights is not None else 0)
 
     def spread(self, query: LegQuery, overshoot: float) -> Wave | None:
-        """Spread a wave from the goal until it is ``overshoot`` [m] past the start; None: not reached, or cancelled."""
+        """Spread a wave from the goal until it is ``overshoot`` [m] past the start; None: not reached, or cancelled.
+
+        Where no way over free faces leads to the start, the wave also walks along single edges of free vertices.
+        """
         corners = self._mesh_map.faces[query.start.face]
         targets = np.ascontiguousarray(corners[~query.blocked[corners]])
-        wave = self._propagated(query, targets, max(overshoot, 2.0 * self._mesh_map.topology.mean_edge_length))
-        return wave if wave is not None and np.isfinite(wave.distances[corners]).any() else None
+        at_least = max(overshoot, 2.0 * self._mesh_map.topology.mean_edge_length)
+        for along_edges in (False, True):
+            wave = self._propagated(query, targets, at_least, along_edges)
+            if wave is None or np.isfinite(wave.distances[corners]).any():
+                return wave
+        return None
 
-    def reach(self, query: LegQuery) -> NDArray[np.float32] | None:
-        """Distances (V,) from the start to all that a way over free faces leads to, inf elsewhere; None: cancelled."""
-        from_start = replace(query, start=query.goal, goal=query.start)
-        wave = self._propagated(from_start, np.zeros(0, dtype=np.int32), 0.0)
-        return None if wave is None else wave.distances
+    def edges_text(
+        self, query: LegQuery, wave: Wave, positions: NDArray[np.float64], point_faces: NDArray[np.int32]
+    ) -> str:
+        """Say that a path follows edges where no whole face is free, and how far; empty if it need not."""
+        if not wave.along_edges:
+            return ""
+        between_ends = (point_faces[1:] != query.start.face) & (point_faces[1:] != query.goal.face)
+        blocked = query.blocked[self._mesh_map.faces[point_faces[1:]]].any(axis=1) & between_ends
+        length = math.fsum(math.dist(positions[index], positions[index + 1]) for index in np.flatnonzero(blocked))
+        return f"no way over whole free faces: {length:.2f} m lead along edges between blocked faces"
 
-    def trace(self, query: LegQuery, wave: Wave) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-        """Positions (n, 3) from start to goal down the field, and the face (n,) the way to each of them lies in."""
-        mesh_map, start, goal = self._mesh_map, query.start, query.goal
+    def path(self, query: LegQuery, wave: Wave) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Positions (n, 3) from start to goal, and the face (n,) the way to each of them lies in.
+
+        The way down the field, shortened. Where it is longer than the field says, it has lost its course between two
+        fronts: then the way along which the wave came is shortened, too, and the cheaper one taken.
+        """
+        start, goal = query.start, query.goal
         if start.face == goal.face:
             return np.array([start.point, goal.point]), np.array([start.face, goal.face], dtype=np.int32)
+        strip = FaceStrip(self._mesh_map, query.snapshot, query.blocked)
+        best = strip.shorten(*self._trace(query, wave, along_edges=False))
+        foretold = min(
+            float(wave.distances[corner]) + math.dist(self._mesh_map.vertices[corner], start.point)
+            for corner in self._mesh_map.faces[start.face].tolist()
+        )
+        if strip.cost(*best) <= (1.0 + COURSE_LOST) * foretold:
+            return best
+        other = strip.shorten(*self._trace(query, wave, along_edges=True))
+        return min(best, other, key=lambda path: strip.cost(*path))
+
+    def _trace(self, query: LegQuery, wave: Wave, along_edges: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Way down the field, see ``kernels.descent``."""
+        mesh_map, start, goal = self._mesh_map, query.start, query.goal
         return trace_descent(
             mesh_map.vertices,
             mesh_map.faces,
             mesh_map.face_neighbours,
             mesh_map.vertex_face_offsets,
             mesh_map.vertex_faces,
+            mesh_map.neighbour_offsets,
+            mesh_map.neighbours,
+            query.snapshot.edge_weights,
             wave.distances,
             wave.predecessors,
+            wave.bends,
             start.face,
             tuple(start.point.tolist()),
             goal.face,
             tuple(goal.point.tolist()),
-            4 * len(mesh_map.faces),
+            along_edges,
         )
 
     def field(self, query: LegQuery, wave: Wave) -> VectorField | None:
@@ -122,15 +163,15 @@ class WaveSearch:
             directions, wave.distances, goal.face, goal.point.copy(), query.snapshot.version, mesh_map.topology
         )
 
-    def _propagated(self, query: LegQuery, targets: NDArray[np.int32], overshoot: float) -> Wave | None:
+    def _propagated(
+        self, query: LegQuery, targets: NDArray[np.int32], overshoot: float, along_edges: bool
+    ) -> Wave | None:
         """Run the kernel from the goal of a query; None if cancelled."""
         mesh_map = self._mesh_map
         weights = self._take_weights(query)
         if weights is None:
             return None
         distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal, query.snapshot)
-        if len(seeds) == 1:
-            seeds = self._seed_around(query, int(seeds[0]), distances, predecessors)
         cut_records = np.full(len(distances), ALONG_EDGE, dtype=np.int32)
         bends = np.full(len(distances), NO_BEND, dtype=np.int32)
         settled = propagate_wave(
@@ -147,9 +188,10 @@ class WaveSearch:
             overshoot,
             weights.step,
             query.cancel_flag,
+            along_edges,
         )
         self._weights = weights
-        return None if settled < 0 else Wave(distances, predecessors, cut_records, bends)
+        return None if settled < 0 else Wave(distances, predecessors, cut_records, bends, along_edges)
 
     def _take_weights(self, query: LegQuery) -> _Weights | None:
         """Take the weights, brought up to date for a query; give them back after use. None if cancelled meanwhile.
@@ -194,16 +236,3 @@ class WaveSearch:
         sample = sample[np.isfinite(sample)]
         step = float(sample.mean()) if len(sample) else mesh_map.topology.mean_edge_length
         return _Weights(snapshot.version, of_corners, step) if finished else None
-
-    def _seed_around(
-        self, query: LegQuery, center: int, distances: NDArray[np.float32], predecessors: NDArray[np.int32]
-    ) -> NDArray[np.int32]:
-        """Seed the ring of a goal face's only free corner too: a wave needs two known corners to enter a face."""
-        mesh_map = self._mesh_map
-        slots = slice(mesh_map.neighbour_offsets[center], mesh_map.neighbour_offsets[center + 1])
-        ring = mesh_map.neighbours[slots]
-        free = ~query.blocked[ring]
-        ring = ring[free]
-        distances[ring] = distances[center] + query.snapshot.edge_weights[slots][free]
-        predecessors[ring] = center
-        return np.concatenate([[center], ring]).astype(np.int32)

@@ -56,14 +56,14 @@ def write_corner_weights(
             is_written[vertex] = True
             for record in range(Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + ONE])):
                 first, second = Index(corner_ends[record, 0]), Index(corner_ends[record, 1])
-                corner_weights[record, 0] = edge_weights[_slot(neighbour_offsets, neighbours, vertex, first)]
-                corner_weights[record, 1] = edge_weights[_slot(neighbour_offsets, neighbours, vertex, second)]
-                corner_weights[record, 2] = edge_weights[_slot(neighbour_offsets, neighbours, first, second)]
+                corner_weights[record, 0] = edge_weights[slot_of(neighbour_offsets, neighbours, vertex, first)]
+                corner_weights[record, 1] = edge_weights[slot_of(neighbour_offsets, neighbours, vertex, second)]
+                corner_weights[record, 2] = edge_weights[slot_of(neighbour_offsets, neighbours, first, second)]
     return True
 
 
 @inner_kernel
-def _slot(neighbour_offsets: Int32Array, neighbours: Int32Array, vertex: int, other: int) -> int:
+def slot_of(neighbour_offsets: Int32Array, neighbours: Int32Array, vertex: int, other: int) -> int:
     """Where ``other`` stands in the ascending list of a vertex: after all that are less. Without a branch to guess."""
     slot = Index(neighbour_offsets[vertex])
     for entry in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):

@@ -66,6 +66,7 @@ def propagate_wave(
     overshoot: float,
     step: float,
     cancel_flag: FlagArray,
+    along_edges: bool = False,
 ) -> int:
     """Spread a wave from ``seeds`` over the faces whose corners are all free.
 
@@ -93,15 +94,17 @@ def propagate_wave(
         the source, see ``NEAR_STEPS``.
     cancel_flag : (1,) uint8
         Polled; nonzero ends the call.
+    along_edges : bool
+        Whether the wave also walks along single edges of free vertices, where no free face leads on.
 
     Returns
     -------
     int
         Number of settled vertices, -1 if cancelled.
     """
-    # 1. The queue (see ``bucket_queue.py``). A record adds one entry at most; a vertex taken again goes to the heap.
+    # 1. The queue (see ``bucket_queue.py``). A record adds one entry, three with edges; what is taken again none.
     state = blocked.astype(np.uint8)  # _FREE or _BLOCKED
-    room = len(corner_ends) + len(seeds)
+    room = (3 if along_edges else 1) * len(corner_ends) + len(seeds)
     heads, links = np.full(RING, EMPTY, dtype=np.int32), np.empty(room, dtype=np.int32)
     entries, near = np.empty(room, dtype=np.uint64), np.empty(room, dtype=np.uint64)
     used, near_size, bucket = Index(0), Index(0), Count(0)
@@ -137,6 +140,15 @@ def propagate_wave(
             first, second = Index(corner_ends[record, 0]), Index(corner_ends[record, 1])
             states = state[first] + state[second]
             if states != _ONE_FREE and states != _ALL_SETTLED:
+                for side in range(2 if along_edges and states < _ONE_FREE else 0):
+                    end, distance = Index(corner_ends[record, side]), key + corner_weights[record, side]
+                    if state[end] == _FREE and distance < distances[end]:
+                        distances[end], predecessors[end] = distance, vertex
+                        cut_records[end], bends[end] = ALONG_EDGE, vertex
+                        entry = entry_of(distances[end], end)
+                        used, near_size = put(
+                            heads, links, entries, near, used, near_size, bucket, inverse_width, entry
+                        )
                 continue
             known, free = first, second
             to_known, to_free, between = corner_weights[record, 0], corner_weights[record, 1], corner_weights[record, 2]

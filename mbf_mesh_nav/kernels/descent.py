@@ -1,20 +1,27 @@
 """Exact descent of a distance field: the path is traced from edge to edge, never stepped and searched for.
 
-Within a face the field is taken as linear, so the way down is a straight line to an edge. Crossing an edge it goes on
-in the next face, in a valley it follows the edge, at a vertex it takes the steepest face or edge. The field falls
-strictly from crossing to crossing, so the trace ends at the source; where rounding makes the field stall, the wave's
-predecessors, which are acyclic, take over. Thus every reached point gets a path.
+At a point of a face the wave's own rule is applied once more (``cvp.propagate_wave``): two corners that one front has
+passed tell where its centre lies, a virtual source; the way leads straight there, if that line crosses the side between
+the two, else to the corner over which it is shortest. A field taken as linear within a face would be wrong by a tenth
+some edges away from the source, where the fronts are round. A virtual source of two fronts is a fiction and may lead
+in circles: no face is passed through twice, and from corner to corner the distance falls. Thus the trace ends, and
+every reached point gets a path.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
-from mbf_mesh_nav.kernels.dijkstra import Float32Array, Int32Array
-from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, between, difference, dot, norm, row, set_row
+from mbf_mesh_nav.kernels.corners import slot_of
+from mbf_mesh_nav.kernels.dijkstra import BoolArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.fronts import NO_BEND, SLACK
+from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, between, cross, difference, dot, norm, row, set_row
 
 _ON_VERTEX = 1e-6  # a crossing this near (as a share of the edge) to a vertex is the vertex
+_NO_SIDE = -1
 
 
 @kernel
@@ -24,28 +31,34 @@ def trace_descent(
     face_neighbours: Int32Array,
     vertex_face_offsets: Int32Array,
     vertex_faces: Int32Array,
+    neighbour_offsets: Int32Array,
+    neighbours: Int32Array,
+    edge_weights: Float32Array,
     distances: Float32Array,
     predecessors: Int32Array,
+    bends: Int32Array,
     start_face: int,
     start: Vector,
     goal_face: int,
     goal: Vector,
-    max_crossings: int,
+    along_edges: bool,
 ) -> tuple[Float64Array, Int32Array]:
     """Trace the way down from ``start`` to the source of the field at ``goal``.
 
     Parameters
     ----------
-    vertices, faces, face_neighbours, vertex_face_offsets, vertex_faces
-        The mesh; (V, 3) float64 [m], (F, 3), (F, 3), (V+1,), (3F,) int32.
-    distances, predecessors : (V,) float32 [m], (V,) int32
+    vertices, faces, face_neighbours, vertex_face_offsets, vertex_faces, neighbour_offsets, neighbours
+        The mesh; (V, 3) float64 [m], (F, 3), (F, 3), (V+1,), (3F,), (V+1,), (2E,) int32.
+    edge_weights : (2E,) float32
+        Of the wave [m], aligned with ``neighbours``.
+    distances, predecessors, bends : (V,) float32 [m], (V,) int32, (V,) int32
         The wave's result; at least one corner of ``start_face`` is reached.
     start_face, goal_face : int
         Different faces.
     start, goal : (float, float, float)
         Points in them [m].
-    max_crossings : int
-        After that many edges only predecessors are followed.
+    along_edges : bool
+        Follow the predecessors only: a longer way, but surely the one along which the wave came.
 
     Returns
     -------
@@ -57,58 +70,46 @@ def trace_descent(
     capacity = Count(256)
     points = np.empty((capacity, 3), dtype=np.float64)
     point_faces = np.empty(capacity, dtype=np.int32)
-    count = Count(0)
-    face, vertex, point = Count(start_face), Count(-1), start
-    _note(points, point_faces, count, point, face)
-    count += 1
-    if not _is_reached(faces[face], distances):
-        vertex = _best_corner(vertices, faces[face], distances, point)
+    graph = (neighbour_offsets, neighbours, edge_weights)
+    passed = np.zeros(len(faces), dtype=np.bool_)
+    face, vertex = Count(start_face), Count(-1)
+    place = _barycentric(vertices, faces[face], start)
+    set_row(points, Count(0), start)
+    point_faces[0] = face
+    count = Count(1)
     while True:
         # 1. In the goal's face, or at one of its corners, the rest is a straight line.
         if (vertex < 0 and face == goal_face) or (vertex >= 0 and _has_corner(faces[goal_face], vertex)):
-            if vertex >= 0:
-                _note(points, point_faces, count, row(vertices, vertex), face)
-                count += 1
-            _note(points, point_faces, count, goal, Count(goal_face))
+            set_row(points, count, goal)
+            point_faces[count] = goal_face
             return points[: count + 1].copy(), point_faces[: count + 1].copy()
-        if count + 3 > capacity:
+        if count + 2 > capacity:
             capacity *= 2
             points, point_faces = _grown(points, point_faces, capacity)
-        # 2. At a vertex: note it, then choose the steepest way on.
+        # 2. Which way on is the shortest: through one of the sides to a face not passed yet, or over a corner?
         if vertex >= 0:
-            point = row(vertices, vertex)
-            _note(points, point_faces, count, point, face)
-            count += 1
-            if count > max_crossings:
-                face, vertex = Count(vertex_faces[vertex_face_offsets[vertex]]), Count(predecessors[vertex])
-                continue
-            face, vertex = _steepest_way(
-                vertices, faces, vertex_face_offsets, vertex_faces, distances, predecessors, vertex
-            )
-            if vertex >= 0:
-                continue
-        # 3. Straight down through the face to the edge opposite to corner `exit_corner`.
-        corners = faces[face]
-        point, exit_corner, share = _leave_face(vertices, corners, distances, point)
-        left, right = Count(corners[(exit_corner + 1) % 3]), Count(corners[(exit_corner + 2) % 3])
-        if share < _ON_VERTEX or share > 1.0 - _ON_VERTEX or count > max_crossings:
-            vertex = left if share < 0.5 else right
-            continue
-        _note(points, point_faces, count, point, face)
-        count += 1
-        # 4. Go on in the next face, or along the edge where the next face rises.
-        following = face_neighbours[face, (exit_corner + 1) % 3]
-        if following >= 0 and _leads_away_from_edge(vertices, faces[following], distances, left, right):
-            face = Count(following)
+            face, side, share, vertex = _way_from_vertex(
+                vertices, faces, face_neighbours, vertex_face_offsets, vertex_faces, graph, distances, predecessors,
+                bends, goal_face, passed, vertex, along_edges,
+            )  # fmt: skip
         else:
-            vertex = left if distances[left] < distances[right] else right
-
-
-@kernel
-def _note(points: Float64Array, point_faces: Int32Array, count: int, point: Vector, face: int) -> None:
-    """Write the point that follows the first ``count``."""
-    set_row(points, count, point)
-    point_faces[count] = face
+            _, side, share, vertex = _way_through(
+                vertices, faces, face_neighbours, graph, distances, bends, goal_face, passed, face, place, along_edges
+            )
+        # 3. Note where it leads, and go on there.
+        if vertex < 0:
+            left, right = Count(faces[face, side]), Count(faces[face, (side + 1) % 3])
+            passed[face] = True
+            if share < _ON_VERTEX or share > 1.0 - _ON_VERTEX:
+                vertex = left if share < 0.5 else right
+        point_faces[count] = face
+        if vertex >= 0:
+            set_row(points, count, row(vertices, vertex))
+        else:
+            set_row(points, count, between(row(vertices, left), row(vertices, right), share))
+            face = Count(face_neighbours[face, side])
+            place = _on_side(_side_of(faces[face], right), 1.0 - share)
+        count += 1
 
 
 @inner_kernel
@@ -121,128 +122,191 @@ def _grown(points: Float64Array, point_faces: Int32Array, capacity: int) -> tupl
 
 
 @inner_kernel
-def _is_reached(corners: Int32Array, distances: Float32Array) -> bool:
-    return bool(distances[corners[0]] < np.inf and distances[corners[1]] < np.inf and distances[corners[2]] < np.inf)
-
-
-@inner_kernel
 def _has_corner(corners: Int32Array, vertex: int) -> bool:
     return bool(corners[0] == vertex or corners[1] == vertex or corners[2] == vertex)
 
 
 @inner_kernel
-def _best_corner(vertices: Float64Array, corners: Int32Array, distances: Float32Array, point: Vector) -> int:
-    """Return the corner over which the way from ``point`` is shortest."""
-    best, best_total = Count(corners[0]), np.inf
-    for k in range(3):
-        corner = Count(corners[k])
-        total = distances[corner] + norm(difference(row(vertices, corner), point))
-        if total < best_total:
-            best, best_total = corner, total
-    return best  # type: ignore[no-any-return]
+def _side_of(corners: Int32Array, vertex: int) -> int:
+    """Number of the side that begins at a corner."""
+    side = 0 if corners[0] == vertex else (1 if corners[1] == vertex else 2)
+    return Count(side)  # type: ignore[no-any-return]
 
 
 @inner_kernel
-def _face_edges(vertices: Float64Array, corners: Int32Array) -> tuple[Vector, Vector]:
-    """Edge vectors from corner 0 of a face to corners 1 and 2."""
-    origin = row(vertices, Count(corners[0]))
-    return difference(row(vertices, Count(corners[1])), origin), difference(row(vertices, Count(corners[2])), origin)
+def _on_side(side: int, share: float) -> Vector:
+    """Barycentric coordinates of a point on a side, at a share of it from its first corner."""
+    first = 1.0 - share
+    if side == 0:
+        return first, share, 0.0
+    return (0.0, first, share) if side == 1 else (share, 0.0, first)
 
 
 @inner_kernel
-def _descent_direction(vertices: Float64Array, corners: Int32Array, distances: Float32Array) -> Vector:
-    """Negative gradient of the linear field on a face; its length is the slope of the field."""
-    e1, e2 = _face_edges(vertices, corners)
-    d1 = float(distances[corners[1]]) - float(distances[corners[0]])
-    d2 = float(distances[corners[2]]) - float(distances[corners[0]])
-    g11, g12, g22 = dot(e1, e1), dot(e1, e2), dot(e2, e2)
-    determinant = max(g11 * g22 - g12 * g12, 1e-300)
-    s1, s2 = (d2 * g12 - d1 * g22) / determinant, (d1 * g12 - d2 * g11) / determinant
-    return s1 * e1[0] + s2 * e2[0], s1 * e1[1] + s2 * e2[1], s1 * e1[2] + s2 * e2[2]
+def _barycentric(vertices: Float64Array, corners: Int32Array, point: Vector) -> Vector:
+    """Barycentric coordinates of a point in the plane of a face."""
+    a, b, c = row(vertices, Count(corners[0])), row(vertices, Count(corners[1])), row(vertices, Count(corners[2]))
+    normal = cross(difference(b, a), difference(c, a))
+    squared = max(dot(normal, normal), 1e-300)
+    second = dot(cross(difference(point, a), difference(c, a)), normal) / squared
+    third = dot(cross(difference(b, a), difference(point, a)), normal) / squared
+    return 1.0 - second - third, second, third
 
 
 @inner_kernel
-def _barycentric_rates(vertices: Float64Array, corners: Int32Array, direction: Vector) -> Vector:
-    """Change of the barycentric coordinates per unit of a direction in the face's plane."""
-    e1, e2 = _face_edges(vertices, corners)
-    g11, g12, g22 = dot(e1, e1), dot(e1, e2), dot(e2, e2)
-    determinant = max(g11 * g22 - g12 * g12, 1e-300)
-    p1, p2 = dot(direction, e1), dot(direction, e2)
-    second, third = (p1 * g22 - p2 * g12) / determinant, (p2 * g11 - p1 * g12) / determinant
-    return -second - third, second, third
+def _side_weights(
+    vertices: Float64Array, corners: Int32Array, graph: tuple[Int32Array, Int32Array, Float32Array]
+) -> Vector:
+    """Weights [m] of the sides of a face, that from corner k to the next at k; the length at a blocked corner."""
+    return (
+        _weight(vertices, Count(corners[0]), Count(corners[1]), graph),
+        _weight(vertices, Count(corners[1]), Count(corners[2]), graph),
+        _weight(vertices, Count(corners[2]), Count(corners[0]), graph),
+    )
 
 
 @inner_kernel
-def _leave_face(
-    vertices: Float64Array, corners: Int32Array, distances: Float32Array, point: Vector
-) -> tuple[Vector, int, float]:
-    """Follow the descent through a face; the exit point, the corner opposite to its edge, its share of the edge.
-
-    The share counts from the corner after the opposite one (counter-clockwise).
-    """
-    rates = _barycentric_rates(vertices, corners, _descent_direction(vertices, corners, distances))
-    offsets = _barycentric_rates(vertices, corners, difference(point, row(vertices, Count(corners[0]))))
-    weights = (offsets[0] + 1.0, offsets[1], offsets[2])
-    exit_corner, shortest = 0, np.inf
-    for corner in range(1, 3):
-        exit_corner = corner if rates[corner] < rates[exit_corner] else exit_corner
-    for corner in range(3):
-        # A coordinate at zero belongs to the edge the way came in by.
-        if rates[corner] < 0.0 and weights[corner] > 1e-9 and -weights[corner] / rates[corner] < shortest:
-            exit_corner, shortest = corner, -weights[corner] / rates[corner]
-    after, before = (exit_corner + 1) % 3, (exit_corner + 2) % 3
-    travel = shortest if shortest < np.inf else 0.0
-    first, second = max(weights[after] + travel * rates[after], 0.0), max(weights[before] + travel * rates[before], 0.0)
-    share = second / (first + second) if first + second > 0.0 else 0.5
-    exit_point = between(row(vertices, Count(corners[after])), row(vertices, Count(corners[before])), share)
-    return exit_point, exit_corner, share
+def _weight(vertices: Float64Array, a: int, b: int, graph: tuple[Int32Array, Int32Array, Float32Array]) -> float:
+    offsets, neighbours, weights = graph
+    weight = float(weights[slot_of(offsets, neighbours, a, b)])
+    return weight if weight < np.inf else norm(difference(row(vertices, a), row(vertices, b)))
 
 
 @inner_kernel
-def _leads_away_from_edge(
-    vertices: Float64Array, corners: Int32Array, distances: Float32Array, left: int, right: int
-) -> bool:
-    """Whether the descent on a face leads from its edge (left, right) into the face."""
-    if not _is_reached(corners, distances):
-        return False
-    rates = _barycentric_rates(vertices, corners, _descent_direction(vertices, corners, distances))
-    for corner in range(3):
-        if corners[corner] != left and corners[corner] != right:
-            return bool(rates[corner] > 0.0)
-    return False
+def _weighted_length(sides: Vector, step: Vector) -> float:
+    """Length [m] of a step, a difference of barycentric coordinates, in the plane of a triangle of weighted sides."""
+    squared = (
+        step[0] * step[1] * sides[0] * sides[0]
+        + step[1] * step[2] * sides[1] * sides[1]
+        + step[2] * step[0] * sides[2] * sides[2]
+    )
+    return math.sqrt(max(-squared, 0.0))
 
 
 @inner_kernel
-def _steepest_way(
+def _way_through(
     vertices: Float64Array,
     faces: Int32Array,
+    face_neighbours: Int32Array,
+    graph: tuple[Int32Array, Int32Array, Float32Array],
+    distances: Float32Array,
+    bends: Int32Array,
+    goal_face: int,
+    passed: BoolArray,
+    face: int,
+    place: Vector,
+    over_corner: bool,
+) -> tuple[float, int, float, int]:
+    """Find the shortest way on from a point of a face: its length, the side, the share of it, or the corner (else -1).
+
+    It goes to no face that has been ``passed`` (F,), or to a corner in any case (``over_corner``). Where one is not
+    reached, only the others count.
+    """
+    corners = faces[face]
+    sides = _side_weights(vertices, corners, graph)
+    best, best_side, best_share, best_vertex = np.inf, Count(_NO_SIDE), 0.0, Count(-1)
+    lengths = (
+        _weighted_length(sides, (place[0] - 1.0, place[1], place[2])),
+        _weighted_length(sides, (place[0], place[1] - 1.0, place[2])),
+        _weighted_length(sides, (place[0], place[1], place[2] - 1.0)),
+    )
+    for corner in range(3):
+        total = distances[corners[corner]] + lengths[corner]
+        if total < best:
+            best, best_vertex = total, Count(corners[corner])
+    for side in range(0 if over_corner else 3):
+        if not _leads_on(faces, face_neighbours[face, side], distances, goal_face, passed):
+            continue
+        left, right = Count(corners[side]), Count(corners[(side + 1) % 3])
+        total, share = _over_side(distances, bends, left, right, sides[side], lengths[side], lengths[(side + 1) % 3])
+        if total < best:
+            best, best_side, best_share, best_vertex = total, Count(side), share, Count(-1)
+    return best, best_side, best_share, best_vertex
+
+
+@inner_kernel
+def _is_reached(corners: Int32Array, distances: Float32Array) -> bool:
+    return bool(distances[corners[0]] < np.inf and distances[corners[1]] < np.inf and distances[corners[2]] < np.inf)
+
+
+@inner_kernel
+def _leads_on(faces: Int32Array, following: int, distances: Float32Array, goal_face: int, passed: BoolArray) -> bool:
+    """Whether the trace may enter a face: the goal's, or one that is reached and has not been passed (F,)."""
+    if following < 0 or passed[following]:
+        return False
+    return bool(following == goal_face or _is_reached(faces[following], distances))
+
+
+@inner_kernel
+def _over_side(
+    distances: Float32Array, bends: Int32Array, left: int, right: int, c: float, b: float, a: float
+) -> tuple[float, float]:
+    """Length of the straight way through a side to the centre of the front, and where it crosses the side.
+
+    ``c``, ``b``, ``a`` are the side and the lengths from the point to its left and right end. The length is inf where
+    the way would not cross the side; the crossing is a share of the side from its left end.
+    """
+    bend = bends[left]
+    to_bend = float(distances[bend]) if bend == bends[right] and bend != NO_BEND else 0.0
+    u1, u2 = float(distances[left]) - to_bend, float(distances[right]) - to_bend
+    # The left end is the origin, the x axis runs to the right one; the point lies above, the virtual source below.
+    source_x = (c * c + (u1 - u2) * (u1 + u2)) / (2.0 * c)
+    point_x = (c * c + (b - a) * (b + a)) / (2.0 * c)
+    if not abs(source_x) <= SLACK * u1:
+        return np.inf, 0.0
+    depth = math.sqrt(max((u1 - source_x) * (u1 + source_x), 0.0))
+    height = math.sqrt(max((b - point_x) * (b + point_x), 0.0))
+    across, along = height + depth, point_x - source_x
+    crossing = source_x * height + point_x * depth  # times ``across``
+    if not 0.0 < crossing < c * across:
+        return np.inf, 0.0
+    return to_bend + math.sqrt(across * across + along * along), crossing / (across * c)
+
+
+@inner_kernel
+def _way_from_vertex(
+    vertices: Float64Array,
+    faces: Int32Array,
+    face_neighbours: Int32Array,
     vertex_face_offsets: Int32Array,
     vertex_faces: Int32Array,
+    graph: tuple[Int32Array, Int32Array, Float32Array],
     distances: Float32Array,
     predecessors: Int32Array,
+    bends: Int32Array,
+    goal_face: int,
+    passed: BoolArray,
     vertex: int,
-) -> tuple[int, int]:
-    """Choose the way down from a vertex: (face, -1) through a face, or (face, next vertex) along one of its edges."""
-    best_slope, best_face = 0.0, Count(vertex_faces[vertex_face_offsets[vertex]])
+    to_predecessor: bool,
+) -> tuple[int, int, float, int]:
+    """Choose the way on from a vertex: (face, side, share, -1) through a face, or (face, -1, 0, next vertex)."""
+    best, best_face, best_side, best_share = np.inf, Count(-1), Count(_NO_SIDE), 0.0
     best_vertex = Count(predecessors[vertex])
+    for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
+        face = Count(vertex_faces[record])
+        corners = faces[face]
+        # A side of a free face is told of as that, it may have a blocked face on the other side.
+        if _has_corner(corners, best_vertex) and (best_face < 0 or _is_reached(corners, distances)):
+            best_face = face
+    if to_predecessor:
+        return best_face, best_side, best_share, best_vertex
     for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
         face = Count(vertex_faces[record])
         corners = faces[face]
         if not _is_reached(corners, distances):
             continue
-        descent = _descent_direction(vertices, corners, distances)
-        rates = _barycentric_rates(vertices, corners, descent)
-        inside = True
-        for k in range(3):
-            corner = Count(corners[k])
-            if corner == vertex:
-                continue
-            inside = inside and rates[k] > 0.0
-            fall = float(distances[vertex]) - float(distances[corner])
-            slope = fall / norm(difference(row(vertices, corner), row(vertices, vertex)))
-            if slope > best_slope:
-                best_slope, best_face, best_vertex = slope, face, corner
-        slope = norm(descent)
-        if inside and slope > best_slope:
-            best_slope, best_face, best_vertex = slope, face, Count(-1)
-    return best_face, best_vertex
+        own = _side_of(corners, vertex)
+        sides = _side_weights(vertices, corners, graph)
+        for step in range(1, 3):
+            other = Count(corners[(own + step) % 3])
+            total = distances[other] + (sides[own] if step == 1 else sides[(own + 2) % 3])
+            if distances[other] < distances[vertex] and total < best:
+                best, best_face, best_side, best_share, best_vertex = total, face, Count(_NO_SIDE), 0.0, other
+        opposite = (own + 1) % 3
+        if passed[face] or not _leads_on(faces, face_neighbours[face, opposite], distances, goal_face, passed):
+            continue
+        left, right = Count(corners[opposite]), Count(corners[(opposite + 1) % 3])
+        total, share = _over_side(distances, bends, left, right, sides[opposite], sides[own], sides[(own + 2) % 3])
+        if total < best:
+            best, best_face, best_side, best_share, best_vertex = total, face, Count(opposite), share, Count(-1)
+    return best_face, best_side, best_share, best_vertex
