@@ -96,17 +96,22 @@ class WaveSearch:
         length = math.fsum(math.dist(positions[index], positions[index + 1]) for index in np.flatnonzero(blocked))
         return f"no way over whole free faces: {length:.2f} m lead along edges between blocked faces"
 
-    def path(self, query: LegQuery, wave: Wave) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    def path(self, query: LegQuery, wave: Wave, taut_over_costs: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Positions (n, 3) from start to goal, and the face (n,) the way to each of them lies in.
 
-        The way down the field, shortened. Where it is longer than the field says, it has lost its course between two
-        fronts: then the way along which the wave came is shortened, too, and the cheaper one taken.
+        The way down the field, shortened to a geodesic. Where that is longer than the field says, it has lost its
+        course between two fronts: then the way along which the wave came is shortened, too, and the shorter one taken.
+        Over costs the cheapest path is no geodesic: there the way down the field stays, or is pulled taut as far as
+        that costs no more (``taut_over_costs``).
         """
         start, goal = query.start, query.goal
         if start.face == goal.face:
             return np.array([start.point, goal.point]), np.array([start.face, goal.face], dtype=np.int32)
         strip = FaceStrip(self._mesh_map, query.snapshot, query.blocked)
-        best = strip.shorten(*self._trace(query, wave, along_edges=False))
+        traced = self._trace(query, wave, along_edges=False)
+        if strip.has_costs(traced[1]):
+            return strip.shorten(*traced) if taut_over_costs else traced
+        best = strip.shorten(*traced)
         foretold = min(
             float(wave.distances[corner]) + math.dist(self._mesh_map.vertices[corner], start.point)
             for corner in self._mesh_map.faces[start.face].tolist()

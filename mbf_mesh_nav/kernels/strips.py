@@ -179,6 +179,7 @@ def straighten(
     strip: Int32Array,
     start: Vector,
     goal: Vector,
+    turn: bool,
 ) -> tuple[Float64Array, Int32Array]:
     """Pull a path taut through a strip and turn the strip round the vertices where that makes the path shorter.
 
@@ -190,6 +191,8 @@ def straighten(
         Faces, each sharing an edge with the next.
     start, goal : (float, float, float)
         Points in the first and the last face [m].
+    turn : bool
+        Whether the strip may be turned; without it the path is that of ``pull_taut``.
 
     Returns
     -------
@@ -200,7 +203,7 @@ def straighten(
     """
     points = pull_taut(vertices, faces, strip, start, goal)
     length = _length(points)
-    index, tries, is_changed = Count(0), _MAX_TURNS_A_FACE * len(strip), False
+    index, tries, is_changed = Count(0), _MAX_TURNS_A_FACE * len(strip) if turn else Count(0), False
     while tries > 0 and len(strip) > 1:
         if index >= len(strip) - 1:
             if not is_changed:
