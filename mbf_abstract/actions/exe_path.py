@@ -155,7 +155,7 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
             on_abandon=lambda: self._abandon(following, run),
         )
         self._tell_started(following)
-        with self.runtime.map_hooks.using_map(PluginKind.CONTROLLER), run:
+        with run, run.map_in_use():
             following.execution = ControllerExecution(run, take_new_plan, publish)
             end = following.execution.execute()
         return self._result(end, following.execution, progress.path, plugin.name)

@@ -70,7 +70,7 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
             patience=lambda: self.runtime.parameters.planner_patience,
             on_abandon=lambda: job.abandon(*self._hung(run.suspect, handle)),
         )
-        with self.runtime.map_hooks.using_map(PluginKind.PLANNER), run:
+        with run, run.map_in_use():
             execution = PlannerExecution(run, request, goal.goal_area)
             state = execution.execute()
         # 4. Judge how it ended.

@@ -54,7 +54,7 @@ class RecoveryAction(Action[RecoveryGoal, RecoveryResultMessage, NoFeedback]):
             on_abandon=lambda: self._abandon(job, run, execution),
         )
         execution = RecoveryExecution(run)
-        with self.runtime.map_hooks.using_map(PluginKind.RECOVERY), run:
+        with run, run.map_in_use():
             result = execution.execute()
         # 3. Its outcome is the goal's; a text is never missing.
         verdict = "done" if is_success(result.outcome) else "failed"

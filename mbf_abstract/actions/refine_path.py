@@ -54,7 +54,7 @@ class RefinePathAction(Action[RefinePathGoal, RefinePathResult, NoFeedback]):
             patience=lambda: self.runtime.parameters.planner_patience,
             on_abandon=lambda: job.abandon(*self._hung(plugin.name, handle)),
         )
-        with self.runtime.map_hooks.using_map(PluginKind.REFINER), run:
+        with run, run.map_in_use():
             result = RefinerExecution(run, handle.goal.path).execute()
         # 3. Measure what changed.
         return self._measured(result, handle.goal.path, plugin.name)

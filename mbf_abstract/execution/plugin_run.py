@@ -130,6 +130,21 @@ class PluginRun(Generic[P]):
             return function()
 
     @contextmanager
+    def map_in_use(self) -> Iterator[None]:
+        """Have the map kept alive for a plugin of this kind."""
+        who, hooks, kind = "the map's using_map()", self.runtime.map_hooks, self.plugin.spec.kind
+        keeper = self.call_beside(who, lambda: hooks.using_map(kind))
+        try:
+            self.call_beside(who, keeper.__enter__)
+        except Abandoned:  # it did come back, but late
+            keeper.__exit__(None, None, None)
+            raise
+        try:
+            yield
+        finally:
+            self.call_beside(who, lambda: keeper.__exit__(None, None, None))
+
+    @contextmanager
     def _supervised(self, who: str) -> Iterator[None]:
         self.suspect = who
         self._call_began = self.runtime.clock.now()

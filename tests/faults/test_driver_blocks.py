@@ -4,9 +4,9 @@ import threading
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, RecoveryGoal
+from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.clock import WallClock
-from mbf_abstract.geometry import Twist
+from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import RecoveryResult
 from mbf_abstract.sim_clock import SimClock
@@ -238,3 +238,48 @@ def test_a_recovery_whose_command_blocks_ends_too(drive_into):
     bench.clock.sleep(0.5)
     assert bench.robot.command.is_stopped()
     bench.close()
+
+
+class BlockingKeeper:
+    """What ``using_map`` gives: blocks at its start or at its end."""
+
+    def __init__(self, block, place):
+        self._block, self._place, self.depth = block, place, 0
+
+    def __enter__(self):
+        self.depth += 1
+        if self._place == "start":
+            self._block()
+
+    def __exit__(self, *exc):
+        self.depth -= 1
+        if self._place == "end":
+            self._block()
+
+
+@pytest.mark.parametrize("place", ["start", "end"])
+@pytest.mark.parametrize(
+    "make_goal",
+    [
+        lambda bench: GetPathGoal(Pose.planar(2.0, 0.0)),
+        lambda bench: ExePathGoal(bench.path_to(1.0)),
+        lambda bench: RecoveryGoal(),
+        lambda bench: RefinePathGoal(bench.path_to(1.0)),
+    ],
+    ids=["get_path", "exe_path", "recovery", "refine_path"],
+)
+def test_a_map_that_blocks_while_it_is_kept_alive_holds_no_goal_up(make_goal, place):
+    patience = {"planner_patience": 1.0, "controller_patience": 1.0, "recovery_patience": 1.0}
+    with Bench(cancel_grace=0.3, **patience) as bench:
+        block = ClockBlock(bench.clock)
+        block.on = True
+        keeper = BlockingKeeper(block, place)
+        using_map, bench.server.using_map = bench.server.using_map, lambda kind: keeper
+        handle = bench.navigator.send(make_goal(bench))
+        assert not handle.wait(10.0).success
+        assert_ended_once(bench, handle)
+        block.free()
+        bench.clock.sleep(0.1)
+        assert keeper.depth == 0 and not bench.server.runtime.hanging
+        bench.server.using_map = using_map
+        assert_next_goals_work(bench)
