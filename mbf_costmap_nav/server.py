@@ -137,7 +137,7 @@ class CostmapNavigationServer(AbstractNavigationServer):
     def map_view(self, name: str = "") -> GridView:
         """The costs of a map, of the global one without a name; 1 for what the robot's middle must not touch."""
         costmap = (self.local_costmap if name == "local_costmap" else self.global_costmap).snapshot()
-        costs = (costmap.cells / np.float32(INSCRIBED)).astype(np.float32)
+        costs = np.divide(costmap.cells, np.float32(INSCRIBED), dtype=np.float32)
         costs[costmap.cells == UNKNOWN] = np.nan
         geometry = costmap.geometry
         return GridView(costs, (geometry.origin_x, geometry.upper_x, geometry.origin_y, geometry.upper_y))
