@@ -21,7 +21,7 @@ PROGRAM = """
 import os, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell lets its background jobs ignore it
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # and nohup lets its program ignore this one
-from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal
 from mbf_abstract.clock import WallClock
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import BusyHang, Hang, drive
@@ -45,6 +45,10 @@ def run(path, hang=False):
     bench.clock.sleep(0.3)
     print("driving", flush=True)
     return bench
+
+def plan_for_long(bench):
+    bench.planner.play(Hang(bench.clock))
+    return bench.navigator.send(GetPathGoal(bench.robot.pose))
 """
 ENDS = {
     "end of the program": "bench = run(sys.argv[1])",
@@ -94,12 +98,12 @@ def test_ctrl_c_stops_the_robot(tmp_path):
 WAITS = {
     "sleep": "bench = run(sys.argv[1]); bench.clock.sleep(60.0)",
     "context manager": "\nwith run(sys.argv[1]) as bench:\n    bench.clock.sleep(60.0)",
-    "wait": "bench = run(sys.argv[1]); bench.server.exe_path.unfinished[0].wait()",
+    "wait": "bench = run(sys.argv[1]); plan_for_long(bench).wait()",
     "hanging plugin": "bench = run(sys.argv[1], hang=True); bench.clock.sleep(60.0)",
     "asyncio": """
 import asyncio
 async def main():
-    await bench.server.exe_path.unfinished[0]
+    await plan_for_long(bench)
 bench = run(sys.argv[1])
 asyncio.run(main())
 """,
