@@ -273,10 +273,10 @@ def _validated(layer_class: type[MeshLayer], block: Mapping[str, Any] | LayerPar
 
 
 def _narrower_than_robot(entry: LayerEntry, layer: LayerParameters, robot_radius: float) -> list[str]:
-    radius = getattr(layer, "inscribed_radius", robot_radius)
+    radius = getattr(layer, "inflation_radius", robot_radius)
     if radius >= robot_radius:
         return []
-    least = f"inscribed_radius of at least the robot's (mesh_map.inscribed_radius), {robot_radius:g} m"
+    least = f"inflation_radius of at least the robot's radius (mesh_map.inscribed_radius), {robot_radius:g} m"
     return [f"layer '{entry.name}': {least}: else ground the robot's body touches would be free, got {radius:g} m"]
 
 

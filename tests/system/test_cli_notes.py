@@ -83,6 +83,6 @@ def test_a_mesh_whose_inflation_is_made_for_a_narrower_robot_is_refused():
         inscribed_radius=1.5,
         layers=[{"name": "border", "type": "border"}, {"name": "inflation", "type": "inflation", "inputs": ["border"]}],
     )
-    text = r"'inflation': inscribed_radius of at least the robot's \(mesh_map.inscribed_radius\), 1.5 m"
+    text = r"'inflation': inflation_radius of at least the robot's radius \(mesh_map.inscribed_radius\), 1.5 m"
     with pytest.raises(LayerGraphError, match=text):
         build_mesh_map(parameters, {"inflation": {"inflation_radius": 0.6}}, vertices=vertices, faces=faces)
