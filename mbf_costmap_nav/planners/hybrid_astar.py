@@ -168,8 +168,8 @@ class HybridAStarPlanner(CostmapPlanner):
     def _car(self, resolution: float, cells: float) -> Car:
         """The car as the search takes it, with bins of so many cells."""
         p = self.parameters
-        # An arc leaves its bin, and turns by a bin of the headings at least.
-        step = max(1.5 * cells * resolution, 2.0 * math.pi / HEADINGS * p.min_turning_radius)
+        # An arc leaves its bin, and turns by a bin of the headings at least; in fine bins, for tight places, by a part.
+        step = max(1.5 * cells * resolution, min(1.0, cells) * 2.0 * math.pi / HEADINGS * p.min_turning_radius)
         return Car(
             radius=p.min_turning_radius,
             reversing=p.allow_reversing,
