@@ -38,12 +38,19 @@ SCENARIO = {
     "sensors": [{"name": "lidar", "rays": 180, "max_range": 8.0}],
 }
 
+PROGRAM = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell lets its background jobs ignore it
+from mbf_abstract.cli import main
+main()
+"""
+
 
 @pytest.fixture
 def slow_run(tmp_path):
     """Start ``mbf run`` in real time; returns the process and its folder once some seconds have been driven."""
     (tmp_path / "corridor.yaml").write_text(yaml.safe_dump(SCENARIO))
-    start = [sys.executable, "-c", "from mbf_abstract.cli import main; main()", "run", str(tmp_path / "corridor.yaml")]
+    start = [sys.executable, "-c", PROGRAM, "run", str(tmp_path / "corridor.yaml")]
     process = subprocess.Popen(
         [*start, "--wall-clock", "--out", str(tmp_path / "run")],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,

@@ -31,7 +31,14 @@ TEXTS = [
     r"$\frac$", "$$", "$x_{", "\ud800", "a\udfff b", "[/x]", "[bold]", "</script><b>", "\x00\x07", "x" * 20_000,
     "\u202e\U0001f600", "走廊", "{0}%s",
 ]  # fmt: skip
-CALM = {"max_tilt_deg": 5.0, "path_length_m": 10.0, "mishaps": [], "collisions_while_moving": 0}
+CALM = {
+    "max_tilt_deg": 5.0,
+    "path_length_m": 10.0,
+    "mishaps": [],
+    "collisions_while_moving": 0,
+    "arrivals": [],
+    "arrival_tolerance": (0.4, 180.0),
+}
 
 
 def run_called(text):
