@@ -4,8 +4,7 @@ When to use: steps, kerbs, walls and holes that are small against the slope of t
 because a smooth slope costs nothing here. When not: meshes whose edges are as long as the radius (nothing lies within
 it) and noisy scans with random normals.
 Rule of mesh_navigation: the neighbourhood is a cylinder about the vertex normal. It has no bound along the normal
-there, so next to a wall it can run over the whole mesh, at a cost quadratic in the vertices;
-``height_limit`` bounds it.
+there, so next to a wall it can run over the whole mesh; ``height_limit`` bounds it.
 """
 
 from __future__ import annotations
@@ -14,7 +13,11 @@ import numpy as np
 
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.kernels.neighbourhood_layers import height_differences
+from mbf_mesh_nav.kernels.patches import bound_patches, grow_patches, height_differences_by_patches, patch_borders
 from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
+
+_DENSE = 16.0
+"""Edges in a radius from which patches pay: of about 48 vertices, they are then small against the neighbourhood."""
 
 
 class HeightDiffParameters(LayerParameters):
@@ -36,13 +39,17 @@ class HeightDiffLayer(MeshLayer):
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = height difference [m], lethal above ``threshold``."""
-        mesh = self.topology
-        costs = height_differences(
-            mesh.vertices,
-            mesh.vertex_normals,
-            mesh.neighbour_offsets,
-            mesh.neighbours,
-            self.parameters.radius,
-            self.parameters.height_limit,
-        )
+        costs = self._differences()
         return costs, costs > self.parameters.threshold
+
+    def _differences(self) -> CostArray:
+        """Height differences (V,) [m]; dense meshes by patches, which gives the same values."""
+        mesh, lengths = self.topology, self.topology.neighbour_lengths
+        surface = mesh.vertices, mesh.vertex_normals, mesh.neighbour_offsets, mesh.neighbours
+        limits = self.parameters.radius, self.parameters.height_limit
+        if len(lengths) == 0 or lengths.mean() * _DENSE > self.parameters.radius:
+            return height_differences(*surface, *limits)
+        patch_of, members, begins = grow_patches(mesh.vertices, mesh.neighbour_offsets, mesh.neighbours)
+        bounds = bound_patches(mesh.vertices, mesh.vertex_normals, members, begins)
+        borders = patch_borders(patch_of, mesh.neighbour_offsets, mesh.neighbours, len(bounds))
+        return height_differences_by_patches(*surface, *limits, patch_of, members, begins, bounds, borders)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.kernels.neighbourhood_layers import height_differences
 from mbf_mesh_nav.kernels.polygons import inside_polygon
 from mbf_mesh_nav.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.layers.border import BorderLayer
@@ -58,6 +59,29 @@ def test_height_difference_equals_its_twin(seed, radius):
     for v, normal in enumerate(mesh.vertex_normals):
         heights = mesh.vertices[[v, *neighbourhood(mesh, v, radius, plane=True)]] @ normal
         assert layer.costs[v] == pytest.approx(heights.max() - heights.min(), abs=1e-6)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(0, 10_000), st.floats(0.25, 0.5), st.floats(0.005, 0.2), st.floats(0.0, 0.3))
+def test_height_difference_of_dense_meshes_takes_patches_and_keeps_every_bit(seed, radius, height_limit, left_out):
+    rng = np.random.default_rng(seed)
+    x, y = np.meshgrid(np.linspace(0.0, 6.0, 45), np.linspace(0.0, 6.0, 35))
+    heights = 0.03 * np.sin(x) * np.cos(y) + rng.random() * 0.01 * rng.random(x.shape)
+    vertices, faces = heightfield_mesh(heights, 0.01, 0.01)
+    mesh = MeshMap.from_arrays(vertices, faces[rng.random(len(faces)) >= left_out])
+    surface = mesh.vertices, mesh.vertex_normals, mesh.neighbour_offsets, mesh.neighbours
+
+    for limit in (height_limit, np.inf):
+        layer = computed(mesh, HeightDiffLayer, radius=radius, height_limit=limit)
+        np.testing.assert_array_equal(layer.costs, height_differences(*surface, radius, limit))
+
+
+def test_height_difference_of_a_dense_mesh_does_not_reach_over_a_gap():
+    low, faces = heightfield_mesh(np.zeros((20, 20)), 0.01, 0.01)
+    vertices = np.vstack([low, low + np.array([0.0, 0.0, 0.1])])
+    mesh = MeshMap.from_arrays(vertices, np.vstack([faces, faces + len(low)]))
+
+    assert (computed(mesh, HeightDiffLayer, radius=0.3).costs == 0.0).all()
 
 
 @settings(deadline=None, max_examples=10)
