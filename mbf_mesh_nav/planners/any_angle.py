@@ -2,9 +2,9 @@
 
 Strengths: the path of ``mesh.cvp``, a geodesic where nothing on it has a cost, without computing a vector field; over
 costs it is pulled taut as far as that costs no more, where ``mesh.cvp`` keeps the way down the field. Known failure: a
-local optimum, it passes ridges and obstacles on the side on which the wave did. Cost: that of a wave; over costs the
-attempts to pull pieces taut take twice as long again or more. When not: with a controller that wants a field; on coarse
-meshes, with faces as long as the way around an obstacle, densify the map (``mesh_map.densify``).
+local optimum, it passes ridges and obstacles on the side on which the wave did. Cost: little more than that of a wave.
+When not: with a controller that wants a field; on coarse meshes, with faces as long as the way around an obstacle,
+densify the map (``mesh_map.densify``).
 """
 
 from __future__ import annotations
