@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 import trimesh
+from pygeodesic import geodesic
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
@@ -98,7 +99,6 @@ def torus():
 @pytest.mark.parametrize("make", [lambda: irregular(250, 2), stretched, torus], ids=["irregular", "stretched", "torus"])
 @pytest.mark.parametrize("planner_class", [CVPPlanner, AnyAnglePlanner])
 def test_paths_are_exact_geodesics_but_for_three_percent(make_plugin, planner_class, make):
-    geodesic = pytest.importorskip("pygeodesic.geodesic")
     mesh_map = MeshMap.from_arrays(*make())
     solver = geodesic.PyGeodesicAlgorithmExact(mesh_map.vertices, mesh_map.faces)
     planner, rng, ratios = make_plugin(planner_class, mesh_map), np.random.default_rng(3), []
