@@ -28,7 +28,8 @@ NO_OFFSETS = np.zeros(0, dtype=np.float32)
 class LegQuery:
     """One search: from ``start`` to ``goal`` over the vertices that are not ``blocked`` (V,) bool.
 
-    The poses behind the two points are for planners that look at headings.
+    The poses behind the two points, and how far [rad] the last heading may be off, are for planners that look at
+    headings.
     """
 
     start: SurfacePoint
@@ -38,6 +39,7 @@ class LegQuery:
     cancel_flag: NDArray[np.uint8]
     start_pose: Pose | None = None
     goal_pose: Pose | None = None
+    angle_tolerance: float = 0.0
 
 
 @dataclass(frozen=True)

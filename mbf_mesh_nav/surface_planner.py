@@ -92,7 +92,8 @@ class SurfacePlanner(MeshPlanner):
         poses = (request.start, *request.via, request.goal)
         for index, (start, goal) in enumerate(itertools.pairwise(stops)):
             ends = poses[index], poses[index + 1]
-            leg = self.find_leg(LegQuery(start, goal, snapshot, blocked, request.cancel_token.flag, *ends))
+            tolerance = request.angle_tolerance if index == len(request.via) else 0.0
+            leg = self.find_leg(LegQuery(start, goal, snapshot, blocked, request.cancel_token.flag, *ends, tolerance))
             if leg is None:
                 problem = self._no_path(start, goal, blocked)
                 break
@@ -183,7 +184,8 @@ class SurfacePlanner(MeshPlanner):
         """Leg to the reachable vertex nearest to the goal, if one lies within ``dist_tolerance``."""
         mesh_map = self.mesh_map
         last_pose = (request.start, *request.via)[-1]
-        query = LegQuery(start, start, snapshot, blocked, request.cancel_token.flag, last_pose, request.goal)
+        ends = last_pose, request.goal, request.angle_tolerance
+        query = LegQuery(start, start, snapshot, blocked, request.cancel_token.flag, *ends)
         distances = self.reach(query)
         if distances is None:
             return None

@@ -23,6 +23,22 @@ def nearest_corner(mesh_map: MeshMap, point: SurfacePoint) -> int:
     return int(mesh_map.faces[point.face, np.argmax(point.barycentric)])
 
 
+def passes_blocked_corner(start: SurfacePoint, end: SurfacePoint, blocked: NDArray[np.bool_]) -> bool:
+    """Whether the line between two points of one face comes nearer to a blocked corner (3,) than to the free ones.
+
+    Neither point does itself. How much nearer is the lesser of two linear functions, so greatest where they are equal.
+    """
+    begin, change = start.barycentric, end.barycentric - start.barycentric
+    for corner in np.flatnonzero(blocked).tolist():
+        left, right = (corner + 1) % 3, (corner + 2) % 3
+        rate = change[left] - change[right]
+        share = min(max(float((begin[right] - begin[left]) / rate), 0.0), 1.0) if rate != 0.0 else 0.5
+        there = begin + share * change
+        if there[corner] > max(there[left], there[right]):
+            return True
+    return False
+
+
 def surface_point_at_vertex(mesh_map: MeshMap, vertex: int) -> SurfacePoint:
     """Return the surface point at a vertex, in one of its faces."""
     face = int(mesh_map.vertex_faces[mesh_map.vertex_face_offsets[vertex]])

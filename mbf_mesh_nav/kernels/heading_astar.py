@@ -2,7 +2,8 @@
 
 A state is ``vertex * HEADINGS + heading``. A move turns on the spot to the heading of an edge, over headings that are
 all allowed there, and drives along the edge; it costs the edge's weight, lengthened by the roll it brings, plus the
-turn.
+turn. Whether the tilt allows an edge at the very heading of the edge, all along it, is found out when a search first
+wants to take it.
 """
 
 from __future__ import annotations
@@ -15,10 +16,13 @@ from numpy.typing import NDArray
 from mbf_mesh_nav.kernels.astar import straight_line_bound
 from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.footprint_sweep import Chassis, Ground, Scratch, edge_use
 from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
 HEADINGS = 16
 HEADING_STEP = 2.0 * math.pi / HEADINGS
+UNKNOWN, DRIVABLE, FORBIDDEN = 0, 1, 2
+"""What is known of a directed edge."""
 
 
 @kernel
@@ -38,8 +42,12 @@ def search_with_heading(
     seeds: Int32Array,
     targets: Int32Array,
     target_offsets: Float32Array,
+    target_headings: Int32Array,
     goal: NDArray[np.float64],
-    goal_heading: int,
+    edges: NDArray[np.uint8],
+    ground: Ground,
+    chassis: Chassis,
+    scratch: Scratch,
     cancel_flag: FlagArray,
 ) -> tuple[int, float]:
     """Relax ``distances`` and ``predecessors`` in place until the best target state is settled.
@@ -60,9 +68,13 @@ def search_with_heading(
         Start states.
     targets, target_offsets : (t,) int32, (t,) float32 [m]
         Goal vertices and what is left from them to the goal.
+    target_headings : (t,) int32
+        Turning to it at the goal vertex costs, too, and has to be allowed; -1 = any heading will do.
     goal : (3,) float64 [m]
-    goal_heading : int
-        Turning to it at the goal costs, too, and has to be allowed; -1 = any heading will do.
+    edges : (2E,) uint8
+        Whether a directed edge may be driven; what is ``UNKNOWN`` is found out and written here.
+    ground, chassis, scratch
+        The surface, the robot and its limits, see ``footprint_sweep``.
     cancel_flag : (1,) uint8
 
     Returns
@@ -90,7 +102,7 @@ def search_with_heading(
         vertex, heading = state // HEADINGS, state % HEADINGS
         for i in range(len(targets)):
             if targets[i] == vertex:
-                turn = 0 if goal_heading < 0 else _shortest_turn(heading, goal_heading)
+                turn = 0 if target_headings[i] < 0 else _shortest_turn(heading, target_headings[i])
                 total = distances[state] + target_offsets[i] + turning_cost * HEADING_STEP * abs(turn)
                 if total < best_total and _may_turn(allowed, vertex, heading, turn):
                     best_state, best_total = state, total
@@ -105,6 +117,11 @@ def search_with_heading(
             candidate = np.float32(distances[state] + drive + turning_cost * HEADING_STEP * abs(turn))
             following = neighbour * HEADINGS + new_heading
             if candidate < distances[following]:
+                if edges[slot] == UNKNOWN:
+                    use = edge_use(ground, chassis, scratch, Count(vertex), Count(neighbour))
+                    edges[slot] = DRIVABLE if use <= 1.0 else FORBIDDEN
+                if edges[slot] == FORBIDDEN:
+                    continue
                 distances[following] = candidate
                 predecessors[following] = state
                 key = candidate + straight_line_bound(vertices, Index(neighbour), goal)

@@ -15,8 +15,9 @@ from mbf_mesh_nav.kernels.vectors import Float64Array, Vector, cross, difference
 def poses_along(positions: Float64Array, normals: Float64Array, tolerance: float) -> tuple[Float64Array, Float64Array]:
     """Positions (m, 3) and quaternions (m, 4), x y z w: each pose stands on its normal and looks to the next one.
 
-    Both ends are kept, and of the points between what is farther than ``tolerance`` from the point before and from
-    the last one. The last pose looks any way.
+    Both ends are kept, and of the points between what is farther than ``tolerance`` from the last one kept before;
+    what comes that near to the end just before it is dropped, too. A way that passes the place where it ends keeps its
+    course there. The last pose looks any way.
 
     Parameters
     ----------
@@ -25,17 +26,22 @@ def poses_along(positions: Float64Array, normals: Float64Array, tolerance: float
     tolerance : float
         Distance [m].
     """
-    last, limit, count = len(positions) - 1, tolerance * tolerance, Count(0)
+    last, limit, count = len(positions) - 1, tolerance * tolerance, Count(1)
     kept = np.empty(len(positions), dtype=np.int32)
-    end, before = row(positions, last), row(positions, Count(0))
-    for index in range(len(positions)):
-        point = row(positions, index)
-        to_end, step = difference(end, point), difference(point, before)
-        between = dot(to_end, to_end) > limit and dot(step, step) > limit
-        if between or index == 0 or index == last:
+    kept[0] = 0
+    for index in range(1, last):
+        step = difference(row(positions, index), row(positions, Count(kept[count - 1])))
+        if dot(step, step) > limit:
             kept[count] = index
             count += 1
-        before = point
+    end = row(positions, last)
+    while count > 1:
+        to_end = difference(end, row(positions, Count(kept[count - 1])))
+        if dot(to_end, to_end) > limit:
+            break
+        count -= 1
+    kept[count] = last
+    count += 1
     points = np.empty((count, 3), dtype=np.float64)
     orientations = np.empty((count, 4), dtype=np.float64)
     for place in range(count):

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from mbf_mesh_nav.kernels.compiled import kernel
-from mbf_mesh_nav.kernels.dijkstra import BoolArray, Float32Array
+from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.dijkstra import BoolArray, Float32Array, Int32Array
 from mbf_mesh_nav.kernels.vectors import Float64Array
 
 
@@ -52,3 +52,31 @@ def tilt_of_normals(
             allowed[vertex, heading] = abs(roll) <= max_roll and abs(pitch) <= max_pitch
             rolls[vertex, heading] = roll
     return allowed, rolls
+
+
+@kernel
+def slopes_of_edges(
+    vertices: Float64Array,
+    neighbour_offsets: Int32Array,
+    neighbours: Int32Array,
+    normals: Float64Array,
+    max_roll: float,
+    max_pitch: float,
+) -> BoolArray:
+    """Which directed edges (2E,) a robot on the tangent plane may drive along, at the very heading of the edge.
+
+    Between both ends the normal goes from one to the other in proportion, so roll and pitch are greatest at an end.
+    """
+    allowed = np.empty(len(neighbours), dtype=np.bool_)
+    for vertex in range(len(vertices)):
+        for slot in range(neighbour_offsets[vertex], neighbour_offsets[vertex + 1]):
+            other = neighbours[slot]
+            dx, dy = vertices[other, 0] - vertices[vertex, 0], vertices[other, 1] - vertices[vertex, 1]
+            length = math.sqrt(dx * dx + dy * dy)
+            worst = 0.0 if length > 0.0 else np.inf
+            for end in (Count(vertex), Count(other)):
+                x, y, up = normals[end, 0], normals[end, 1], normals[end, 2] * length
+                roll, pitch = abs(math.atan2(y * dx - x * dy, up)), abs(math.atan2(x * dx + y * dy, up))
+                worst = max(worst, roll / max_roll, pitch / max_pitch)
+            allowed[slot] = worst <= 1.0
+    return allowed

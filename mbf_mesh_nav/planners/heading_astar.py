@@ -1,7 +1,8 @@
 """Heading-aware A*: plans where a slope may be taken straight but not sideways, and where turning has its price.
 
 Strengths: knows the direction of slopes (limits for roll and pitch, per heading) and the turns of the path; with a
-``tilt`` layer it uses the footprint settled on the surface, without one the vertex normals. Known failure: drives along
+``tilt`` layer it uses the footprint settled on the surface, without one the vertex normals. The limits hold all along
+the path, at the headings really driven; turns on the spot are looked at every 22.5 degrees. Known failure: drives along
 edges only, so headings are those of the mesh (six to eight of 16 on regular grids), and the path zigzags in between;
 a cost of roll or turning too high for the map makes it slow. Cost: up to 16 x the states of ``mesh.astar``, about
 320 bytes a vertex while planning; meant for meshes below 300 k vertices.
@@ -9,7 +10,6 @@ a cost of roll or turning too high for the map makes it slow. Cost: up to 16 x t
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -18,18 +18,17 @@ from numpy.typing import NDArray
 from mbf_abstract.arithmetic import arctan2
 from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import PlanResult
+from mbf_mesh_nav.end_stretches import EndStretches, headings_within
+from mbf_mesh_nav.heading_limits import FootprintLimits, HeadingLimits, NormalLimits, ground_of
 from mbf_mesh_nav.kernels.dijkstra import follow_predecessors
+from mbf_mesh_nav.kernels.footprint_sweep import scratch_for
 from mbf_mesh_nav.kernels.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
-from mbf_mesh_nav.kernels.slopes import tilt_of_normals
-from mbf_mesh_nav.layers.tilt import TiltLayer, heading_index
+from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, Leg, LegQuery, straight_leg
 from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.surface_planner import SurfacePlanner, SurfacePlannerParameters
-from mbf_mesh_nav.surface_point import corner_distances, nearest_corner
 
-AT_ONE_PLACE = 1e-6
-"""Start and goal this near [m] have no direction between them."""
 CANCELLED = -2
 """What ``search_with_heading`` answers instead of a state."""
 
@@ -54,6 +53,7 @@ class HeadingAStarPlanner(SurfacePlanner):
     parameters: HeadingAStarParameters
 
     _tilt_at_ends = ""
+    _limits: FootprintLimits | NormalLimits | None = None
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
@@ -76,14 +76,13 @@ class HeadingAStarPlanner(SurfacePlanner):
 
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Search from the start's corners, with the robot's heading, to the goal's corners."""
-        mesh_map = self.mesh_map
-        allowed, roll = self._tilt()
-        if query.start.face == query.goal.face and self._may_drive_straight(query, allowed):
+        mesh_map, limits = self.mesh_map, self._current_limits()
+        stretches = EndStretches(mesh_map, limits, query, self.parameters.turning_cost)
+        if query.start.face == query.goal.face and stretches.may_drive_straight():
             return straight_leg(mesh_map, query)
-        targets = corner_distances(mesh_map, query.blocked, query.goal, query.snapshot)
-        best, cost, _, predecessors = self._search(query, allowed, roll, *targets)
+        best, cost, _, predecessors = self._search(query, limits, stretches.from_start(), stretches.to_goal())
         if best < 0:
-            self._tilt_at_ends = self._describe_ends(query, allowed)
+            self._tilt_at_ends = self._describe_ends(query, limits)
             return None
         chain = follow_predecessors(predecessors, best)[::-1] // HEADINGS
         positions = np.concatenate([[query.start.point], mesh_map.vertices[chain], [query.goal.point]])
@@ -92,32 +91,33 @@ class HeadingAStarPlanner(SurfacePlanner):
         return Leg(positions, normals, cost)
 
     def reach(self, query: LegQuery) -> NDArray[np.float32] | None:
-        """As for every planner; here to where the robot may also turn to the heading of the goal."""
-        allowed, roll = self._tilt()
-        best, _, distances, _ = self._search(query, allowed, roll, NO_TARGETS, NO_OFFSETS)
+        """As for every planner; here to where the robot may also turn to a heading asked for at the goal."""
+        limits = self._current_limits()
+        from_start = EndStretches(self.mesh_map, limits, query, self.parameters.turning_cost).from_start()
+        best, _, distances, _ = self._search(query, limits, from_start, (NO_TARGETS, NO_OFFSETS, NO_TARGETS))
         if best == CANCELLED:
             return None
         by_heading = distances.reshape(-1, HEADINGS)
-        if query.goal_pose is None:
+        headings = headings_within(query.goal_pose, query.angle_tolerance)
+        if not headings:
             return np.asarray(by_heading.min(axis=1))
-        may_turn = may_turn_to(allowed, heading_index(query.goal_pose.yaw))
+        may_turn = np.zeros_like(limits.allowed)
+        for heading in headings:
+            may_turn |= may_turn_to(limits.allowed, heading)
         return np.asarray(np.where(may_turn, by_heading, np.float32(np.inf)).min(axis=1))
 
     def _search(
         self,
         query: LegQuery,
-        allowed: NDArray[np.bool_],
-        roll: NDArray[np.float32],
-        targets: NDArray[np.int32],
-        target_offsets: NDArray[np.float32],
+        limits: HeadingLimits,
+        from_start: tuple[NDArray[np.int32], NDArray[np.float32]],
+        to_goal: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.int32]],
     ) -> tuple[int, float, NDArray[np.float32], NDArray[np.int32]]:
         """Run the kernel: best target state, its cost, distances and predecessors (16 V,) of all states it came to."""
         mesh_map = self.mesh_map
         distances = np.full(HEADINGS * len(mesh_map.vertices), np.inf, dtype=np.float32)
         predecessors = np.full(len(distances), -1, dtype=np.int32)
-        heading = 0 if query.start_pose is None else heading_index(query.start_pose.yaw)
-        corners, offsets = corner_distances(mesh_map, query.blocked, query.start, query.snapshot)
-        seeds = corners * np.int32(HEADINGS) + np.int32(heading)
+        seeds, offsets = from_start
         distances[seeds] = offsets
         best, cost = search_with_heading(
             mesh_map.vertices,
@@ -126,17 +126,19 @@ class HeadingAStarPlanner(SurfacePlanner):
             query.snapshot.edge_weights,
             self._edge_headings,
             query.blocked,
-            allowed,
-            roll,
+            limits.allowed,
+            limits.roll,
             self.parameters.roll_cost,
             self.parameters.turning_cost,
             distances,
             predecessors,
             seeds,
-            targets,
-            target_offsets,
+            *to_goal,
             query.goal.point,
-            -1 if query.goal_pose is None else heading_index(query.goal_pose.yaw),
+            limits.edges,
+            ground_of(mesh_map),
+            limits.chassis,
+            scratch_for(len(mesh_map.vertices)),
             query.cancel_flag,
         )
         return best, cost, distances, predecessors
@@ -146,32 +148,27 @@ class HeadingAStarPlanner(SurfacePlanner):
         result = super()._no_path(start, goal, blocked)
         return replace(result, message=result.message + self._tilt_at_ends)
 
-    def _describe_ends(self, query: LegQuery, allowed: NDArray[np.bool_]) -> str:
+    def _describe_ends(self, query: LegQuery, limits: HeadingLimits) -> str:
         """Which of the two poses the tilt forbids, else that it may close ways in between."""
         ends = (("start", query.start, query.start_pose), ("goal", query.goal, query.goal_pose))
         tilted = [
             f"; tilt forbids the heading {pose.yaw:.2f} rad at the {name}"
             for name, point, pose in ends
-            if pose is not None and not allowed[nearest_corner(self.mesh_map, point), heading_index(pose.yaw)]
+            if pose is not None and limits.standing(point, pose.yaw) > 1.0
         ]
-        return "".join(tilted) or f"; tilt forbids {1.0 - float(allowed.mean()):.1%} of all headings"
+        return "".join(tilted) or f"; tilt forbids {1.0 - float(limits.allowed.mean()):.1%} of all headings"
 
-    def _may_drive_straight(self, query: LegQuery, allowed: NDArray[np.bool_]) -> bool:
-        """Whether all corners of the face allow the heading of the line to the goal, and those at both ends."""
-        line = query.goal.point - query.start.point
-        poses = [pose.yaw for pose in (query.start_pose, query.goal_pose) if pose is not None]
-        yaws = [*poses, math.atan2(line[1], line[0])] if np.hypot(line[0], line[1]) > AT_ONE_PLACE else poses
-        corners = self.mesh_map.faces[query.goal.face]
-        return all(bool(allowed[corners, heading_index(yaw)].all()) for yaw in yaws)
-
-    def _tilt(self) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
-        """Allowed headings (V, 16) and roll (V, 16) [rad]: of the tilt layer, or of the vertex normals."""
+    def _current_limits(self) -> HeadingLimits:
+        """Limits of the tilt layer, or of the vertex normals; kept while neither layer nor parameters change."""
         layer = self.mesh_map.layers.get(self.parameters.tilt_layer)
         if isinstance(layer, TiltLayer):
-            return layer.allowed, layer.roll
-        limits = self.parameters.max_roll, self.parameters.max_pitch
-        headings = np.asarray(np.arange(HEADINGS) * HEADING_STEP, dtype=np.float64)
-        return tilt_of_normals(self.mesh_map.vertex_normals, headings, *limits)
+            if not isinstance(self._limits, FootprintLimits) or self._limits.allowed is not layer.allowed:
+                self._limits = FootprintLimits(self.mesh_map, layer)
+            return self._limits
+        angles = self.parameters.max_roll, self.parameters.max_pitch
+        if not isinstance(self._limits, NormalLimits) or self._limits.angles != angles:
+            self._limits = NormalLimits(self.mesh_map, *angles)
+        return self._limits
 
 
 def may_turn_to(allowed: NDArray[np.bool_], heading: int) -> NDArray[np.bool_]:

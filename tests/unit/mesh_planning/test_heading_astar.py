@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.kernels.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
+from mbf_mesh_nav.heading_limits import NO_CHASSIS, ground_of
+from mbf_mesh_nav.kernels.footprint_sweep import scratch_for
+from mbf_mesh_nav.kernels.heading_astar import DRIVABLE, HEADING_STEP, HEADINGS, search_with_heading
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner, may_turn_to
 
@@ -61,7 +63,9 @@ def test_the_search_finds_the_cost_of_the_naive_one(make_plugin, seed):
         mesh_map.vertices, mesh_map.neighbour_offsets, mesh_map.neighbours, mesh_map.neighbour_lengths, headings,
         np.zeros(count, bool), allowed, roll, 0.7, 0.2, distances, predecessors,
         np.array([start * HEADINGS + 2], np.int32), np.array([target], np.int32), np.full(1, 0.1, np.float32),
-        mesh_map.vertices[target], goal_heading, np.zeros(1, np.uint8),
+        np.array([goal_heading], np.int32), mesh_map.vertices[target],
+        np.full(len(mesh_map.neighbours), DRIVABLE, np.uint8), ground_of(mesh_map), NO_CHASSIS, scratch_for(count),
+        np.zeros(1, np.uint8),
     )  # fmt: skip
     expected = slow_search(mesh_map, headings, allowed, roll, 0.7, 0.2, (start, 2), target, 0.1, goal_heading)
     assert total == pytest.approx(expected, rel=1e-5)

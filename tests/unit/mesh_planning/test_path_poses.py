@@ -29,14 +29,21 @@ def test_a_way_straight_up_the_normal_still_gives_a_pose():
 
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=30, deadline=None)
-def test_only_inner_points_that_repeat_their_forerunner_or_the_end_are_dropped(seed):
+def test_only_inner_points_that_repeat_their_forerunner_or_end_where_the_way_ends_are_dropped(seed):
     rng = np.random.default_rng(seed)
     positions = rng.integers(0, 2, (rng.integers(2, 12), 3)).astype(float)
-    kept = [
-        i in (0, len(positions) - 1)
-        or (np.linalg.norm(p - positions[i - 1]) > 1e-6 and np.linalg.norm(p - positions[-1]) > 1e-6)
-        for i, p in enumerate(positions)
-    ]
+    kept = [positions[0]]
+    for position in positions[1:-1]:
+        if np.linalg.norm(position - kept[-1]) > 1e-6:
+            kept.append(position)
+    while len(kept) > 1 and np.linalg.norm(kept[-1] - positions[-1]) <= 1e-6:
+        kept.pop()
     found, orientations = poses_along(positions, np.tile([0.0, 0.0, 1.0], (len(positions), 1)), 1e-6)
-    np.testing.assert_array_equal(found, positions[kept])
+    np.testing.assert_array_equal(found, [*kept, positions[-1]])
     assert len(orientations) == len(found)
+
+
+def test_a_way_that_passes_the_place_where_it_ends_keeps_its_course_there():
+    way = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.5], [2.0, 0.0, 0.0], [1.0, 0.0, 0.5]])
+    found, _ = poses_along(way, np.tile([0.0, 0.0, 1.0], (4, 1)), 1e-6)
+    np.testing.assert_array_equal(found, way)
