@@ -27,6 +27,13 @@ FROM_CORNER = 2.5
 FLAT_LETHAL_SLOPE = 30.0
 CONFIGS = {name: SHIPPED / "config" / f"outdoor_{name}.yaml" for name in ("mesh", "costmap")}
 SURVEYS = {"kootenai_1m.npz": 1.0, "N44W072.hgt": 0.5 / 90.0, "jacksboro.npz": 0.5 / 80.0, "bigtujunga.npz": 0.5 / 30.0}
+FRESH_SURVEYS = {  # nothing was ever chosen on these
+    "tidal_2m.npz": 0.5 / 2.0,
+    "gale_aeolis_mount_sharp_aeolis_palus_center.npz": 0.5 / 2.0,
+    "jezero_neretva_neretva_center.npz": 0.5 / 2.0,
+}
+SCALES = SURVEYS | FRESH_SURVEYS
+FRESH_SEED = 5000
 
 
 def scenario_in(name: str, world: GeneratedWorld | HeightfieldWorld, corner: tuple[float, float]) -> Scenario:
@@ -71,7 +78,7 @@ def _survey(file: Path) -> Heightfield:
 
 def real(file: Path, seed: int) -> Scenario:
     """A crop of a survey, drawn from the seed."""
-    survey, scale = _survey(file), SURVEYS[file.name]
+    survey, scale = _survey(file), SCALES[file.name]
     length, width = (side / scale for side in SIZE)
     rng = np.random.default_rng(seed)
     x = survey.x0 + rng.uniform(0.0, survey.size[0] - length)
@@ -89,9 +96,13 @@ def real(file: Path, seed: int) -> Scenario:
 
 
 def terrains(data: Path, first_seed: int, generated_seeds: int, crops: int) -> list[tuple[Scenario, int]]:
-    """Every level with ``generated_seeds`` seeds and ``crops`` of each survey there is, each with its seed."""
-    files = [(data / "terrain" / "dem" / name).resolve() for name in SURVEYS]
-    files = [file for file in files if file.is_file()]
+    """Every level with ``generated_seeds`` seeds and ``crops`` of each survey there is, each with its seed.
+
+    From ``FRESH_SEED`` on the fresh surveys count, too.
+    """
+    names = SCALES if first_seed >= FRESH_SEED else SURVEYS
+    places = [(data / "terrain" / folder / name).resolve() for name in names for folder in ("dem", "mars")]
+    files = [file for file in places if file.is_file()]
     chosen = []
     for number in range(max(generated_seeds, crops)):  # easy and hard ones mixed, so that a part tells of the whole
         seed = first_seed + number
