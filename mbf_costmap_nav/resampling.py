@@ -15,7 +15,8 @@ from mbf_costmap_nav.costmap import FREE, UNKNOWN, CellArray, CellBox, Costmap, 
 from mbf_costmap_nav.placement import mapped
 
 ON_A_BORDER = 1e-6
-"""A centre this close [cells] below a border counts as above it, so that rounding never moves it to and fro."""
+"""A centre this close [cells] below a border counts as above it, so that rounding never moves it to and fro: on a grid
+half a cell beside its source every centre lies on one, and each wall would be lost here and twice as thick there."""
 
 
 def sample_costmap(
@@ -54,8 +55,7 @@ def _at_centres(source: Costmap, geometry: GridGeometry, box: CellBox, outside: 
     """Value of the source at the centre of each cell."""
     x = geometry.origin_x + (np.arange(box.x0, box.x1) + 0.5) * geometry.resolution
     y = geometry.origin_y + (np.arange(box.y0, box.y1) + 0.5) * geometry.resolution
-    ix = np.floor((x - source.origin_x) / source.resolution).astype(np.int64)
-    iy = np.floor((y - source.origin_y) / source.resolution).astype(np.int64)
+    ix, iy = _cells(x, source.origin_x, source), _cells(y, source.origin_y, source)
     columns, rows = (ix >= 0) & (ix < source.width), (iy >= 0) & (iy < source.height)
     values = np.full((len(y), len(x)), outside, dtype=np.uint8)
     values[np.ix_(rows, columns)] = source.cells[np.ix_(iy[rows], ix[columns])]
@@ -67,7 +67,12 @@ def _cells_of_centres(
 ) -> NDArray[np.int64]:
     """Index, counted from ``start``, of the cell in which each of the source's ``count`` centres along an axis lies."""
     centres = source_origin + (np.arange(count) + 0.5) * source.resolution
-    return np.asarray(np.floor((centres - origin) / geometry.resolution + ON_A_BORDER), dtype=np.int64) - start
+    return _cells(centres, origin, geometry) - start
+
+
+def _cells(points: NDArray[np.float64], lower: float | NDArray[np.float64], grid: GridGeometry) -> NDArray[np.int64]:
+    """Index of the cell of ``grid``, counted from its corner ``lower`` [m], in which each point [m] lies."""
+    return np.asarray(np.floor((points - lower) / grid.resolution + ON_A_BORDER), dtype=np.int64)
 
 
 def _raise_by_blocks(values: CellArray, cells: CellArray, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> None:
@@ -91,14 +96,15 @@ def _sample_transformed(
     lower = np.array([geometry.origin_x, geometry.origin_y]) + np.array([box.x0, box.y0]) * geometry.resolution
     rows, columns = (axis.ravel() for axis in np.indices(values.shape))
     centres = lower + (np.column_stack([columns, rows]) + 0.5) * geometry.resolution
-    cells, inside = source.world_to_cells(mapped(T_source_grid, centres))
-    values[rows[inside], columns[inside]] = source.cells[cells[inside, 1], cells[inside, 0]]
+    ix, iy = _cells(mapped(T_source_grid, centres), np.array([source.origin_x, source.origin_y]), source).T
+    inside = (ix >= 0) & (ix < source.width) & (iy >= 0) & (iy < source.height)
+    values[rows[inside], columns[inside]] = source.cells[iy[inside], ix[inside]]
 
     part = _around(source, lower, values.shape, geometry.resolution, T_source_grid)
     costs = _known(source.cells[part.slices])
     iy, ix = np.nonzero(costs)
     points = mapped(T_source_grid.inverse(), source.cells_to_world(np.column_stack([ix + part.x0, iy + part.y0])))
-    x, y = np.floor((points - lower) / geometry.resolution + ON_A_BORDER).astype(np.int64).T
+    x, y = _cells(points, lower, geometry).T
     seen = (x >= 0) & (x < values.shape[1]) & (y >= 0) & (y < values.shape[0])
     highest = np.zeros_like(values)
     np.maximum.at(highest, (y[seen], x[seen]), costs[iy[seen], ix[seen]])

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -16,17 +16,27 @@ from mbf_costmap_nav.resampling import sample_costmap
 
 
 def one_by_one(source, grid, box, outside, T_source_grid=None):
-    """The slow way: the value at each centre, then each cost where its own centre lies."""
+    """The slow way: the value at each centre, then each cost of a finer or turned map where its own centre lies."""
     there = T_source_grid or Transform((0.0, 0.0, 0.0), parent=source.frame_id, child="grid")
+
+    def cell(of, x, y):
+        """A point on a border, or a rounding error below it, lies in the upper cell."""
+        return tuple(
+            math.floor((at - lower) / of.resolution + 1e-6) for at, lower in ((x, of.origin_x), (y, of.origin_y))
+        )
+
     values = np.full((box.y1 - box.y0, box.x1 - box.x0), outside, dtype=np.uint8)
     for iy, ix in np.ndindex(*values.shape):
         x, y = there.apply([(*grid.cell_to_world(ix + box.x0, iy + box.y0), 0.0)])[0, :2]
-        cost = source.cost_at(x, y)
-        values[iy, ix] = outside if cost is None else cost
+        column, row = cell(source, x, y)
+        if 0 <= column < source.width and 0 <= row < source.height:
+            values[iy, ix] = source.cost(column, row)
+    if T_source_grid is None and source.resolution >= grid.resolution:
+        return values  # a centre lies in every cell of the source
     for iy, ix in np.argwhere((source.cells != FREE) & (source.cells != UNKNOWN)):
         x, y = there.inverse().apply([(*source.cell_to_world(ix, iy), 0.0)])[0, :2]
-        column = math.floor((x - grid.origin_x) / grid.resolution) - box.x0
-        row = math.floor((y - grid.origin_y) / grid.resolution) - box.y0
+        column, row = cell(grid, x, y)
+        column, row = column - box.x0, row - box.y0
         if 0 <= column < values.shape[1] and 0 <= row < values.shape[0]:
             known = 0 if values[row, column] == UNKNOWN else values[row, column]
             values[row, column] = max(known, source.cells[iy, ix])
@@ -38,6 +48,12 @@ OFFSETS = st.floats(-1.0, 1.0)
 
 
 @given(SIDES, SIDES, OFFSETS, OFFSETS, st.one_of(st.none(), st.floats(-math.pi, math.pi)), st.integers(0, 99))
+@example(0.4, 0.4, -1.0, 0.0, None, 1)  # centres of one on the borders of the other, of equal cells and of others
+@example(0.2, 0.2, -1.0, -1.0, None, 1)
+@example(0.2, 0.4, -1.0, -1.0, None, 1)
+@example(0.2, 0.2, -1.0, -1.0, 0.0, 1)
+@example(0.4, 0.2, -1.0, -1.0, 0.0, 1)
+@example(0.2, 0.4, -0.5, -1.0, -math.pi / 2, 1)
 @settings(max_examples=60, deadline=None)
 def test_it_is_the_same_as_looked_up_one_by_one(fine, coarse, x, y, yaw, seed):
     values = np.array([FREE, FREE, FREE, UNKNOWN, 17, 200, LETHAL], dtype=np.uint8)
@@ -57,6 +73,17 @@ def test_a_wall_one_cell_wide_stays_a_wall_on_every_coarser_grid(wall, resolutio
     grid = GridGeometry(math.ceil(2.0 / resolution), math.ceil(2.0 / resolution), resolution)
     sampled = sample_costmap(Costmap(cells, 0.05), grid, grid.box, UNKNOWN) == LETHAL
     assert sampled.any(axis=0).sum() >= int(2.0 / resolution) and sampled.any(axis=1).sum() == 1
+
+
+@pytest.mark.parametrize("resolution", [0.025, 0.05, 0.1, 0.3])
+@pytest.mark.parametrize("halves", range(-15, 16))
+def test_a_wall_one_cell_wide_stays_so_on_a_grid_that_lies_half_a_cell_beside(halves, resolution):
+    grid = GridGeometry(60, 10, resolution, -25.0 * resolution)
+    for wall in range(18):
+        cells = np.zeros((14, 18), dtype=np.uint8)
+        cells[:, wall] = LETHAL
+        source = Costmap(cells, resolution, halves * resolution / 2)
+        assert (sample_costmap(source, grid, grid.box, UNKNOWN) == LETHAL).any(axis=0).sum() == 1
 
 
 @pytest.fixture
