@@ -22,7 +22,7 @@ element vertex {len(vertices)}
 property float x
 property float y
 property float z
-element face {2 * len(faces)}
+element face {len(faces)}
 property list uchar int vertex_indices
 end_header
 """
