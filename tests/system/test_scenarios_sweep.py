@@ -9,7 +9,7 @@ import sys
 from contextlib import ExitStack
 
 import pytest
-from distributed import Client, LocalCluster
+from distributed import Client
 from pyarrow import parquet
 
 from terrain.sweep_cluster import ClusterError, run_on_cluster
@@ -17,6 +17,7 @@ from terrain.sweep_cluster import ClusterError, run_on_cluster
 pytestmark = pytest.mark.timeout(300)
 
 COMMAND = "import typer; from terrain.sweep_cli import sweep; typer.run(sweep)"
+CONNECT = "import sys; from terrain.sweep_cluster import run_on_cluster; list(run_on_cluster([], sys.argv[1]))"
 SCENARIO = """
 name: trial
 proves: A short drive.
@@ -47,8 +48,8 @@ def arguments(tmp_path):
 
 
 @pytest.fixture
-def cluster():
-    """A Dask scheduler with two worker processes: its address, and the workers by name."""
+def dask():
+    """``dask(*arguments, wait_for)`` starts a part of a Dask cluster: its process, and the line it waited for."""
     with ExitStack() as processes:
 
         def start(*arguments, wait_for):
@@ -60,14 +61,25 @@ def cluster():
             processes.callback(process.stderr.close)
             return process, next(line for line in process.stderr if wait_for in line)
 
-        line = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", wait_for="Scheduler at")[1]
-        address = line.split()[-1]
-        single = ("--nthreads", "1", "--no-nanny", "--no-dashboard")
-        workers = {
-            name: start("worker", address, *single, "--name", name, wait_for="Starting established connection")[0]
-            for name in ("one", "two")
-        }
-        yield address, workers
+        yield start
+
+
+@pytest.fixture
+def scheduler(dask):
+    """Address of a Dask scheduler."""
+    options = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+    return dask("scheduler", *options, wait_for="Scheduler at")[1].split()[-1]
+
+
+@pytest.fixture
+def worker(dask, scheduler):
+    """``worker(name, threads)`` starts a worker process of the scheduler."""
+
+    def start(name, threads=1):
+        options = ("--nthreads", str(threads), "--no-nanny", "--no-dashboard", "--name", name)
+        return dask("worker", scheduler, *options, wait_for="Starting established connection")[0]
+
+    return start
 
 
 def logged(folder):
@@ -101,13 +113,13 @@ def test_a_killed_sweep_is_resumed_without_losing_or_doubling_a_run(arguments, t
     }
 
 
-def test_a_cluster_that_loses_a_worker_at_work_does_every_run_once(arguments, cluster, tmp_path):
-    address, workers = cluster
-    with Client(address, set_as_default=False) as client:
+def test_a_cluster_that_loses_a_worker_at_work_does_every_run_once(arguments, scheduler, worker, tmp_path):
+    workers = {name: worker(name) for name in ("one", "two")}
+    with Client(scheduler, set_as_default=False) as client:
         client.wait_for_workers(len(workers), timeout=60)
         info = client.scheduler_info(n_workers=-1)["workers"]
-        processes = {where: workers[worker["name"]] for where, worker in info.items()}
-        with subprocess.Popen([*arguments, "--scheduler", address], stdout=subprocess.DEVNULL) as process:
+        processes = {where: workers[told["name"]] for where, told in info.items()}
+        with subprocess.Popen([*arguments, "--scheduler", scheduler], stdout=subprocess.DEVNULL) as process:
             victim = None
             while victim is None:
                 assert process.poll() is None, "the sweep ended before a worker was seen at work"
@@ -129,10 +141,13 @@ def test_a_scheduler_that_does_not_answer_is_told():
         list(run_on_cluster([], "nonsense://here"))
 
 
-def test_workers_with_several_threads_are_refused():
-    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as local:
-        with pytest.raises(ClusterError, match="one thread"):
-            list(run_on_cluster([], local.scheduler_address))
+def test_workers_with_several_threads_are_refused(scheduler, worker):
+    worker("two at once", threads=2)
+
+    # A process of its own: beside busy threads of other tests the client's loop has been seen to start too late.
+    finished = subprocess.run([sys.executable, "-c", CONNECT, scheduler], capture_output=True, text=True)
+
+    assert "ClusterError: workers must have one thread (--nthreads 1)" in finished.stderr
 
 
 def test_settings_that_look_like_markup_neither_break_the_table_nor_vanish(arguments, tmp_path):
