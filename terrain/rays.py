@@ -1,8 +1,8 @@
 """Batches of rays at a world: a tree of boxes for what stands still, Bullet for what moves.
 
 The tree is built once. Bullet knows where moving bodies are at each instant. A range sensor takes the nearer of the two
-answers. Embree casts several times as many rays a second but is not used: its ranges differ by up to 0.1 mm from one
-CPU's instruction set to the next, and so would every drive by lidar (docs/decisions/0013).
+answers. Embree is not used: its ranges differ by up to 0.1 mm from one CPU's instruction set to the next, and so would
+every drive by lidar (docs/decisions/0013).
 """
 
 from __future__ import annotations
@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.arithmetic import norm
-from terrain.kernels.ray_tree import build_leaves, build_nodes, first_distances, morton_codes
+from terrain.kernels.ray_casting import first_distances
+from terrain.kernels.ray_tree import build_tree
 from terrain.world import MOVING, BulletWorld
 
 FloatArray = NDArray[np.float64]
-
-MORTON_CELLS = 2.0**20 - 1.0  # along the longest side, the most that a code has bits for
 
 
 class RayCaster(Protocol):
@@ -49,15 +48,13 @@ class StaticRays:
     """
 
     def __init__(self, vertices: FloatArray, faces: NDArray[np.int32]) -> None:
-        self._tree: tuple[FloatArray, NDArray[np.int64], FloatArray] | None = None
+        self._tree: tuple[FloatArray, NDArray[np.int32], NDArray[np.uint8], FloatArray] | None = None
         if len(faces):
-            vertices = np.ascontiguousarray(vertices, dtype=np.float64)
-            centres = (vertices[faces[:, 0]] + vertices[faces[:, 1]] + vertices[faces[:, 2]]) / 3.0
-            lower, upper = centres.min(axis=0), centres.max(axis=0)
-            cell = max(float((upper - lower).max()), 1e-9) / MORTON_CELLS
-            order = np.argsort(morton_codes(centres, lower, cell), kind="stable")
-            ordered = np.ascontiguousarray(faces[order], dtype=np.int32)
-            self._tree = *build_nodes(vertices, ordered), build_leaves(vertices, ordered)
+            tree = build_tree(
+                np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.int32)
+            )
+            boxes, children, far_first, leaves = tree
+            self._tree = boxes.ravel(), children.ravel(), far_first.ravel(), leaves.ravel()
 
     def distances(self, origins: FloatArray, directions: FloatArray, max_range: float) -> FloatArray:
         """Cast the rays; see ``RayCaster``."""

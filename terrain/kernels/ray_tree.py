@@ -1,8 +1,9 @@
-"""A tree of boxes over triangles that do not move, laid out for rays.
+"""Building a tree of boxes over triangles that do not move, laid out for rays (``ray_casting``).
 
-Triangles come sorted along a Morton curve, so the tree needs no building beyond boxes: leaf i holds triangles 4i to
-4i+3, and node i of a level holds nodes 4i to 4i+3 of the level below. What a ray needs of the four children of a node,
-or of the four triangles of a leaf, lies side by side in memory.
+A node has up to eight children, found by halving its triangles three times along their longest side. A child is a
+node or a leaf of eight triangles. What a ray needs of the eight children of a node, or of the eight triangles of a
+leaf, lies side by side in memory, so that vector units work on eight at once. How the tree is cut decides how fast a
+ray is, never what it hits.
 """
 
 from __future__ import annotations
@@ -14,160 +15,147 @@ from terrain.kernels.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
+OrderArray = NDArray[np.int64]
 
-WIDTH = 4
-STACK_SIZE = 96  # three more for each level of the tree, of which there are at most 31
-EDGE_SLACK = 1e-9  # share of a triangle by which it is larger, so that no ray slips through between two
-HUGE = 1e300  # inverse of a direction's component that is 0: finite, so that no NaN arises at the side of a box
+WIDTH = 8
+OCTANTS = 8
 
 
 @kernel
-def morton_codes(points: FloatArray, lower: FloatArray, cell: float) -> NDArray[np.uint64]:
-    """Codes (n,) of points (n, 3): the bits of their cell numbers from ``lower`` (3,) on, interleaved."""
-    codes = np.empty(len(points), dtype=np.uint64)
-    for index in range(len(points)):
-        code = np.uint64(0)
+def halve(centres: FloatArray, order: OrderArray, first: int, end: int) -> int:
+    """Sort ``order[first:end]`` into two halves of whole leaves that lie apart, and return where the second begins."""
+    axis, longest = 0, -1.0
+    for candidate in range(3):
+        low = high = centres[order[first], candidate]
+        for place in range(first + 1, end):
+            low = min(low, centres[order[place], candidate])
+            high = max(high, centres[order[place], candidate])
+        if high - low > longest:
+            axis, longest = candidate, high - low
+    middle = first + WIDTH * ((end - first + 2 * WIDTH - 1) // (2 * WIDTH))
+    # Quickselect (Hoare 1961): only the part with the middle in it is sorted further.
+    lowest, highest = first, end - 1
+    while lowest < highest:
+        pivot = centres[order[(lowest + highest) // 2], axis]
+        up, down = lowest, highest
+        while up <= down:
+            while centres[order[up], axis] < pivot:
+                up += 1
+            while centres[order[down], axis] > pivot:
+                down -= 1
+            if up <= down:
+                order[up], order[down] = order[down], order[up]
+                up += 1
+                down -= 1
+        if middle <= down:
+            highest = down
+        elif middle >= up:
+            lowest = up
+        else:
+            break
+    return middle
+
+
+@kernel
+def cut(centres: FloatArray, order: OrderArray, cuts: OrderArray) -> int:
+    """Cut the triangles between the first two ``cuts`` into up to eight, write theirs and return how many they are."""
+    parts = 1
+    for _ in range(3):
+        for part in range(parts - 1, -1, -1):
+            if cuts[part + 1] - cuts[part] > WIDTH:
+                for later in range(parts, part, -1):
+                    cuts[later + 1] = cuts[later]
+                cuts[part + 1] = halve(centres, order, cuts[part], cuts[part + 1])
+                parts += 1
+    return parts
+
+
+@kernel
+def write_box(box: FloatArray, lane: int, lower: FloatArray, upper: FloatArray, order: OrderArray, hair: float) -> None:
+    """Write the box around the triangles of ``order`` into ``box`` (6, 8), a hair larger than they are."""
+    for axis in range(3):
+        low, high = lower[order[0], axis], upper[order[0], axis]
+        for face in order:
+            low, high = min(low, lower[face, axis]), max(high, upper[face, axis])
+        box[axis, lane], box[3 + axis, lane] = low - hair, high + hair
+
+
+@kernel
+def write_leaf(leaf: FloatArray, vertices: FloatArray, faces: IntArray, order: OrderArray) -> None:
+    """Write a corner and the two sides from it of every triangle of ``order`` into ``leaf`` (9, 8)."""
+    for lane in range(len(order)):
         for axis in range(3):
-            number = np.uint64((points[index, axis] - lower[axis]) / cell)
-            for bit in range(20):
-                code |= ((number >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
-        codes[index] = code
-    return codes
+            corner = vertices[faces[order[lane], 0], axis]
+            leaf[axis, lane] = corner
+            leaf[3 + axis, lane] = vertices[faces[order[lane], 1], axis] - corner
+            leaf[6 + axis, lane] = vertices[faces[order[lane], 2], axis] - corner
 
 
 @kernel
-def build_leaves(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Triangles (leaves, 9, 4): a corner and the two sides from it, of four triangles; those left over are points."""
-    leaves = np.zeros(((len(faces) + WIDTH - 1) // WIDTH, 9, WIDTH), dtype=np.float64)
-    for face in range(len(faces)):
-        leaf, lane = face // WIDTH, face % WIDTH
-        for axis in range(3):
-            corner = vertices[faces[face, 0], axis]
-            leaves[leaf, axis, lane] = corner
-            leaves[leaf, 3 + axis, lane] = vertices[faces[face, 1], axis] - corner
-            leaves[leaf, 6 + axis, lane] = vertices[faces[face, 2], axis] - corner
-    return leaves
+def write_far_first(ranks: NDArray[np.uint8], box: FloatArray, parts: int) -> None:
+    """Write for rays into each octant in which order they leave the children in ``box`` behind, the last one first."""
+    along = np.empty(WIDTH, dtype=np.float64)
+    for octant in range(OCTANTS):
+        for lane in range(WIDTH):
+            along[lane] = 0.0 if lane < parts else -np.inf
+            for axis in range(3):
+                if lane < parts:
+                    middle = box[axis, lane] + box[3 + axis, lane]
+                    along[lane] += -middle if (octant >> axis) & 1 else middle
+        for lane in range(WIDTH):
+            rank = 0
+            for other in range(WIDTH):
+                rank += along[other] > along[lane] or (along[other] == along[lane] and other < lane)
+            ranks[octant, rank] = lane
 
 
 @kernel
-def build_nodes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Boxes (nodes, 6, 4) of the children of every node, the lowest level first, and where each level starts.
+def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, NDArray[np.uint8], FloatArray]:
+    """Build the tree over ``faces`` (n >= 1, 3) of ``vertices`` (m, 3) [m].
 
-    Each box is min x y z, max x y z, a hair larger than what is in it. Children that do not exist are empty boxes.
+    Returns
+    -------
+    boxes : (nodes, 6, 8) float64
+        Min x y z and max x y z of the children of every node; of a child that does not exist NaN. Node 0 stands above
+        the root: its one child is the root.
+    children : (nodes, 8) int32
+        Their numbers as nodes; of leaf i it is -1 - i.
+    far_first : (nodes, 8, 8) uint8
+        The order in which rays go on the stack, for each octant of directions (bit k is set where axis k falls).
+    leaves : (leaves, 9, 8) float64
+        A corner and the two sides from it of every triangle; those that do not exist are points.
     """
-    leaf_count = (len(faces) + WIDTH - 1) // WIDTH
-    starts = np.zeros(33, dtype=np.int64)
-    levels, count = 0, leaf_count
-    while levels == 0 or count > 1:
-        count = (count + WIDTH - 1) // WIDTH
-        starts[levels + 1] = starts[levels] + count
-        levels += 1
-    nodes = np.empty((starts[levels], 6, WIDTH), dtype=np.float64)
-    nodes[:, :3] = np.inf
-    nodes[:, 3:] = -np.inf
+    lower, upper = np.empty((len(faces), 3), dtype=np.float64), np.empty((len(faces), 3), dtype=np.float64)
+    for face in range(len(faces)):
+        for axis in range(3):
+            a, b, c = vertices[faces[face, 0], axis], vertices[faces[face, 1], axis], vertices[faces[face, 2], axis]
+            lower[face, axis], upper[face, axis] = min(a, b, c), max(a, b, c)
+    centres, order = 0.5 * (lower + upper), np.arange(len(faces))
     hair = 1e-9 * max(np.abs(vertices).max(), 1.0)
-    for face in range(len(faces)):
-        leaf = face // WIDTH
-        for corner in range(3):
-            for axis in range(3):
-                value = vertices[faces[face, corner], axis]
-                low, high = nodes[leaf // WIDTH, axis, leaf % WIDTH], nodes[leaf // WIDTH, 3 + axis, leaf % WIDTH]
-                nodes[leaf // WIDTH, axis, leaf % WIDTH] = min(low, value - hair)
-                nodes[leaf // WIDTH, 3 + axis, leaf % WIDTH] = max(high, value + hair)
-    for level in range(1, levels):
-        for child in range(starts[level] - starts[level - 1]):
-            node = starts[level] + child // WIDTH
-            for axis in range(3):
-                nodes[node, axis, child % WIDTH] = nodes[starts[level - 1] + child, axis].min()
-                nodes[node, 3 + axis, child % WIDTH] = nodes[starts[level - 1] + child, 3 + axis].max()
-    return nodes, starts[: levels + 1]
-
-
-@kernel
-def first_distances(
-    nodes: FloatArray,
-    starts: NDArray[np.int64],
-    leaves: FloatArray,
-    origins: FloatArray,
-    directions: FloatArray,
-    max_range: float,
-) -> FloatArray:
-    """Distance (n,) [m] along each ray to the first triangle within ``max_range``, both sides count; inf = none.
-
-    Parameters
-    ----------
-    nodes, starts, leaves
-        Of ``build_nodes`` and ``build_leaves``.
-    origins, directions : (n, 3) float64
-        Directions of unit length.
-    """
-    distances = np.empty(len(origins), dtype=np.float64)
-    stack, levels = np.empty(STACK_SIZE, dtype=np.int64), np.empty(STACK_SIZE, dtype=np.int64)
-    enters = np.empty(STACK_SIZE, dtype=np.float64)
-    near, far = np.empty(WIDTH, dtype=np.float64), np.empty(WIDTH, dtype=np.float64)
-    for ray in range(len(origins)):
-        x, y, z = origins[ray, 0], origins[ray, 1], origins[ray, 2]
-        dx, dy, dz = directions[ray, 0], directions[ray, 1], directions[ray, 2]
-        ix = 1.0 / dx if dx != 0.0 else HUGE
-        iy = 1.0 / dy if dy != 0.0 else HUGE
-        iz = 1.0 / dz if dz != 0.0 else HUGE
-        # Which side of a box a ray enters through depends on its direction alone.
-        in_x, in_y, in_z = 0 if ix >= 0.0 else 3, 1 if iy >= 0.0 else 4, 2 if iz >= 0.0 else 5
-        best = max_range
-        found = False
-        stack[0], levels[0], enters[0] = starts[-1] - 1, len(starts) - 2, 0.0
-        top = 1
-        while top > 0:
-            top -= 1
-            if enters[top] > best:
-                continue
-            node, level = stack[top], levels[top]
-            if level < 0:
-                # 1. A leaf: its triangles (Moeller and Trumbore 1997).
-                leaf = leaves[node]
-                for lane in range(WIDTH):
-                    bx, by, bz = leaf[3, lane], leaf[4, lane], leaf[5, lane]
-                    cx, cy, cz = leaf[6, lane], leaf[7, lane], leaf[8, lane]
-                    ox, oy, oz = x - leaf[0, lane], y - leaf[1, lane], z - leaf[2, lane]
-                    px, py, pz = dy * cz - dz * cy, dz * cx - dx * cz, dx * cy - dy * cx
-                    qx, qy, qz = oy * bz - oz * by, oz * bx - ox * bz, ox * by - oy * bx
-                    inverse = 1.0 / (bx * px + by * py + bz * pz)
-                    v = (ox * px + oy * py + oz * pz) * inverse
-                    w = (dx * qx + dy * qy + dz * qz) * inverse
-                    distance = (cx * qx + cy * qy + cz * qz) * inverse
-                    hit = (v >= -EDGE_SLACK) & (w >= -EDGE_SLACK) & (v + w <= 1.0 + EDGE_SLACK) & (distance >= 0.0)
-                    near[lane] = distance if hit else np.inf
-                for lane in range(WIDTH):
-                    if near[lane] <= best:
-                        best = near[lane]
-                        found = True
-                continue
-            # 2. A node: where the ray enters and leaves its four children.
-            box = nodes[node]
-            low_x, low_y, low_z = box[in_x], box[in_y], box[in_z]
-            high_x, high_y, high_z = box[3 - in_x], box[5 - in_y], box[7 - in_z]
-            for lane in range(WIDTH):
-                ex, ey, ez = (low_x[lane] - x) * ix, (low_y[lane] - y) * iy, (low_z[lane] - z) * iz
-                enter = ex if ex > ey else ey
-                enter = enter if enter > ez else ez
-                near[lane] = enter if enter > 0.0 else 0.0
-            for lane in range(WIDTH):
-                lx, ly, lz = (high_x[lane] - x) * ix, (high_y[lane] - y) * iy, (high_z[lane] - z) * iz
-                leave = lx if lx < ly else ly
-                far[lane] = leave if leave < lz else lz
-            # 3. Children onto the stack, the one entered first on top.
-            first = WIDTH * (node - starts[level]) + (starts[level - 1] if level > 0 else 0)
-            base = top
-            for lane in range(WIDTH):
-                enter = near[lane]
-                if enter > far[lane] or enter > best:
-                    continue
-                place = top
-                while place > base and enters[place - 1] < enter:
-                    stack[place], levels[place] = stack[place - 1], levels[place - 1]
-                    enters[place] = enters[place - 1]
-                    place -= 1
-                stack[place], levels[place], enters[place] = first + lane, level - 1, enter
-                top += 1
-        distances[ray] = best if found else np.inf
-    return distances
+    leaf_count = (len(faces) + WIDTH - 1) // WIDTH
+    most = leaf_count + 1  # a node has at least two children, but for the one above the root
+    boxes, leaves = np.empty((most, 6, WIDTH), dtype=np.float64), np.zeros((leaf_count, 9, WIDTH), dtype=np.float64)
+    children = np.zeros((most, WIDTH), dtype=np.int32)
+    far_first = np.empty((most, OCTANTS, WIDTH), dtype=np.uint8)
+    spans = np.empty((most, 2), dtype=np.int64)
+    spans[0, 0], spans[0, 1] = 0, len(faces)
+    cuts = np.empty(WIDTH + 1, dtype=np.int64)
+    node, node_count, written = 0, 1, 0
+    while node < node_count:
+        cuts[0], cuts[1] = spans[node, 0], spans[node, 1]
+        parts = cut(centres, order, cuts) if node > 0 else 1
+        boxes[node] = np.nan
+        for lane in range(parts):
+            within = order[cuts[lane] : cuts[lane + 1]]
+            write_box(boxes[node], lane, lower, upper, within, hair)
+            if len(within) <= WIDTH:
+                write_leaf(leaves[written], vertices, faces, within)
+                written += 1
+                children[node, lane] = -written
+            else:
+                spans[node_count, 0], spans[node_count, 1] = cuts[lane], cuts[lane + 1]
+                children[node, lane] = node_count
+                node_count += 1
+        write_far_first(far_first[node], boxes[node], parts)
+        node += 1
+    return boxes[:node_count].copy(), children[:node_count].copy(), far_first[:node_count].copy(), leaves

@@ -21,7 +21,7 @@ def first_hit_of_all(vertices, faces, origin, direction, max_range):
     return best
 
 
-@pytest.mark.parametrize("count", [1, 3, 4, 5, 70, 300])
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 64, 65, 300, 600])
 def test_the_tree_finds_what_a_look_at_every_triangle_finds(count):
     rng = np.random.default_rng(count)
     vertices = rng.uniform(-5.0, 5.0, (count, 1, 3)) + rng.normal(0.0, 1.0, (count, 3, 3))
@@ -33,6 +33,23 @@ def test_the_tree_finds_what_a_look_at_every_triangle_finds(count):
     for ray, (origin, direction) in enumerate(zip(origins, directions, strict=True)):
         expected = first_hit_of_all(vertices, faces, origin, direction, 8.0)
         assert found[ray] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("max_range", [3.0, math.inf])
+def test_how_the_tree_is_cut_changes_no_bit_of_a_range(max_range):
+    rng = np.random.default_rng(5)
+    vertices = (rng.uniform(-5.0, 5.0, (3000, 1, 3)) + rng.normal(0.0, 0.2, (3000, 3, 3))).reshape(-1, 3)
+    faces = np.arange(9000, dtype=np.int32).reshape(-1, 3)
+    origins, directions = rng.uniform(-6.0, 6.0, (500, 3)), rng.normal(size=(500, 3))
+    directions[:9] = np.concatenate([np.eye(3), -np.eye(3), [[1.0, 1, 1], [-1.0, 1, 1], [0.0, -1, 1]]])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    whole = StaticRays(vertices, faces).distances(origins, directions, max_range)
+    shuffled = StaticRays(vertices, rng.permutation(faces)).distances(origins, directions, max_range)
+    parts = [
+        StaticRays(vertices, faces[k : k + 8]).distances(origins, directions, max_range) for k in range(0, 3000, 8)
+    ]
+    assert 50 < np.isfinite(whole).sum() < 500
+    assert np.array_equal(whole, shuffled) and np.array_equal(whole, np.min(parts, axis=0))
 
 
 def test_no_ray_slips_through_between_two_triangles():
