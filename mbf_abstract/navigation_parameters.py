@@ -144,8 +144,12 @@ class NavigationParameters(ParameterModel):
     max_steering_angle: float | None = parameter(
         None, "Limit of a car's steering angle.", unit="rad", gt=0.0, le=math.pi / 2.0
     )
-    min_turning_radius: float = parameter(
-        0.0, "Radius of the tightest curve of commands; 0 = turning on the spot is allowed.", unit="m", ge=0.0, le=100.0
+    min_turning_radius: float | None = parameter(
+        None,
+        "Radius of the tightest curve of commands; 0 = turning on the spot is allowed, absent = what the driver says.",
+        unit="m",
+        ge=0.0,
+        le=100.0,
     )
 
     # Life of the maps

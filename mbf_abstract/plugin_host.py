@@ -120,7 +120,13 @@ class PluginHost(ABC):
         rng = np.random.default_rng([self._seed, zlib.crc32(spec.name.encode())])
         runtime = self.runtime
         base = PluginContext(
-            spec.name, spec.parameters, runtime.clock, rng, runtime.robot, relaxation=runtime.relaxation
+            spec.name,
+            spec.parameters,
+            runtime.clock,
+            rng,
+            runtime.robot,
+            relaxation=runtime.relaxation,
+            min_turning_radius=runtime.gate.limits.min_turning_radius,
         )
         instance: Plugin = spec.plugin_class(self.make_context(spec.kind, spec.options, base))
         return LoadedPlugin(spec, instance, runtime)

@@ -61,6 +61,8 @@ class PluginContext:
     relaxation : Relaxation
         Slack that recoveries of this server grant for a while. Planning and arrival take it into account by themselves;
         a controller may widen limits of its own.
+    min_turning_radius : float
+        Radius [m] of the robot's tightest curve when the plugin is loaded; 0 = it turns on the spot.
     """
 
     name: str
@@ -69,6 +71,7 @@ class PluginContext:
     rng: np.random.Generator
     robot: RobotInformation
     relaxation: Relaxation = field(default_factory=Relaxation, kw_only=True)
+    min_turning_radius: float = field(default=0.0, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,7 @@ class Plugin(ABC):
         self.rng = context.rng
         self.robot = context.robot
         self.relaxation = context.relaxation
+        self.min_turning_radius = context.min_turning_radius
 
     def cancel(self) -> bool:
         """Ask the running call to end; return whether the plugin supports this beside its cancel token."""
@@ -214,6 +218,11 @@ class PlannedMotion:
 
 class AbstractController(Plugin):
     """Follows a path: one velocity command a cycle."""
+
+    @property
+    def turns_on_the_spot(self) -> bool:
+        """Whether it counts on a robot that can; a server whose robot cannot says so."""
+        return False
 
     @abstractmethod
     def set_plan(self, path: Path) -> bool:

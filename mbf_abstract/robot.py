@@ -57,6 +57,9 @@ def odometry_problem(answer: object) -> str:
 class Robot(Protocol):
     """What a robot driver implements: two plain functions, called from several threads.
 
+    The driver of a car may say its tightest curve in an attribute ``min_turning_radius`` [m]; the velocity gate,
+    planners and controllers keep to it where no configuration says otherwise.
+
     A driver built on asyncio hands a command to its loop with ``asyncio.run_coroutine_threadsafe`` and answers
     ``odometry`` from a variable.
     """
@@ -69,6 +72,11 @@ class Robot(Protocol):
 
     def odometry(self) -> Odometry | None:
         """Last measured velocity, or None if this robot has no odometry. Must not block."""
+
+
+def turning_radius_of(robot: Robot) -> float:
+    """Radius [m] of the tightest curve, as the driver says; 0 = the robot turns on the spot."""
+    return float(getattr(robot, "min_turning_radius", 0.0))
 
 
 class RobotInformation:

@@ -8,7 +8,7 @@ driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_co
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields
 from pathlib import Path as FilePath
@@ -35,7 +35,7 @@ from mbf_abstract.navigation_parameters import READ_ONCE, NavigationParameters
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugin_host import PluginHost
 from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
-from mbf_abstract.robot import Robot, RobotInformation
+from mbf_abstract.robot import Robot, RobotInformation, turning_radius_of
 from mbf_abstract.sensing import RangeScan
 from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.transforms import TransformBuffer
@@ -77,6 +77,7 @@ class AbstractNavigationServer(PluginHost):
         self.config = config
         self._closed = False
         check_driver(robot, clock)
+        self._own_turning_radius = turning_radius_of(robot)
         super().__init__(self._make_runtime(config.parameters, robot, clock, transforms, events), seed)
         self._process_end = ProcessEndWatch(self.runtime.gate)
         try:
@@ -138,7 +139,19 @@ class AbstractNavigationServer(PluginHost):
         )
         kept = self.runtime.events.memory
         found = (str(event.data.get("message", "")) for event in (kept.of_kind(EventKind.MAP) if kept else ()))
-        return (*left_out, *found)
+        return (*left_out, *found, *self._curve_notes())
+
+    def _curve_notes(self) -> Iterator[str]:
+        """Plugins whose curves are tighter than the robot's."""
+        tightest = self.runtime.gate.limits.min_turning_radius
+        for kind in (PluginKind.PLANNER, PluginKind.CONTROLLER):
+            for plugin in self.plugins.all_of(kind):
+                name = f"{kind.name.lower()} {plugin.name!r}"
+                radius = getattr(plugin.instance.parameters, "min_turning_radius", None)
+                if radius is not None and 0.0 < radius < tightest:
+                    yield f"{name}: min_turning_radius {radius:g} m is tighter than the robot's {tightest:.2f} m"
+                if tightest > 0.0 and getattr(plugin.instance, "turns_on_the_spot", False):
+                    yield f"{name} turns on the spot, which the robot cannot: its tightest curve is {tightest:.2f} m"
 
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
         """Heights [m] of the ground at a place of the global frame, the best to stand on first; () without any."""
@@ -195,7 +208,7 @@ class AbstractNavigationServer(PluginHost):
     def _put_into_effect(self, parameters: NavigationParameters) -> None:
         """Hand parameters to those parts that keep a copy."""
         runtime = self.runtime
-        runtime.gate.limits = _limits(parameters)
+        runtime.gate.limits = _limits(parameters, self._own_turning_radius)
         runtime.gate.command_timeout = parameters.command_timeout
         runtime.robot.max_pose_age = runtime.robot.max_velocity_age = parameters.tf_timeout
         if isinstance(runtime.clock, SimClock):
@@ -285,7 +298,9 @@ class AbstractNavigationServer(PluginHost):
             events=events,
             supervisor=supervisor,
             callbacks=CallbackThread(clock, events, supervisor),
-            gate=VelocityGate(robot, clock, events, _limits(parameters), parameters.command_timeout),
+            gate=VelocityGate(
+                robot, clock, events, _limits(parameters, self._own_turning_radius), parameters.command_timeout
+            ),
             robot=RobotInformation(
                 robot,
                 transforms,
@@ -305,6 +320,8 @@ class AbstractNavigationServer(PluginHost):
         return runtime
 
 
-def _limits(parameters: NavigationParameters) -> VelocityLimits:
+def _limits(parameters: NavigationParameters, own_turning_radius: float) -> VelocityLimits:
+    """Limits of the parameters; where they do not give a turning radius [m], the robot's own."""
     given = {limit.name: getattr(parameters, limit.name) for limit in fields(VelocityLimits)}
-    return VelocityLimits(**{name: value for name, value in given.items() if value is not None})
+    limits = {name: value for name, value in given.items() if value is not None}
+    return VelocityLimits(**{"min_turning_radius": own_turning_radius, **limits})

@@ -122,7 +122,7 @@ class Bench:
         self.digest = RunDigest(self.clock.now)
         self.events = EventBus(self.clock.now, [self.memory, self.digest, *sinks])
         delay = CommandDelay(self.world.physics, self.robot.send_command, self.scenario.perturb.command_delay)
-        clocked = ClockedRobot(delay, self._odometry, self.digest)
+        clocked = ClockedRobot(delay, self._odometry, self.digest, self.robot.spec.min_turning_radius)
         on_step("building the map")
         server = server_class(config, clocked, self.clock, TransformBuffer(), self.events, self.seed)
         server.get_path.listeners.append(self._record_plan)

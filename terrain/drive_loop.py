@@ -38,9 +38,18 @@ class ClockedRobot:
         Returns its odometry, stamped with the world's time.
     digest : RunDigest
         Takes every command.
+    min_turning_radius : float
+        Its tightest curve [m]; 0 = it turns on the spot.
     """
 
-    def __init__(self, send: Callable[[Command], None], measure: Callable[[], Odometry], digest: RunDigest) -> None:
+    def __init__(
+        self,
+        send: Callable[[Command], None],
+        measure: Callable[[], Odometry],
+        digest: RunDigest,
+        min_turning_radius: float,
+    ) -> None:
+        self.min_turning_radius = min_turning_radius
         self._send = send
         self._measure = measure
         self._digest = digest

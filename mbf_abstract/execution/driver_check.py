@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 
 from mbf_abstract.clock import Clock
 from mbf_abstract.geometry import Twist
@@ -25,8 +26,8 @@ def check_driver(robot: Robot, clock: Clock) -> None:
     Raises
     ------
     DriverError
-        The object is a class, a method is missing, a coroutine function or takes other arguments, or ``odometry``
-        answers with something else than ``Odometry`` or None.
+        The object is a class, a method is missing, a coroutine function or takes other arguments, ``odometry``
+        answers with something else than ``Odometry`` or None, or ``min_turning_radius`` is no length.
     """
     name = robot.__name__ if isinstance(robot, type) else type(robot).__name__
     if isinstance(robot, type):
@@ -35,6 +36,9 @@ def check_driver(robot: Robot, clock: Clock) -> None:
         problem = _method_problem(getattr(robot, method, None), arguments)
         if problem:
             raise DriverError(f"{name} is no robot driver: {method} {problem}")
+    radius = getattr(robot, "min_turning_radius", 0.0)
+    if not isinstance(radius, int | float) or not (math.isfinite(radius) and radius >= 0.0):
+        raise DriverError(f"{name} is no robot driver: min_turning_radius is {radius!r}, expected a length in m")
     problem = _first_odometry_problem(robot, clock)
     if problem:
         raise DriverError(f"{name} is no robot driver: {problem}")

@@ -67,6 +67,11 @@ class DwaController(PathFollower):
         self._critics = build_critics(self.parameters.critics)
 
     @property
+    def turns_on_the_spot(self) -> bool:
+        """It does."""
+        return True
+
+    @property
     def full_speed(self) -> float:
         """Largest speed in any direction [m/s]."""
         return max(self.parameters.max_vel_x, self.parameters.max_vel_y)

@@ -7,7 +7,8 @@ Known failure: two equally good ways around an obstacle can average to neither; 
 the best single sample. A robot that can turn on the spot turns to a path that begins behind it. A car turns onto a path
 it looks away from by a right angle, slowly where its turning radius is larger than the way it looks ahead
 (``vx_max * time_steps * model_dt``); one that looks back along its path drives it backward and ends with the wrong
-heading. Give it paths that begin with its heading, as ``costmap.hybrid_astar`` does; it drives their cusps.
+heading. Give it paths that begin with its heading, as ``costmap.hybrid_astar`` does; it drives their cusps, and asks
+for another plan (NO_VALID_CMD) where it stands beside its goal.
 
 Formula: information-theoretic MPPI (Williams et al. 2018, algorithm 2), with Nav2's structure of critics; the noise
 comes from a pool drawn once from the plugin's generator, so that a cycle draws only an index. Deviation: the noise is
@@ -39,6 +40,10 @@ NOISE_POOL = 4
 """Sets of noise drawn at start; each cycle uses one of them."""
 SMOOTHING = np.array([-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0]) / 231.0
 """Savitzky-Golay filter of 9 points, quadratic (Savitzky and Golay 1964, table I)."""
+DEFAULT_RADIUS = 0.5
+"""Turning circle [m] of a car where neither the parameters nor the robot tell one."""
+STANDSTILL, IDLE_CYCLES = 0.05, 60
+"""A car commanded to be slower than this [m/s] for so many cycles does not get on and needs another plan."""
 FALLBACK_SAMPLES = 30
 """How many of the best single samples are tried when the mean does not fit."""
 
@@ -63,7 +68,13 @@ class MppiParameters(PluginParameters):
     noise_correlation_time: float = parameter(
         0.5, "How long noise keeps its direction.", unit="s", gt=0.0, le=10.0, dynamic=False
     )
-    min_turning_radius: float = parameter(0.5, "Turning circle of an Ackermann robot.", unit="m", ge=0.0, le=100.0)
+    min_turning_radius: float | None = parameter(
+        None,
+        "Turning circle of an Ackermann robot; absent = the robot's, or 0.5 m where that turns on the spot.",
+        unit="m",
+        ge=0.0,
+        le=100.0,
+    )
     wheelbase: float = parameter(
         0.0, "Above 0: answer Ackermann commands for this wheelbase.", unit="m", ge=0.0, le=20.0
     )
@@ -87,6 +98,7 @@ class MppiController(PathFollower):
         self._velocities = np.empty(shape[1:], dtype=np.float32)
         self._poses = np.empty(shape[1:], dtype=np.float32)
         self._smoothing = smoothing_matrix(p.time_steps)
+        self._idle_cycles = 0
         self._nominal: Float32Array = np.zeros((3, p.time_steps), dtype=np.float32)
         self.parameters_changed()
 
@@ -100,13 +112,27 @@ class MppiController(PathFollower):
         self._change = np.array([p.ax_max, p.ay_max, p.az_max], dtype=np.float32) * np.float32(p.model_dt)
         deviation = [p.vx_std, p.vy_std if p.motion_model == "omni" else 0.0, p.wz_std]
         self._deviation = np.array(deviation, dtype=np.float32)
-        self._radius = p.min_turning_radius if p.motion_model == "ackermann" else 0.0
+        self._radius = self.turning_radius
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path; the nominal sequence is kept while driving, so that a new plan does not jerk."""
         if self.tracker is None:
             self._nominal[:] = 0.0
+        self._idle_cycles = 0
         return super().set_plan(path)
+
+    @property
+    def turning_radius(self) -> float:
+        """Radius [m] of the tightest curve, as configured or the robot's; 0 = turns on the spot."""
+        p = self.parameters
+        if p.motion_model != "ackermann":
+            return 0.0
+        return (self.min_turning_radius or DEFAULT_RADIUS) if p.min_turning_radius is None else p.min_turning_radius
+
+    @property
+    def turns_on_the_spot(self) -> bool:
+        """Whether its motion model does."""
+        return self._radius == 0.0
 
     @property
     def full_speed(self) -> float:
@@ -121,6 +147,10 @@ class MppiController(PathFollower):
             return cycle
         for attempt in range(2):
             controls = self._optimise(cycle)
+            if controls is not None and self._is_stuck(controls):
+                left = cycle.tracker.remaining
+                text = f"no motion that a car can do gets it on, {left:.2f} m before the end of its path"
+                return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
             if controls is not None:
                 command = controls[:, 0].copy()
                 self._nominal = np.column_stack([controls[:, 1:], controls[:, -1]])
@@ -129,6 +159,12 @@ class MppiController(PathFollower):
                 self._nominal[:] = 0.0  # start over from standing still: the old sequence may be what collides
         text = f"none of {self.parameters.batch_size} sampled trajectories is free of collision"
         return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
+
+    def _is_stuck(self, controls: Float32Array) -> bool:
+        """Whether a car that drives ``controls`` has found no way on for a while: it cannot mend where it stands."""
+        idle = self._radius > 0.0 and abs(controls[0, 0]) < STANDSTILL
+        self._idle_cycles = self._idle_cycles + 1 if idle else 0
+        return self._idle_cycles > IDLE_CYCLES
 
     def planned_motion(self) -> PlannedMotion:
         """Return the nominal sequence."""

@@ -54,14 +54,14 @@ class RegulatedPurePursuitParameters(PluginParameters):
     )
     approach_dist: float = parameter(0.6, "Slow down over this length before the end.", unit="m", ge=0.0, le=20.0)
     min_approach_vel: float = parameter(0.05, "Speed at the end of the approach.", unit="m/s", gt=0.0, le=5.0)
-    rotate_to_heading: bool = parameter(True, "Turn in place to the path and at the goal; off for car-like robots.")
+    rotate_to_heading: bool = parameter(True, "Turn in place to the path and at the goal; a car never does.")
     rotate_to_heading_min_angle: float = parameter(
         0.785, "Turn in place if the carrot is further off than this.", unit="rad", gt=0.0, le=3.2
     )
     rotate_to_heading_vel: float = parameter(1.8, "Yaw rate of turning in place.", unit="rad/s", gt=0.0, le=20.0)
     max_angular_vel: float = parameter(1.8, "Largest yaw rate while driving.", unit="rad/s", gt=0.0, le=20.0)
-    min_turning_radius: float = parameter(
-        0.0, "Radius of the tightest arc, of a car-like robot; 0 = any.", unit="m", ge=0.0, le=100.0
+    min_turning_radius: float | None = parameter(
+        None, "Radius of the tightest arc; 0 = any, absent = the robot's.", unit="m", ge=0.0, le=100.0
     )
     max_angular_accel: float = parameter(3.2, "Change of the yaw rate in place.", unit="rad/s^2", gt=0.0, le=100.0)
     allow_reversing: bool = parameter(True, "Drive backward where the poses of the path look against its direction.")
@@ -115,6 +115,17 @@ class RegulatedPurePursuitController(PathFollower):
         return self.parameters.max_linear_vel
 
     @property
+    def turning_radius(self) -> float:
+        """Radius [m] of the tightest arc, as configured or the robot's; 0 = any."""
+        given = self.parameters.min_turning_radius
+        return self.min_turning_radius if given is None else given
+
+    @property
+    def rotates(self) -> bool:
+        """Whether it turns in place to the path and at the goal."""
+        return self.parameters.rotate_to_heading and self.turning_radius == 0.0
+
+    @property
     def decay(self) -> float:
         """Rate [1/m] at which costs fall with distance: as configured, or as the map's last inflation layer has it."""
         if (given := self.parameters.inflation_cost_scaling_factor) is not None:
@@ -139,7 +150,7 @@ class RegulatedPurePursuitController(PathFollower):
             backward = self.parameters.allow_reversing and tracker.driving_backward
             bearing = math.atan2(carrot[1], carrot[0])
             error = normalize_angle(bearing + math.pi) if backward else bearing
-            if self.parameters.rotate_to_heading and abs(error) > self.parameters.rotate_to_heading_min_angle:
+            if self.rotates and abs(error) > self.parameters.rotate_to_heading_min_angle:
                 turn = error
         if turn is not None:
             command = Twist.planar(wz=self.rotation_speed(turn, request.velocity.wz))
@@ -189,7 +200,7 @@ class RegulatedPurePursuitController(PathFollower):
 
     def _turn_at_goal(self, cycle: ControlCycle) -> float | None:
         """Angle to the goal's heading once the robot stands at the goal's position."""
-        if not self.parameters.rotate_to_heading:
+        if not self.rotates:
             return None
         goal, pose = cycle.tracker.goal, cycle.request.pose
         # Once inside, twice the tolerance keeps the robot turning although it slides a little while it stops.
@@ -204,8 +215,8 @@ class RegulatedPurePursuitController(PathFollower):
         """Command along the arc through the carrot."""
         p, velocity = self.parameters, cycle.request.velocity
         curvature = 2.0 * carrot[1] / max(carrot[0] ** 2 + carrot[1] ** 2, 1e-6)
-        if p.min_turning_radius > 0.0:
-            curvature = min(max(curvature, -1.0 / p.min_turning_radius), 1.0 / p.min_turning_radius)
+        if self.turning_radius > 0.0:
+            curvature = min(max(curvature, -1.0 / self.turning_radius), 1.0 / self.turning_radius)
         cost = cycle.costmap.cost_at(cycle.request.pose.x, cycle.request.pose.y) or FREE
         regulated = min(self.regulated_speed(curvature, cost, cycle.tracker.to_cusp), cycle.speed_limit)
         wanted = -regulated if backward else regulated

@@ -60,6 +60,11 @@ class RotationShimController(PathFollower):
         )
         self._aligning = False
 
+    @property
+    def turns_on_the_spot(self) -> bool:
+        """It does."""
+        return True
+
     def set_plan(self, path: Path) -> bool:
         """Hand the path to both; alignment starts over."""
         self._aligning = True

@@ -1,4 +1,7 @@
-"""Turns to the goal's heading once the robot stands within the tolerance of the goal's position."""
+"""Turns to the goal's heading once the robot stands within the tolerance of the goal's position.
+
+A car cannot turn there: near the goal, it is judged by the heading it ends with.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,9 @@ import math
 
 from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
 from mbf_costmap_nav.kernels.critics import mean_angle_to
+
+CAR_WITHIN = 1.0
+"""Length [m] left on the path below which a car minds the heading of its end."""
 
 
 class GoalAngleCritic(Critic):
@@ -15,5 +21,7 @@ class GoalAngleCritic(Critic):
         """Mean angle [rad]."""
         if not rollouts.on_last_section:
             return None
+        if rollouts.turning_radius > 0.0 and rollouts.near_goal(CAR_WITHIN):
+            return mean_angle_to(rollouts.poses[:, -1:], rollouts.goal[2])
         near = math.hypot(rollouts.goal[0], rollouts.goal[1]) <= rollouts.goal_tolerance
         return mean_angle_to(rollouts.poses, rollouts.goal[2]) if near else None

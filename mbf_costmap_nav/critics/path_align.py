@@ -1,6 +1,7 @@
 """Keeps on the path: distance between the trajectory and the path after the same length travelled.
 
-Silent near the goal, where the path is too short to compare with, and where the path itself is blocked: a robot that
+Silent near the goal, where the path is too short to compare with, for all but cars, which come to their heading only by
+their path, and where the path itself is blocked: a robot that
 is to drive around an obstacle must be allowed to leave the path. Silent too where a car looks away from its path: it
 has to leave the path in order to turn, and the least distance from it is that of not starting at all.
 """
@@ -23,8 +24,11 @@ class PathAlignCritic(Critic):
 
     def score(self, rollouts: Rollouts) -> Float32Array | None:
         """Mean distance [m] over the steps."""
-        if rollouts.near_goal(ACTIVE_BEYOND) or rollouts.path_free.mean() < LEAST_FREE:
+        if rollouts.path_free.mean() < LEAST_FREE:
             return None
-        if rollouts.turning_radius > 0.0 and not rollouts.faces_path:
+        if rollouts.near_goal(ACTIVE_BEYOND):
+            if rollouts.turning_radius == 0.0:
+                return None
+        elif rollouts.turning_radius > 0.0 and not rollouts.faces_path:
             return None
         return alignment(rollouts.poses, rollouts.path, rollouts.path_spacing, STRIDE)

@@ -40,6 +40,8 @@ FloatArray = NDArray[np.float64]
 
 UNKNOWN_AS = 252
 """Cost of the unknown cells that may be driven through, as for the other planners."""
+DEFAULT_RADIUS = 0.5
+"""Tightest curve [m] where neither the parameters nor the robot tell one."""
 CELLS_OF_BINS = (2.0, 1.0, 0.5, 0.25)
 """Sides [cells] of the bins: coarse ones first, an eighth of the states; what they cannot reach, finer ones may."""
 STATES_THAT_SHOW = 20_000
@@ -49,7 +51,13 @@ STATES_THAT_SHOW = 20_000
 class HybridAStarParameters(PluginParameters):
     """Parameters of ``costmap.hybrid_astar``."""
 
-    min_turning_radius: float = parameter(0.5, "Radius of the tightest curve.", unit="m", gt=0.0, le=100.0)
+    min_turning_radius: float | None = parameter(
+        None,
+        "Radius of the tightest curve; absent = the robot's, or 0.5 m where that turns on the spot.",
+        unit="m",
+        gt=0.0,
+        le=100.0,
+    )
     allow_reversing: bool = parameter(True, "Reeds-Shepp curves; otherwise Dubins curves, forward only.")
     allow_unknown: bool = parameter(True, "Plan through unknown cells, counted like cost 252.")
     cost_factor: float = parameter(2.0, "How much longer a way through cells of cost 252 counts.", ge=0.0, le=1000.0)
@@ -107,6 +115,12 @@ class HybridAStarPlanner(CostmapPlanner):
 
     Parameters: ClassVar[type[PluginParameters]] = HybridAStarParameters
     parameters: HybridAStarParameters
+
+    @property
+    def turning_radius(self) -> float:
+        """Radius [m] of the tightest curve: as configured, or the robot's."""
+        given = self.parameters.min_turning_radius
+        return (self.min_turning_radius or DEFAULT_RADIUS) if given is None else given
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Plan from the start over the via poses to the goal, each with its heading."""
@@ -167,11 +181,11 @@ class HybridAStarPlanner(CostmapPlanner):
 
     def _car(self, resolution: float, cells: float) -> Car:
         """The car as the search takes it, with bins of so many cells."""
-        p = self.parameters
+        p, radius = self.parameters, self.turning_radius
         # An arc leaves its bin, and turns by a bin of the headings at least; in fine bins, for tight places, by a part.
-        step = max(1.5 * cells * resolution, min(1.0, cells) * 2.0 * math.pi / HEADINGS * p.min_turning_radius)
+        step = max(1.5 * cells * resolution, min(1.0, cells) * 2.0 * math.pi / HEADINGS * radius)
         return Car(
-            radius=p.min_turning_radius,
+            radius=radius,
             reversing=p.allow_reversing,
             cost_factor=p.cost_factor,
             reverse_factor=p.reverse_penalty,

@@ -3,8 +3,8 @@
 Strengths: reads the map of *now*, so it drives round obstacles seen after planning; knows slopes, costs and the robot's
 motion model (differential or Ackermann). Known failure: a local method with a horizon of ``horizon_steps * step_time``;
 out of a pocket deeper than that only a new plan leads. An Ackermann robot cannot mend its heading
-where it stands; it comes in on a curve along the goal's heading, if there is room for one, and drives no path whose
-poses ask for reverse (no planner for meshes makes one).
+where it stands; it comes in on a curve along the goal's heading, if there is room for one. A path whose poses ask for
+reverse it drives as it is, cusp after cusp, where ``min_lin_velocity`` allows that, and refuses otherwise.
 Cost: about 3 ms a cycle with 400 samples of 30 steps; so many times more as a step is longer than half
 the shortest edge of the mesh, or than 0.05 m if that is more.
 
@@ -51,6 +51,7 @@ _STRICT_RADII = 8.0  # before the goal at which a bent approach begins to be fol
 _STRICTNESS = 10.0  # ... so many times more closely: who cuts it arrives with the wrong heading
 _STANDSTILL = 0.2  # [m] and [rad] gained over the horizon: less than this is no motion
 _IDLE_CYCLES = 20  # without motion, after which there is none that gets on
+_RUN_OUT = np.array([[0.1], [0.2], [0.3]])  # [m] beyond the end of a section that a car drives
 
 
 class MPPIParameters(PluginParameters):
@@ -102,26 +103,41 @@ class MPPIController(MeshController):
         self._hardness: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
 
     def set_plan(self, path: Path) -> bool:
-        """Take over a path of at least one pose in the map's frame; a car refuses one that is driven in reverse."""
+        """Take over a path of at least one pose in the map's frame; not one in reverse for a car that may not."""
         if len(path) == 0 or path.frame_id != self.mesh_map.frame_id:
             return False
-        p = self.parameters
-        if p.motion_model == "ackermann" and reverse_segments(path, path.positions).any():
+        p, is_car = self.parameters, self.parameters.motion_model == "ackermann"
+        self._reverses = is_car and bool(reverse_segments(path, path.positions).any())
+        if self._reverses and p.min_lin_velocity == 0.0:
             return False
         self._approach = GoalApproach(path[-1], p.goal_distance)
-        self._run_out: NDArray[np.float64] = np.zeros((0, 3))
         self._strict_below = 0.0
-        if p.motion_model == "ackermann":
-            radius = p.wheelbase / math.tan(p.max_steering_angle)
-            bent = with_final_approach(path, self.mesh_map, self._blocked(), _ROOM_TO_STEER * radius)
-            # Beyond the goal, for the critic that looks along the path: it shows how to stand there.
-            self._run_out = path.positions[-1] + np.array([[0.1], [0.2], [0.3]]) * path[-1].rotation[:, 0]
-            self._strict_below = _STRICT_RADII * radius if bent is not path else 0.0
+        if is_car and not self._reverses:
+            bent = with_final_approach(path, self.mesh_map, self._blocked(), _ROOM_TO_STEER * self._turning_radius)
+            self._strict_below = _STRICT_RADII * self._turning_radius if bent is not path else 0.0
             path = bent
         self._begun, self._idle_cycles = False, 0
         self._follow(path)
         self._nominal: NDArray[np.float64] = np.zeros((p.horizon_steps, 2))
         return True
+
+    @property
+    def turns_on_the_spot(self) -> bool:
+        """Whether its motion model does."""
+        return self.parameters.motion_model == "differential"
+
+    @property
+    def _steering_limit(self) -> float:
+        """Largest steering angle [rad]: as configured, and no curve tighter than the robot's."""
+        p = self.parameters
+        if self.min_turning_radius == 0.0:
+            return p.max_steering_angle
+        return min(p.max_steering_angle, math.atan(p.wheelbase / self.min_turning_radius))
+
+    @property
+    def _turning_radius(self) -> float:
+        """Radius [m] of a car's tightest curve."""
+        return self.parameters.wheelbase / math.tan(self._steering_limit)
 
     def _follow(self, path: Path) -> None:
         self._tracker = tracker_on_surface(self.mesh_map, path, self.parameters.max_surface_distance)
@@ -130,8 +146,8 @@ class MPPIController(MeshController):
         """Lead a car that looks elsewhere onto its path on a curve, now that its pose is known."""
         p, path = self.parameters, self._tracker.path
         self._begun = True
-        if p.motion_model == "ackermann":
-            radius = _ROOM_TO_STEER * p.wheelbase / math.tan(p.max_steering_angle)
+        if p.motion_model == "ackermann" and not self._reverses:
+            radius = _ROOM_TO_STEER * self._turning_radius
             self._tracker.update(spot.point)
             ahead = Path.from_points(self._tracker.ahead(math.inf), path[-1].orientation, None, path.frame_id)
             bent = with_first_turn(ahead, self.mesh_map, self._blocked(), radius, pose)
@@ -226,12 +242,13 @@ class MPPIController(MeshController):
         noise[0] = 0.0
         controls = self._nominal + noise
         controls[1] = 0.0
-        np.clip(controls[..., 0], p.min_lin_velocity, max_speed, out=controls[..., 0])
+        slowest = max(p.min_lin_velocity, -max_speed) if self._reverses else p.min_lin_velocity
+        np.clip(controls[..., 0], slowest, max_speed, out=controls[..., 0])
         if p.motion_model == "differential":
             before = np.cumsum(controls[..., 0], axis=1) - controls[..., 0]
             room = np.maximum(remaining / p.step_time - before, 0.0)
             np.minimum(controls[..., 0], room, out=controls[..., 0])
-        turn_limit = p.max_ang_velocity if p.motion_model == "differential" else p.max_steering_angle
+        turn_limit = p.max_ang_velocity if p.motion_model == "differential" else self._steering_limit
         np.clip(controls[..., 1], -turn_limit, turn_limit, out=controls[..., 1])
         return np.asarray(controls)
 
@@ -248,9 +265,13 @@ class MPPIController(MeshController):
         end = min(tracker.progress + reach, tracker.next_cusp)
         along = np.append(np.arange(tracker.progress, end, _PATH_SPACING), end)
         ahead, remaining = tracker.points_at(along), tracker.next_cusp - along
-        if end == tracker.length:
-            ahead = np.concatenate([ahead, self._run_out])
-            remaining = np.append(remaining, np.zeros(len(self._run_out)))
+        backward = self._reverses and tracker.driving_backward
+        if p.motion_model == "ackermann" and (end == tracker.length or (self._reverses and end == tracker.next_cusp)):
+            # Beyond the end, for the critic that looks along the path: it shows how to stand there. A cusp draws the
+            # car past itself, or it would creep to it.
+            ahead = np.concatenate([ahead, self._run_out(end)])
+            beyond = np.zeros(len(_RUN_OUT)) if end == tracker.length else -_RUN_OUT[:, 0]
+            remaining = np.append(remaining, beyond)
         strictness = _STRICTNESS if tracker.remaining < self._strict_below else 1.0
         weights = (
             strictness * p.path_weight,
@@ -276,7 +297,19 @@ class MPPIController(MeshController):
             remaining,
             np.array(weights),
             (p.roll_limit, p.pitch_limit),
+            -1.0 if backward else 1.0,
         )
+
+    def _run_out(self, end: float) -> NDArray[np.float64]:
+        """Points (3, 3) straight on beyond ``end`` [m] of the path: beyond a cusp, or beyond the goal as it looks."""
+        tracker = self._tracker
+        if end == tracker.length:
+            assert self._approach is not None
+            goal = self._approach.goal
+            ahead = -goal.rotation[:, 0] if self._reverses and tracker.driving_backward else goal.rotation[:, 0]
+            return np.asarray(goal.position) + _RUN_OUT * ahead
+        before, corner = tracker.points_at(np.array([end - _PATH_SPACING, end]))
+        return np.asarray(corner + _RUN_OUT / _PATH_SPACING * (corner - before))
 
     def _pieces_of_a_step(self) -> int:
         """Into how many pieces a step is cut, so that none leads from one side of a thin wall to the other.
@@ -309,7 +342,7 @@ class MPPIController(MeshController):
     def _as_command(self, speed: float, turn: float) -> Command:
         if self.parameters.motion_model == "differential":
             return Twist.planar(vx=speed, wz=turn)
-        return AckermannCommand(speed, clamp(turn, self.parameters.max_steering_angle))
+        return AckermannCommand(speed, clamp(turn, self._steering_limit))
 
 
 def _vector(array: NDArray[np.float64]) -> Vector:

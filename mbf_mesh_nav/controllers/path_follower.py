@@ -75,6 +75,11 @@ class PathFollower(MeshController):
 
     _approach: GoalApproach | None = None
 
+    @property
+    def turns_on_the_spot(self) -> bool:
+        """It does."""
+        return True
+
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the map's frame."""
         if len(path) == 0 or path.frame_id != self.mesh_map.frame_id:

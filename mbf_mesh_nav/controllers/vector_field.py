@@ -57,6 +57,11 @@ class VectorFieldController(MeshController):
 
     _approach: GoalApproach | None = None
 
+    @property
+    def turns_on_the_spot(self) -> bool:
+        """It does."""
+        return True
+
     def set_plan(self, path: Path) -> bool:
         """Take over a path that brings its vector fields along; refuse others, and those of another mesh or frame."""
         fields = path.guidance if isinstance(path.guidance, tuple) else ()

@@ -40,6 +40,7 @@ def score_rollouts(
     remaining: Float64Array,
     weights: Float64Array,
     tilt_limits: tuple[float, float],
+    facing: float,
 ) -> tuple[Float64Array, BoolArray]:
     """Score every sequence of ``controls``.
 
@@ -62,6 +63,8 @@ def score_rollouts(
         Of the critics, in the order of this module's constants.
     tilt_limits : (float, float)
         Roll and pitch [rad] that cost 1 each.
+    facing : float
+        1 where the robot looks along the path, -1 where it drives it backward.
 
     Returns
     -------
@@ -111,7 +114,7 @@ def score_rollouts(
         ahead = difference(target, point)
         length = norm(ahead)
         if length > 0.1:
-            score += weights[HEADING] * (1.0 - dot(ahead, direction) / length)
+            score += weights[HEADING] * (1.0 - facing * dot(ahead, direction) / length)
         scores[sequence] = score
     return scores, collided
 

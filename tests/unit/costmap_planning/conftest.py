@@ -77,6 +77,7 @@ def make_plugin() -> Callable[..., Any]:
         seed=0,
         costmap=None,
         transforms=None,
+        turning_radius=0.0,
         **parameters,
     ):
         grid = cells if isinstance(cells, Costmap) else Costmap(np.asarray(cells, dtype=np.uint8), resolution)
@@ -91,6 +92,7 @@ def make_plugin() -> Callable[..., Any]:
             costmap,
             costmap,
             transforms=transforms or TransformBuffer(),
+            min_turning_radius=turning_radius,
         )
         return plugin_class(context)
 

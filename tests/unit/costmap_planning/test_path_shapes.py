@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.plugins import PlanRequest
 from mbf_costmap_nav.controllers.dwa import DwaController
 from mbf_costmap_nav.controllers.mppi import MppiController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
 from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
 
 FREE_MAP = Costmap(np.zeros((160, 160), dtype=np.uint8), 0.05, -4.0, -4.0)
 CAR_RADIUS = 0.9
@@ -125,3 +128,47 @@ def test_a_robot_started_at_any_heading_turns_and_drives_forward(make_plugin, cl
     robot, outcome, _ = closed_loop.follow(controller, path, FREE_MAP, start=start, seconds=30.0, angle_tolerance=0.4)
     assert outcome == 0, f"{outcome} at {robot.state}"
     assert backward_share(robot) < 0.1
+
+
+HYBRID_GOALS = [(-1.2, 0.19, -2.68), (-0.3, 1.46, 0.59), (-0.2, 1.02, 0.71), (0.86, -1.96, -2.53)]
+
+
+@pytest.mark.parametrize("goal", HYBRID_GOALS)
+def test_a_car_comes_to_the_end_of_a_hybrid_plan_with_its_heading_at_once(make_plugin, closed_loop, goal):
+    planner = make_plugin(HybridAStarPlanner, FREE_MAP, min_turning_radius=1.3)
+    path = planner.make_plan(PlanRequest(Pose.planar(0.0, 0.0), Pose.planar(*goal))).path
+    controller = make_plugin(MppiController, FREE_MAP, **{**MPPI_CAR, "min_turning_radius": 1.06, "wz_max": 1.0})
+    robot, outcome, seconds = closed_loop.follow(
+        controller, path, FREE_MAP, start=(0.0, 0.0, 0.0), seconds=60.0, dist_tolerance=0.25, angle_tolerance=0.3
+    )
+    assert outcome == 0, f"{outcome} at {robot.state}"
+    assert seconds < 4.0 + path.length / 0.25
+
+
+def test_a_car_that_stands_beside_its_goal_asks_for_another_plan(make_plugin, closed_loop):
+    controller = make_plugin(MppiController, FREE_MAP, **MPPI_CAR)
+    path = Path.from_points([(x, 0.0, 0.0) for x in np.linspace(-0.6, 0.0, 7)])
+    _, outcome, seconds = closed_loop.follow(controller, path, FREE_MAP, start=(0.0, 0.35, 0.0), seconds=30.0)
+    assert outcome == ExePathOutcome.NO_VALID_CMD and seconds < 15.0
+
+
+def test_plugins_keep_to_the_curve_their_robot_tells_where_no_parameter_says_otherwise(make_plugin):
+    for plugin_class, parameters in (
+        (HybridAStarPlanner, {}),
+        (MppiController, {"motion_model": "ackermann"}),
+        (RegulatedPurePursuitController, {}),
+    ):
+        plugin = make_plugin(plugin_class, FREE_MAP, turning_radius=1.2, **parameters)
+        assert plugin.turning_radius == 1.2
+        own = make_plugin(plugin_class, FREE_MAP, turning_radius=1.2, min_turning_radius=2.0, **parameters)
+        assert own.turning_radius == 2.0
+    assert make_plugin(MppiController, FREE_MAP, motion_model="ackermann").turning_radius == 0.5
+    assert make_plugin(MppiController, FREE_MAP, turning_radius=1.2).turns_on_the_spot
+
+
+def test_pure_pursuit_never_turns_a_car_on_the_spot(make_plugin, closed_loop):
+    controller = make_plugin(RegulatedPurePursuitController, FREE_MAP, turning_radius=CAR_RADIUS)
+    path = Path.from_points([(x, 0.0, 0.0) for x in np.linspace(-1.5, 2.0, 31)])
+    robot, _, _ = closed_loop.follow(controller, path, FREE_MAP, start=(-1.5, 0.0, 1.2), seconds=20.0)
+    for command in robot.commands:
+        assert abs(command.wz) * CAR_RADIUS <= abs(command.vx) * (1.0 + 1e-6) + 1e-9

@@ -53,6 +53,14 @@ class TupleVelocity(Good):
         return Odometry((0.5, 0.0, 0.1), 0.0)
 
 
+class NoRadius(Good):
+    min_turning_radius = "tight"
+
+
+class NegativeRadius(Good):
+    min_turning_radius = -1.0
+
+
 class NoOdometry:
     def send_command(self, command):
         pass
@@ -76,6 +84,8 @@ class NumberForMethod(Good):
         (HiddenAsyncOdometry(), "answered with coroutine, expected Odometry or None"),
         (TupleOdometry(), "answered with tuple, expected Odometry or None"),
         (TupleVelocity(), "holds tuple, expected Twist"),
+        (NoRadius(), "min_turning_radius is 'tight', expected a length in m"),
+        (NegativeRadius(), "min_turning_radius is -1.0"),
     ],
 )
 @pytest.mark.parametrize("clock", [SimClock, WallClock])

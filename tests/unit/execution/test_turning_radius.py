@@ -1,0 +1,49 @@
+"""A car's tightest curve: told by its driver once, kept to by the gate and known to every plugin."""
+
+import pytest
+
+from mbf_abstract.geometry import Twist
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner
+
+
+class Car:
+    """A driver that keeps its commands."""
+
+    min_turning_radius = 1.5
+
+    def __init__(self):
+        self.sent = []
+
+    def send_command(self, command):
+        self.sent.append(command)
+
+    def odometry(self):
+        return None
+
+
+class Spinner(ScriptedController):
+    turns_on_the_spot = True
+
+
+@pytest.mark.parametrize(("given", "radius"), [({}, 1.5), ({"min_turning_radius": 3.0}, 3.0)])
+def test_the_gate_widens_curves_to_what_the_driver_tells_or_the_configuration_says(given, radius):
+    with Bench(robot=Car(), **given) as bench:
+        assert bench.server.runtime.gate.limits.apply(Twist.planar(1.0, wz=2.0)) == Twist.planar(1.0, wz=1.0 / radius)
+        assert bench.planner.min_turning_radius == bench.controller.min_turning_radius == radius
+        bench.server.set_parameters(max_vx=0.5)
+        assert bench.server.runtime.gate.limits.min_turning_radius == radius
+
+
+def test_a_configured_zero_lets_a_car_turn_on_the_spot():
+    with Bench(robot=Car(), min_turning_radius=0.0) as bench:
+        assert bench.server.runtime.gate.limits.apply(Twist.planar(wz=1.0)) == Twist.planar(wz=1.0)
+
+
+def test_a_controller_that_turns_on_the_spot_is_told_for_a_car_only():
+    plugins = {"planner": ScriptedPlanner, "spinner": Spinner}
+    with Bench(plugins, robot=Car()) as bench:
+        told = "controller 'spinner' turns on the spot, which the robot cannot: its tightest curve is 1.50 m"
+        assert bench.server.notes == (told,)
+    with Bench(plugins) as bench:
+        assert bench.server.notes == ()
