@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.kernels.strip_detours import pass_vertices
 from mbf_mesh_nav.kernels.strips import link_faces, straighten
 from mbf_mesh_nav.mesh_map import MeshMap
 from mbf_mesh_nav.path_cost import cost_along
@@ -76,6 +77,20 @@ class FaceStrip:
         head = self._shorten_piece(positions[: middle + 1], point_faces[: middle + 1], strip[: cut[0] + 1], turn)
         tail = self._shorten_piece(positions[middle:], point_faces[middle:], strip[cut[0] :], turn)
         return np.concatenate([head[0], tail[0][1:]]), np.concatenate([head[1], tail[1][1:]])
+
+    def pass_vertices(self, positions: NDArray[np.float64], point_faces: NDArray[np.int32]) -> Piece:
+        """The shortest geodesic found by passing single vertices on their other side; all costs apart.
+
+        A path that leads along edges between blocked faces stays as it is.
+        """
+        mesh_map = self._mesh_map
+        strip, pieces = link_faces(mesh_map.faces, mesh_map.face_neighbours, self._blocked, point_faces)
+        if len(pieces) != 1 or len(strip) == 0:
+            return positions, point_faces
+        ends = tuple(positions[0].tolist()), tuple(positions[-1].tolist())
+        mesh = mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, self._blocked
+        points, faces = pass_vertices(*mesh, strip, *ends)
+        return points, np.concatenate([point_faces[:1], faces])
 
     def has_costs(self, faces: NDArray[np.int32]) -> bool:
         """Whether costs on faces (n,) make some ways over them longer than others; infinite ones do not count."""

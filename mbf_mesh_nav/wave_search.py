@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.arithmetic import norm
-from mbf_mesh_nav.face_strip import FaceStrip
+from mbf_mesh_nav.face_strip import FaceStrip, Piece
 from mbf_mesh_nav.kernels.corners import build_corner_ends, write_corner_weights
 from mbf_mesh_nav.kernels.cvp import ALONG_EDGE, propagate_wave
 from mbf_mesh_nav.kernels.descent import trace_descent
 from mbf_mesh_nav.kernels.fronts import NO_BEND
 from mbf_mesh_nav.kernels.wave_directions import wave_directions
 from mbf_mesh_nav.leg_search import LegQuery, seeded_arrays
+from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.other_courses import OtherCourses, is_worth_a_search, reversed_query
 from mbf_mesh_nav.snapshot import MeshSnapshot
 from mbf_mesh_nav.vector_field import VectorField
 
@@ -101,6 +104,7 @@ class WaveSearch:
 
         The way down the field, shortened to a geodesic. Where that is longer than the field says, it has lost its
         course between two fronts: then the way along which the wave came is shortened, too, and the shorter one taken.
+        Where it leads through few large faces, other courses are looked for.
         Over costs the cheapest path is no geodesic: there the way down the field stays, or is pulled taut as far as
         that costs no more (``taut_over_costs``).
         """
@@ -116,10 +120,28 @@ class WaveSearch:
             float(wave.distances[corner]) + math.dist(self._mesh_map.vertices[corner], start.point)
             for corner in self._mesh_map.faces[start.face].tolist()
         )
-        if strip.cost(*best) <= (1.0 + COURSE_LOST) * foretold:
+        if strip.cost(*best) > (1.0 + COURSE_LOST) * foretold:
+            other = strip.shorten(*self._trace(query, wave, along_edges=True))
+            best = min(best, other, key=lambda path: strip.cost(*path))
+        return best if wave.along_edges else self._other_course(query, wave, strip, best)
+
+    def _other_course(self, query: LegQuery, wave: Wave, strip: FaceStrip, best: Piece) -> Piece:
+        """A shorter way than the best so far through few large faces, see ``other_courses``; else that one."""
+        if not is_worth_a_search(query, best, strip):
             return best
-        other = strip.shorten(*self._trace(query, wave, along_edges=True))
-        return min(best, other, key=lambda path: strip.cost(*path))
+        back = reversed_query(query)
+        wave_back = self.spread(back, overshoot=0.0)
+        if wave_back is None or wave_back.along_edges:
+            return best
+        to_goal, to_start = partial(self._trace_from, query, wave), partial(self._trace_from, back, wave_back)
+        courses = OtherCourses(self._mesh_map, query, strip, to_goal, to_start)
+        return courses.best(best, wave.distances, wave_back.distances)
+
+    def _trace_from(self, query: LegQuery, wave: Wave, place: SurfacePoint) -> Piece:
+        """Way down the field from any place the wave came to."""
+        if place.face == query.goal.face:
+            return np.array([place.point, query.goal.point]), np.array([place.face] * 2, dtype=np.int32)
+        return self._trace(replace(query, start=place), wave, along_edges=False)
 
     def _trace(self, query: LegQuery, wave: Wave, along_edges: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Way down the field, see ``kernels.descent``."""

@@ -88,7 +88,7 @@ def _is_blocked(corners: Int32Array, blocked: BoolArray) -> bool:
 
 
 @inner_kernel
-def _corner_of(corners: Int32Array, vertex: int) -> int:
+def corner_of(corners: Int32Array, vertex: int) -> int:
     """Number of a vertex among the corners of a face, -1 if it is none of them."""
     for corner in range(3):
         if corners[corner] == vertex:
@@ -115,16 +115,16 @@ def _linked(
             return _appended(strip, begin, count, following)
     for corner in range(3):
         vertex = Count(faces[last, corner])
-        if _corner_of(faces[following], vertex) < 0:
+        if corner_of(faces[following], vertex) < 0:
             continue
-        left = _fan_length(faces, face_neighbours, blocked, vertex, last, following, Count(0))
-        right = _fan_length(faces, face_neighbours, blocked, vertex, last, following, Count(2))
+        left = fan_length(faces, face_neighbours, blocked, vertex, last, following, Count(0))
+        right = fan_length(faces, face_neighbours, blocked, vertex, last, following, Count(2))
         if left < 0 and right < 0:
             return strip, Count(-1)
         side = Count(0) if right < 0 or 0 <= left < right else Count(2)
         face = last
         while face != following:
-            face = _turned(faces, face_neighbours, vertex, face, side)
+            face = next_round(faces, face_neighbours, vertex, face, side)
             strip, count = _appended(strip, begin, count, face)
         return strip, count
     return strip, Count(-1)
@@ -142,13 +142,13 @@ def _appended(strip: Int32Array, begin: int, count: int, face: int) -> tuple[Int
 
 
 @inner_kernel
-def _turned(faces: Int32Array, face_neighbours: Int32Array, vertex: int, face: int, side: int) -> int:
+def next_round(faces: Int32Array, face_neighbours: Int32Array, vertex: int, face: int, side: int) -> int:
     """Next face round a vertex over its outgoing (0) or incoming (2) edge; -1 at a border."""
-    return Count(face_neighbours[face, (_corner_of(faces[face], vertex) + side) % 3])  # type: ignore[no-any-return]
+    return Count(face_neighbours[face, (corner_of(faces[face], vertex) + side) % 3])  # type: ignore[no-any-return]
 
 
 @inner_kernel
-def _fan_length(
+def fan_length(
     faces: Int32Array,
     face_neighbours: Int32Array,
     blocked: BoolArray,
@@ -163,7 +163,7 @@ def _fan_length(
     """
     steps, begin = Count(0), face
     while face != following:
-        face = _turned(faces, face_neighbours, vertex, face, side)
+        face = next_round(faces, face_neighbours, vertex, face, side)
         steps += 1
         if face < 0 or face == begin or (face != following and _is_blocked(faces[face], blocked)):
             return Count(-1)  # type: ignore[no-any-return]
@@ -202,7 +202,7 @@ def straighten(
         The faces the path goes through.
     """
     points = pull_taut(vertices, faces, strip, start, goal)
-    length = _length(points)
+    length = path_length(points)
     index, tries, is_changed = Count(0), _MAX_TURNS_A_FACE * len(strip) if turn else Count(0), False
     while tries > 0 and len(strip) > 1:
         if index >= len(strip) - 1:
@@ -214,18 +214,18 @@ def straighten(
             index += 1
             continue
         first, last = index, index + 1
-        while first > 0 and _corner_of(faces[strip[first - 1]], vertex) >= 0:
+        while first > 0 and corner_of(faces[strip[first - 1]], vertex) >= 0:
             first -= 1
-        while last < len(strip) - 1 and _corner_of(faces[strip[last + 1]], vertex) >= 0:
+        while last < len(strip) - 1 and corner_of(faces[strip[last + 1]], vertex) >= 0:
             last += 1
         side = _free_side(vertices, faces, face_neighbours, blocked, strip, points, vertex, first, last)
-        turned = strip if side < 0 else _turned_strip(faces, face_neighbours, strip, vertex, first, last, side)
+        turned = strip if side < 0 else turned_strip(faces, face_neighbours, strip, vertex, first, last, side)
         index = last
         if side < 0:
             continue
         tries -= 1
         shorter = pull_taut(vertices, faces, turned, start, goal)
-        new_length = _length(shorter)
+        new_length = path_length(shorter)
         if new_length < length:
             points, strip, length, is_changed = shorter, turned, new_length, True
             index = max(first - 1, 0)
@@ -233,7 +233,8 @@ def straighten(
 
 
 @inner_kernel
-def _length(points: Float64Array) -> float:
+def path_length(points: Float64Array) -> float:
+    """Length [m] of a polyline (n, 3)."""
     total = 0.0
     for index in range(len(points) - 1):
         total += norm(difference(row(points, index + 1), row(points, index)))
@@ -246,7 +247,7 @@ def _bend_at(vertices: Float64Array, faces: Int32Array, strip: Int32Array, point
     following, crossing = faces[strip[portal + 1]], row(points, Count(portal + 1))
     for corner in range(3):
         vertex = Count(faces[strip[portal], corner])
-        if _corner_of(following, vertex) >= 0 and norm(difference(row(vertices, vertex), crossing)) < _AT_VERTEX:
+        if corner_of(following, vertex) >= 0 and norm(difference(row(vertices, vertex), crossing)) < _AT_VERTEX:
             return vertex  # type: ignore[no-any-return]
     return Count(-1)  # type: ignore[no-any-return]
 
@@ -274,44 +275,44 @@ def _free_side(
     None if it is not free, or if the path leaves an angle of half a turn or more there.
     """
     inner = Count(strip[first + 1])
-    side = Count(2) if _turned(faces, face_neighbours, vertex, Count(strip[first]), Count(0)) == inner else Count(0)
+    side = Count(2) if next_round(faces, face_neighbours, vertex, Count(strip[first]), Count(0)) == inner else Count(0)
     begin, end = Count(strip[first]), Count(strip[last])
-    if begin == end or _fan_length(faces, face_neighbours, blocked, vertex, begin, end, side) < 0:
+    if begin == end or fan_length(faces, face_neighbours, blocked, vertex, begin, end, side) < 0:
         return Count(-1)  # type: ignore[no-any-return]
     # The path comes to the vertex from the point before face ``first`` and leaves it to the one behind ``last``.
     at = row(vertices, vertex)
-    corner = _corner_of(faces[begin], vertex)
+    corner = corner_of(faces[begin], vertex)
     # Over the outgoing edge the face is left between the vertex and the next corner, else and the one before.
     edge = row(vertices, Count(faces[begin, (corner + 1) % 3 if side == 0 else (corner + 2) % 3]))
     total = _angle(at, row(points, first), edge)
-    face = _turned(faces, face_neighbours, vertex, begin, side)
+    face = next_round(faces, face_neighbours, vertex, begin, side)
     while face != end and total < _LESS_THAN_HALF_A_TURN:
-        corner = _corner_of(faces[face], vertex)
+        corner = corner_of(faces[face], vertex)
         total += _angle(
             at, row(vertices, Count(faces[face, (corner + 1) % 3])), row(vertices, Count(faces[face, (corner + 2) % 3]))
         )
-        face = _turned(faces, face_neighbours, vertex, face, side)
-    corner = _corner_of(faces[end], vertex)
+        face = next_round(faces, face_neighbours, vertex, face, side)
+    corner = corner_of(faces[end], vertex)
     edge = row(vertices, Count(faces[end, (corner + 2) % 3 if side == 0 else (corner + 1) % 3]))
     total += _angle(at, edge, row(points, Count(last + 1)))
     return side if total < _LESS_THAN_HALF_A_TURN else Count(-1)  # type: ignore[no-any-return]
 
 
 @inner_kernel
-def _turned_strip(
+def turned_strip(
     faces: Int32Array, face_neighbours: Int32Array, strip: Int32Array, vertex: int, first: int, last: int, side: int
 ) -> Int32Array:
     """The strip led round the other side of a vertex between two of its faces."""
-    between, face, end = Count(0), _turned(faces, face_neighbours, vertex, Count(strip[first]), side), strip[last]
+    between, face, end = Count(0), next_round(faces, face_neighbours, vertex, Count(strip[first]), side), strip[last]
     while face != end:
-        face = _turned(faces, face_neighbours, vertex, face, side)
+        face = next_round(faces, face_neighbours, vertex, face, side)
         between += 1
     turned = np.empty(first + 1 + between + len(strip) - last, dtype=np.int32)
     for index in range(first + 1):
         turned[index] = strip[index]
     face = Count(strip[first])
     for index in range(between):
-        face = _turned(faces, face_neighbours, vertex, face, side)
+        face = next_round(faces, face_neighbours, vertex, face, side)
         turned[first + 1 + index] = face
     for index in range(last, len(strip)):
         turned[first + 1 + between + index - last] = strip[index]

@@ -2,9 +2,10 @@
 
 Strengths: the path of ``mesh.cvp``, a geodesic where nothing on it has a cost, without computing a vector field; over
 costs it is pulled taut as far as that costs no more, where ``mesh.cvp`` keeps the way down the field. Known failure: a
-local optimum, it passes ridges and obstacles on the side on which the wave did. Cost: little more than that of a wave.
-When not: with a controller that wants a field; on coarse meshes, with faces as long as the way around an obstacle,
-densify the map (``mesh_map.densify``).
+local optimum over costs, there it passes ridges and obstacles on the side on which the wave did; where nothing costs
+and faces are large, other courses are looked for (``other_courses``). Cost: little more than that of a wave, twice that
+for the short paths of which other courses are looked at. When not: with a controller that wants a field; over costs on
+coarse meshes, with faces as long as the way around an obstacle, densify the map (``mesh_map.densify``).
 """
 
 from __future__ import annotations
