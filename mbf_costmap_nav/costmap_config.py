@@ -87,6 +87,13 @@ class CostmapParameters(ParameterModel):
     confine_images: bool = parameter(
         False, "Refuse maps and masks whose image lies out of their YAML file's folder.", dynamic=False
     )
+    max_cells: int = parameter(
+        MAX_CELLS,
+        "Larger grids, maps and masks are refused before memory is taken.",
+        ge=1,
+        le=178_000_000,  # Pillow opens no larger images
+        dynamic=False,
+    )
     layers: tuple[LayerEntry, ...] = parameter((), "Layers in order of writing.", dynamic=False)
 
     @field_validator("footprint")
@@ -101,9 +108,10 @@ class CostmapParameters(ParameterModel):
     @model_validator(mode="after")
     def _size_has_a_limit(self) -> CostmapParameters:
         columns, rows = self.width / self.resolution, self.height / self.resolution
-        if columns * rows > MAX_CELLS:
+        if columns * rows > self.max_cells:
             raise ValueError(
-                f"at most {MAX_CELLS} cells, not the {columns:g} x {rows:g} of width, height and resolution"
+                f"at most {self.max_cells} cells (max_cells), not the {columns:g} x {rows:g} of width, height and "
+                "resolution"
             )
         return self
 
@@ -191,6 +199,7 @@ def build_layered_costmap(
                     confine_images=parameters.confine_images,
                     static_map=static_map,
                     transforms=transforms,
+                    max_cells=parameters.max_cells,
                 )
             )
         )

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.transforms import TransformBuffer
-from mbf_costmap_nav.costmap import FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.costmap import FREE, MAX_CELLS, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
 
 CellType = TypeVar("CellType", bound=np.generic)
@@ -63,6 +63,8 @@ class LayerContext:
         Relative file names of the configuration start here.
     confine_images : bool
         Whether the image of a map or mask must lie in the folder of its YAML file.
+    max_cells : int
+        Larger maps and masks are refused before memory is taken.
     static_map : Costmap, optional
         A map handed over by the program instead of a file.
     transforms : TransformBuffer, optional
@@ -78,6 +80,7 @@ class LayerContext:
     confine_images: bool = False
     static_map: Costmap | None = None
     transforms: TransformBuffer | None = None
+    max_cells: int = MAX_CELLS
 
 
 class CostmapLayer(ABC):

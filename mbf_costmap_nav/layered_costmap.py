@@ -160,8 +160,15 @@ class LayeredCostmap:
     def doubts(self) -> list[str]:
         """What is legal but hardly meant in the layers' parameters, e.g. an inflation narrower than the robot."""
         with self._lock:
-            said = ((layer.name, layer.doubt()) for layer in self._enabled_layers())
-            return [f"layer {name!r}: {doubt}" for name, doubt in said if doubt]
+            layers = list(self._enabled_layers())
+            doubts = [f"layer {layer.name!r}: {doubt}" for layer in layers if (doubt := layer.doubt())]
+            inflates = any(hasattr(layer.parameters, "inflation_radius") for layer in layers)
+            if layers and not inflates and self.inscribed_radius > 0.0:
+                radius = f"{self.inscribed_radius:.2f} m"
+                doubts.append(
+                    f"no inflation layer: grid planners take the robot, of inscribed radius {radius}, for a point"
+                )
+            return doubts
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Lowest speed [m/s] the layers allow at the point (x, y) [m]; ``full_speed`` where there is no limit."""

@@ -78,7 +78,9 @@ class OccupancyMap:
         occupancy, (dx, dy) = turned_upright(self.occupancy, yaw, max_cells)
         return OccupancyMap(occupancy, self.resolution, (x + dx * self.resolution, y + dy * self.resolution, 0.0))
 
-    def to_costmap(self, frame_id: str = "map", track_unknown_space: bool = True) -> Costmap:
+    def to_costmap(
+        self, frame_id: str = "map", track_unknown_space: bool = True, max_cells: int = MAX_CELLS
+    ) -> Costmap:
         """Costs of the map: occupied is lethal, free is free, anything between is scaled to 1..253.
 
         In mode raw all values from 100 to 254 are occupied, as for costmap_2d.
@@ -89,11 +91,13 @@ class OccupancyMap:
             Frame the map's origin is given in.
         track_unknown_space : bool
             Keep unknown cells unknown; otherwise they become free.
+        max_cells : int
+            As for ``upright``, whose ValueError it raises.
         """
         table = np.full(256, UNKNOWN if track_unknown_space else FREE, dtype=np.uint8)
         table[:OCCUPIED] = np.arange(OCCUPIED) * LETHAL // OCCUPIED
         table[OCCUPIED:UNKNOWN_OCCUPANCY] = LETHAL
-        flat = self.upright()
+        flat = self.upright(max_cells)
         return Costmap(table[flat.occupancy], flat.resolution, flat.origin[0], flat.origin[1], frame_id)
 
 
@@ -127,13 +131,19 @@ def _lies_in(file: Path, folder: Path) -> bool:
 
 
 def load_costmap(
-    file: Path | str, frame_id: str = "map", track_unknown_space: bool = True, *, confined: bool = False
+    file: Path | str,
+    frame_id: str = "map",
+    track_unknown_space: bool = True,
+    *,
+    confined: bool = False,
+    max_cells: int = MAX_CELLS,
 ) -> Costmap:
     """Read a map_server YAML file, or a bare image, as a costmap, see ``OccupancyMap.to_costmap``."""
-    return load_map_file(file, confined=confined).to_costmap(frame_id, track_unknown_space)
+    occupancy = load_map_file(file, confined=confined, max_cells=max_cells)
+    return occupancy.to_costmap(frame_id, track_unknown_space, max_cells)
 
 
-def load_map_file(file: Path | str, *, confined: bool = False) -> OccupancyMap:
+def load_map_file(file: Path | str, *, confined: bool = False, max_cells: int = MAX_CELLS) -> OccupancyMap:
     """Read a map_server YAML file, or a bare image.
 
     A bare image is described by the YAML file of the same name beside it; without one its cells have
@@ -142,7 +152,9 @@ def load_map_file(file: Path | str, *, confined: bool = False) -> OccupancyMap:
     file = Path(file)
     description = file.with_suffix(".yaml") if file.suffix.lower() in IMAGE_SUFFIXES else file
     bare = description != file and not description.is_file()
-    return load_image(file, BARE_IMAGE_RESOLUTION) if bare else load_map(description, confined=confined)
+    if bare:
+        return load_image(file, BARE_IMAGE_RESOLUTION, max_cells=max_cells)
+    return load_map(description, max_cells, confined=confined)
 
 
 def load_image(
@@ -182,7 +194,7 @@ def _read_pixels(file: Path, max_cells: int, mode: MapMode) -> NDArray[np.uint8]
         raise MapError(file, f"expected an image, got {kind}")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit below decides
             image = Image.open(file, formats=IMAGE_FORMATS)
         with image:
             width, height = image.size
@@ -192,7 +204,7 @@ def _read_pixels(file: Path, max_cells: int, mode: MapMode) -> NDArray[np.uint8]
                 raise MapError(file, f"has pixels of type {image.mode!r}; expected 8-bit grey or colour")
             has_opacity = "A" in image.mode or "transparency" in image.info
             pixels = np.asarray(image.convert("RGBA"), dtype=np.uint8)
-    except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
+    except Image.DecompressionBombError as error:
         raise MapError(file, f"has too many pixels: {error}") from error
     except UnidentifiedImageError as error:
         raise MapError(file, "is no image that can be read (pgm, png, bmp)") from error

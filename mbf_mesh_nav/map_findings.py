@@ -1,4 +1,4 @@
-"""What somebody should know of a map that can be used: how its file was turned, coarse edges, ground all lethal."""
+"""What somebody should know of a map that can be used: turned files, coarse edges, ground all lethal, wider robots."""
 
 from __future__ import annotations
 
@@ -32,6 +32,31 @@ def map_findings(mesh_map: MeshMap) -> Iterator[Finding]:
     """Findings about a map whose layers are computed."""
     yield from _coarse(mesh_map)
     yield from _lethal(mesh_map)
+    yield from _narrow(mesh_map)
+
+
+def _narrow(mesh_map: MeshMap) -> Iterator[Finding]:
+    """Findings if the layers leave ground free which the robot's body would touch.
+
+    A tilt layer puts the whole robot onto the ground, so beside it an inflation need not keep the robot's radius.
+    """
+    radius, layers = mesh_map.inscribed_radius, mesh_map.layers
+    if not layers or any(hasattr(layer.parameters, "wheelbase") for layer in layers.values()):
+        return
+    inflations = {name: one.parameters for name, one in layers.items() if hasattr(one.parameters, "inflation_radius")}
+    if radius > 0.0 and not inflations:
+        text = (
+            f"no layer is an inflation or a tilt: the robot is planned as a point, its inscribed radius is {radius:g} m"
+        )
+        yield Finding("narrow", text, NOWHERE, harmless=True)
+    for name, parameters in inflations.items():
+        own = float(getattr(parameters, "inscribed_radius", radius))
+        if own < radius:
+            text = (
+                f"inscribed_radius {own:g} m of layer '{name}' is less than the robot's (mesh_map.inscribed_radius), "
+                f"{radius:g} m, and no tilt layer looks at the whole robot: ground its body touches may count as free"
+            )
+            yield Finding("narrow", text, NOWHERE, harmless=True)
 
 
 def _lethal(mesh_map: MeshMap) -> Iterator[Finding]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.arithmetic import rotated, scalar_products
 from mbf_abstract.bounded_files import special_file
+from mbf_mesh_nav.collada_check import check_collada
 from mbf_mesh_nav.cut_files import refuse_cut_file
 from mbf_mesh_nav.file_frames import GLTF_FORMATS
 from mbf_mesh_nav.gltf_check import check_gltf
@@ -52,6 +53,8 @@ def read_scene(path: Path, part: str, max_faces: int) -> MeshArrays:
         refuse_cut_file(path)
         if path.suffix.lower() in GLTF_FORMATS:
             check_gltf(path)
+        elif path.suffix.lower() == ".dae":
+            check_collada(path)
         return _read(path, part, max_faces)
     except MeshError:
         raise

@@ -48,7 +48,9 @@ class KeepoutLayer(CostmapLayer):
         self._mask = None
         if files.mask_file:
             mask_file = context.base_folder / files.mask_file
-            self._mask = load_costmap(mask_file, context.frame_id, confined=context.confine_images)
+            self._mask = load_costmap(
+                mask_file, context.frame_id, confined=context.confine_images, max_cells=context.max_cells
+            )
         self._placement = Placement(files.map_frame, context)
         self._changed = EMPTY_BOX
 

@@ -50,7 +50,8 @@ class SpeedLimitLayer(CostmapLayer):
         self._zones = files.zones + (load_zones(context.base_folder / files.zones_file) if files.zones_file else ())
         self._mask: Costmap | None = None
         if files.mask_file:
-            mask = load_map(context.base_folder / files.mask_file, confined=context.confine_images).upright()
+            mask_file = context.base_folder / files.mask_file
+            mask = load_map(mask_file, context.max_cells, confined=context.confine_images).upright(context.max_cells)
             self._mask = Costmap(mask.occupancy, mask.resolution, mask.origin[0], mask.origin[1], context.frame_id)
         self._placement = Placement(files.map_frame, context)
 

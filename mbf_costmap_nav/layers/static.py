@@ -15,9 +15,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
-from mbf_costmap_nav.costmap import EMPTY_BOX, UNKNOWN, CellArray, CellBox, GridGeometry
+from mbf_costmap_nav.costmap import EMPTY_BOX, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.layer import CombinationMethod, GridLayer, LayerContext, LayerParameters, combine
 from mbf_costmap_nav.map_io import load_costmap
 from mbf_costmap_nav.placement import Placement
@@ -32,6 +34,10 @@ class StaticLayerParameters(LayerParameters):
     )
     map_frame: str = parameter("", "Frame of the map file's origin; empty = the costmap's.", dynamic=False)
     use_maximum: bool = parameter(False, "Combine by the larger cost instead of replacing what is below.")
+
+
+LETHAL_SHARE = 0.95
+"""A map with a greater share of occupied cells is hardly what anybody wanted."""
 
 
 class StaticLayer(GridLayer):
@@ -49,6 +55,7 @@ class StaticLayer(GridLayer):
                 self.parameters.map_frame or context.frame_id,
                 context.track_unknown_space,
                 confined=context.confine_images,
+                max_cells=context.max_cells,
             )
         elif context.static_map is not None:
             self._map = context.static_map
@@ -56,6 +63,16 @@ class StaticLayer(GridLayer):
             raise ValueError(f"static layer {context.name!r} needs map_file, or a map handed over by the program")
         self._changed = EMPTY_BOX
         self._placement = Placement(self._map.frame_id, context)
+
+    def doubt(self) -> str:
+        """Say that nearly all of the map is occupied."""
+        known = self._map.cells != UNKNOWN
+        share = float(np.sum(self._map.cells == LETHAL)) / max(int(np.sum(known)), 1)
+        if share < LETHAL_SHARE:
+            return ""
+        return (
+            f"{share:.0%} of the known cells are occupied, so hardly anything can be planned; see negate and thresholds"
+        )
 
     @property
     def default_value(self) -> int:

@@ -3,6 +3,7 @@
 import base64
 import json
 import os
+import re
 import tracemalloc
 
 import numpy as np
@@ -140,3 +141,41 @@ def test_a_mesh_whose_name_is_yaml_is_only_a_name(tmp_path):
     file = tmp_path / "a: !!python_object [b], '#c.ply"
     text = MeshNavigationServer.config_for_map(file)
     assert text is not None and yaml.safe_load(text)["mesh_map"]["mesh_file"] == str(file)
+
+
+def unfolding(folder, levels, each=10):
+    """A COLLADA file whose node of each level uses the one below ``each`` times; the lowest one holds the mesh."""
+    file = collada(folder)
+    text = file.read_text()
+    geometry = re.search(r"<instance_geometry.*?</instance_geometry>", text, re.S).group(0)
+    nodes = [f'<node id="l0">{geometry}</node>']
+    for level in range(1, levels):
+        uses = f'<instance_node url="#l{level - 1}"/>' * each
+        nodes.append(f'<node id="l{level}">{uses}</node>')
+    text = text.replace(geometry, f'<instance_node url="#l{levels - 1}"/>')
+    file.write_text(
+        text.replace(
+            "<library_visual_scenes>", f"<library_nodes>{''.join(nodes)}</library_nodes><library_visual_scenes>"
+        )
+    )
+    return file
+
+
+def test_a_collada_scene_is_not_unfolded_before_its_uses_are_counted(tmp_path):
+    file = unfolding(tmp_path, 10)
+    tracemalloc.start()
+    with pytest.raises(MeshError, match="1000000000 uses of geometries through its nodes, the limit is 100000"):
+        read_mesh(file)
+    assert tracemalloc.get_traced_memory()[1] < 20_000_000
+    tracemalloc.stop()
+
+
+def test_a_collada_scene_of_few_uses_is_read(tmp_path):
+    assert len(read_mesh(unfolding(tmp_path, 3, each=2))[1]) == 4 * len(FACES)
+
+
+def test_collada_nodes_that_instance_each_other_in_a_cycle_are_refused(tmp_path):
+    file = unfolding(tmp_path, 3)
+    file.write_text(file.read_text().replace('<node id="l1">', '<node id="l1"><instance_node url="#l2"/>'))
+    with pytest.raises(MeshError, match="its nodes instance each other in a cycle"):
+        read_mesh(file)

@@ -1,10 +1,12 @@
 """Layers of a costmap as they are configured: zones and masks, bad configurations, footprints, relaxation."""
 
 import math
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 import yaml
+from PIL import Image
 from pydantic import ValidationError
 
 from mbf_abstract.geometry import Pose
@@ -148,3 +150,39 @@ def test_unknown_cells_are_inflated_only_where_told(build):
     assert results[0] == [254, 255, e2, 0, 0, 0]
     assert results[1] == [254, e1, e2, 0, 0, 0]
     assert results[2][2:] == [e1, e2, 0, 0]
+
+
+@pytest.mark.parametrize(("free", "told"), [(0, True), (1, True), (10, False)])
+def test_a_map_nearly_all_occupied_is_told(free, told):
+    cells = np.full((10, 10), 254, dtype=np.uint8)
+    cells.flat[:free] = 0
+    cells[:, 9] = 255
+    parameters = CostmapParameters.model_validate(
+        {"robot_radius": 0.0, "layers": [{"name": "walls", "type": "static"}]}
+    )
+    doubts = build_layered_costmap(parameters, static_map=Costmap(cells, 1.0)).doubts()
+    assert any("of the known cells are occupied, so hardly anything can be planned" in one for one in doubts) == told
+
+
+def test_a_robot_on_a_map_without_inflation_is_told_and_a_point_is_not(build):
+    (doubt,) = build("static", robot_radius=0.5).doubts()
+    assert doubt == "no inflation layer: grid planners take the robot, of inscribed radius 0.49 m, for a point"
+    assert build("static", "inflation", robot_radius=0.5).doubts() == []
+    assert build("static").doubts() == build(robot_radius=0.5).doubts() == []
+
+
+def test_the_limit_of_cells_is_a_parameter_for_grids_maps_and_masks(tmp_path):
+    Image.fromarray(np.full((20, 30), 254, dtype=np.uint8)).save(tmp_path / "map.png")
+    (tmp_path / "map.yaml").write_text("{image: map.png, resolution: 0.1, origin: [0, 0, 0]}")
+    with pytest.raises(ValueError, match="at most 99 cells"):
+        CostmapParameters(width=10.0, height=1.0, resolution=0.1, max_cells=99)
+    blocks = {"static": {"map_file": "map.yaml"}, "keepout": {"mask_file": "map.yaml"}}
+    blocks["speed_limit"] = {"mask_file": "map.yaml"}
+    for kind, block in blocks.items():
+        for limit in (599, 600):
+            parameters = CostmapParameters.model_validate(
+                {"width": 1.0, "height": 1.0, "max_cells": limit, "layers": [{"name": "one", "type": kind}]}
+            )
+            refused = pytest.raises(MapError, match="30 x 20 pixels are more than the limit of 599 cells")
+            with refused if limit == 599 else nullcontext():
+                build_layered_costmap(parameters, {"one": block}, base_folder=tmp_path)

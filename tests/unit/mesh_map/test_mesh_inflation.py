@@ -7,10 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.kernels.inflation import front_arrival
 from mbf_mesh_nav.layer import LayerContext
 from mbf_mesh_nav.layers.inflation import InflationLayer, InflationParameters
 from mbf_mesh_nav.layers.keep_out import KeepOutLayer, KeepOutParameters
+from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh_map import MeshMap
 
 
@@ -171,3 +173,33 @@ def test_costs_follow_new_parameters_at_run_time():
 def test_an_inflation_narrower_than_the_robot_is_refused():
     with pytest.raises(ValueError, match="at least inscribed_radius, 1 m"):
         InflationParameters(inflation_radius=0.4, inscribed_radius=1.0)
+
+
+BORDER = {"name": "border", "type": "border"}
+INFLATION = {"name": "inflation", "type": "inflation", "inputs": ["border"]}
+TILT = {"name": "tilt", "type": "tilt"}
+
+
+@pytest.mark.parametrize(
+    ("layers", "own", "text"),
+    [
+        ([BORDER, INFLATION], 0.2, "inscribed_radius 0.2 m of layer 'inflation' is less than the robot's"),
+        (
+            [BORDER],
+            None,
+            "no layer is an inflation or a tilt: the robot is planned as a point",
+        ),
+        ([BORDER, INFLATION], 0.34, ""),
+        ([BORDER, TILT, INFLATION], 0.2, ""),
+    ],
+)
+def test_a_robot_wider_than_what_the_layers_keep_off_it_is_told_unless_a_tilt_layer_looks_at_all_of_it(
+    layers, own, text
+):
+    vertices, faces = heightfield_mesh(np.zeros((11, 11)), 0.15, 0.15)
+    parameters = MeshMapParameters(inscribed_radius=0.34, layers=layers)
+    blocks = {} if own is None else {"inflation": {"inscribed_radius": own, "inflation_radius": 0.8}}
+    mesh_map = build_mesh_map(parameters, blocks, vertices=vertices, faces=faces)
+    told = [str(found) for found in mesh_map.report.findings if found.name == "narrow"]
+    assert len(told) == bool(text)
+    assert all(text in one for one in told)
