@@ -1,4 +1,4 @@
-"""The same scenario and seed is the same drive, to the last bit, on every CPU, locale, hash seed and folder.
+"""Environments in which drives are repeated, each in a process of its own, and the digests of what happened there.
 
 Other CPUs are emulated: OpenBLAS and numpy can be told to use what an older one has, numba to compile for any. With
 MBF_SAME_BYTES=all every drive is repeated in every environment, kernels compiled anew for a generic CPU included, as
@@ -18,11 +18,10 @@ try:
 except ImportError:  # numpy before 2
     from numpy.core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
-pytestmark = pytest.mark.timeout(1800)
+from terrain.scenario import load_scenario, shipped_scenarios
 
 DRIVES = Path(__file__).with_name("drives.py")
 EVERYTHING = os.environ.get("MBF_SAME_BYTES") == "all"
-NAMES = [] if EVERYTHING else ["crowded_corridor", "rubble_field", "table1/B"]  # none named: all
 
 VECTOR_UNITS = [name for name in __cpu_dispatch__ if __cpu_features__[name]]
 AVX_512 = [name for name in VECTOR_UNITS if name.startswith(("AVX512", "X86_V4"))]
@@ -41,26 +40,36 @@ IN_CI = {
 }
 
 
-def digests(environment, folder):
+def digests(names, environment, folder):
     """Digests of the drives in a process of its own."""
     inherited = {name: value for name, value in os.environ.items() if not name.startswith(("OPENBLAS_", "NPY_"))}
-    command = [sys.executable, str(DRIVES), *NAMES]
+    command = [sys.executable, str(DRIVES), *names]
     done = subprocess.run(command, env=inherited | environment, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert found and list(found) == names
+    return found
 
 
 @pytest.fixture(scope="module")
-def here(tmp_path_factory):
+def names(request):
+    """Drives of this file: in CI every shipped scenario of its ``BACKEND`` and ``MORE``, elsewhere ``SOME``."""
+    file = request.module
+    if not EVERYTHING:
+        return file.SOME
+    return [name for name in sorted(shipped_scenarios()) if load_scenario(name).backend == file.BACKEND] + file.MORE
+
+
+@pytest.fixture(scope="module")
+def here(names, tmp_path_factory):
     """Digests on this CPU as it is."""
-    return digests({}, tmp_path_factory.mktemp("here"))
+    return digests(names, {}, tmp_path_factory.mktemp("here"))
 
 
-@pytest.mark.parametrize("name", [*ENVIRONMENTS, *(IN_CI if EVERYTHING else ())])
-def test_drives_are_the_same_to_the_last_bit_elsewhere(name, here, tmp_path):
-    environment = {**ENVIRONMENTS, **IN_CI}[name]
+@pytest.fixture(params=[*ENVIRONMENTS, *(IN_CI if EVERYTHING else ())])
+def elsewhere(request, names, tmp_path):
+    """Digests in another environment."""
+    environment = {**ENVIRONMENTS, **IN_CI}[request.param]
     if "NUMBA_CPU_NAME" in environment:
         environment = environment | {"NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
-    elsewhere = digests(environment, tmp_path)
-    assert elsewhere.keys() == here.keys() and len(here) >= 3
-    assert not [drive for drive in here if here[drive] != elsewhere[drive]]
+    return digests(names, environment, tmp_path)

@@ -1,0 +1,16 @@
+"""The same scenario and seed is the same drive on costmaps, to the last bit, on every CPU, locale, hash seed, folder.
+
+A file for each kind of map, so that two workers share the work: each compiles and loads the kernels of its map only.
+"""
+
+import pytest
+
+pytestmark = pytest.mark.timeout(1800)
+
+BACKEND = "costmap"
+MORE = ["table1/S1", "table1/B"]
+SOME = ["crowded_corridor", "table1/B"]
+
+
+def test_drives_are_the_same_to_the_last_bit_elsewhere(here, elsewhere):
+    assert not [drive for drive in here if here[drive] != elsewhere[drive]]
