@@ -7,6 +7,8 @@ which its own centre lies, where it is the higher one: nothing gets lost, and no
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,7 +72,9 @@ def _cells_of_centres(
     return _cells(centres, origin, geometry) - start
 
 
-def _cells(points: NDArray[np.float64], lower: float | NDArray[np.float64], grid: GridGeometry) -> NDArray[np.int64]:
+def _cells(
+    points: NDArray[np.floating[Any]], lower: float | NDArray[np.float64], grid: GridGeometry
+) -> NDArray[np.int64]:
     """Index of the cell of ``grid``, counted from its corner ``lower`` [m], in which each point [m] lies."""
     return np.asarray(np.floor((points - lower) / grid.resolution + ON_A_BORDER), dtype=np.int64)
 
