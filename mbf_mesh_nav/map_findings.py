@@ -78,16 +78,21 @@ def _lethal(mesh_map: MeshMap) -> Iterator[Finding]:
 
 
 def _coarse(mesh_map: MeshMap) -> Iterator[Finding]:
-    """Findings if the mesh's edges are too long for the robot's radius, the reach of a layer, or a robot's wheels."""
+    """Findings if the mesh's edges are too long for the robot's wheels or radius, or for the reach of a layer.
+
+    A layer that stands the robot's wheels on the faces sees ledges between vertices up to a wheelbase apart; farther
+    apart the robot tilts more than the layer knows. Where none does, vertices are all that is known of the ground, and
+    there have to be several under a robot.
+    """
     mean_edge = mesh_map.topology.mean_edge_length
-    limits = {"half the inscribed radius": 0.5 * mesh_map.inscribed_radius}
-    for name, layer in mesh_map.layers.items():
-        limits[f"the radius of layer '{name}'"] = float(getattr(layer.parameters, "radius", 0.0))
-        # Ledges between vertices a wheelbase apart are on no map: the robot tilts more than the layer knows.
-        limits[f"the wheelbase of layer '{name}'"] = float(getattr(layer.parameters, "wheelbase", 0.0))
+    blocks = {name: layer.parameters for name, layer in mesh_map.layers.items()}
+    limits = {f"the wheelbase of layer '{name}'": getattr(block, "wheelbase", 0.0) for name, block in blocks.items()}
+    if not any(limits.values()):
+        limits["half the inscribed radius"] = 0.5 * mesh_map.inscribed_radius
         if mesh_map.inscribed_radius == 0.0:  # then that of an inflation is all that is known of the robot
-            inscribed = float(getattr(layer.parameters, "inscribed_radius", 0.0))
-            limits[f"half the inscribed radius of layer '{name}'"] = 0.5 * inscribed
+            for name, block in blocks.items():
+                limits[f"half the inscribed radius of layer '{name}'"] = 0.5 * getattr(block, "inscribed_radius", 0.0)
+    limits |= {f"the radius of layer '{name}'": getattr(block, "radius", 0.0) for name, block in blocks.items()}
     for what, limit in limits.items():
         if 0.0 < limit < mean_edge:
             text = (

@@ -262,6 +262,16 @@ def test_a_map_whose_edges_are_longer_than_a_robot_is_reported_with_its_tilt_lay
         assert any("the wheelbase of layer 'stance' (0.512 m)" in text for text in texts) is told
 
 
+@pytest.mark.parametrize("wheels", [False, True])
+def test_the_radius_of_a_robot_says_what_is_coarse_unless_a_layer_stands_its_wheels_on_the_faces(wheels):
+    vertices, faces = heightfield_mesh(np.zeros((9, 9)), 0.3, 0.3)
+    parameters = MeshMapParameters(
+        layers=[{"name": "ground", "type": "tilt" if wheels else "steepness"}], inscribed_radius=0.34
+    )
+    mesh_map = build_mesh_map(parameters, {}, vertices=vertices, faces=faces)
+    assert ("coarse" in mesh_map.report) is not wheels
+
+
 def test_coarse_mesh_is_reported_and_densify_mends_it():
     vertices, faces = heightfield_mesh(np.zeros((3, 3)), 2.0, 2.0)
     coarse = MeshMapParameters(inscribed_radius=0.4)
