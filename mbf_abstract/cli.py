@@ -26,6 +26,7 @@ def make_app() -> typer.Typer:
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
+        rich_markup_mode="markdown",  # "rich", the default, takes a unit such as [m] for markup and drops it
     )
     for command in (plan, check, plugins, new, doctor):
         command.register(app)

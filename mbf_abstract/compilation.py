@@ -30,12 +30,17 @@ class Compiled:
 
     Attributes
     ----------
+    kernels : list of str
+        Without what numba compiles of its own for them.
     seconds : float
         Real time [s].
+    kept : bool
+        Whether the machine code of all of them is on disk now, so that the next process need not compile them.
     """
 
     kernels: list[str] = field(default_factory=list)
     seconds: float = 0.0
+    kept: bool = True
 
 
 _watchers = _Watchers()
@@ -70,10 +75,13 @@ class CompilerClock:
         self._depth = 0
         self._began = 0.0
 
-    def start(self, kernel: str) -> None:
-        """Say that a kernel is compiled from now on, on this thread."""
+    def start(self, kernel: str, kept: bool) -> None:
+        """Say that a kernel is compiled from now on, on this thread, and whether the result is kept on disk."""
         for compiled, tell in tuple(_listeners):
+            if kernel.startswith("numba."):
+                continue
             compiled.kernels.append(kernel)
+            compiled.kept &= kept
             tell(kernel)
         self._depth += 1
         if self._depth == 1:

@@ -22,7 +22,7 @@ from typing import Any
 
 from numba import config, njit
 from numba.core import event
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import IndexDataCacheFile, NullCache
 
 from mbf_abstract.compilation import CompilerClock
 
@@ -91,8 +91,10 @@ class _CompilerWatch(event.Listener):  # type: ignore[misc]
 
     def on_start(self, event: event.Event) -> None:
         """A compilation begins, perhaps within another one."""
-        function = event.data["dispatcher"].py_func
-        self.clock.start(f"{function.__module__}.{function.__qualname__}")
+        dispatcher = event.data["dispatcher"]
+        function = dispatcher.py_func
+        kept = not isinstance(dispatcher._cache, NullCache)
+        self.clock.start(f"{function.__module__}.{function.__qualname__}", kept)
         if self.depth == 0:
             self.was_enabled = gc.isenabled()
             gc.disable()

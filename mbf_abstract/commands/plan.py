@@ -68,7 +68,7 @@ def plan(
             goal_pose = _pose("goal", to_place, server, notes)
             place_robot(server, start_pose)
             began = wall_seconds()
-            with waiting("planning") as say, told_of_kernels(lambda name: say(f"compiling {name}, once")) as compiled:
+            with waiting("planning") as say, told_of_kernels(lambda name: say(f"compiling {name}")) as compiled:
                 goal_to_plan = GetPathGoal(goal_pose, planner=planner, dist_tolerance=tolerance)
                 result = Navigator(server).send(goal_to_plan).wait()
             seconds = wall_seconds() - began - compiled.seconds
@@ -76,7 +76,9 @@ def plan(
                 with waiting("drawing the picture"):
                     draw_plan(png, server, start_pose, goal_pose, result)
     if compiled.kernels:
-        typer.echo(f"compiled once, kept on disk ({compiled.seconds:.1f} s): {', '.join(compiled.kernels)}", err=True)
+        what = "compiled once, kept on disk" if compiled.kept else "compiled, and not kept for the next time"
+        names = ", ".join(dict.fromkeys(compiled.kernels))  # some are compiled for several types
+        typer.echo(f"{what} ({compiled.seconds:.1f} s): {names}", err=True)
     _tell(result, seconds, notes, as_json)
     if not result.success:
         raise typer.Exit(FAILURE)
