@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import ClassVar
 
@@ -20,7 +20,9 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.costmap import INSCRIBED, Costmap
+from mbf_costmap_nav.lasting_walls import stays_unreachable
+from mbf_costmap_nav.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.path_geometry import arc_lengths, resample
 from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 from mbf_costmap_nav.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchRoom
@@ -84,7 +86,8 @@ class GridPlanner(CostmapPlanner):
             if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if len(leg.points) == 0:
-                return failure or _no_path(grid, start, goal, tolerance, name)
+                failure = failure or _no_path(grid, start, goal, tolerance, name)
+                return unless_lasting(failure, self.costmap, start, goal, tolerance, self.parameters.lethal_cost)
             reached_goal = leg.reached_goal and grid.costmap.contains(goal.x, goal.y)
             piece = _with_exact_ends(grid, leg.points, start, goal if reached_goal else None)
             pieces.append(resample(piece, self.pose_spacing) if self.pose_spacing > 0.0 else piece)
@@ -103,6 +106,23 @@ class GridPlanner(CostmapPlanner):
         if grid.is_blocked(cell):
             return PlanResult(GetPathOutcome.BLOCKED_START, _blocked(grid, "start", start, cell))
         return None
+
+
+def unless_lasting(
+    failure: PlanResult,
+    costmap: LayeredCostmap,
+    start: Pose,
+    goal: Pose,
+    tolerance: float,
+    lethal_cost: int = INSCRIBED,
+) -> PlanResult:
+    """Return a failure to find a way, as a permanent one where lasting walls part start and goal."""
+    if failure.outcome not in (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL):
+        return failure
+    if not stays_unreachable(costmap, start, goal, tolerance, lethal_cost):
+        return failure
+    text = f"{failure.message}; walls of the static map part them, whatever else moves away"
+    return replace(failure, message=text, permanent=True)
 
 
 def check_tolerance(tolerance: float) -> None:

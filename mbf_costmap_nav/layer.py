@@ -137,6 +137,11 @@ class CostmapLayer(ABC):
         """Why the layer's data is too old at ``now`` [s]; empty while it is current."""
         return ""
 
+    @property
+    def lasting(self) -> bool:
+        """Whether no sensor has a part in its cells, and no frame moves them: what it forbids stays forbidden."""
+        return False
+
     def doubt(self) -> str:
         """What is legal but hardly meant in the layer's parameters, given the footprint; empty if nothing is."""
         return ""

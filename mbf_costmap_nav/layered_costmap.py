@@ -22,6 +22,7 @@ from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.footprint import Footprint
 from mbf_costmap_nav.layer import CostmapLayer, LayerParameters, shifted
+from mbf_costmap_nav.layers_in_sum import doubts_about, lasting_map
 from mbf_costmap_nav.sensor_data import Observation, SensorLayer
 
 
@@ -142,6 +143,14 @@ class LayeredCostmap:
                 )
             return self._snapshot
 
+    def lasting(self) -> Costmap | None:
+        """The map as it were if no sensor saw anything, see ``layers_in_sum``; None where that is moot."""
+        with self._lock:
+            if self.rolling_window or self._last_update is None:
+                return None
+            self._pending = self._geometry.box  # layers may keep notes of the cells they are asked for
+            return lasting_map(list(self._enabled_layers()), self._geometry, self._default_value, self.frame_id)
+
     def is_current(self, now: float) -> bool:
         """Whether a command may be computed on this map at ``now`` [s]."""
         return not self.currency_problem(now)
@@ -160,15 +169,7 @@ class LayeredCostmap:
     def doubts(self) -> list[str]:
         """What is legal but hardly meant in the layers' parameters, e.g. an inflation narrower than the robot."""
         with self._lock:
-            layers = list(self._enabled_layers())
-            doubts = [f"layer {layer.name!r}: {doubt}" for layer in layers if (doubt := layer.doubt())]
-            inflates = any(hasattr(layer.parameters, "inflation_radius") for layer in layers)
-            if layers and not inflates and self.inscribed_radius > 0.0:
-                radius = f"{self.inscribed_radius:.2f} m"
-                doubts.append(
-                    f"no inflation layer: grid planners take the robot, of inscribed radius {radius}, for a point"
-                )
-            return doubts
+            return doubts_about(list(self._enabled_layers()), self.inscribed_radius)
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Lowest speed [m/s] the layers allow at the point (x, y) [m]; ``full_speed`` where there is no limit."""

@@ -75,6 +75,11 @@ class InflationLayer(CostmapLayer):
         """
         self._relief = (factor, until)
 
+    @property
+    def lasting(self) -> bool:
+        """It is as lasting as what it inflates; unknown cells are not."""
+        return not self.parameters.inflate_around_unknown
+
     def doubt(self) -> str:
         """Say that the radius is smaller than the robot and is not kept to."""
         radius = self.parameters.inflation_radius

@@ -54,6 +54,11 @@ class KeepoutLayer(CostmapLayer):
         self._placement = Placement(files.map_frame, context)
         self._changed = EMPTY_BOX
 
+    @property
+    def lasting(self) -> bool:
+        """Whether its areas are in the costmap's frame."""
+        return self._placement.in_costmap_frame
+
     def match_geometry(self, geometry: GridGeometry) -> None:
         """Paint the areas onto the grid."""
         super().match_geometry(geometry)

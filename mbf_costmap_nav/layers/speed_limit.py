@@ -55,6 +55,11 @@ class SpeedLimitLayer(CostmapLayer):
             self._mask = Costmap(mask.occupancy, mask.resolution, mask.origin[0], mask.origin[1], context.frame_id)
         self._placement = Placement(files.map_frame, context)
 
+    @property
+    def lasting(self) -> bool:
+        """It changes no cell."""
+        return True
+
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Look up where the areas lie; they change no cell."""
         self._placement.refresh()

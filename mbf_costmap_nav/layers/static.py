@@ -64,6 +64,11 @@ class StaticLayer(GridLayer):
         self._changed = EMPTY_BOX
         self._placement = Placement(self._map.frame_id, context)
 
+    @property
+    def lasting(self) -> bool:
+        """Whether its map is in the costmap's frame."""
+        return self._placement.in_costmap_frame
+
     def doubt(self) -> str:
         """Say that nearly all of the map is occupied."""
         known = self._map.cells != UNKNOWN

@@ -27,7 +27,7 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.costmap import LETHAL, Costmap
 from mbf_costmap_nav.footprint_check import FootprintCheck
-from mbf_costmap_nav.grid_planning import check_tolerance, heights_along, off_map
+from mbf_costmap_nav.grid_planning import check_tolerance, heights_along, off_map, unless_lasting
 from mbf_costmap_nav.kernels.car_ground import ground_of, pose_cost
 from mbf_costmap_nav.kernels.driven_arcs import Car
 from mbf_costmap_nav.kernels.grid_search import CANCELED, FOUND, search
@@ -136,7 +136,8 @@ class HybridAStarPlanner(CostmapPlanner):
             if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if leg is None or len(leg.poses) == 0:
-                return failure or self._no_way(world, start, goal, leg, tolerance)
+                failure = failure or self._no_way(world, start, goal, leg, tolerance)
+                return unless_lasting(failure, self.costmap, start, goal, tolerance)
             legs.append(leg)
         poses = np.concatenate([legs[0].poses, *(leg.poses[1:] for leg in legs[1:])])
         path = to_path(poses, heights_along(poses[:, :2], request), world.costmap.frame_id, self.clock.now())

@@ -1,0 +1,38 @@
+"""Whether a goal stays out of reach whatever moves away: what walls and keep-out areas alone make of the map.
+
+On the map as it is, a wall and a closed box that somebody put there look the same. Here the question is asked again
+on the map of those layers that no sensor writes: where even that has no way, waiting and trying again are useless.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from mbf_abstract.geometry import Pose
+from mbf_costmap_nav.costmap import INSCRIBED, UNKNOWN
+from mbf_costmap_nav.layered_costmap import LayeredCostmap
+
+EIGHT_NEIGHBOURS = np.ones((3, 3), dtype=bool)
+
+
+def stays_unreachable(
+    costmap: LayeredCostmap, start: Pose, goal: Pose, tolerance: float, lethal_cost: int = INSCRIBED
+) -> bool:
+    """Whether lasting walls part a start from all cells within ``tolerance`` [m] of a goal.
+
+    Doubt speaks for a way: unknown cells, corners that are cut, and costs below the inscribed one count as free, and
+    nothing is said of a start that stands in a wall or of poses off the map. ``lethal_cost`` is the planner's.
+    """
+    walls = costmap.lasting()
+    if walls is None or not (walls.contains(start.x, start.y) and walls.contains(goal.x, goal.y)):
+        return False
+    free = (walls.cells < max(lethal_cost, INSCRIBED)) | (walls.cells == UNKNOWN)
+    ix, iy = walls.world_to_cell_clamped(start.x, start.y)
+    if not free[iy, ix]:
+        return False
+    pieces, _ = ndimage.label(free, EIGHT_NEIGHBOURS)
+    rows, columns = np.nonzero(pieces == pieces[iy, ix])
+    goal_x, goal_y = walls.world_to_cell_clamped(goal.x, goal.y)
+    reach = tolerance / walls.resolution + 1.0 if tolerance > 0.0 else 0.0
+    return bool(((columns - goal_x) ** 2 + (rows - goal_y) ** 2 > reach * reach).all())

@@ -1,0 +1,94 @@
+"""Walls that stay end a goal at once; what may move away is waited for."""
+
+import numpy as np
+import pytest
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PlanRequest
+from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.planners.astar import AStarPlanner
+from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
+from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
+from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
+
+PLANNERS = [AStarPlanner, DijkstraPlanner, ThetaStarPlanner, HybridAStarPlanner]
+OBSTACLES = {"sources": {"scan": {"obstacle_max_range": 20.0}}}
+
+
+def two_rooms(gap=0):
+    """Two rooms of 5 m x 5 m at 0.1 m, and a gap of some cells in the wall between them."""
+    cells = np.zeros((50, 101), dtype=np.uint8)
+    cells[:, 50] = 254
+    cells[20 : 20 + gap, 50] = 0
+    return Costmap(cells, 0.1)
+
+
+@pytest.fixture
+def rooms():
+    """Make a layered map of two rooms with whatever layers, a box of sensed obstacles over the wall's gap."""
+
+    def make(gap, sensed, layers=("static", "obstacle", "inflation"), **obstacle):
+        parameters = CostmapParameters.model_validate(
+            {"robot_radius": 0.2, "layers": [{"name": name, "type": name} for name in layers]}
+        )
+        blocks = {"obstacle": {**OBSTACLES, **obstacle}} if "obstacle" in layers else {}
+        costmap = build_layered_costmap(parameters, blocks, static_map=two_rooms(gap))
+        if sensed:
+            points = [(5.05, 0.05 + 0.1 * k, 0.2) for k in range(50)]
+            costmap.insert_points("scan", points, (1.0, 2.5, 0.2), 0.0)
+        costmap.update(Pose.planar(1.0, 2.5), 0.0)
+        return costmap
+
+    return make
+
+
+def plan(make_plugin, planner_class, costmap, **request):
+    planner = make_plugin(planner_class, two_rooms(), costmap=costmap)
+    return planner.make_plan(PlanRequest(Pose.planar(1.0, 2.5), Pose.planar(9.0, 2.5), **request))
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+def test_a_goal_behind_a_wall_is_told_for_good(make_plugin, rooms, planner_class):
+    result = plan(make_plugin, planner_class, rooms(gap=0, sensed=False))
+    assert (result.outcome, result.permanent) == (GetPathOutcome.NO_PATH_FOUND, True)
+    assert "walls of the static map part them, whatever else moves away" in result.message
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+def test_a_goal_behind_a_gap_too_narrow_for_the_robot_is_told_for_good(make_plugin, rooms, planner_class):
+    assert plan(make_plugin, planner_class, rooms(gap=3, sensed=False)).permanent
+
+
+@pytest.mark.parametrize("planner_class", PLANNERS)
+def test_a_goal_behind_sensed_obstacles_may_become_free(make_plugin, rooms, planner_class):
+    result = plan(make_plugin, planner_class, rooms(gap=10, sensed=True))
+    assert (result.outcome, result.permanent) == (GetPathOutcome.NO_PATH_FOUND, False)
+
+
+@pytest.mark.parametrize(
+    ("layers", "obstacle"),
+    [
+        (("static", "obstacle", "inflation"), {"combination_method": "overwrite"}),
+        (("static", "obstacle", "denoise", "inflation"), {}),
+    ],
+)
+def test_nothing_is_said_for_good_where_no_wall_lasts_or_a_layer_may_free_one(make_plugin, rooms, layers, obstacle):
+    costmap = rooms(0, True, layers, **obstacle)
+    assert costmap.lasting() is None
+
+
+def test_a_tolerance_that_reaches_this_side_of_the_wall_is_no_failure_for_good(make_plugin, rooms):
+    walled = rooms(gap=0, sensed=False)
+    assert plan(make_plugin, AStarPlanner, walled, dist_tolerance=3.0).permanent
+    assert plan(make_plugin, AStarPlanner, walled, dist_tolerance=5.0).success
+
+
+def test_asking_for_lasting_walls_changes_nothing_of_the_map(rooms):
+    asked, left = rooms(gap=10, sensed=True), rooms(gap=10, sensed=True)
+    assert not np.array_equal(asked.lasting().cells, asked.snapshot().cells)
+    for costmap in (asked, left):
+        costmap.insert_points("scan", [(3.05, 3.05, 0.2)], (1.0, 2.5, 0.2), 1.0)
+        costmap.update(Pose.planar(1.0, 2.5), 1.0)
+    assert np.array_equal(asked.snapshot().cells, left.snapshot().cells)
