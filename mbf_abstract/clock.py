@@ -11,7 +11,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from enum import IntEnum
 from types import TracebackType
 from typing import Protocol
@@ -92,8 +92,7 @@ class Clock(Protocol):
     def settle(self) -> None:
         """Let threads that were told to end do so, where they need this thread to wait for it; moves no time."""
 
-    @contextmanager
-    def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> Iterator[None]:
+    def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> AbstractContextManager[None]:
         """Mark foreign code (a plugin call) in which the thread may hang; ``on_hang`` is told if the clock gives up.
 
         ``ThreadDetached`` leaves the section only where the clock has really given up on the thread; one that the
@@ -129,6 +128,22 @@ class _WallCondition(threading.Condition):
         return super().wait(None if timeout is None else min(timeout, threading.TIMEOUT_MAX))
 
 
+class _WallSection:
+    """A guarded section on the wall clock, whose thread is never given up. Entered some hundred times a second."""
+
+    __slots__ = ("label",)
+
+    def __init__(self, label: str) -> None:
+        self.label = label
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        if isinstance(error, ThreadDetached):
+            raise RuntimeError(f"{self.label} raised ThreadDetached: {error}") from error
+
+
 class WallClock:
     """Real time, from the operating system's monotonic clock."""
 
@@ -159,13 +174,9 @@ class WallClock:
     def settle(self) -> None:
         """Do nothing: threads end by themselves."""
 
-    @contextmanager
-    def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> Iterator[None]:
+    def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> AbstractContextManager[None]:
         """Do nothing: a thread that hangs does not stop real time."""
-        try:
-            yield
-        except ThreadDetached as forged:
-            raise RuntimeError(f"{label} raised ThreadDetached: {forged}") from forged
+        return _WallSection(label)
 
     @contextmanager
     def outside(self) -> Iterator[None]:

@@ -1,6 +1,6 @@
 """Time that numba's compiler takes at the first use of a kernel is nobody's: no patience and no hang guard counts it.
 
-Who watches a call of foreign code says with ``compiler_watched`` what is to be done while a kernel is compiled on the
+Who watches a call of foreign code says with ``watch_compiler`` what is to be done while a kernel is compiled on the
 thread of that call. Who talks to a user hears of every kernel with ``told_of_kernels``. ``kernel_cache`` connects this
 to numba; here nothing is imported that takes time.
 """
@@ -47,14 +47,14 @@ _watchers = _Watchers()
 _listeners: list[tuple[Compiled, Callable[[str], None]]] = []
 
 
-@contextmanager
-def compiler_watched(on_start: Notice, on_end: Notice) -> Iterator[None]:
-    """Call ``on_start`` and ``on_end`` around everything that is compiled on this thread in the block."""
+def watch_compiler(on_start: Notice, on_end: Notice) -> None:
+    """Call ``on_start`` and ``on_end`` around all that is compiled on this thread, until ``unwatch_compiler``."""
     _watchers.pairs.append((on_start, on_end))
-    try:
-        yield
-    finally:
-        _watchers.pairs.pop()
+
+
+def unwatch_compiler() -> None:
+    """End the watch that was begun last on this thread."""
+    _watchers.pairs.pop()
 
 
 @contextmanager

@@ -48,6 +48,10 @@ def to_json_value(value: Any) -> JsonValue:
     A type that JSON does not know becomes its ``str``; an enum becomes its name. What is too long, too deep or too
     many is replaced by a text that says so.
     """
+    if value is None or type(value) is bool:
+        return value
+    if type(value) is str and len(value) <= MAX_TEXT and value.isascii():  # most fields; others go the long way
+        return value
     try:
         return _Converter().convert(value, 0)
     except Exception as error:  # e.g. a mapping whose items raise

@@ -116,10 +116,10 @@ def _quaternions_from_matrices(m: FloatArray) -> FloatArray:
 
 
 def _finite(name: str, values: Iterable[float]) -> tuple[float, ...]:
-    numbers = tuple(float(value) for value in values)
-    for index, value in enumerate(numbers):
-        if not math.isfinite(value):
-            raise NonFiniteError(f"{name}[{index}] must be finite, got {value}")
+    numbers = tuple(map(float, values))
+    if not all(map(math.isfinite, numbers)):
+        index = [math.isfinite(value) for value in numbers].index(False)
+        raise NonFiniteError(f"{name}[{index}] must be finite, got {numbers[index]}")
     return numbers
 
 

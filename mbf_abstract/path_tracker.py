@@ -125,10 +125,11 @@ class PathTracker:
             self._joined, window = True, math.inf
             self._advance(self._joining_place(robot))
         cusp = self.next_cusp
-        self._advance(self._nearest_ahead(robot.tolist(), min(self.progress + window, cusp)))
+        place = robot.tolist()
+        self._advance(self._nearest_ahead(place, min(self.progress + window, cusp)))
         if cusp < self.length and cusp - self.progress <= CUSP_REACHED:
             self._advance(cusp)
-        self.deviation = float(norm(self.point_at(self.progress) - robot))
+        self.deviation = _norm(c - r for c, r in zip(self._point_at(self.progress), place, strict=True))
 
     def seen_from(self, transform: Transform) -> PathTracker:
         """Return the same path and progress in the transform's parent frame."""
@@ -139,7 +140,16 @@ class PathTracker:
 
     def point_at(self, length: float) -> FloatArray:
         """Point (dimensions,) of the path at ``length`` [m] along it, clamped to its ends."""
-        return np.asarray(self.points_at(np.array([length]))[0])
+        return np.array(self._point_at(length))
+
+    def _point_at(self, length: float) -> list[float]:
+        """As ``points_at``, to the bit, without the cost of array calls."""
+        segment = int(self.lengths.searchsorted(length, side="right")) - 1
+        if segment < 0 or segment == len(self.lengths) - 1:
+            return list(self.points[max(segment, 0)].tolist())
+        begin, end = self.lengths[segment : segment + 2].tolist()
+        corner, following = self.points[segment : segment + 2].tolist()
+        return [(f - c) / (end - begin) * (length - begin) + c for c, f in zip(corner, following, strict=True)]
 
     def points_at(self, lengths: FloatArray) -> FloatArray:
         """Points (m, dimensions) of the path at ``lengths`` (m,) [m] along it, clamped to its ends."""
@@ -219,7 +229,10 @@ def polyline_lengths(points: FloatArray) -> FloatArray:
 
 
 def _norm(components: Iterable[float]) -> float:
-    return math.sqrt(sum(component * component for component in components))
+    total = 0.0
+    for component in components:
+        total += component * component
+    return math.sqrt(total)
 
 
 def reverse_segments(path: Path, points: FloatArray) -> NDArray[np.bool_]:

@@ -27,7 +27,6 @@ from contextlib import contextmanager
 import numpy as np
 
 from mbf_abstract.clock import ClockThread, Condition, Priority, ThreadDetached
-from mbf_abstract.compilation import compiler_watched
 from mbf_abstract.sim_thread import Participant, Section, SimCondition, SimThread
 
 DEFAULT_HANG_GUARD = 30.0
@@ -108,29 +107,30 @@ class SimClock:
         """Start a daemon thread that joins the lockstep at the present instant."""
         return SimThread(self, target, name, priority)
 
-    @contextmanager
-    def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> Iterator[None]:
+    def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> Section:
         """Watch the section with the wall-clock guard, which calls ``on_hang`` on its own thread.
 
         Sections may lie within each other; the time that counts is that of the outermost one, without what numba's
         compiler took of it.
         """
+        return Section(self, label, on_hang)
+
+    def _enter_section(self, section: Section) -> Participant:
         me = self._current()
         if not me.sections:
             me.start_counting()
-        me.sections.append(Section(label, on_hang))
-        self._start_guard()
-        try:
-            with compiler_watched(me.stop_counting, me.start_counting):
-                yield
-        except ThreadDetached as error:
-            if not me.detached:
-                raise RuntimeError(f"{label} raised ThreadDetached: {error}") from error
-        finally:
-            me.sections.pop()
-            if me.detached:
-                self._go_on_as_foreign(me)
-                raise ThreadDetached(label)
+        me.sections.append(section)
+        if not self._guarding:
+            self._start_guard()
+        return me
+
+    def _leave_section(self, section: Section, me: Participant, error: BaseException | None) -> None:
+        me.sections.pop()
+        if me.detached:
+            self._go_on_as_foreign(me)
+            raise ThreadDetached(section.label)
+        if isinstance(error, ThreadDetached):
+            raise RuntimeError(f"{section.label} raised ThreadDetached: {error}") from error
 
     def _go_on_as_foreign(self, me: Participant) -> None:
         if self._local.participant is me:
@@ -220,8 +220,9 @@ class SimClock:
 
     # ------------------------------------------------------------------------------ the scheduler itself
     def _current(self) -> Participant:
-        me: Participant | None = getattr(self._local, "participant", None)
-        if me is None:
+        try:
+            me: Participant = self._local.participant
+        except AttributeError:  # a thread that this clock has not seen yet
             me = Participant(threading.current_thread().name, Priority.CLIENT, foreign=True)
             self._local.participant = me
         if me.detached:
@@ -358,7 +359,7 @@ class SimClock:
                 self._dispatch()
 
     def _start_guard(self) -> None:
-        if self.hang_guard > 0.0 and not self._guarding:
+        if self.hang_guard > 0.0:
             self._guarding = True
             self._alone.clear()
             threading.Thread(target=self._guard, name="hang guard", daemon=True).start()

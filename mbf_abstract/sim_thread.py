@@ -11,22 +11,17 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import PurePath
-from typing import TYPE_CHECKING, NamedTuple
+from types import TracebackType
+from typing import TYPE_CHECKING
 
 from mbf_abstract.clock import ThreadDetached
+from mbf_abstract.compilation import unwatch_compiler, watch_compiler
 
 if TYPE_CHECKING:
     from mbf_abstract.sim_clock import SimClock
 
 WAITING_MODULES = ("threading.py", "selectors.py", "queue.py")
 """Files of Python's library in which a thread waits for another one."""
-
-
-class Section(NamedTuple):
-    """One guarded section, and who is told if its thread hangs."""
-
-    label: str
-    on_hang: Callable[[], None] | None
 
 
 class Participant:
@@ -68,6 +63,25 @@ class Participant:
         self.resumed_at = math.inf
 
 
+class Section:
+    """One guarded section, and who is told if its thread hangs. Entered some hundred times a second."""
+
+    __slots__ = ("_clock", "_me", "label", "on_hang")
+
+    def __init__(self, clock: SimClock, label: str, on_hang: Callable[[], None] | None) -> None:
+        self._clock = clock
+        self.label = label
+        self.on_hang = on_hang
+
+    def __enter__(self) -> None:
+        self._me = me = self._clock._enter_section(self)
+        watch_compiler(me.stop_counting, me.start_counting)
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        unwatch_compiler()
+        self._clock._leave_section(self, self._me, error)
+
+
 class SimCondition:
     """A condition of a SimClock; the real lock inside is contended only by foreign threads."""
 
@@ -79,13 +93,17 @@ class SimCondition:
         self.waiters: list[Participant] = []
 
     def __enter__(self) -> SimCondition:
-        me = self._clock._current()
-        self._clock._maybe_yield(me)
-        self.acquire(me)
+        clock = self._clock
+        me = clock._current()
+        if clock._schedule is not None:
+            clock._maybe_yield(me)
+        self._lock.acquire()
+        me.held_locks += 1
         return self
 
     def __exit__(self, *exc: object) -> None:
-        self.release(self._clock._local.participant)
+        self._clock._local.participant.held_locks -= 1
+        self._lock.release()
 
     def acquire(self, me: Participant) -> None:
         """Take the real lock for ``me``."""

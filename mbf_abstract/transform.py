@@ -71,18 +71,18 @@ class Transform:
         for name in (self.parent, self.child):
             if problem := frame_name_problem(name):
                 raise InvalidTransformError(f"{label}: {problem}")
-        translation = tuple(float(value) for value in self.translation)
-        rotation = tuple(float(value) for value in self.rotation)
+        translation, rotation = tuple(map(float, self.translation)), tuple(map(float, self.rotation))
         if len(translation) != 3 or len(rotation) != 4:
             raise InvalidTransformError(f"{label}: needs 3 and 4 numbers, got {translation} and {rotation}")
-        if not all(math.isfinite(value) for value in (*translation, *rotation, self.stamp)):
+        if not all(map(math.isfinite, (*translation, *rotation, self.stamp))):
             raise InvalidTransformError(f"{label}: not finite: {translation} {rotation} at {self.stamp}")
-        norm_squared = sum(value * value for value in rotation)
+        x, y, z, w = rotation
+        norm_squared = x * x + y * y + z * z + w * w
         if abs(norm_squared - 1.0) >= QUATERNION_NORM_TOLERANCE:
             raise InvalidTransformError(f"{label}: squared norm of the rotation is {norm_squared:.6g}, expected 1")
         norm = math.sqrt(norm_squared)
         object.__setattr__(self, "translation", translation)
-        object.__setattr__(self, "rotation", tuple(value / norm for value in rotation))
+        object.__setattr__(self, "rotation", (x / norm, y / norm, z / norm, w / norm))
 
     @classmethod
     def from_pose(cls, pose: Pose, child: str) -> Transform:

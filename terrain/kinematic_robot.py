@@ -132,17 +132,16 @@ class KinematicRobot:
         What stops a robot leaves a gap of up to a step's length; the contact lasts until the robot is farther away.
         """
         commanded, velocity = commanded_twist(self.spec, self._command), self.velocity()
-        touched = self._touched | self._contact(self._x, self._y, self._yaw)[1]
-        self._touched = touched & self._near()
+        touched, near = self._touched, self._near()
+        if near:  # what is not even near is not touched
+            touched |= self._contact(self._x, self._y, self._yaw)[1]
+        self._touched = touched & near
         return MotionSample(self.pose(), velocity, commanded, velocity, touched=touched)
 
     def _near(self) -> frozenset[Thing]:
         """What is within a step's length of the outline; ground that ends counts as a wall."""
         near = self._contact(self._x, self._y, self._yaw, STOPPING_GAP)[1]
-        around = [
-            (self._x + dx, self._y + dy) for dx in (-STOPPING_GAP, STOPPING_GAP) for dy in (-STOPPING_GAP, STOPPING_GAP)
-        ]
-        return near if all(self.world.contains(x, y) for x, y in around) else near | {Thing.WALL}
+        return near if self.world.contains(self._x, self._y, STOPPING_GAP) else near | {Thing.WALL}
 
 
 def _approach(value: float, target: float, most: float) -> float:

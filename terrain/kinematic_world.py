@@ -21,6 +21,7 @@ from terrain.upright_solids import UprightSolid
 FloatArray = NDArray[np.float64]
 
 TIME_STEP = 1.0 / 60.0
+NOTHING: frozenset[Thing] = frozenset()
 FLOOR = 1000.0  # m; half the size of the floor that sensors see in a world without a map
 
 
@@ -101,10 +102,15 @@ class KinematicWorld:
         """Whether anything may move besides the robots."""
         return any(solid.moving for solid in self.solids)
 
-    def contains(self, x: float, y: float) -> bool:
-        """Whether there is ground at (x, y) [m]."""
+    def contains(self, x: float, y: float, margin: float = 0.0) -> bool:
+        """Whether there is ground at (x, y) [m], and at all places within ``margin`` [m] along x and y."""
         terrain = self.terrain
-        return terrain is None or (terrain.x0 <= x <= terrain.x_max and terrain.y0 <= y <= terrain.y_max)
+        return terrain is None or (
+            terrain.x0 <= x - margin
+            and x + margin <= terrain.x_max
+            and terrain.y0 <= y - margin
+            and y + margin <= terrain.y_max
+        )
 
     def contact(
         self, outline: FloatArray, x: float, y: float, yaw: float, reach: float, gap: float = 0.0
@@ -128,12 +134,14 @@ class KinematicWorld:
             Below 0 where it touches nothing.
         touched : frozenset of Thing
         """
+        if not self.solids and self.building is None:
+            return -math.inf, NOTHING
         near = [(body, solid) for body, solid in enumerate(self.solids) if solid.distance(x, y) < reach + gap]
         grid = self.building
         if grid is not None and self._wall_clearance(x, y) > reach + 2.0 * grid.resolution:
             grid = None
         if grid is None and not near:
-            return -math.inf, frozenset()
+            return -math.inf, NOTHING
         corners = placed(outline, x, y, yaw)
         depths = [(solid.depth(corners), self.things.get(body, Thing.WALL)) for body, solid in near]
         if grid is not None:

@@ -40,6 +40,9 @@ class MishapKind(Enum):
     COLLISION_WITH_ROBOT = "collision_with_robot"
 
 
+COLLISIONS_WITH = {thing: MishapKind(f"collision_with_{thing.value}") for thing in Thing}
+
+
 @dataclass(frozen=True)
 class MotionSample:
     """State of a robot at one instant.
@@ -159,7 +162,7 @@ class MishapMonitor:
             (MishapKind.STUCK, 0.0, lambda s: standing >= limits.stuck_hold),
             (MishapKind.COLLISION, 0.0, lambda s: bool(s.touched)),
             (MishapKind.COLLISION_WHILE_MOVING, 0.0, lambda s: self._moved_in_contact),
-            *((MishapKind(f"collision_with_{t.value}"), 0.0, lambda s, t=t: t in s.touched) for t in Thing),
+            *((kind, 0.0, lambda s, t=thing: t in s.touched) for thing, kind in COLLISIONS_WITH.items()),
         ]
         return [
             Mishap(kind, sample.pose.stamp, sample.pose)

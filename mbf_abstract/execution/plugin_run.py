@@ -11,12 +11,12 @@ for calls of the robot's driver and of the map that are made beside the plugin.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Generic, TypeVar
 
 from mbf_abstract.actions.handle import AnyGoalHandle
 from mbf_abstract.clock import Stopwatch
-from mbf_abstract.compilation import compiler_watched
+from mbf_abstract.compilation import unwatch_compiler, watch_compiler
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.plugins import Plugin
@@ -121,43 +121,57 @@ class PluginRun(Generic[P]):
 
     def call(self, method: str, function: Callable[[], T]) -> T:
         """Call into the plugin; raises PluginFault if it raises, Abandoned if the goal ended meanwhile."""
-        with self._supervised(self.plugin.title), compiler_watched(self._compiler_starts, self._compiler_ends):
+        self._begin_call(self.plugin.title)
+        watch_compiler(self._compiler_starts, self._compiler_ends)
+        try:
             return self.plugin.call(self.handle.id, method, function, self._declare_hung)
+        finally:
+            unwatch_compiler()
+            self._end_call()
 
     def call_beside(self, who: str, function: Callable[[], T]) -> T:
         """Call what is no plugin but may hang like one, the driver or the map; raises Abandoned as ``call`` does."""
-        with self._supervised(who), self.runtime.clock.guarded(who, self._declare_hung):
-            return function()
+        self._begin_call(who)
+        try:
+            with self.runtime.clock.guarded(who, self._declare_hung):
+                return function()
+        finally:
+            self._end_call()
 
     @contextmanager
     def map_in_use(self) -> Iterator[None]:
         """Have the map kept alive for a plugin of this kind."""
-        who, hooks, kind = "the map's using_map()", self.runtime.map_hooks, self.plugin.spec.kind
-        keeper = self.call_beside(who, lambda: hooks.using_map(kind))
+        who = "the map's using_map()"
+        kept: list[AbstractContextManager[None]] = []
         try:
-            self.call_beside(who, keeper.__enter__)
+            self.call_beside(who, lambda: self._keep_map(kept))
         except Abandoned:  # it did come back, but late
-            keeper.__exit__(None, None, None)
+            for keeper in kept:
+                keeper.__exit__(None, None, None)
             raise
         try:
             yield
         finally:
-            self.call_beside(who, lambda: keeper.__exit__(None, None, None))
+            self.call_beside(who, lambda: kept[0].__exit__(None, None, None))
 
-    @contextmanager
-    def _supervised(self, who: str) -> Iterator[None]:
+    def _keep_map(self, kept: list[AbstractContextManager[None]]) -> None:
+        keeper = self.runtime.map_hooks.using_map(self.plugin.spec.kind)
+        keeper.__enter__()
+        kept.append(keeper)
+
+    def _begin_call(self, who: str) -> None:
         self.suspect = who
         self._call_began = self.runtime.clock.now()
-        try:
-            yield
-        finally:
-            if self._hung:
-                self._abandon()  # the clock has given up on this thread, whoever comes first to say so
-            with self._condition:
-                self._call_began = None
-                abandoned = self.abandoned
-            if abandoned:
-                raise Abandoned(who)
+
+    def _end_call(self) -> None:
+        """Note that a call has come back; raises Abandoned if that was too late."""
+        if self._hung:
+            self._abandon()  # the clock has given up on this thread, whoever comes first to say so
+        with self._condition:
+            self._call_began = None
+            abandoned = self.abandoned
+        if abandoned:
+            raise Abandoned(self.suspect)
 
     def is_patience_over(self) -> bool:
         """Whether the patience has run out, now or earlier."""

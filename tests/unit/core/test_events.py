@@ -56,6 +56,14 @@ def test_values_become_plain_json(value, expected):
     json.dumps(result, allow_nan=False)
 
 
+@pytest.mark.parametrize(
+    "value", [None, True, False, "", "plain", "x" * 10_000, "x" * 10_001, "caf\u00e9", "half \ud800", np.str_("text")]
+)
+def test_a_value_alone_becomes_what_it_becomes_in_a_list(value):
+    alone, within = to_json_value(value), to_json_value([value])
+    assert within == [alone] and type(within[0]) is type(alone)
+
+
 def holding_itself():
     endless = []
     endless.append(endless)

@@ -128,6 +128,17 @@ def test_a_path_of_one_pose_is_its_own_end():
     assert tracker.has_arrived(0.1) and not tracker.driving_backward
 
 
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-1, 1)), min_size=1, max_size=8),
+    st.floats(-1.0, 50.0),
+)
+def test_a_single_point_of_a_path_is_that_of_many_to_the_bit(corners, length):
+    tracker = PathTracker(Path.from_points(np.array(corners)))
+    for place in [length, *tracker.lengths.tolist(), *(tracker.lengths / 3.0).tolist()]:
+        assert np.array_equal(tracker.point_at(place), tracker.points_at(np.array([place]))[0])
+
+
 def test_seen_from_above_heights_do_not_count():
     tracker = PathTracker(path_through((0, 0, 0), (3, 0, 4)), dimensions=2)
     assert tracker.length == pytest.approx(3.0)
