@@ -23,6 +23,8 @@ from mbf_mesh_nav.surface_point import corner_distances, passes_blocked_corner
 AT_ONE_PLACE = 1e-6
 """Start and goal this near [m], or a corner and one of them, have no direction between them."""
 ANY_HEADING = -1
+ROUNDED = 2e-3
+"""A tolerance may be so little [rad] less than meant: 3.14 is half a turn."""
 
 IntArray = NDArray[np.int32]
 Offsets = NDArray[np.float32]
@@ -142,7 +144,9 @@ def headings_within(pose: Pose | None, tolerance: float) -> set[int]:
     if pose is None:
         return set()
     offsets = [abs(math.remainder(heading * HEADING_STEP - pose.yaw, math.tau)) for heading in range(HEADINGS)]
-    within = {heading for heading, offset in enumerate(offsets) if offset <= tolerance} | {heading_index(pose.yaw)}
+    within = {heading for heading, offset in enumerate(offsets) if offset <= tolerance + ROUNDED} | {
+        heading_index(pose.yaw)
+    }
     return within if len(within) < HEADINGS else set()
 
 

@@ -150,7 +150,8 @@ class HeadingAStarPlanner(SurfacePlanner):
 
     def _describe_ends(self, query: LegQuery, limits: HeadingLimits) -> str:
         """Which of the two poses the tilt forbids, else that it may close ways in between."""
-        ends = (("start", query.start, query.start_pose), ("goal", query.goal, query.goal_pose))
+        asked = query.goal_pose if headings_within(query.goal_pose, query.angle_tolerance) else None
+        ends = (("start", query.start, query.start_pose), ("goal", query.goal, asked))
         tilted = [
             f"; tilt forbids the heading {pose.yaw:.2f} rad at the {name}"
             for name, point, pose in ends

@@ -167,6 +167,17 @@ def test_any_heading_within_the_tolerance_will_do_at_a_goal(make_plugin):
         assert planner.make_plan(PlanRequest(start, goal, angle_tolerance=tolerance)).success
 
 
+def test_where_any_heading_will_do_the_goal_s_own_is_not_the_reason(make_plugin):
+    y = np.arange(61) * 0.2
+    height = np.clip(np.tan(0.4) * (3.0 - np.abs(y - 6.0)), 0.0, None)
+    ridge = MeshMap.from_heights(np.tile(height[:, None], (1, 61)), 0.2, 0.2)
+    planner = make_plugin(HeadingAStarPlanner, ridge, max_roll=0.2, max_pitch=0.3)
+    ends = Pose.planar(2.0, 1.0, 1.57), Pose.planar(2.0, 4.5, 0.0, z=0.6)
+    assert "at the goal" in planner.make_plan(PlanRequest(*ends)).message
+    message = planner.make_plan(PlanRequest(*ends, angle_tolerance=3.14159)).message
+    assert "at the goal" not in message and "of all headings" in message
+
+
 def test_headings_within_a_tolerance_include_the_nearest_and_all_of_them_are_any():
     assert headings_within(Pose.planar(0.0, 0.0, 0.3), 0.0) == {1}
     assert headings_within(Pose.planar(0.0, 0.0, 3.0), 0.6) == {7, 8, 9}
