@@ -1,0 +1,162 @@
+"""Every hook of every interface, found by looking at the classes, with every fault: P1 stop, P2 end, P3 stay."""
+
+import asyncio
+import inspect
+
+import pytest
+
+from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, RecoveryGoal, RefinePathGoal
+from mbf_abstract.execution.runtime import MapHooks
+from mbf_abstract.geometry import Pose
+from mbf_abstract.plugins import PLUGIN_BASES, PluginKind
+from mbf_abstract.robot import Robot
+from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.faulty import Hang
+from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops
+
+LIMITS = {"planner_patience": 2.0, "controller_patience": 2.0, "recovery_patience": 2.0, "cancel_grace": 0.5}
+ENDS_WITHIN = 8.0  # s: driving, patience, grace, and a call that is late by LATE
+LATE = 3.0  # s
+GOALS = {
+    PluginKind.PLANNER: lambda bench: GetPathGoal(Pose.planar(3.0, 0.0)),
+    PluginKind.CONTROLLER: lambda bench: ExePathGoal(bench.path_to(1.0)),
+    PluginKind.RECOVERY: lambda bench: RecoveryGoal(),
+    PluginKind.REFINER: lambda bench: RefinePathGoal(bench.path_to(3.0)),
+}
+CALLED_OTHERWISE = {"parameters_changed"}  # by the client's own thread, which gets what it raises
+
+
+def raising(error):
+    def fault(healthy, clock):
+        def call(*arguments, **keywords):
+            raise error
+
+        return call
+
+    return fault
+
+
+def answering(answer):
+    return lambda healthy, clock: lambda *arguments, **keywords: answer
+
+
+def hanging(healthy, clock):
+    hang = Hang(clock)
+
+    def call(*arguments, **keywords):
+        return hang(None)
+
+    call.release = hang.release
+    return call
+
+
+def late(healthy, clock):
+    def call(*arguments, **keywords):
+        clock.sleep(LATE)
+        return healthy(*arguments, **keywords)
+
+    return call
+
+
+FAULTS = {
+    "Exception": raising(RuntimeError("broken")),
+    "SystemExit": raising(SystemExit(3)),
+    "KeyboardInterrupt": raising(KeyboardInterrupt()),
+    "CancelledError": raising(asyncio.CancelledError("no")),
+    "NaN": answering(float("nan")),
+    "wrong type": answering(object()),
+    "hang": hanging,
+    "late": late,
+}
+
+
+def hooks(interface):
+    """Names of the public methods of an interface, inherited ones included."""
+    return [
+        name
+        for name, _ in inspect.getmembers(interface, inspect.isfunction)
+        if not name.startswith("_") and name not in CALLED_OTHERWISE
+    ]
+
+
+PLUGIN_HOOKS = [(kind, name) for kind, base in PLUGIN_BASES.items() for name in hooks(base)]
+
+
+class PassingOn:
+    """A driver in front of the bench's own."""
+
+    def __init__(self):
+        self.robot = None
+
+    def send_command(self, command):
+        if self.robot is not None:
+            self.robot.send_command(command)
+
+    def odometry(self):
+        return self.robot.odometry() if self.robot is not None else None
+
+
+def drive_with(bench, owner, hook, fault, goal, monkeypatch):
+    """Send a goal while ``hook`` of ``owner`` is at fault, cancel it on its way; healthy again, the next ones work."""
+    faulty = FAULTS[fault](getattr(owner, hook), bench.clock)
+    monkeypatch.setattr(owner, hook, faulty)
+    handle = bench.navigator.send(goal)
+    bench.clock.sleep(1.0)
+    handle.cancel()
+    begun = bench.clock.now()
+    handle.wait(ENDS_WITHIN)
+    assert handle.done, f"{handle.status} after {bench.clock.now() - begun:.2f} s"
+    assert_ended_once(bench, handle)
+    monkeypatch.undo()
+    getattr(faulty, "release", lambda: None)()
+    ended = bench.clock.now()
+    bench.clock.sleep(LATE + 1.0)
+    if hook == "send_command":
+        assert bench.robot.command.is_stopped()  # the driver holds a command back as long as it likes; zero follows it
+    else:
+        assert_stops(bench, ended)
+    assert_next_goals_work(bench)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(("kind", "hook"), PLUGIN_HOOKS, ids=lambda value: getattr(value, "name", value))
+def test_every_hook_of_every_plugin_keeps_the_promises(kind, hook, fault, monkeypatch):
+    with Bench(**LIMITS) as bench:
+        plugin = getattr(bench, kind.name.lower())
+        drive_with(bench, plugin, hook, fault, GOALS[kind](bench), monkeypatch)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("hook", hooks(Robot))
+def test_every_hook_of_a_driver_keeps_the_promises(hook, fault, monkeypatch):
+    driver = PassingOn()
+    with Bench(robot=driver, **LIMITS) as bench:
+        driver.robot = bench.robot
+        drive_with(bench, driver, hook, fault, ExePathGoal(bench.path_to(1.0)), monkeypatch)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("hook", hooks(MapHooks))
+def test_every_hook_of_a_map_keeps_the_promises(hook, fault, monkeypatch):
+    with Bench(**LIMITS) as bench:
+        drive_with(bench, bench.server, hook, fault, ExePathGoal(bench.path_to(1.0)), monkeypatch)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("method", ["add_done_callback", "add_feedback_callback"])
+def test_callbacks_at_fault_hold_up_nothing(method, fault):
+    with Bench(**LIMITS) as bench:
+        faulty = FAULTS[fault](lambda *arguments: None, bench.clock)
+        handle = bench.navigator.send(ExePathGoal(bench.path_to(1.0)))
+        getattr(handle, method)(faulty)
+        assert handle.wait(ENDS_WITHIN).success
+        assert_ended_once(bench, handle)
+        assert_next_goals_work(bench)
+        getattr(faulty, "release", lambda: None)()
+
+
+def test_hooks_are_found_and_none_is_forgotten():
+    assert len(PLUGIN_HOOKS) >= 11
+    assert set(hooks(Robot)) == {"send_command", "odometry"}
+    assert set(GOALS) == set(PLUGIN_BASES)
+    assert hooks(MapHooks)
