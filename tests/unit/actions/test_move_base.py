@@ -1,4 +1,4 @@
-"""move_base: order and resets of recovery, replanning, oscillation, goals that supersede, cancel and pause anywhere."""
+"""move_base: planning and following, tolerances, order and resets of recovery, oscillation."""
 
 from dataclasses import replace
 
@@ -7,11 +7,11 @@ import pytest
 from mbf_abstract.actions.goals import MoveBaseGoal
 from mbf_abstract.actions.handle import GoalStatus
 from mbf_abstract.events import EventKind
-from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
 from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
-from mbf_abstract.testing.faulty import drive, obedient, slow
+from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, straight_plan
 
 NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
@@ -92,7 +92,6 @@ def test_a_path_that_ends_off_the_target_leaves_less_of_the_tolerance_for_arriva
     assert result.final_pose.distance_to(Pose.planar(2.0, 0.0)) <= farthest
 
 
-# -------------------------------------------------------------------------------------------------- recovery
 def test_failed_planning_runs_the_behaviours_in_order_and_ends_with_the_planners_code(make_bench):
     bench = make_bench(**ONCE)
     bench.planner.play(NO_PATH)
@@ -170,58 +169,6 @@ def test_a_fatal_failure_of_control_ends_the_goal_without_recovery(make_bench):
     assert recoveries(bench) == []
 
 
-# ------------------------------------------------------------------------------------------------ replanning
-def test_replanning_swaps_the_path_without_stopping(make_bench):
-    bench = make_bench(planner_frequency=2.0)
-    assert send(bench, 3.0).wait().success
-    assert plans(bench) > 8
-    begin, end = bench.robot.commands[0][0], bench.clock.now() - 1.5
-    assert not [1 for stamp, command in bench.robot.commands if begin < stamp < end and command.is_stopped()]
-    assert len(bench.events(EventKind.LEASE_GRANTED)) == 1
-
-
-def test_without_a_frequency_nothing_is_planned_anew(make_bench):
-    bench = make_bench(planner_frequency=0.0)
-    send(bench).wait()
-    assert plans(bench) == 1
-
-
-def _fails_after_the_first_plan(bench):
-    bench.planner.play(straight_plan, NO_PATH)
-    return send(bench, 3.0)
-
-
-def test_policy_keep_drives_on_with_the_old_path(make_bench):
-    bench = make_bench(planner_frequency=2.0, replan_failed_policy="keep", **ONCE)
-    assert _fails_after_the_first_plan(bench).wait().success
-    assert plans(bench) > 5
-
-
-def test_policy_stop_ends_the_goal_standing(make_bench):
-    bench = make_bench(planner_frequency=2.0, replan_failed_policy="stop", **ONCE)
-    result = _fails_after_the_first_plan(bench).wait()
-    assert (result.outcome, result.message) == (GetPathOutcome.NO_PATH_FOUND, "replanning failed: walled in")
-    assert bench.robot.command == Twist()
-    assert recoveries(bench) == []
-
-
-def test_policy_recover_stops_recovers_and_plans_anew(make_bench):
-    bench = make_bench(planner_frequency=2.0, replan_failed_policy="recover", **ONCE)
-    bench.planner.play(straight_plan, NO_PATH, straight_plan)
-    assert send(bench, 3.0).wait().success
-    assert recoveries(bench) == ["first"]
-
-
-def test_a_replanning_under_way_at_the_goal_is_canceled(make_bench):
-    bench = make_bench(planner_frequency=1.0)
-    canceled = PlanResult(GetPathOutcome.CANCELED, "as told")
-    bench.planner.play(straight_plan, obedient(bench.clock, 4.0, straight_plan, canceled))
-    assert send(bench, 1.0).wait().success
-    bench.clock.sleep(0.1)
-    assert not bench.server.get_path.busy
-
-
-# ----------------------------------------------------------------------------------------------- oscillation
 def test_a_robot_that_gets_nowhere_is_stopped_and_recovered(make_bench):
     bench = make_bench(oscillation_timeout=2.0)
     to_and_fro = [drive(0.3 if i // 5 % 2 else -0.3) for i in range(45)]
@@ -236,180 +183,3 @@ def test_a_robot_that_never_gets_anywhere_ends_with_oscillation(make_bench):
     result = send(bench, 3.0).wait()
     assert result.outcome == Outcome.OSCILLATION
     assert recoveries(bench) == ["first", "second", "third"]
-
-
-# --------------------------------------------------------------------------------------------- superseding
-def test_a_newer_goal_takes_over_while_the_robot_drives_on(make_bench):
-    bench = make_bench()
-    bench.planner.play(straight_plan, slow(bench.clock, 0.5, straight_plan))
-    first = send(bench, 5.0)
-    bench.clock.sleep(1.0)
-    second = send(bench, 3.0, 2.0)
-    bench.clock.sleep(0.3)
-    assert (first.status, first.result.outcome) == (GoalStatus.CANCELED, Outcome.CANCELED)
-    assert first.result.message == "preempted by a new goal"
-    assert not bench.robot.command.is_stopped()
-    result = second.wait()
-    assert result.success
-    assert bench.robot.pose.distance_to(Pose.planar(3.0, 2.0)) < 0.15
-    assert len(bench.events(EventKind.LEASE_GRANTED)) == 1
-
-
-def test_arriving_at_the_old_goal_while_the_new_plan_is_made_is_no_success_of_the_new_one(make_bench):
-    bench = make_bench()
-    bench.planner.play(straight_plan, slow(bench.clock, 3.0, straight_plan))
-    send(bench, 1.0)
-    bench.clock.sleep(1.5)
-    second = send(bench, 1.0, 2.0)
-    assert second.wait().success
-    assert bench.robot.pose.distance_to(Pose.planar(1.0, 2.0)) < 0.15
-
-
-def test_a_failed_plan_for_the_new_goal_stops_the_robot_and_recovers(make_bench):
-    bench = make_bench(**ONCE)
-    bench.planner.play(straight_plan, NO_PATH, straight_plan)
-    send(bench, 5.0)
-    bench.clock.sleep(1.0)
-    assert send(bench, 3.0).wait().success
-    assert recoveries(bench) == ["first"]
-
-
-def test_a_newer_goal_during_recovery_is_planned_for_afterwards(make_bench):
-    bench = make_bench(**ONCE)
-    bench.planner.play(NO_PATH, straight_plan)
-    bench.plugin("first", ScriptedRecovery).play(slow(bench.clock, 2.0, RecoveryResult(0, "waited")))
-    first = send(bench, 5.0)
-    bench.clock.sleep(1.0)
-    second = send(bench, 1.0)
-    assert second.wait().success
-    assert first.status is GoalStatus.CANCELED
-    assert [request.goal.x for request in bench.planner.requests] == [5.0, 1.0]
-
-
-def test_a_newer_goal_while_the_robot_stops_is_planned_for_without_the_old_recovery(make_bench):
-    bench = make_bench(planner_frequency=2.0, replan_failed_policy="recover", **ONCE)
-    bench.controller.stops_itself = True  # takes five cycles
-    bench.planner.play(straight_plan, NO_PATH, straight_plan)
-    send(bench, 5.0)
-    bench.clock.sleep(0.6)
-    second = send(bench, 1.0)
-    assert second.wait().success
-    assert recoveries(bench) == []
-
-
-def test_a_newer_goal_in_an_unknown_frame_stops_the_robot(make_bench):
-    bench = make_bench()
-    first = send(bench, 5.0)
-    bench.clock.sleep(1.0)
-    second = bench.navigator.send(MoveBaseGoal(Pose.planar(1.0, 0.0, frame_id="mars")))
-    result = second.wait()
-    assert result.outcome == Outcome.TF_ERROR
-    assert "mars" in result.message
-    assert first.status is GoalStatus.CANCELED
-    assert bench.robot.command == Twist()
-
-
-def test_many_goals_at_once_leave_only_the_newest(make_bench):
-    bench = make_bench()
-    handles = [send(bench, float(x)) for x in range(1, 6)]
-    bench.clock.sleep(0.5)
-    handles += [send(bench, 0.5), send(bench, 1.0)]
-    assert handles[-1].wait().success
-    assert {handle.status for handle in handles[:-1]} == {GoalStatus.CANCELED}
-
-
-# ---------------------------------------------------------------------------------------------- cancel, pause
-def _planning(bench):
-    canceled = PlanResult(GetPathOutcome.CANCELED, "as told")
-    bench.planner.play(obedient(bench.clock, 4.0, straight_plan, canceled))
-
-
-def _following(bench):
-    pass
-
-
-def _recovering(bench):
-    bench.planner.play(NO_PATH)
-    bench.plugin("first", ScriptedRecovery).play(
-        lambda request: RecoveryResult(0 if request.motion.sleep(9.0) else RecoveryOutcome.CANCELED, "")
-    )
-
-
-@pytest.mark.parametrize("begin", [_planning, _following, _recovering])
-def test_a_cancel_ends_the_goal_and_its_parts_in_every_state(make_bench, begin):
-    bench = make_bench(**ONCE)
-    begin(bench)
-    handle = send(bench, 5.0)
-    bench.clock.sleep(1.0)
-    handle.cancel("enough")
-    result = handle.wait()
-    assert (handle.status, result.outcome, result.message) == (GoalStatus.CANCELED, Outcome.CANCELED, "enough")
-    assert bench.clock.now() < 1.1
-    assert bench.robot.command == Twist()
-    server = bench.server
-    bench.clock.sleep(0.1)
-    assert not any(action.busy for action in (server.get_path, server.exe_path, server.recovery, server.move_base))
-
-
-def test_a_cancel_in_the_instant_the_plan_is_there_is_not_lost(make_bench):
-    bench = make_bench()
-    handle = send(bench, 5.0)
-
-    def plan_and_cancel(request):
-        handle.cancel()
-        return straight_plan(request)
-
-    bench.planner.play(plan_and_cancel)
-    assert handle.wait().outcome == Outcome.CANCELED
-    bench.clock.sleep(1.0)
-    assert not bench.robot.moved_after(-1.0)
-
-
-@pytest.mark.parametrize("begin", [_planning, _following, _recovering])
-def test_a_pause_holds_the_robot_in_every_state_and_the_goal_goes_on_after_it(make_bench, begin):
-    bench = make_bench(oscillation_timeout=5.0, **ONCE)
-    begin(bench)
-    handle = send(bench, 2.0)
-    bench.clock.sleep(1.0)
-    handle.pause()
-    bench.clock.sleep(0.1)
-    where = bench.robot.pose.x
-    bench.clock.sleep(30.0)
-    assert handle.status is GoalStatus.PAUSED
-    assert bench.robot.pose.x == where
-    bench.planner.play(straight_plan)
-    handle.resume()
-    assert handle.wait().success
-
-
-# ------------------------------------------------------------------------------------------- rejection, errors
-@pytest.mark.parametrize(
-    ("fields", "words"),
-    [
-        ({"planner": "x"}, "no planner named 'x'"),
-        ({"controller": "x"}, "no controller named 'x'"),
-        ({"recovery_behaviors": ("first", "x")}, "no recovery behavior named 'x'"),
-        ({"dist_tolerance": 0.0}, "dist_tolerance must be positive"),
-        ({"angle_tolerance": -1.0}, "angle_tolerance must be positive"),
-    ],
-)
-def test_a_goal_that_can_not_be_served_is_rejected_with_the_reason(make_bench, fields, words):
-    bench = make_bench()
-    handle = send(bench, **fields)
-    assert handle.status is GoalStatus.REJECTED
-    assert handle.result.outcome == Outcome.FAILURE
-    assert words in handle.result.message
-
-
-def test_without_a_robot_pose_the_goal_is_a_transform_error(make_bench):
-    bench = make_bench()
-    bench.robot.publishes_pose = False
-    bench.transforms.clear()
-    result = send(bench).wait()
-    assert (result.outcome, result.final_pose) == (Outcome.TF_ERROR, None)
-
-
-def test_a_target_in_an_unknown_frame_is_a_transform_error(make_bench):
-    bench = make_bench()
-    result = bench.navigator.go_to(Pose.planar(1.0, 0.0, frame_id="mars"))
-    assert result.outcome == Outcome.TF_ERROR
