@@ -39,9 +39,19 @@ class LivePage:
     tour : GoalTour
     controls : LiveControls
     log : LiveLog
+    steered : bool
+        Whether anybody may steer; else there are no buttons, and what chooses the view is disabled.
     """
 
-    def __init__(self, server_page: Any, bench: Bench, tour: GoalTour, controls: LiveControls, log: LiveLog) -> None:
+    def __init__(
+        self,
+        server_page: Any,
+        bench: Bench,
+        tour: GoalTour,
+        controls: LiveControls,
+        log: LiveLog,
+        steered: bool = True,
+    ) -> None:
         self._server = server_page
         self._bench = bench
         self._tour = tour
@@ -53,13 +63,17 @@ class LivePage:
         look_at_route(server_page.initial_camera, start, FARTHER)
         with gui.add_folder("Drive"):
             self._headline = gui.add_html("")
-            self._drive = DrivePanel(server_page, controls, bench)
+            self._drive = DrivePanel(server_page, controls, bench) if steered else None
         with gui.add_folder("Show"):
             self._camera = FollowCamera(server_page)
             self._ground = Ground(server_page, bench.navigator.server, bench.world.ground)
             self.things = MovingThings(server_page, bench, pin_height(start))
-        with gui.add_folder("Fault", expand_by_default=False):
-            FaultPanel(server_page, controls, bench)
+        if steered:
+            with gui.add_folder("Fault", expand_by_default=False):
+                FaultPanel(server_page, controls, bench)
+        else:
+            for control in gui._gui_input_handle_from_uuid.values():
+                control.disabled = True
         self._add_left_panel(gui)
 
     @property
@@ -73,7 +87,8 @@ class LivePage:
             self.things.show(time, self._words(time), is_driving=self._tour.target is not None)
             self._camera.show(np.array(self._bench.simulation.robot.pose().position))
             self._ground.show()
-            self._drive.show()
+            if self._drive is not None:
+                self._drive.show()
             self._show_words(time)
             if self._frame % PLOT_EVERY == 0:
                 self._plots.show(history)

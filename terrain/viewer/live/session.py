@@ -83,7 +83,8 @@ class LiveSession:
         bench, access = self._bench, self._options.access()
         with ExitStack() as exits:
             server = exits.enter_context(page_server(self._options.port, access, "mbf " + bench.scenario.name))
-            self._page = page = LivePage(server, bench, self._tour, self.controls, self._log)
+            steered = Role.STEER in access.roles.values()
+            self._page = page = LivePage(server, bench, self._tour, self.controls, self._log, steered)
             exits.enter_context(_ctrl_c(lambda: self.controls.post(lambda: self.controls.end("Ctrl-C"))))
             self.address = access.address(server.get_port(), Role.STEER) or ""
             self.watching_address = access.address(server.get_port(), Role.WATCH) or ""

@@ -32,14 +32,19 @@ SPEED = "0.1"  # of real time: however slow the browser is, the robot is still u
 CANVAS = "document.querySelector('canvas')"
 PLACE = f"(() => {{ const r = {CANVAS}.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
 
+DISABLED = """(() => {
+  const label = e => e.innerText ? e.innerText.trim() : label(e.parentElement);
+  return [...document.querySelectorAll('input[type=checkbox]:disabled')].map(label);
+})()"""
+
 
 @pytest.fixture
-def served_run(tmp_path):
+def served_run(tmp_path, request):
     """Start ``mbf run --view`` on open ground; returns the process, the page's address and the folder of results."""
     (tmp_path / "meadow.yaml").write_text(yaml.safe_dump(SCENARIO))
     start = [sys.executable, "-c", "from mbf_abstract.cli import main; main()", "run", tmp_path / "meadow.yaml"]
     options = ["--out", tmp_path / "run", "--json", "--executive", "navigation"]
-    view = ["--view", "--view-port", "18400", "--view-speed", SPEED]
+    view = ["--view", "--view-port", "18400", "--view-speed", SPEED, *getattr(request, "param", ())]
     process = subprocess.Popen([*start, *options, *view], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     for line in process.stderr:
         if "live view at " in line:
@@ -79,6 +84,24 @@ def test_the_page_shows_the_run_and_steers_it(chromium, served_run, tmp_path):
     assert answer["outcome"] == "CANCELED"
     assert (folder / "replay.html").is_file()
     assert_the_ground_and_the_person_are_seen(png)
+
+
+@pytest.mark.parametrize("served_run", [["--view-read-only"]], indirect=True)
+def test_a_page_for_watching_only_shows_the_run_without_a_button_that_could_be_pressed(chromium, served_run):
+    address = served_run[1]
+
+    async def watch(page):
+        await page.open(address)
+        await page.read("▶ follow path")
+        await page.read("follow the robot")  # the last control of the page that steers nothing
+        text = await page.evaluate("document.body.innerText")
+        disabled = await page.evaluate(DISABLED)
+        return page.errors, text, disabled
+
+    errors, text, disabled = chromium.visit(watch)
+
+    assert errors == [] and "follow the robot" in disabled
+    assert not [word for word in ("Cancel", "Pause", "End the run", "Inject", "a click is a new goal") if word in text]
 
 
 def assert_the_log_tells_what_was_asked_for(events):
