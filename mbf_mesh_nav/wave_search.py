@@ -31,6 +31,9 @@ STEP_SAMPLE = 64
 COURSE_LOST = 0.005
 """A path so much costlier than its field, as a share, is looked for once more. Fields are right to 0.3 %."""
 
+AS_FORETOLD = 5e-4
+"""A path that differs by no more from what its field says, as a share, is the one that the wave meant."""
+
 
 @dataclass(frozen=True, eq=False)
 class Wave:
@@ -123,7 +126,9 @@ class WaveSearch:
         if strip.cost(*best) > (1.0 + COURSE_LOST) * foretold:
             other = strip.shorten(*self._trace(query, wave, along_edges=True))
             best = min(best, other, key=lambda path: strip.cost(*path))
-        return best if wave.along_edges else self._other_course(query, wave, strip, best)
+        if wave.along_edges or abs(strip.cost(*best) - foretold) <= AS_FORETOLD * foretold:
+            return best
+        return self._other_course(query, wave, strip, best)
 
     def _other_course(self, query: LegQuery, wave: Wave, strip: FaceStrip, best: Piece) -> Piece:
         """A shorter way than the best so far through few large faces, see ``other_courses``; else that one."""
