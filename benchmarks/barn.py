@@ -28,10 +28,10 @@ from barn_world import GOAL, START, World, drive, warm_up
 from scipy.spatial import cKDTree
 
 from mbf_abstract.plugins import PlanRequest
-from mbf_abstract.sim_clock import SimClock
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_abstract.time.sim_clock import SimClock
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
 from mbf_costmap_nav.plugins import CostmapContext
 

@@ -15,13 +15,13 @@ from pathlib import Path as FilePath
 import numpy as np
 from numba import njit
 
-from mbf_abstract.actions.goals import MoveBaseGoal
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.goal_types import MoveBaseGoal
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
-from mbf_abstract.sensing import RangeScan
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.time.sim_clock import SimClock
 
 HALF_LENGTH, HALF_WIDTH = 0.21, 0.165
 BEAMS, SCAN_RANGE, SCAN_PERIOD = 720, 10.0, 0.1

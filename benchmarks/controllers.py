@@ -23,9 +23,9 @@ from mbf_abstract.plugins import ControlRequest
 from mbf_costmap_nav.controllers.dwa import DwaController
 from mbf_costmap_nav.controllers.mppi import MppiController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.plugins import CostmapContext
 
 SAMPLES, STEPS, DT = 2000, 56, np.float32(0.05)

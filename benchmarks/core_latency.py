@@ -15,13 +15,13 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal
-from mbf_abstract.clock import WallClock
 from mbf_abstract.events import MemorySink
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive
+from mbf_abstract.time.clock import WallClock
 
 WARM_UP = 500
 TARGET = Pose.planar(1.0, 0.0)

@@ -23,12 +23,12 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from mbf_costmap_nav.kernels.grid_line import line_cost, pull_string
-from mbf_costmap_nav.kernels.grid_path import trace_cells
-from mbf_costmap_nav.kernels.grid_search import FOUND, pad_cells, search
-from mbf_costmap_nav.kernels.short_lines import trace_lines
-from mbf_costmap_nav.kernels.theta_star import theta_search
-from mbf_costmap_nav.search_grid import traversal_table
+from mbf_costmap_nav.kernels.search.grid_line import line_cost, pull_string
+from mbf_costmap_nav.kernels.search.grid_path import trace_cells
+from mbf_costmap_nav.kernels.search.grid_search import FOUND, pad_cells, search
+from mbf_costmap_nav.kernels.search.short_lines import trace_lines
+from mbf_costmap_nav.kernels.search.theta_star import theta_search
+from mbf_costmap_nav.planning.search_grid import traversal_table
 
 FINE = 16
 """Small cells along a cell of the any-angle maps."""

@@ -24,14 +24,14 @@ from types import ModuleType
 import numpy as np
 
 from mbf_abstract.geometry import Pose
-from mbf_costmap_nav.costmap import CellBox
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.kernels.grid_search import CANCELED, FOUND, pad_cells, search
-from mbf_costmap_nav.kernels.inflation import inflate
-from mbf_costmap_nav.kernels.search_cells import new_records
-from mbf_costmap_nav.kernels.theta_star import theta_search
+from mbf_costmap_nav.grid.costmap import CellBox
+from mbf_costmap_nav.kernels.map.inflation import inflate
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND, pad_cells, search
+from mbf_costmap_nav.kernels.search.search_cells import new_records
+from mbf_costmap_nav.kernels.search.theta_star import theta_search
 from mbf_costmap_nav.layers.inflation import cost_table
-from mbf_costmap_nav.search_grid import traversal_table
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.planning.search_grid import traversal_table
 
 RESOLUTION = 0.05
 REPEATS = 7

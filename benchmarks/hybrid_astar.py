@@ -31,15 +31,14 @@ from numba.typed import Dict
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_costmap_nav.collision import footprint_costs
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.footprint_check import FootprintCheck
-from mbf_costmap_nav.kernels.car_curves import curve_between
-from mbf_costmap_nav.kernels.car_ground import driven_cost, fitting_cost, ground_of
-from mbf_costmap_nav.kernels.compiled import kernel
-from mbf_costmap_nav.kernels.driven_arcs import (
+from mbf_costmap_nav.files.map_io import load_image, load_map
+from mbf_costmap_nav.grid.collision import footprint_costs
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.kernels.car.curves import curve_between
+from mbf_costmap_nav.kernels.car.ground import driven_cost, fitting_cost, ground_of
+from mbf_costmap_nav.kernels.car.motion_primitives import (
     MOTIONS,
     Car,
     change_of,
@@ -49,8 +48,9 @@ from mbf_costmap_nav.kernels.driven_arcs import (
     steering_of,
     weight_of,
 )
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
-from mbf_costmap_nav.map_io import load_image, load_map
+from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
 from mbf_costmap_nav.plugins import CostmapContext
 

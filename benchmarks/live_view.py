@@ -15,10 +15,10 @@ import statistics
 import time
 from contextlib import nullcontext
 
-from terrain.bench import Bench
-from terrain.goal_drivers import make_goal_driver
-from terrain.goal_tour import GoalTour
-from terrain.scenario import PlanarPose, Scenario, load_scenario
+from terrain.scenarios.scenario import PlanarPose, Scenario, load_scenario
+from terrain.session.bench import Bench
+from terrain.session.executives import make_goal_driver
+from terrain.session.goal_sequence import GoalTour
 from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.session import LiveSession
 

@@ -23,13 +23,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import Scenario, load_scenario, shipped_scenarios
-from terrain.scenario_perturbation import Perturbation
-from terrain.sweep import hash_of
-from terrain.sweep_cli import parse_seeds
-from terrain.sweep_log import SweepLog
-from terrain.worker_pool import run_in_workers
+from terrain.scenarios.perturbation import Perturbation
+from terrain.scenarios.scenario import Scenario, load_scenario, shipped_scenarios
+from terrain.session.runner import RunOptions, run_scenario
+from terrain.sweeps.command import parse_seeds
+from terrain.sweeps.log import SweepLog
+from terrain.sweeps.sweep import hash_of
+from terrain.sweeps.worker_pool import run_in_workers
 
 PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")
 PERTURBED = Perturbation(

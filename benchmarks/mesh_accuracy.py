@@ -30,12 +30,12 @@ from terrain_meshes import add_layer, fractal_terrain
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.surface_point import surface_point_at_vertex
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
-from mbf_mesh_nav.surface_point import surface_point_at_vertex
-from mbf_mesh_nav.wave_search import WaveSearch
+from mbf_mesh_nav.search.wave_search import WaveSearch
 
 REPAIRS = ("duplicate_vertices", "zero_area", "duplicate_faces", "non_manifold", "flipped_winding", "unreferenced")
 PLANNERS = {"cvp_path": CVPPlanner, "any_angle_path": AnyAnglePlanner, "dijkstra_path": DijkstraPlanner}

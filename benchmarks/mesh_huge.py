@@ -18,10 +18,10 @@ from mesh_speed import NEVER, corner_query, plugin, scipy_graph, seconds_of
 from scipy.sparse.csgraph import dijkstra
 from terrain_meshes import Terrain, add_layer, fractal_terrain
 
-from mbf_mesh_nav.leg_search import spread_from
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.astar import AStarPlanner
-from mbf_mesh_nav.wave_search import WaveSearch
+from mbf_mesh_nav.search.leg_search import spread_from
+from mbf_mesh_nav.search.wave_search import WaveSearch
 
 
 def resident_gigabytes() -> float:

@@ -22,12 +22,12 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 from terrain_meshes import fractal_terrain
 
-from mbf_mesh_nav.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.layers.tilt import TiltLayer
-from mbf_mesh_nav.locate import SurfaceLocator
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
-from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.wave_search import WaveSearch
+from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.locate import SurfaceLocator
+from mbf_mesh_nav.search.wave_search import WaveSearch
 
 ANALYSIS = ("border", "steepness", "roughness", "height_diff", "ridge", "clearance")
 LIMIT_EIGHT_LAYERS = 40.0

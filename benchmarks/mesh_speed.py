@@ -23,16 +23,16 @@ from terrain_meshes import Terrain, add_layer, fractal_terrain, shuffled
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.layer import NOTHING_CHANGED, LayerContext, MeshLayer
-from mbf_mesh_nav.layer_graph import LayerGraph
 from mbf_mesh_nav.layers.inflation import InflationLayer
-from mbf_mesh_nav.leg_search import LegQuery, spread_from
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerContext, MeshLayer
+from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.surface_point import surface_point_at_vertex
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.repairing import RepairingPlanner
 from mbf_mesh_nav.plugins import MeshContext
-from mbf_mesh_nav.surface_point import surface_point_at_vertex
-from mbf_mesh_nav.wave_search import WaveSearch
+from mbf_mesh_nav.search.leg_search import LegQuery, spread_from
+from mbf_mesh_nav.search.wave_search import WaveSearch
 
 SIDES = {"10k": 100, "100k": 316, "1M": 1000}
 CPP_RATIOS = {"dijkstra": 5.3, "cvp": 18.0, "inflation": 7.5}

@@ -26,21 +26,21 @@ from mesh_speed import plugin
 from terrain_meshes import fractal_terrain
 
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.map_queries import PlaceQuery
+from mbf_abstract.maps.queries import PlaceQuery
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_mesh_nav.controllers.mppi import MPPIController
 from mbf_mesh_nav.controllers.path_follower import PathFollower
 from mbf_mesh_nav.controllers.vector_field import VectorFieldController
-from mbf_mesh_nav.layer import LayerContext
 from mbf_mesh_nav.layers.tilt import TiltLayer
-from mbf_mesh_nav.map_builder import build_mesh_map, default_layers
+from mbf_mesh_nav.map.layer import LayerContext
+from mbf_mesh_nav.map.map_builder import build_mesh_map, default_layers
+from mbf_mesh_nav.map.pose_checks import check_pose
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
 from mbf_mesh_nav.planners.repairing import RepairingPlanner
-from mbf_mesh_nav.pose_checks import check_pose
 
 PLANNERS = (DijkstraPlanner, AStarPlanner, RepairingPlanner, AnyAnglePlanner, HeadingAStarPlanner, CVPPlanner)
 CONTROLLERS = (VectorFieldController, PathFollower, MPPIController)

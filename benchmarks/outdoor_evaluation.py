@@ -7,7 +7,7 @@ Seeded terrains of rising difficulty and crops of real surveys (``outdoor_terrai
 drives from one corner to the other, once per method, with the shipped outdoor configurations. Finished runs stand in
 the results file and are never run again, so the evaluation can be stopped at any time.
 
-Rates are over the terrains with a route: those where ``terrain.reachability`` finds that a robot with the Husky's
+Rates are over the terrains with a route: those where ``benchmarks.reachability`` finds that a robot with the Husky's
 limits can get there at all. Its limits are near to those of the maps' tilt layer, so a second rate is over the terrains
 that anybody drove, whatever the judge says, the flat map and the straight line included. Failures are of the planner
 (no plan), of physics (tipped over, stuck, high-centred) or of the controller (the rest), or an error before the start;
@@ -31,10 +31,10 @@ from mbf_abstract.geometry import Path, quaternion_from_yaw
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_mesh_nav.plugins import MeshPlanner
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import Scenario
-from terrain.sweep import Job, SweepRun, hash_of, run_all
-from terrain.sweep_log import SweepLog
+from terrain.scenarios.scenario import Scenario
+from terrain.session.runner import RunOptions, run_scenario
+from terrain.sweeps.log import SweepLog
+from terrain.sweeps.sweep import Job, SweepRun, hash_of, run_all
 
 SLOPE_ONLY = {  # what mesh_navigation's steepness and inflation layers know: slopes without a direction, no footprint
     "planner": "dijkstra",

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from terrain.dem_io import read_dem
-from terrain.heightfield import Heightfield
-from terrain.reachability import is_reachable
-from terrain.robot_models import HUSKY
-from terrain.scenario import SHIPPED, PlanarPose, Scenario
-from terrain.scenario_places import coordinates
-from terrain.scenario_stage import WORLD_STREAM
-from terrain.scenario_world_types import GeneratedWorld, HeightfieldWorld
+from benchmarks.reachability import is_reachable
+from terrain.physics.robot_models import HUSKY
+from terrain.scenarios.environment import WORLD_STREAM
+from terrain.scenarios.places import coordinates
+from terrain.scenarios.scenario import SHIPPED, PlanarPose, Scenario
+from terrain.scenarios.world_types import GeneratedWorld, HeightfieldWorld
+from terrain.worlds.elevation_files import read_dem
+from terrain.worlds.heightfield import Heightfield
 
 SIZE = (24.0, 20.0)
 SPACING = 0.25

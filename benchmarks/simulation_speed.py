@@ -19,16 +19,16 @@ from collections.abc import Callable
 import numpy as np
 
 from mbf_abstract.geometry import Twist
-from terrain.dem_io import jacksboro
-from terrain.heightfield import Heightfield
-from terrain.kinematic_robot import KinematicRobot
-from terrain.kinematic_world import KinematicWorld
-from terrain.rays import StaticRays
-from terrain.robot_models import HUSKY
-from terrain.robots import WheeledRobot
-from terrain.sensors import Lidar, ring_directions
-from terrain.simulation import SimulatedRobot, Simulation, SteppedWorld
-from terrain.world import STATIC, BulletWorld
+from terrain.physics.kinematic_robot import KinematicRobot
+from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.robot_models import HUSKY
+from terrain.physics.robots import WheeledRobot
+from terrain.physics.simulation import SimulatedRobot, Simulation, SteppedWorld
+from terrain.physics.world import STATIC, BulletWorld
+from terrain.sensors.lidar import Lidar, ring_directions
+from terrain.sensors.rays import StaticRays
+from terrain.worlds.elevation_files import jacksboro
+from terrain.worlds.heightfield import Heightfield
 
 LIMITS = {"outdoor_realtime_factor": 10.0, "rays_over_bullet": 2.0}
 RANGE = 20.0

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.layer import CostArray, LayerContext, LethalArray, MeshLayer
-from mbf_mesh_nav.layer_graph import LayerGraph
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import CostArray, LayerContext, LethalArray, MeshLayer
+from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 SPACING = 0.1
 MEDIAN_SLOPE = np.radians(15.0)

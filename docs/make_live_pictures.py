@@ -20,8 +20,8 @@ from typing import Any
 
 from PIL import Image
 
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import load_scenario
+from terrain.scenarios.scenario import load_scenario
+from terrain.session.runner import RunOptions, run_scenario
 from terrain.viewer.live.options import ViewOptions
 
 REPOSITORY = Path(__file__).resolve().parents[1]

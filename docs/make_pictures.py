@@ -7,10 +7,10 @@ from pathlib import Path
 
 from PIL import Image
 
-from terrain.recording import Recording
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import load_scenario
-from terrain.viewer.animation import write_animation
+from terrain.recording.recording import Recording
+from terrain.scenarios.scenario import load_scenario
+from terrain.session.runner import RunOptions, run_scenario
+from terrain.viewer.pictures.animation import write_animation
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
 WIDTH = 900  # pixels

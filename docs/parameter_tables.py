@@ -9,11 +9,11 @@ from typing import Any, get_args
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic.fields import FieldInfo
 
-from mbf_abstract.config import PluginDeclaration
-from mbf_abstract.navigation_parameters import NavigationParameters
+from mbf_abstract.config.configuration import PluginDeclaration
+from mbf_abstract.config.navigation_parameters import NavigationParameters
+from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.parameters import ParameterModel
-from mbf_abstract.registry import PluginRegistry
-from mbf_abstract.server import AbstractNavigationServer
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
 
 INTRODUCTION = """\
 # Configuration

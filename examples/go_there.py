@@ -9,7 +9,7 @@ Run it twice and change nothing but the configuration::
 import sys
 
 from mbf_abstract.outcomes import ExePathOutcome
-from terrain.bench import Bench
+from terrain.session.bench import Bench
 
 RECOVERY_FOR = {ExePathOutcome.COLLISION: "back_up", ExePathOutcome.ROBOT_STUCK: "back_up"}
 

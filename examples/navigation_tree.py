@@ -10,10 +10,10 @@ when it takes too long::
 import sys
 
 from mbf_abstract.executives.pacing import TimeLimit
-from mbf_abstract.executives.ready_trees import TreeOptions, navigation_tree
+from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_drawing import as_text
 from mbf_abstract.executives.tree_executive import TreeExecutive
-from terrain.bench import Bench
+from terrain.session.bench import Bench
 
 
 def main(scenario: str, backend: str, time_limit: float = 600.0) -> bool:

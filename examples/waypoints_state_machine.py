@@ -14,13 +14,13 @@ from itertools import permutations
 
 from py_trees.common import Status
 
-from mbf_abstract.actions.goals import GetPathGoal, GetPathResult
 from mbf_abstract.executives.conditions import Do
 from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery
 from mbf_abstract.executives.state_machine import State, StateMachine
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Path, Pose
-from terrain.bench import Bench
+from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult
+from terrain.session.bench import Bench
 
 WAYPOINTS = [(7.5, 1.5), (1.5, 5.0), (6.0, 5.5), (3.5, 1.5)]  # x, y [m], all in the reception
 

@@ -23,8 +23,8 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, Protocol, TextIO
 
-from mbf_abstract.clock import is_for_the_program
 from mbf_abstract.event_values import FLOAT_DIGITS, JsonValue, error_text, to_json_value, well_formed
+from mbf_abstract.time.clock import is_for_the_program
 
 DEFAULT_MEMORY_EVENTS = 10_000
 DEFAULT_MAX_FILE_BYTES = 256 * 1024 * 1024

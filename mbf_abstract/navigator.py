@@ -18,7 +18,11 @@ import os
 from collections.abc import Iterable
 from typing import Any, overload
 
-from mbf_abstract.actions.goals import (
+from mbf_abstract.drive.robot import Robot
+from mbf_abstract.events import EventBus
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.goal_types import (
     ExePathFeedback,
     ExePathGoal,
     ExePathResult,
@@ -36,14 +40,10 @@ from mbf_abstract.actions.goals import (
     RefinePathResult,
     WaypointTask,
 )
-from mbf_abstract.actions.handle import GoalHandle
-from mbf_abstract.clock import Clock, WallClock
-from mbf_abstract.events import EventBus
-from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.robot import Robot
-from mbf_abstract.server import AbstractNavigationServer
-from mbf_abstract.server_factory import make_server
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.goals.handle import GoalHandle
+from mbf_abstract.server.factory import make_server
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.time.clock import Clock, WallClock
 
 
 class Navigator:

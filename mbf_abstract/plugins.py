@@ -20,17 +20,17 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Command, FloatArray, Path, Pose, Twist
+from mbf_abstract.maps.relaxation import Relaxation
 from mbf_abstract.outcomes import PERMANENT_OUTCOMES, is_success
 from mbf_abstract.parameters import PluginParameters
-from mbf_abstract.relaxation import Relaxation
+from mbf_abstract.time.cancel import CancelToken
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from mbf_abstract.clock import Clock
-    from mbf_abstract.robot import RobotInformation
+    from mbf_abstract.drive.robot import RobotInformation
+    from mbf_abstract.time.clock import Clock
 
 
 class PluginKind(Enum):

@@ -10,8 +10,8 @@ import numpy as np
 from scipy import ndimage
 
 from mbf_abstract.geometry import Pose
-from mbf_costmap_nav.costmap import INSCRIBED, UNKNOWN
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 
 EIGHT_NEIGHBOURS = np.ones((3, 3), dtype=bool)
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mbf_costmap_nav.costmap import Costmap, GridGeometry
-from mbf_costmap_nav.layer import CombinationMethod, CostmapLayer
+from mbf_costmap_nav.grid.costmap import Costmap, GridGeometry
+from mbf_costmap_nav.map.layer import CombinationMethod, CostmapLayer
 
 
 def doubts_about(layers: Sequence[CostmapLayer], inscribed_radius: float) -> list[str]:

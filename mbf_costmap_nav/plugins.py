@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.plugins import (
     AbstractController,
     AbstractPlanner,
@@ -17,8 +18,7 @@ from mbf_abstract.plugins import (
     AbstractRefiner,
     PluginContext,
 )
-from mbf_abstract.transforms import TransformBuffer
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 
 
 @dataclass(frozen=True)

@@ -15,26 +15,26 @@ from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 
-from mbf_abstract.config import Config, PluginDeclaration
-from mbf_abstract.findings import ConfigError, Finding
-from mbf_abstract.map_queries import MapQueries
-from mbf_abstract.map_view import FloorMap, GridView
+from mbf_abstract.config.configuration import Config, PluginDeclaration
+from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.registry import Adapter
+from mbf_abstract.maps.queries import MapQueries
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.view import FloorMap, GridView
 from mbf_abstract.parameters import ParameterModel, parameter
-from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PluginContext, PluginKind
-from mbf_abstract.registry import Adapter
-from mbf_abstract.sensing import RangeScan
-from mbf_abstract.server import AbstractNavigationServer
-from mbf_costmap_nav.costmap import INSCRIBED, UNKNOWN
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
-from mbf_costmap_nav.map_description import MapError
-from mbf_costmap_nav.map_io import load_map_file
-from mbf_costmap_nav.nav_core import wrap_nav_core
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.server.plugin_host import ServerError
+from mbf_costmap_nav.files.map_description import MapError
+from mbf_costmap_nav.files.map_io import load_map_file
+from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.map.queries import CostmapQueries
+from mbf_costmap_nav.map.scan_intake import ScanIntake
+from mbf_costmap_nav.map.served_costmap import ServedCostmap
+from mbf_costmap_nav.planning.nav_core import wrap_nav_core
 from mbf_costmap_nav.plugins import CostmapContext
-from mbf_costmap_nav.queries import CostmapQueries
-from mbf_costmap_nav.scan_intake import ScanIntake
-from mbf_costmap_nav.served_costmap import ServedCostmap
 
 Which = Literal["local", "global"]
 """One of the two maps, as a plugin's declaration names it."""

@@ -15,10 +15,10 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.testing.contract.report import ContractBroken, Report
-from mbf_costmap_nav.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.layer import CostmapLayer, LayerContext, LayerParameters, shifted
-from mbf_costmap_nav.sensor_data import Observation, SensorLayer
+from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext, LayerParameters, shifted
+from mbf_costmap_nav.map.sensor_data import Observation, SensorLayer
 
 __all__ = ["ContractBroken", "check_layer"]
 

@@ -16,7 +16,7 @@ from mbf_abstract.plugins import (
     Plugin,
     PluginContext,
 )
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.mesh_map import MeshMap
 
 
 @dataclass(frozen=True)

@@ -14,27 +14,27 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from mbf_abstract.config import Config
+from mbf_abstract.config.configuration import Config
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
-from mbf_abstract.execution.ticker import Ticker
 from mbf_abstract.geometry import Path as PlannedPath
-from mbf_abstract.map_queries import MapQueries
-from mbf_abstract.map_view import FieldView, MeshView
+from mbf_abstract.maps.queries import MapQueries
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.view import FieldView, MeshView
 from mbf_abstract.parameters import ParameterModel, with_changes
-from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PluginContext, PluginKind
-from mbf_abstract.sensing import RangeScan
-from mbf_abstract.server import AbstractNavigationServer
-from mbf_mesh_nav.ground import ground_heights
-from mbf_mesh_nav.layer_graph import LayerGraphError
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
-from mbf_mesh_nav.mesh_io import known_endings, read_mesh
-from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.mesh_report import SHOWN_INDICES
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.server.plugin_host import ServerError
+from mbf_abstract.time.ticker import Ticker
+from mbf_mesh_nav.files.mesh_io import known_endings, read_mesh
+from mbf_mesh_nav.map.layer_graph import LayerGraphError
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.queries import MeshQueries
+from mbf_mesh_nav.mesh.ground import ground_heights
+from mbf_mesh_nav.mesh.mesh_report import SHOWN_INDICES
+from mbf_mesh_nav.motion.vector_field import VectorField
 from mbf_mesh_nav.plugins import MeshContext
-from mbf_mesh_nav.queries import MeshQueries
-from mbf_mesh_nav.vector_field import VectorField
 
 DECAY_PERIOD = 0.5  # s; how often obstacles are checked for their age
 
@@ -139,7 +139,7 @@ class MeshNavigationServer(AbstractNavigationServer):
         MeshError
             The file exists or cannot be written; no part of one is left.
         """
-        from mbf_mesh_nav.lvr2_io import write_lvr2_map  # h5py only for those who use it
+        from mbf_mesh_nav.files.lvr2_io import write_lvr2_map  # h5py only for those who use it
 
         write_lvr2_map(self.config.path.parent / file, self.mesh_map, layout=layout)
         self.runtime.events.emit(EventKind.MAP, "mesh_map", message=f"the map was saved to {file}")

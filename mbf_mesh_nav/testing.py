@@ -13,10 +13,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbf_abstract.sensing import RangeScan
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.testing.contract.report import ContractBroken, Report
-from mbf_mesh_nav.layer import CostArray, IntArray, LayerContext, LayerParameters, LethalArray, MeshLayer
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import CostArray, IntArray, LayerContext, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.map.mesh_map import MeshMap
 
 __all__ = ["ContractBroken", "check_layer"]
 

@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 from scipy.sparse import coo_array, csgraph
 
-from mbf_abstract.config import Config
-from mbf_abstract.disc_queries import DiscQueries
+from mbf_abstract.config.configuration import Config
+from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.geometry import FloatArray, Path
-from mbf_abstract.map_queries import CellState, MapQueries, PlaceAnswer
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.disc_queries import DiscQueries
+from mbf_abstract.maps.queries import CellState, MapQueries, PlaceAnswer
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginContext, PluginKind
-from mbf_abstract.robot import RobotInformation
-from mbf_abstract.sensing import RangeScan
-from mbf_abstract.server import AbstractNavigationServer
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
 
 
 class ElevationGridParameters(ParameterModel):

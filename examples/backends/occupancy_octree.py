@@ -15,18 +15,18 @@ from typing import Any, ClassVar, cast
 
 from octree import Column, OctreeMap, OctreeParameters
 
-from mbf_abstract.cancel import CancelToken
-from mbf_abstract.config import Config
-from mbf_abstract.disc_queries import DiscQueries
+from mbf_abstract.config.configuration import Config
+from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.geometry import FloatArray, Path
-from mbf_abstract.map_queries import CellState, MapQueries, PlaceAnswer
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.disc_queries import DiscQueries
+from mbf_abstract.maps.queries import CellState, MapQueries, PlaceAnswer
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginContext, PluginKind
-from mbf_abstract.robot import RobotInformation
-from mbf_abstract.sensing import RangeScan
-from mbf_abstract.server import AbstractNavigationServer
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.time.cancel import CancelToken
 
 STEPS = [(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
 

@@ -13,7 +13,7 @@ from mbf_abstract.geometry import FloatArray, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_costmap_nav.costmap import INSCRIBED
+from mbf_costmap_nav.grid.costmap import INSCRIBED
 from mbf_costmap_nav.plugins import CostmapController
 
 

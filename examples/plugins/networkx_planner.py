@@ -14,8 +14,8 @@ import numpy as np
 from mbf_abstract.geometry import Path
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
+from mbf_mesh_nav.mesh.vertex_graph import vertex_names
 from mbf_mesh_nav.plugins import MeshPlanner
-from mbf_mesh_nav.vertex_graph import vertex_names
 
 MAX_DISTANCE = 1.0  # m; how far a pose may be from the surface
 

@@ -13,7 +13,7 @@ from mbf_abstract.geometry import Path
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_costmap_nav.costmap import INSCRIBED
+from mbf_costmap_nav.grid.costmap import INSCRIBED
 from mbf_costmap_nav.plugins import CostmapPlanner
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
-from mbf_costmap_nav.costmap import UNKNOWN, CellArray, CellBox
-from mbf_costmap_nav.layer import CostmapLayer, LayerParameters
+from mbf_costmap_nav.grid.costmap import UNKNOWN, CellArray, CellBox
+from mbf_costmap_nav.map.layer import CostmapLayer, LayerParameters
 
 
 class WetFloorParameters(LayerParameters):

@@ -11,16 +11,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar, Generic, TypeVar
 
-from mbf_abstract.actions.goals import ActionResult
-from mbf_abstract.actions.handle import GoalHandle, GoalStatus
-from mbf_abstract.clock import ThreadDetached
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import PluginGone
 from mbf_abstract.execution.plugin_run import Abandoned
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.execution.worker import Worker
+from mbf_abstract.goals.goal_types import ActionResult
+from mbf_abstract.goals.handle import GoalHandle, GoalStatus
 from mbf_abstract.outcomes import is_success
+from mbf_abstract.time.clock import ThreadDetached
 
 G = TypeVar("G")
 R = TypeVar("R", bound=ActionResult)

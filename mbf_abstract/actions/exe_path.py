@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbf_abstract.actions.action import PREEMPTED, Action, GoalJob
-from mbf_abstract.actions.goals import ExePathFeedback, ExePathGoal, ExePathResult
-from mbf_abstract.actions.handle import GoalHandle
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.arrival import ArrivalCheck, ToleranceCheck
 from mbf_abstract.execution.controller import ControllerExecution
@@ -22,11 +21,12 @@ from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.execution.progress import PathProgress
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.goals.goal_types import ExePathFeedback, ExePathGoal, ExePathResult
+from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.plugin_table import PluginTable
 from mbf_abstract.plugins import AbstractController, PluginKind
-from mbf_abstract.robot import RobotStateError
-from mbf_abstract.transforms import TransformError
+from mbf_abstract.server.plugin_table import PluginTable
 
 Handle = GoalHandle[ExePathGoal, ExePathResult, ExePathFeedback]
 Job = GoalJob[ExePathGoal, ExePathResult, ExePathFeedback]

@@ -10,7 +10,13 @@ from __future__ import annotations
 from typing import Any
 
 from mbf_abstract.actions.action import Action, GoalJob
-from mbf_abstract.actions.goals import (
+from mbf_abstract.actions.move_base import MoveBaseAction
+from mbf_abstract.event_values import error_text
+from mbf_abstract.events import EventKind
+from mbf_abstract.execution.plugin_run import IDLE_CHECK, Abandoned
+from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import (
     ExePathFeedback,
     FollowWaypointsFeedback,
     FollowWaypointsGoal,
@@ -19,13 +25,7 @@ from mbf_abstract.actions.goals import (
     MoveBaseResult,
     WaypointTask,
 )
-from mbf_abstract.actions.handle import GoalHandle, GoalStatus
-from mbf_abstract.actions.move_base import MoveBaseAction
-from mbf_abstract.event_values import error_text
-from mbf_abstract.events import EventKind
-from mbf_abstract.execution.plugin_run import IDLE_CHECK, Abandoned
-from mbf_abstract.execution.runtime import Runtime
-from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.handle import GoalHandle, GoalStatus
 from mbf_abstract.outcomes import MoveBaseOutcome
 
 Handle = GoalHandle[FollowWaypointsGoal, FollowWaypointsResult, FollowWaypointsFeedback]

@@ -9,19 +9,19 @@ from __future__ import annotations
 from typing import Any
 
 from mbf_abstract.actions.action import Action, GoalJob
-from mbf_abstract.actions.goals import GetPathGoal, GetPathResult, NoFeedback
-from mbf_abstract.actions.handle import GoalHandle
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.plan_check import area_problem, check_path, in_global_frame
 from mbf_abstract.execution.planner import PlannerExecution, PlannerState
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult, NoFeedback
+from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.plugin_table import PluginTable
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginKind
-from mbf_abstract.robot import RobotStateError
-from mbf_abstract.transforms import TransformError
+from mbf_abstract.server.plugin_table import PluginTable
 
 Handle = GoalHandle[GetPathGoal, GetPathResult, NoFeedback]
 Job = GoalJob[GetPathGoal, GetPathResult, NoFeedback]

@@ -29,19 +29,19 @@ from typing import Any
 from mbf_abstract.actions.action import PREEMPTED, Action, GoalJob
 from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.get_path import GetPathAction
-from mbf_abstract.actions.goals import ExePathFeedback, MoveBaseGoal, MoveBaseResult
-from mbf_abstract.actions.handle import GoalHandle
 from mbf_abstract.actions.move_base_machine import MoveBaseMachine
 from mbf_abstract.actions.recovery import RecoveryAction
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.plan_check import area_problem, in_global_frame
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.goals.goal_types import ExePathFeedback, MoveBaseGoal, MoveBaseResult
+from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import MoveBaseOutcome
-from mbf_abstract.plugin_table import PluginTable
 from mbf_abstract.plugins import PluginKind
-from mbf_abstract.robot import RobotStateError
-from mbf_abstract.transforms import TransformError
+from mbf_abstract.server.plugin_table import PluginTable
 
 Handle = GoalHandle[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
 Job = GoalJob[MoveBaseGoal, MoveBaseResult, ExePathFeedback]

@@ -7,7 +7,12 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 from mbf_abstract.actions.action import PREEMPTED, GoalJob
-from mbf_abstract.actions.goals import (
+from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.events import EventKind
+from mbf_abstract.execution.oscillation import OscillationDetector
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.goals.goal_types import (
     ExePathFeedback,
     ExePathGoal,
     GetPathGoal,
@@ -16,15 +21,10 @@ from mbf_abstract.actions.goals import (
     MoveBaseResult,
     RecoveryGoal,
 )
-from mbf_abstract.actions.handle import AnyGoalHandle
-from mbf_abstract.clock import Stopwatch
-from mbf_abstract.events import EventKind
-from mbf_abstract.execution.oscillation import OscillationDetector
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from mbf_abstract.plugins import PluginKind
-from mbf_abstract.robot import RobotStateError
-from mbf_abstract.transforms import TransformError
+from mbf_abstract.time.clock import Stopwatch
 
 if TYPE_CHECKING:
     from mbf_abstract.actions.move_base import MoveBaseAction

@@ -9,15 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 from mbf_abstract.actions.action import Action, GoalJob
-from mbf_abstract.actions.goals import NoFeedback, RecoveryGoal, RecoveryResultMessage
-from mbf_abstract.actions.handle import GoalHandle
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.execution.recovery import RecoveryExecution
 from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.goals.goal_types import NoFeedback, RecoveryGoal, RecoveryResultMessage
+from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import RecoveryOutcome, is_success
-from mbf_abstract.plugin_table import PluginTable
 from mbf_abstract.plugins import AbstractRecovery, PluginKind
+from mbf_abstract.server.plugin_table import PluginTable
 
 Handle = GoalHandle[RecoveryGoal, RecoveryResultMessage, NoFeedback]
 Job = GoalJob[RecoveryGoal, RecoveryResultMessage, NoFeedback]

@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 from mbf_abstract.actions.action import Action, GoalJob
-from mbf_abstract.actions.goals import NoFeedback, RefinePathGoal, RefinePathResult
-from mbf_abstract.actions.handle import GoalHandle
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.execution.refiner import RefinerExecution
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path
+from mbf_abstract.goals.goal_types import NoFeedback, RefinePathGoal, RefinePathResult
+from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import RefinePathOutcome
-from mbf_abstract.plugin_table import PluginTable
 from mbf_abstract.plugins import AbstractRefiner, PluginKind, RefineResult
+from mbf_abstract.server.plugin_table import PluginTable
 
 Handle = GoalHandle[RefinePathGoal, RefinePathResult, NoFeedback]
 Job = GoalJob[RefinePathGoal, RefinePathResult, NoFeedback]

@@ -9,18 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
-from mbf_abstract.config import Config
+from mbf_abstract.config.configuration import Config
+from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.yaml_source import read_yaml
+from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.events import EventBus, MemorySink
-from mbf_abstract.findings import ConfigError, Finding
 from mbf_abstract.geometry import Command, Pose, Twist
-from mbf_abstract.map_view import UNKNOWN_OCCUPANCY, FloorMap
-from mbf_abstract.robot import Odometry
-from mbf_abstract.server import AbstractNavigationServer
-from mbf_abstract.server_factory import installed_servers, read_config
-from mbf_abstract.sim_clock import SimClock
-from mbf_abstract.transform import Transform
-from mbf_abstract.transforms import TransformBuffer
-from mbf_abstract.yaml_source import read_yaml
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.view import UNKNOWN_OCCUPANCY, FloorMap
+from mbf_abstract.server.factory import installed_servers, read_config
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.time.sim_clock import SimClock
 
 YAML_SUFFIXES = {".yaml", ".yml"}
 

@@ -21,7 +21,7 @@ def check(
     """Check a configuration: all mistakes at once, exit code 2 if there is any. Tells what was found in its map."""
     with readable_errors():
         from mbf_abstract.commands.bench import standing_server
-        from mbf_abstract.server_factory import read_config
+        from mbf_abstract.server.factory import read_config
 
         cls, checked = read_config(config)
         if load:

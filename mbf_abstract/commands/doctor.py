@@ -113,7 +113,7 @@ def _check(what: str, look: Callable[[], str], cure: str) -> Finding:
 
 
 def _plugins() -> str:
-    from mbf_abstract.registry import PluginRegistry
+    from mbf_abstract.config.registry import PluginRegistry
 
     entries = PluginRegistry().entries()
     broken = [entry.name for entry in entries if entry.error]

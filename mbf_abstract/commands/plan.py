@@ -15,9 +15,9 @@ from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from mbf_abstract.commands.waiting import waiting
 
 if TYPE_CHECKING:
-    from mbf_abstract.actions.goals import GetPathResult
     from mbf_abstract.geometry import Pose
-    from mbf_abstract.server import AbstractNavigationServer
+    from mbf_abstract.goals.goal_types import GetPathResult
+    from mbf_abstract.server.navigation_server import AbstractNavigationServer
 
 
 class Unknown(str, Enum):
@@ -52,12 +52,12 @@ def plan(
     """
     from_place, to_place = parse_place(start, "--start"), parse_place(goal, "--goal")
     with readable_errors():
-        from mbf_abstract.actions.goals import GetPathGoal
-        from mbf_abstract.clock import wall_seconds
         from mbf_abstract.commands.bench import place_robot, read_config_or_map, standing_server
         from mbf_abstract.commands.plan_picture import draw_plan
-        from mbf_abstract.compilation import told_of_kernels
+        from mbf_abstract.compiling.compilation import told_of_kernels
+        from mbf_abstract.goals.goal_types import GetPathGoal
         from mbf_abstract.navigator import Navigator
+        from mbf_abstract.time.clock import wall_seconds
 
         cls, checked, notes = read_config_or_map(config, "" if unknown is None else unknown.value)
         with ExitStack() as open_server:

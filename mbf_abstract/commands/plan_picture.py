@@ -1,7 +1,7 @@
 """The picture of ``mbf plan --png``, drawn by whatever installed package can draw.
 
 The core must not plot. A package that can offers a function by an entry point of the group ``mbf.plan_pictures``:
-``write(file, view, start, goal, path, title)``, see ``mbf_abstract.map_view`` for the view.
+``write(file, view, start, goal, path, title)``, see ``mbf_abstract.maps.view`` for the view.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from mbf_abstract.actions.goals import GetPathResult
 from mbf_abstract.geometry import Pose
-from mbf_abstract.server import AbstractNavigationServer
+from mbf_abstract.goals.goal_types import GetPathResult
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
 
 PICTURES_GROUP = "mbf.plan_pictures"
 

@@ -19,7 +19,7 @@ def list_plugins(
     as_json: bool = typer.Option(False, "--json", help="Print a JSON list instead of a table."),
 ) -> None:
     """List all plugins; exit code 1 if one of them cannot be imported."""
-    from mbf_abstract.registry import GROUPS, PluginRegistry
+    from mbf_abstract.config.registry import GROUPS, PluginRegistry
 
     if kind and kind not in GROUPS:
         raise typer.BadParameter(f"no kind {kind!r}; known: {', '.join(GROUPS)}", param_hint="--kind")

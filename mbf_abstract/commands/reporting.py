@@ -23,7 +23,7 @@ def text_of(error: Exception) -> str:
 @contextmanager
 def readable_errors() -> Iterator[None]:
     """Turn every exception into a text and exit code 2; set the environment variable MBF_TRACEBACK=1 to see it all."""
-    from mbf_abstract.findings import ConfigError
+    from mbf_abstract.config.findings import ConfigError
 
     try:
         yield

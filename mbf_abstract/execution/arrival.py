@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goal_area import GoalArea
-from mbf_abstract.path_tracker import PathTracker
-from mbf_abstract.relaxation import Slack
+from mbf_abstract.goals.goal_area import GoalArea
+from mbf_abstract.maps.relaxation import Slack
 
 ToleranceCheck = Literal["plugin", "either", "exclusive"]
 

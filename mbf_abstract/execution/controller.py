@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from mbf_abstract.clock import Stopwatch
+from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.drive.velocity_gate import Lease
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.controller_state import ControllerEnd, ControllerState, Cycle, Plan
@@ -18,11 +19,10 @@ from mbf_abstract.execution.loaded_plugin import PluginFault, PluginNonFinite, c
 from mbf_abstract.execution.motion_watch import MotionWatch
 from mbf_abstract.execution.plugin_run import Abandoned, PluginRun
 from mbf_abstract.geometry import Command, Pose, Twist
+from mbf_abstract.geometry.transform_buffer import TransformError
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
-from mbf_abstract.robot import RobotStateError
-from mbf_abstract.transforms import TransformError
-from mbf_abstract.velocity_gate import Lease
+from mbf_abstract.time.clock import Stopwatch
 
 T = TypeVar("T")
 

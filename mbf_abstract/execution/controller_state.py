@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from mbf_abstract.execution.arrival import ArrivalCheck
+from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import ControlResult
 
 

@@ -12,14 +12,14 @@ from contextlib import contextmanager
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
-from mbf_abstract.clock import Priority, ThreadDetached
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import NonFiniteError
 from mbf_abstract.plugins import Plugin
+from mbf_abstract.time.clock import Priority, ThreadDetached
 
 if TYPE_CHECKING:
-    from mbf_abstract.config import PluginSpec
+    from mbf_abstract.config.configuration import PluginSpec
     from mbf_abstract.execution.runtime import Runtime
 
 

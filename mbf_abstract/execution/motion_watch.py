@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from mbf_abstract.clock import Stopwatch
 from mbf_abstract.execution.oscillation import OscillationDetector
+from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.execution.progress import ProgressDetector
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.path_tracker import PathTracker
-from mbf_abstract.tilt import tilt_of
+from mbf_abstract.time.clock import Stopwatch
 
 
 class MotionWatch:

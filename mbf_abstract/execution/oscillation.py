@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mbf_abstract.clock import Clock, Stopwatch
 from mbf_abstract.geometry import Pose
+from mbf_abstract.time.clock import Clock, Stopwatch
 
 
 class OscillationDetector:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.goal_area import GoalArea
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.goals.goal_area import GoalArea
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_abstract.transforms import TransformError
 
 
 def in_global_frame(pose: Pose, runtime: Runtime) -> Pose:

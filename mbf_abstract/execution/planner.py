@@ -22,7 +22,7 @@ from enum import Enum
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import PluginFault, checked_answer, plugin_events
 from mbf_abstract.execution.plugin_run import PluginRun
-from mbf_abstract.goal_area import GoalArea, plan_to_area
+from mbf_abstract.goals.goal_area import GoalArea, plan_to_area
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult
 

@@ -14,12 +14,12 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Generic, TypeVar
 
-from mbf_abstract.actions.handle import AnyGoalHandle
-from mbf_abstract.clock import Stopwatch
-from mbf_abstract.compilation import unwatch_compiler, watch_compiler
+from mbf_abstract.compiling.compilation import unwatch_compiler, watch_compiler
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.plugins import Plugin
+from mbf_abstract.time.clock import Stopwatch
 
 P = TypeVar("P", bound=Plugin)
 T = TypeVar("T")

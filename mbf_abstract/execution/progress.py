@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from mbf_abstract.actions.goals import ExePathFeedback
-from mbf_abstract.clock import Clock, Stopwatch
+from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.path_tracker import PathTracker
+from mbf_abstract.goals.goal_types import ExePathFeedback
 from mbf_abstract.plugins import ControlResult
+from mbf_abstract.time.clock import Clock, Stopwatch
 
 LEAST_PROGRESS = 0.1
 """Progress along the path [m], or rotation towards the final heading [rad], that counts."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from mbf_abstract.clock import Stopwatch
+from mbf_abstract.drive.velocity_gate import Lease
 from mbf_abstract.execution.loaded_plugin import PluginFault, checked_answer, plugin_events
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import AbstractRecovery, RecoveryRequest, RecoveryResult
-from mbf_abstract.velocity_gate import Lease
+from mbf_abstract.time.clock import Stopwatch
 
 
 class GatedMotion:

@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import TYPE_CHECKING, Protocol
 
-from mbf_abstract.clock import Clock
+from mbf_abstract.config.navigation_parameters import NavigationParameters
+from mbf_abstract.drive.robot import RobotInformation
+from mbf_abstract.drive.velocity_gate import VelocityGate
 from mbf_abstract.events import EventBus
-from mbf_abstract.execution.callbacks import CallbackThread
 from mbf_abstract.execution.supervisor import Supervisor
-from mbf_abstract.navigation_parameters import NavigationParameters
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.callbacks import CallbackThread
+from mbf_abstract.maps.relaxation import Relaxation
 from mbf_abstract.plugins import PluginKind
-from mbf_abstract.relaxation import Relaxation
-from mbf_abstract.robot import RobotInformation
-from mbf_abstract.transforms import TransformBuffer
-from mbf_abstract.velocity_gate import VelocityGate
+from mbf_abstract.time.clock import Clock
 
 if TYPE_CHECKING:
     pass

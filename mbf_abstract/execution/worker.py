@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from mbf_abstract.clock import Clock, Priority
+from mbf_abstract.time.clock import Clock, Priority
 
 
 class Job(Protocol):

@@ -7,12 +7,12 @@ from collections.abc import Callable
 
 from py_trees.common import Status
 
-from mbf_abstract.clock import Stopwatch
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.executives.mission import MissionContext
 from mbf_abstract.executives.nodes import Leaf
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, is_success
-from mbf_abstract.robot import RobotStateError
+from mbf_abstract.time.clock import Stopwatch
 
 TIME_RESOLUTION = 1e-9  # s
 

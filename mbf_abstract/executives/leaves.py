@@ -12,7 +12,9 @@ from typing import Any
 
 from py_trees.common import Status
 
-from mbf_abstract.actions.goals import (
+from mbf_abstract.executives.nodes import Leaf
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.goal_types import (
     ActionResult,
     ExePathGoal,
     ExePathResult,
@@ -21,9 +23,7 @@ from mbf_abstract.actions.goals import (
     MoveBaseGoal,
     RecoveryGoal,
 )
-from mbf_abstract.actions.handle import AnyGoalHandle
-from mbf_abstract.executives.nodes import Leaf
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.handle import AnyGoalHandle
 
 
 class ActionLeaf(Leaf):

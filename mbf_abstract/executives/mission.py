@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from mbf_abstract.actions.goals import ActionResult, ExePathFeedback, ExePathResult, GetPathResult
-from mbf_abstract.actions.handle import AnyGoalHandle
-from mbf_abstract.clock import Clock
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.goal_types import ActionResult, ExePathFeedback, ExePathResult, GetPathResult
+from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, is_success
+from mbf_abstract.time.clock import Clock
 
 PATIENCE_CODES = (GetPathOutcome.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED)
 

@@ -19,7 +19,7 @@ def register(app: typer.Typer) -> None:
 
 def list_trees() -> None:
     """List the trees that come with the package."""
-    from mbf_abstract.executives.ready_trees import READY_TREES
+    from mbf_abstract.executives.reference_trees import READY_TREES
 
     for name, make in READY_TREES.items():
         typer.echo(f"{name:12} {(make.__doc__ or '').splitlines()[0]}")
@@ -32,7 +32,7 @@ def show(
 ) -> None:
     """Draw a tree."""
     with readable_errors():
-        from mbf_abstract.executives.ready_trees import READY_TREES
+        from mbf_abstract.executives.reference_trees import READY_TREES
         from mbf_abstract.executives.tree_drawing import FORMATS, draw_tree
 
         if name not in READY_TREES:

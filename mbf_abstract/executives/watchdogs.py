@@ -12,13 +12,13 @@ from abc import abstractmethod
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from mbf_abstract.actions.goals import ActionResult
-from mbf_abstract.clock import Stopwatch
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.oscillation import OscillationDetector
 from mbf_abstract.executives.nodes import Decorator
 from mbf_abstract.geometry import Path
+from mbf_abstract.goals.goal_types import ActionResult
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.robot import RobotStateError
+from mbf_abstract.time.clock import Stopwatch
 
 
 class Watchdog(Decorator):

@@ -15,20 +15,20 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mbf_abstract.clock import Clock
-from mbf_abstract.config import Config, NavigationParameters, PluginSpec
+from mbf_abstract.config.configuration import Config, NavigationParameters, PluginSpec
+from mbf_abstract.drive.robot import Robot
 from mbf_abstract.events import Event, EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.map_queries import MapQueries
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.queries import MapQueries
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.plugins import PLUGIN_BASES, Plugin, PluginContext, PluginKind
-from mbf_abstract.robot import Robot
-from mbf_abstract.sensing import RangeScan
-from mbf_abstract.server import AbstractNavigationServer
-from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, ScriptedRefiner
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.time.clock import Clock
+from mbf_abstract.time.sim_clock import SimClock
 
 P = TypeVar("P", bound=Plugin)
 

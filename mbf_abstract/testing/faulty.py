@@ -9,12 +9,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from mbf_abstract.cancel import CancelToken
-from mbf_abstract.clock import Clock
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlanRequest, PlanResult
 from mbf_abstract.testing.scripted import Answer, straight_plan
+from mbf_abstract.time.cancel import CancelToken
+from mbf_abstract.time.clock import Clock
 
 
 class Hang:

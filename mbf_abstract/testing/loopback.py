@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from mbf_abstract.clock import Clock, Priority
+from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import AckermannCommand, Command, Pose, Twist, quaternion_from_yaw
-from mbf_abstract.robot import Odometry
-from mbf_abstract.transform import Transform
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.time.clock import Clock, Priority
 
 MAX_LOGGED_COMMANDS = 100_000
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mbf_abstract.actions.goals import ExePathGoal
-from mbf_abstract.actions.handle import AnyGoalHandle
 from mbf_abstract.events import EventKind
+from mbf_abstract.goals.goal_types import ExePathGoal
+from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.scripted import Scripted, straight_plan
 

@@ -16,7 +16,6 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import (
@@ -33,6 +32,7 @@ from mbf_abstract.plugins import (
     RecoveryResult,
     RefineResult,
 )
+from mbf_abstract.time.cancel import CancelToken
 
 Request = TypeVar("Request")
 Answer: TypeAlias = Any

@@ -1,1 +1,1 @@
-"""Controllers on a costmap, one a file; what they share is in ``mbf_costmap_nav.path_handling``."""
+"""Controllers on a costmap, one a file; what they share is in ``mbf_costmap_nav.control.path_handling``."""

@@ -27,12 +27,12 @@ from mbf_abstract.geometry import AckermannCommand, Command, Path, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
+from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower
+from mbf_costmap_nav.control.trajectory_scoring import build_critics, is_free, roll_out, score
 from mbf_costmap_nav.critics import CriticParameters
 from mbf_costmap_nav.critics.obstacle import COLLISION
-from mbf_costmap_nav.kernels.rollout import add_noise, blend, clip_velocities, integrate
-from mbf_costmap_nav.path_handling import ControlCycle, PathFollower
+from mbf_costmap_nav.kernels.control.rollout import add_noise, blend, clip_velocities, integrate
 from mbf_costmap_nav.plugins import CostmapContext
-from mbf_costmap_nav.trajectory_scoring import build_critics, is_free, roll_out, score
 
 Float32Array = NDArray[np.float32]
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import normalize_angle
 from mbf_abstract.parameters import ParameterModel, parameter
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.kernels.critics import furthest_reached
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.kernels.control.critics import furthest_reached
 
 Float32Array = NDArray[np.float32]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
-from mbf_costmap_nav.kernels.critics import mean_distance_to_point
+from mbf_costmap_nav.kernels.control.critics import mean_distance_to_point
 
 ACTIVE_WITHIN = 1.4
 """Length [m] left on the path below which the goal draws; before, following the path does."""

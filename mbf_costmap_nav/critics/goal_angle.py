@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
-from mbf_costmap_nav.kernels.critics import mean_angle_to
+from mbf_costmap_nav.kernels.control.critics import mean_angle_to
 
 CAR_WITHIN = 1.0
 """Length [m] left on the path below which a car minds the heading of its end."""

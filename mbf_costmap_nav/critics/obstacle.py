@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbf_costmap_nav.costmap import INSCRIBED, UNKNOWN
 from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
-from mbf_costmap_nav.kernels.critics import map_costs
+from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
+from mbf_costmap_nav.kernels.control.critics import map_costs
 
 STRIDE = 2
 """Every how many steps the map is looked up: at 0.05 s and 0.5 m/s every 5 cm, one cell."""

@@ -9,7 +9,7 @@ has to leave the path in order to turn, and the least distance from it is that o
 from __future__ import annotations
 
 from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
-from mbf_costmap_nav.kernels.critics import alignment
+from mbf_costmap_nav.kernels.control.critics import alignment
 
 ACTIVE_BEYOND = 0.5
 """Length [m] left on the path below which the goal critics take over."""

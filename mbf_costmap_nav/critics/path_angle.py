@@ -7,7 +7,7 @@ make up for what driving away from the path costs.
 from __future__ import annotations
 
 from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
-from mbf_costmap_nav.kernels.critics import mean_angle_to
+from mbf_costmap_nav.kernels.control.critics import mean_angle_to
 
 ACTIVE_BEYOND = 0.5
 """Length [m] left on the path below which the goal critics take over."""

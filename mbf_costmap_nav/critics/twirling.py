@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
-from mbf_costmap_nav.kernels.critics import mean_of
+from mbf_costmap_nav.kernels.control.critics import mean_of
 
 
 class TwirlingCritic(Critic):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from mbf_abstract.kernel_cache import compile_lazily
+from mbf_abstract.compiling.kernel_cache import compile_lazily
 
 KernelFunction = TypeVar("KernelFunction", bound=Callable[..., Any])
 

@@ -17,8 +17,8 @@ from scipy import ndimage
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
-from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
-from mbf_costmap_nav.layer import CostmapLayer, LayerParameters, shifted
+from mbf_costmap_nav.grid.costmap import FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
+from mbf_costmap_nav.map.layer import CostmapLayer, LayerParameters, shifted
 
 
 class DenoiseLayerParameters(LayerParameters):

@@ -16,13 +16,13 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
-from mbf_costmap_nav.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
-from mbf_costmap_nav.kernels.cover import fill_polygon
-from mbf_costmap_nav.layer import CombinationMethod, CostmapLayer, LayerContext, LayerParameters, combine
-from mbf_costmap_nav.map_io import load_costmap
-from mbf_costmap_nav.placement import Placement
-from mbf_costmap_nav.resampling import sample_costmap
-from mbf_costmap_nav.zones import Zone, load_zones
+from mbf_costmap_nav.files.map_io import load_costmap
+from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
+from mbf_costmap_nav.grid.placement import Placement
+from mbf_costmap_nav.grid.resampling import sample_costmap
+from mbf_costmap_nav.grid.zones import Zone, load_zones
+from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon
+from mbf_costmap_nav.map.layer import CombinationMethod, CostmapLayer, LayerContext, LayerParameters, combine
 
 
 class KeepoutLayerParameters(LayerParameters):

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
-from mbf_costmap_nav.costmap import FREE, LETHAL, CellArray, CellBox
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.kernels.cover import fill_polygon
-from mbf_costmap_nav.kernels.raytrace import clear_rays, mark_points
-from mbf_costmap_nav.layer import CombinationMethod, GridLayer, LayerContext, LayerParameters, combine
-from mbf_costmap_nav.sensor_data import Observation, ObservationBuffer, SensorLayer, SourceParameters
+from mbf_costmap_nav.grid.costmap import FREE, LETHAL, CellArray, CellBox
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon
+from mbf_costmap_nav.kernels.map.raytrace import clear_rays, mark_points
+from mbf_costmap_nav.map.layer import CombinationMethod, GridLayer, LayerContext, LayerParameters, combine
+from mbf_costmap_nav.map.sensor_data import Observation, ObservationBuffer, SensorLayer, SourceParameters
 
 
 class ObstacleLayerParameters(LayerParameters):

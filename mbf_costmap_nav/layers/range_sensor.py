@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
-from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
-from mbf_costmap_nav.kernels.sonar import update_cone
-from mbf_costmap_nav.layer import (
+from mbf_costmap_nav.grid.costmap import FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
+from mbf_costmap_nav.kernels.map.sonar import update_cone
+from mbf_costmap_nav.map.layer import (
     CombinationMethod,
     LayerContext,
     LayerParameters,
@@ -29,7 +29,7 @@ from mbf_costmap_nav.layer import (
     combine,
     shifted,
 )
-from mbf_costmap_nav.sensor_data import MAX_OBSERVATIONS, Observation, SensorLayer, SourceTiming, SourceWatch
+from mbf_costmap_nav.map.sensor_data import MAX_OBSERVATIONS, Observation, SensorLayer, SourceTiming, SourceWatch
 
 UNDECIDED = 0.5
 TARGET_PROBABILITY = 233.0 / 254.0

@@ -17,12 +17,12 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
-from mbf_costmap_nav.costmap import FREE, CellArray, CellBox, Costmap
-from mbf_costmap_nav.layer import CostmapLayer, LayerContext, LayerParameters
-from mbf_costmap_nav.map_description import UNKNOWN_OCCUPANCY
-from mbf_costmap_nav.map_io import load_map
-from mbf_costmap_nav.placement import Placement
-from mbf_costmap_nav.zones import Zone, load_zones
+from mbf_costmap_nav.files.map_description import UNKNOWN_OCCUPANCY
+from mbf_costmap_nav.files.map_io import load_map
+from mbf_costmap_nav.grid.costmap import FREE, CellArray, CellBox, Costmap
+from mbf_costmap_nav.grid.placement import Placement
+from mbf_costmap_nav.grid.zones import Zone, load_zones
+from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext, LayerParameters
 
 
 class SpeedLimitLayerParameters(LayerParameters):

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import parameter
-from mbf_costmap_nav.costmap import EMPTY_BOX, CellBox, GridGeometry
-from mbf_costmap_nav.kernels.cover import fill_polygon
-from mbf_costmap_nav.kernels.voxel import clear_voxel_rays, mark_voxels, project_columns
-from mbf_costmap_nav.layer import clear_cells, shifted
+from mbf_costmap_nav.grid.costmap import EMPTY_BOX, CellBox, GridGeometry
+from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon
+from mbf_costmap_nav.kernels.map.voxel import clear_voxel_rays, mark_voxels, project_columns
 from mbf_costmap_nav.layers.obstacle import ObstacleLayer, ObstacleLayerParameters
-from mbf_costmap_nav.sensor_data import Observation, SourceParameters
+from mbf_costmap_nav.map.layer import clear_cells, shifted
+from mbf_costmap_nav.map.sensor_data import Observation, SourceParameters
 
 
 class VoxelLayerParameters(ObstacleLayerParameters):

@@ -20,11 +20,11 @@ from typing import ClassVar
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_costmap_nav.grid_planning import NO_LEG, GridPlanner, Leg
-from mbf_costmap_nav.kernels.grid_path import trace_cells
-from mbf_costmap_nav.kernels.grid_search import CANCELED, search
-from mbf_costmap_nav.potential_planning import plan_down_potential
-from mbf_costmap_nav.search_grid import GridPlannerParameters, SearchGrid
+from mbf_costmap_nav.kernels.search.grid_path import trace_cells
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, search
+from mbf_costmap_nav.planning.grid_planning import NO_LEG, GridPlanner, Leg
+from mbf_costmap_nav.planning.potential_planning import plan_down_potential
+from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid
 
 
 class AStarParameters(GridPlannerParameters):

@@ -22,9 +22,9 @@ from pydantic import model_validator
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_costmap_nav.grid_planning import GridPlanner, Leg
-from mbf_costmap_nav.potential_planning import plan_down_potential
-from mbf_costmap_nav.search_grid import GridPlannerParameters, SearchGrid
+from mbf_costmap_nav.planning.grid_planning import GridPlanner, Leg
+from mbf_costmap_nav.planning.potential_planning import plan_down_potential
+from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid
 
 
 class DijkstraParameters(GridPlannerParameters):

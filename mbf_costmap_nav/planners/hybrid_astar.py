@@ -25,16 +25,16 @@ from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_costmap_nav.costmap import LETHAL, Costmap
-from mbf_costmap_nav.footprint_check import FootprintCheck
-from mbf_costmap_nav.grid_planning import check_tolerance, heights_along, off_map, unless_lasting
-from mbf_costmap_nav.kernels.car_ground import ground_of, pose_cost
-from mbf_costmap_nav.kernels.driven_arcs import Car
-from mbf_costmap_nav.kernels.grid_search import CANCELED, FOUND, search
-from mbf_costmap_nav.kernels.hybrid_astar import GAVE_UP, HEADINGS, Target, hybrid_search
-from mbf_costmap_nav.kernels.shorter_drive import shortened
+from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.kernels.car.ground import ground_of, pose_cost
+from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP, HEADINGS, Target, hybrid_search
+from mbf_costmap_nav.kernels.car.motion_primitives import Car
+from mbf_costmap_nav.kernels.car.shorter_drive import shortened
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND, search
+from mbf_costmap_nav.planning.grid_planning import check_tolerance, heights_along, off_map, unless_lasting
+from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid
 from mbf_costmap_nav.plugins import CostmapPlanner
-from mbf_costmap_nav.search_grid import GridPlannerParameters, SearchGrid
 
 FloatArray = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_costmap_nav.grid_planning import NO_LEG, GridPlanner, Leg
-from mbf_costmap_nav.path_geometry import resample
-from mbf_costmap_nav.search_grid import GridPlannerParameters, SearchGrid
+from mbf_costmap_nav.control.path_geometry import resample
+from mbf_costmap_nav.planning.grid_planning import NO_LEG, GridPlanner, Leg
+from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid
 
 SAMPLES_PER_CELL = 10
 """For the cost of a line: how many samples a cell's length has."""

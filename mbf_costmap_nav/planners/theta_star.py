@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_costmap_nav.grid_planning import NO_LEG, GridPlanner, Leg
-from mbf_costmap_nav.kernels.grid_line import line_cost, pull_string
-from mbf_costmap_nav.kernels.grid_search import CANCELED, FOUND
-from mbf_costmap_nav.kernels.short_lines import trace_lines
-from mbf_costmap_nav.kernels.theta_star import theta_search
-from mbf_costmap_nav.search_grid import GridPlannerParameters, SearchGrid
+from mbf_costmap_nav.kernels.search.grid_line import line_cost, pull_string
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND
+from mbf_costmap_nav.kernels.search.short_lines import trace_lines
+from mbf_costmap_nav.kernels.search.theta_star import theta_search
+from mbf_costmap_nav.planning.grid_planning import NO_LEG, GridPlanner, Leg
+from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid
 
 
 class ThetaStarParameters(GridPlannerParameters):

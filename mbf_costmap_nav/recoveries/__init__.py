@@ -1,1 +1,1 @@
-"""Recovery behaviours on costmaps, one a file; those that move share ``mbf_costmap_nav.guarded_motion``."""
+"""Recovery behaviours on costmaps, one a file; those that move share ``mbf_costmap_nav.control.guarded_motion``."""

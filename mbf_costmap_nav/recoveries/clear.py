@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform_buffer import TransformError
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_abstract.robot import RobotStateError
-from mbf_abstract.transforms import TransformError
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.plugins import CostmapRecovery
 
 

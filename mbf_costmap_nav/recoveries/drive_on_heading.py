@@ -12,7 +12,7 @@ from typing import ClassVar
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_costmap_nav.guarded_motion import GuardedMotionParameters, GuardedRecovery
+from mbf_costmap_nav.control.guarded_motion import GuardedMotionParameters, GuardedRecovery
 
 
 class DriveOnHeadingParameters(GuardedMotionParameters):

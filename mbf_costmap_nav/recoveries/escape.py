@@ -17,9 +17,9 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_costmap_nav.costmap import UNKNOWN
-from mbf_costmap_nav.footprint_check import FootprintCheck, arc_poses
-from mbf_costmap_nav.guarded_motion import GuardedMotionParameters, GuardedRecovery
+from mbf_costmap_nav.control.guarded_motion import GuardedMotionParameters, GuardedRecovery
+from mbf_costmap_nav.grid.costmap import UNKNOWN
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck, arc_poses
 
 OFF_MAP = 256
 """Cost of a centre outside the map: more than that of any cell."""

@@ -17,9 +17,9 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_costmap_nav.costmap import LETHAL
-from mbf_costmap_nav.footprint_check import arc_poses
-from mbf_costmap_nav.guarded_motion import GuardedMotionParameters, GuardedRecovery
+from mbf_costmap_nav.control.guarded_motion import GuardedMotionParameters, GuardedRecovery
+from mbf_costmap_nav.grid.costmap import LETHAL
+from mbf_costmap_nav.grid.footprint_check import arc_poses
 
 LEAST_GAIN = 0.2
 """Metres of clearance a metre of motion must bring; with less the robot slides along an obstacle or nears another."""

@@ -15,14 +15,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.maps.relaxation import Slack
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_abstract.relaxation import Slack
-from mbf_abstract.robot import RobotStateError
-from mbf_abstract.transforms import TransformError
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.layers.inflation import InflationLayer
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.plugins import CostmapRecovery
 
 

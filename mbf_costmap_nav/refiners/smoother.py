@@ -20,17 +20,17 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.arithmetic import arctan2
-from mbf_abstract.cancel import CancelToken
+from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path
+from mbf_abstract.geometry.arithmetic import arctan2
+from mbf_abstract.geometry.transform_buffer import TransformError
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import RefineResult
-from mbf_abstract.transforms import TransformError
-from mbf_costmap_nav.costmap import LETHAL, Costmap
-from mbf_costmap_nav.kernels.smoothing import relax_path
-from mbf_costmap_nav.path_geometry import arc_lengths, resample
+from mbf_abstract.time.cancel import CancelToken
+from mbf_costmap_nav.control.path_geometry import arc_lengths, resample
+from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
+from mbf_costmap_nav.kernels.control.smoothing import relax_path
 from mbf_costmap_nav.plugins import CostmapRefiner
 
 FloatArray = NDArray[np.float64]

@@ -20,14 +20,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.arithmetic import exp, norm, tan
+from mbf_abstract.execution.path_tracker import reverse_segments
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Twist
+from mbf_abstract.geometry.arithmetic import exp, norm, tan
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_abstract.path_tracker import reverse_segments
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
-from mbf_mesh_nav.final_approach import with_final_approach, with_first_turn
-from mbf_mesh_nav.goal_approach import (
+from mbf_mesh_nav.kernels.mesh.surface_walk import tangent
+from mbf_mesh_nav.kernels.mesh.vectors import Vector
+from mbf_mesh_nav.kernels.motion.mppi import score_rollouts
+from mbf_mesh_nav.map.snapshot import MeshSnapshot
+from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.motion.goal_approach import (
     GoalApproach,
     braking_speed,
     clamp,
@@ -35,12 +39,8 @@ from mbf_mesh_nav.goal_approach import (
     heading_error,
     tracker_on_surface,
 )
-from mbf_mesh_nav.kernels.mppi import score_rollouts
-from mbf_mesh_nav.kernels.surface_walk import tangent
-from mbf_mesh_nav.kernels.vectors import Vector
-from mbf_mesh_nav.locate import SurfacePoint
 from mbf_mesh_nav.plugins import MeshContext, MeshController
-from mbf_mesh_nav.snapshot import MeshSnapshot
+from mbf_mesh_nav.search.final_approach import with_final_approach, with_first_turn
 
 _NOISE_HOLD = 3  # steps a noise value is kept for: explores further than independent noise of the same size
 _LEAST_STRIDE = 0.05  # [m] between two looks at the ground; only obstacles without inflation are thinner

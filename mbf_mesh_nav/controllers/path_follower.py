@@ -19,7 +19,9 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_mesh_nav.goal_approach import (
+from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS, may_enter
+from mbf_mesh_nav.mesh.surface_point import beyond_border
+from mbf_mesh_nav.motion.goal_approach import (
     GoalApproach,
     arc_to,
     braking_speed,
@@ -28,9 +30,7 @@ from mbf_mesh_nav.goal_approach import (
     in_robot_frame,
     tracker_on_surface,
 )
-from mbf_mesh_nav.kernels.forbidden_ground import LETHAL_HARDNESS, may_enter
 from mbf_mesh_nav.plugins import MeshController
-from mbf_mesh_nav.surface_point import beyond_border
 
 OBSTACLE_STEP = 0.1  # m between two looks along the path
 

@@ -15,14 +15,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.arithmetic import norm, rotated_back
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.arithmetic import norm, rotated_back
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_mesh_nav.goal_approach import GoalApproach, clamp, ground_distance, heading_error, tracker_on_surface
+from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, ground_distance, heading_error, tracker_on_surface
+from mbf_mesh_nav.motion.vector_field import VectorField
 from mbf_mesh_nav.plugins import MeshController
-from mbf_mesh_nav.vector_field import VectorField
 
 STRAYING = 2.0
 """The field leads to the goal from anywhere, not back to the path: a robot off the path comes to its end otherwise."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 
 
 class BorderParameters(LayerParameters):

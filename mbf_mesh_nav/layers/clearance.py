@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 
 RAY_OFFSET = 0.001
 """Start of the ray above the surface [m], so that it does not hit the faces it stands on."""

@@ -12,9 +12,14 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.kernels.neighbourhood_layers import height_differences
-from mbf_mesh_nav.kernels.patches import bound_patches, grow_patches, height_differences_by_patches, patch_borders
-from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.kernels.layers.neighbourhood_layers import height_differences
+from mbf_mesh_nav.kernels.layers.patches import (
+    bound_patches,
+    grow_patches,
+    height_differences_by_patches,
+    patch_borders,
+)
+from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 
 _DENSE = 16.0
 """Edges in a radius from which patches pay: of about 48 vertices, they are then small against the neighbourhood."""

@@ -15,8 +15,8 @@ import numpy as np
 from pydantic import model_validator
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.kernels.inflation import repair_distances, set_fading_costs
-from mbf_mesh_nav.layer import (
+from mbf_mesh_nav.kernels.layers.inflation import repair_distances, set_fading_costs
+from mbf_mesh_nav.map.layer import (
     CostArray,
     IntArray,
     LayerContext,

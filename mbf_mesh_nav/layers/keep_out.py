@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 from mbf_mesh_nav.layers.polygon_regions import Region
+from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 
 
 class KeepOutParameters(LayerParameters):

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import model_validator
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 from mbf_mesh_nav.layers.polygon_regions import Region
+from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 
 
 class LabelledRegion(Region):

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import field_validator
 
-from mbf_abstract.arithmetic import norm
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.sensing import MAX_STAMP_LEAD, RangeScan
 from mbf_abstract.parameters import parameter
-from mbf_abstract.sensing import MAX_STAMP_LEAD, RangeScan
-from mbf_mesh_nav.layer import (
+from mbf_mesh_nav.map.layer import (
     NOTHING_CHANGED,
     CostArray,
     FloatArray,
@@ -33,7 +33,7 @@ from mbf_mesh_nav.layer import (
     LethalArray,
     MeshLayer,
 )
-from mbf_mesh_nav.range_image import NO_RANGE, RangeImage
+from mbf_mesh_nav.map.range_image import NO_RANGE, RangeImage
 
 
 class ObstacleParameters(LayerParameters):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from pydantic import field_validator, model_validator
 
-from mbf_abstract.arithmetic import norm, scalar_products
+from mbf_abstract.geometry.arithmetic import norm, scalar_products
 from mbf_abstract.parameters import ParameterModel, parameter
-from mbf_mesh_nav.kernels.polygons import inside_polygon
-from mbf_mesh_nav.layer import FloatArray, IntArray, LethalArray
+from mbf_mesh_nav.kernels.mesh.polygons import inside_polygon
+from mbf_mesh_nav.map.layer import FloatArray, IntArray, LethalArray
 
 ON_OUTLINE = 1e-6
 """A vertex this near [m] to a side of a polygon lies on it."""

@@ -9,8 +9,8 @@ vertex without a neighbour within the radius gets ``threshold + 0.1``.
 from __future__ import annotations
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.kernels.neighbourhood_layers import normal_tip_distances
-from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.kernels.layers.neighbourhood_layers import normal_tip_distances
+from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 
 
 class RidgeParameters(LayerParameters):

@@ -8,8 +8,8 @@ Rule of mesh_navigation: the mean edge angle of a vertex, averaged over the conn
 from __future__ import annotations
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.kernels.neighbourhood_layers import mean_edge_angles, neighbourhood_means
-from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.kernels.layers.neighbourhood_layers import mean_edge_angles, neighbourhood_means
+from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 
 
 class RoughnessParameters(LayerParameters):

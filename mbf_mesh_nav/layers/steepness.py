@@ -9,8 +9,8 @@ Rule of mesh_navigation: acos of the normal's z component.
 from __future__ import annotations
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.kernels.slopes import inclinations
-from mbf_mesh_nav.layer import CostArray, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.kernels.mesh.slopes import inclinations
+from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 
 
 class SteepnessParameters(LayerParameters):

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.kernels.footprint_settling import settle_footprints, wheel_directions
-from mbf_mesh_nav.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.kernels.layers.footprint_settling import settle_footprints, wheel_directions
+from mbf_mesh_nav.map.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
 
 HEADINGS = 16
 

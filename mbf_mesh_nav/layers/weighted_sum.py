@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.layer import CostArray
 from mbf_mesh_nav.layers.combination import CombinationLayer
+from mbf_mesh_nav.map.layer import CostArray
 
 
 class WeightedSumLayer(CombinationLayer):

@@ -10,11 +10,11 @@ coarse meshes, with faces as long as the way around an obstacle, densify the map
 
 from __future__ import annotations
 
-from mbf_mesh_nav.leg_search import Leg, LegQuery
-from mbf_mesh_nav.path_cost import cost_along
 from mbf_mesh_nav.plugins import MeshContext
-from mbf_mesh_nav.surface_planner import SurfacePlanner
-from mbf_mesh_nav.wave_search import WaveSearch
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery
+from mbf_mesh_nav.search.path_cost import cost_along
+from mbf_mesh_nav.search.surface_planner import SurfacePlanner
+from mbf_mesh_nav.search.wave_search import WaveSearch
 
 
 class AnyAnglePlanner(SurfacePlanner):

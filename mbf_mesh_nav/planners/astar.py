@@ -7,10 +7,10 @@ the bound is loose and nearly everything is settled, then ``mesh.dijkstra`` is f
 
 from __future__ import annotations
 
-from mbf_mesh_nav.kernels.astar import search_towards
-from mbf_mesh_nav.leg_search import Leg, LegQuery, seeded_arrays, vertex_path_leg
-from mbf_mesh_nav.surface_planner import SurfacePlanner
-from mbf_mesh_nav.surface_point import corner_distances
+from mbf_mesh_nav.kernels.search.astar import search_towards
+from mbf_mesh_nav.mesh.surface_point import corner_distances
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery, seeded_arrays, vertex_path_leg
+from mbf_mesh_nav.search.surface_planner import SurfacePlanner
 
 
 class AStarPlanner(SurfacePlanner):

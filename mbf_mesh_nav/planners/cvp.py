@@ -12,11 +12,11 @@ Cost: about 0.4 us a vertex nearer than the goal. The C++ original's rule and de
 from __future__ import annotations
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.leg_search import Leg, LegQuery
-from mbf_mesh_nav.path_cost import cost_along
 from mbf_mesh_nav.plugins import MeshContext
-from mbf_mesh_nav.surface_planner import SurfacePlanner, SurfacePlannerParameters
-from mbf_mesh_nav.wave_search import WaveSearch
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery
+from mbf_mesh_nav.search.path_cost import cost_along
+from mbf_mesh_nav.search.surface_planner import SurfacePlanner, SurfacePlannerParameters
+from mbf_mesh_nav.search.wave_search import WaveSearch
 
 
 class CVPParameters(SurfacePlannerParameters):

@@ -8,8 +8,8 @@ Cost: about 60 ns a vertex that is nearer than the goal.
 
 from __future__ import annotations
 
-from mbf_mesh_nav.leg_search import Leg, LegQuery, spread_from, vertex_path_leg
-from mbf_mesh_nav.surface_planner import SurfacePlanner
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery, spread_from, vertex_path_leg
+from mbf_mesh_nav.search.surface_planner import SurfacePlanner
 
 
 class DijkstraPlanner(SurfacePlanner):

@@ -15,19 +15,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.arithmetic import arctan2
+from mbf_abstract.geometry.arithmetic import arctan2
 from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import PlanResult
-from mbf_mesh_nav.end_stretches import EndStretches, headings_within
-from mbf_mesh_nav.heading_limits import FootprintLimits, HeadingLimits, NormalLimits, ground_of
-from mbf_mesh_nav.kernels.dijkstra import follow_predecessors
-from mbf_mesh_nav.kernels.footprint_sweep import scratch_for
-from mbf_mesh_nav.kernels.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
+from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for
+from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors
+from mbf_mesh_nav.kernels.search.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
 from mbf_mesh_nav.layers.tilt import TiltLayer
-from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, Leg, LegQuery, straight_leg
-from mbf_mesh_nav.locate import SurfacePoint
+from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.plugins import MeshContext
-from mbf_mesh_nav.surface_planner import SurfacePlanner, SurfacePlannerParameters
+from mbf_mesh_nav.search.end_stretches import EndStretches, headings_within
+from mbf_mesh_nav.search.heading_limits import FootprintLimits, HeadingLimits, NormalLimits, ground_of
+from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, Leg, LegQuery, straight_leg
+from mbf_mesh_nav.search.surface_planner import SurfacePlanner, SurfacePlannerParameters
 
 CANCELLED = -2
 """What ``search_with_heading`` answers instead of a state."""

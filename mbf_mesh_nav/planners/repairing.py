@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.dijkstra import propagate_distances
-from mbf_mesh_nav.kernels.repair_wave import forget_changed_ways
-from mbf_mesh_nav.leg_search import (
+from mbf_mesh_nav.kernels.search.dijkstra import propagate_distances
+from mbf_mesh_nav.kernels.search.repair_wave import forget_changed_ways
+from mbf_mesh_nav.mesh.surface_point import corner_distances
+from mbf_mesh_nav.search.leg_search import (
     NO_OFFSETS,
     NO_TARGETS,
     Leg,
@@ -24,8 +25,7 @@ from mbf_mesh_nav.leg_search import (
     threshold_step,
     vertex_path_leg,
 )
-from mbf_mesh_nav.surface_planner import SurfacePlanner
-from mbf_mesh_nav.surface_point import corner_distances
+from mbf_mesh_nav.search.surface_planner import SurfacePlanner
 
 
 @dataclass

@@ -11,14 +11,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.arithmetic import norm
+from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_mesh_nav.goal_approach import arc_to, clamp, in_robot_frame
-from mbf_mesh_nav.guarded_motion import free_distance, reports_lost_pose, run_guarded
+from mbf_mesh_nav.motion.goal_approach import arc_to, clamp, in_robot_frame
+from mbf_mesh_nav.motion.guarded_motion import free_distance, reports_lost_pose, run_guarded
 from mbf_mesh_nav.plugins import MeshRecovery
 
 TRACK_GAP = 0.5

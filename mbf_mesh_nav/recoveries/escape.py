@@ -15,19 +15,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
-from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_mesh_nav.goal_approach import arc_to, clamp, ground_distance
-from mbf_mesh_nav.guarded_motion import reports_lost_pose, run_guarded
-from mbf_mesh_nav.kernels.dijkstra import follow_predecessors, propagate_distances
-from mbf_mesh_nav.leg_search import NO_OFFSETS, NO_TARGETS, seeded_arrays, threshold_step
-from mbf_mesh_nav.locate import SurfacePoint
+from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors, propagate_distances
+from mbf_mesh_nav.map.snapshot import MeshSnapshot
+from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.mesh.surface_point import nearest_corner
+from mbf_mesh_nav.motion.goal_approach import arc_to, clamp, ground_distance
+from mbf_mesh_nav.motion.guarded_motion import reports_lost_pose, run_guarded
 from mbf_mesh_nav.plugins import MeshRecovery
-from mbf_mesh_nav.snapshot import MeshSnapshot
-from mbf_mesh_nav.surface_point import nearest_corner
+from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, seeded_arrays, threshold_step
 
 
 class EscapeParameters(PluginParameters):

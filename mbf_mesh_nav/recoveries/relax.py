@@ -9,10 +9,10 @@ again meanwhile only prolongs it. Cost: the layer is computed twice, when relaxe
 
 from __future__ import annotations
 
+from mbf_abstract.maps.relaxation import Slack
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_abstract.relaxation import Slack
 from mbf_mesh_nav.layers.inflation import InflationParameters
 from mbf_mesh_nav.plugins import MeshRecovery
 

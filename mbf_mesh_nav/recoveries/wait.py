@@ -6,7 +6,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_mesh_nav.guarded_motion import reports_lost_pose, run_guarded
+from mbf_mesh_nav.motion.guarded_motion import reports_lost_pose, run_guarded
 from mbf_mesh_nav.plugins import MeshRecovery
 
 

@@ -7,7 +7,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from mbf_abstract.kernel_cache import compile_lazily
+from mbf_abstract.compiling.kernel_cache import compile_lazily
 
 KernelFunction = TypeVar("KernelFunction", bound=Callable[..., Any])
 

@@ -4,7 +4,7 @@ The scene is put up once in a viser server that nobody else can reach; its messa
 the recording, which viser packs into one page with its own viewer, a time bar and speeds. Files stay small because a
 frame is only the robot's pose: about 3 MB for a terrain of a quarter of a million triangles.
 
-Use ``terrain.viewer.picture`` where one look is enough.
+Use ``terrain.viewer.pictures.picture`` where one look is enough.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrain.recording import Recording
-from terrain.viewer.legend import legend_of
-from terrain.viewer.page_server import page_server
+from terrain.recording.recording import Recording
+from terrain.recording.whole_files import write_whole
+from terrain.viewer.pictures.legend import legend_of
 from terrain.viewer.replay_panel import with_panel
 from terrain.viewer.scene import (
     ActorModels,
@@ -30,7 +30,7 @@ from terrain.viewer.scene import (
     pin_height,
     wheel_angles,
 )
-from terrain.whole_files import write_whole
+from terrain.viewer.server.page_server import page_server
 
 FloatArray = NDArray[np.float64]
 

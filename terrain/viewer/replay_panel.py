@@ -12,9 +12,9 @@ from typing import Any
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import SYMBOLS
-from terrain.viewer.event_lines import is_told, line_of
-from terrain.viewer.legend import Entry, legend_html
-from terrain.viewer.tree_html import COLOURS, INDENT
+from terrain.viewer.pictures.legend import Entry, legend_html
+from terrain.viewer.reports.event_lines import is_told, line_of
+from terrain.viewer.reports.tree_html import COLOURS, INDENT
 
 SHOWN_LINES = 8
 MAX_LINES = 2000  # a run with more leaves out the oldest

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from mbf_abstract.event_values import error_text
-from terrain.recording import Recording
-from terrain.viewer.picture import ViewerMissing, write_picture
+from terrain.recording.recording import Recording
+from terrain.viewer.pictures.picture import ViewerMissing, write_picture
 from terrain.viewer.replay import write_replay
-from terrain.viewer.report import write_report
+from terrain.viewer.reports.report import write_report
 
 
 def write_results(
@@ -45,7 +45,7 @@ def write_results(
 
 def _write_log(file: Path, recording: Recording) -> None:
     try:
-        from terrain.viewer.mcap_log import write_mcap
+        from terrain.viewer.logs.mcap_log import write_mcap
     except ImportError as error:
         raise ViewerMissing(f"run.mcap needs mcap and its schemas: pip install 'mbf-flex[sim]' ({error})") from error
     write_mcap(file, recording)

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
-from terrain.actor_track import ActorTrack
-from terrain.recording import Recording, RobotShape, Surface
-from terrain.viewer.colours import (
+from terrain.recording.actor_track import ActorTrack
+from terrain.recording.recording import Recording, RobotShape, Surface
+from terrain.viewer.pictures.colours import (
     ACTORS,
     BODY,
     DRIVEN,
@@ -29,8 +29,8 @@ from terrain.viewer.colours import (
     Colour,
     linear_for_viewer,
 )
-from terrain.viewer.shading import LIGHT, vertex_colours
-from terrain.viewer.shapes import cut_walls, prism
+from terrain.viewer.pictures.shading import LIGHT, vertex_colours
+from terrain.viewer.pictures.shapes import cut_walls, prism
 
 FloatArray = NDArray[np.float64]
 Scene = Any  # viser.SceneApi; viser is imported only where a server is started

@@ -13,8 +13,8 @@ ALLOWED = {
     "mbf_mesh_nav": {"mbf_abstract", "mbf_mesh_nav"},
     "terrain": {"mbf_abstract", "terrain"},
 }
-CLOCKS = {"mbf_abstract/clock.py", "mbf_abstract/sim_clock.py", "mbf_abstract/sim_thread.py"}
-SPAWNERS = ("mbf_abstract/execution/", "mbf_abstract/velocity_gate.py", "mbf_abstract/testing/", "terrain/")
+CLOCKS = {"mbf_abstract/time/clock.py", "mbf_abstract/time/sim_clock.py", "mbf_abstract/time/sim_thread.py"}
+SPAWNERS = ("mbf_abstract/execution/", "mbf_abstract/drive/velocity_gate.py", "mbf_abstract/testing/", "terrain/")
 VIEWS = {"matplotlib", "viser", "rich", "typer", "PIL"}
 PLUGIN_FOLDERS = ("planners", "controllers", "recoveries", "refiners")
 MODULES = sorted(file for package in PACKAGES for file in (REPOSITORY / package).rglob("*.py"))

@@ -5,8 +5,8 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")
-ONLY_LOOKS = ("terrain/viewer/", "terrain/table1/statistics.py", "mbf_abstract/testing/")
-ARITHMETIC = "mbf_abstract/arithmetic.py"
+ONLY_LOOKS = ("terrain/viewer/", "terrain/experiments/table1/statistics.py", "mbf_abstract/testing/")
+ARITHMETIC = "mbf_abstract/geometry/arithmetic.py"
 
 BLAS = {
     "dot",

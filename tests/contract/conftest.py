@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.plugins import CostmapContext
-from mbf_mesh_nav.layer import LayerContext, MeshLayer
-from mbf_mesh_nav.layer_graph import LayerGraph
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
+from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.plugins import MeshContext
 
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from mbf_abstract.registry import PluginRegistry
+from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.testing.contract import ContractBroken, check_layer
-from mbf_costmap_nav.costmap import CellBox
-from mbf_costmap_nav.layer import CombinationMethod, CostmapLayer, GridLayer, combine
-from mbf_costmap_nav.sensor_data import Observation, SensorLayer
-from mbf_mesh_nav.layer import LayerContext, MeshLayer
+from mbf_costmap_nav.grid.costmap import CellBox
+from mbf_costmap_nav.map.layer import CombinationMethod, CostmapLayer, GridLayer, combine
+from mbf_costmap_nav.map.sensor_data import Observation, SensorLayer
 from mbf_mesh_nav.layers.border import BorderLayer
 from mbf_mesh_nav.layers.steepness import SteepnessLayer
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
+from mbf_mesh_nav.map.mesh_map import MeshMap
 
 CORNERS = [(1.0, 1.0), (2.5, 1.0), (2.5, 2.0), (1.0, 2.0)]
 SOURCES = {"sources": {"laser": {"observation_persistence": 5.0}}}

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.plugins import PlanRequest, PluginKind
-from mbf_abstract.registry import PluginRegistry
 from mbf_abstract.testing.contract import check_controller, check_planner, check_recovery, check_refiner
 from mbf_abstract.testing.contract.rig import rig
 

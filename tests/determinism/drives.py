@@ -11,11 +11,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import load_scenario
-from terrain.table1.arms import ARMS
-from terrain.table1.repetition import run_repetition
-from terrain.table1.world import WAREHOUSE
+from terrain.experiments.table1.conditions import ARMS
+from terrain.experiments.table1.environments.world import WAREHOUSE
+from terrain.experiments.table1.repetition import run_repetition
+from terrain.scenarios.scenario import load_scenario
+from terrain.session.runner import RunOptions, run_scenario
 
 TABLE_1 = "table1/"
 SWEEP = "sweep"

@@ -7,18 +7,18 @@ import pytest
 import typer
 import yaml
 
-from mbf_abstract.actions.handle import GoalHandle
 from mbf_abstract.cli import make_app
-from mbf_abstract.config import PLUGIN_LISTS
+from mbf_abstract.config.configuration import PLUGIN_LISTS
+from mbf_abstract.config.navigation_parameters import NavigationParameters
+from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.geometry import Path as GeometricPath
 from mbf_abstract.geometry import Pose
-from mbf_abstract.map_queries import MapQueries
-from mbf_abstract.navigation_parameters import NavigationParameters
+from mbf_abstract.goals.handle import GoalHandle
+from mbf_abstract.maps.queries import MapQueries
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_abstract.registry import PluginRegistry
-from mbf_abstract.server import AbstractNavigationServer
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_mesh_nav.plugins import MeshPlanner
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"

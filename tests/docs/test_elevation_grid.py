@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.map_queries import CellState, PlaceQuery
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.contract import check_planner
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.time.sim_clock import SimClock
 
 CONFIG = """\
 backend: elevation_grid:ElevationGridServer

@@ -8,18 +8,18 @@ import trimesh
 from PIL import Image
 
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PluginContext
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.contract import check_controller, check_planner, check_recovery
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_abstract.time.sim_clock import SimClock
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.plugins import CostmapContext
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.plugins import MeshContext
 
 SOUTH = (Pose.planar(1.0, 1.0), Pose.planar(5.0, 1.5, 0.5))

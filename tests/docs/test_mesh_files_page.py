@@ -3,9 +3,10 @@
 import re
 from pathlib import Path
 
-from mbf_mesh_nav import map_builder, map_findings, repair
-from mbf_mesh_nav.mesh_io import SPLIT_CORNERS, known_endings
-from mbf_mesh_nav.repair import REPAIRS
+from mbf_mesh_nav.files.mesh_io import SPLIT_CORNERS, known_endings
+from mbf_mesh_nav.map import map_builder, map_findings
+from mbf_mesh_nav.mesh import repair
+from mbf_mesh_nav.mesh.repair import REPAIRS
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "mesh_files.md").read_text("utf-8")
 

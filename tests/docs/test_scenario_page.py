@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import SHIPPED, load_scenario
-from terrain.scenario_settings import apply_world_settings
-from terrain.sweep_cli import parse_seeds, parse_settings
+from terrain.scenarios.scenario import SHIPPED, load_scenario
+from terrain.scenarios.settings import apply_world_settings
+from terrain.session.runner import RunOptions, run_scenario
+from terrain.sweeps.command import parse_seeds, parse_settings
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "write_a_scenario.md"
 

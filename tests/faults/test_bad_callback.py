@@ -2,9 +2,9 @@
 
 import asyncio
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import Hang
 

@@ -4,14 +4,14 @@ import asyncio
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, RecoveryGoal, RefinePathGoal
-from mbf_abstract.clock import ThreadDetached, WallClock
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import Hang, drive
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from mbf_abstract.time.clock import ThreadDetached, WallClock
 
 ERRORS = [SystemExit(3), asyncio.CancelledError("no"), KeyboardInterrupt(), GeneratorExit(), ThreadDetached("liar")]
 

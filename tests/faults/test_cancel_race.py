@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
-from mbf_abstract.actions.handle import GoalStatus
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
 from mbf_abstract.plugins import PlanResult, RecoveryResult
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import obedient, slow
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.time.sim_clock import SimClock
 
 GOAL = Pose.planar(3.0, 0.0)
 

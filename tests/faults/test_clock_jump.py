@@ -1,11 +1,11 @@
 """Fault table, row 31: clocks that stand still, and long pauses."""
 
-from mbf_abstract.actions.goals import ExePathGoal
-from mbf_abstract.clock import WallClock
-from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.promises import assert_ended_once, assert_stops
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.sim_clock import SimClock
 
 
 def test_the_clocks_never_run_backwards():

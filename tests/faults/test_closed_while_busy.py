@@ -5,14 +5,14 @@ from itertools import product
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal, RefinePathGoal
-from mbf_abstract.actions.handle import GoalStatus
-from mbf_abstract.clock import WallClock
 from mbf_abstract.geometry import Pose
-from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal, RefinePathGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import BusyHang, Hang
 from mbf_abstract.testing.promises import assert_ended_once
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.sim_clock import SimClock
 
 GOALS = {
     "planner": lambda bench: GetPathGoal(Pose.planar(3.0, 0.0)),

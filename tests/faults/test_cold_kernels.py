@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from numba import njit
 
-from mbf_abstract import kernel_cache
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal
-from mbf_abstract.clock import WallClock
-from mbf_abstract.compilation import told_of_kernels
+from mbf_abstract.compiling import kernel_cache
+from mbf_abstract.compiling.compilation import told_of_kernels
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import BusyHang, drive
 from mbf_abstract.testing.promises import assert_ended_once, assert_stops
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.sim_clock import SimClock
 
 assert kernel_cache  # a map backend imports it with its kernels
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal
 from mbf_abstract.geometry import Twist
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult
 from mbf_abstract.testing.bench import Bench

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive

@@ -5,11 +5,11 @@ import inspect
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, RecoveryGoal, RefinePathGoal
+from mbf_abstract.drive.robot import Robot
 from mbf_abstract.execution.runtime import MapHooks
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.plugins import PLUGIN_BASES, PluginKind
-from mbf_abstract.robot import Robot
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops

@@ -4,9 +4,9 @@ import gc
 import threading
 import weakref
 
-from mbf_abstract.actions.goals import GetPathGoal
-from mbf_abstract.actions.handle import GoalStatus
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import GetPathGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import Hang

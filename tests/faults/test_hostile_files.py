@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from PIL import EpsImagePlugin
 
-from mbf_abstract.config import load_config
-from mbf_abstract.findings import ConfigError
-from mbf_abstract.server_factory import read_config
-from mbf_costmap_nav.map_description import MapError
-from mbf_costmap_nav.map_io import load_costmap, load_image, load_map
-from mbf_costmap_nav.zones import load_zones
-from mbf_mesh_nav.lvr2_io import read_lvr2_vertex_attributes, write_lvr2_mesh
-from mbf_mesh_nav.mesh_io import read_mesh
-from mbf_mesh_nav.repair import MeshError
-from terrain.dem_io import TerrainFileError, read_elevation
-from terrain.recording import Recording, RecordingError
+from mbf_abstract.config.configuration import load_config
+from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.server.factory import read_config
+from mbf_costmap_nav.files.map_description import MapError
+from mbf_costmap_nav.files.map_io import load_costmap, load_image, load_map
+from mbf_costmap_nav.grid.zones import load_zones
+from mbf_mesh_nav.files.lvr2_io import read_lvr2_vertex_attributes, write_lvr2_mesh
+from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.mesh.repair import MeshError
+from terrain.recording.recording import Recording, RecordingError
+from terrain.worlds.elevation_files import TerrainFileError, read_elevation
 
 DESCRIPTION = "image: map.png\nresolution: 0.05\norigin: [0, 0, 0]\n"
 EPS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 20 20\n%%EndComments\nshowpage\n%%EOF\n"

@@ -12,10 +12,10 @@ import trimesh
 import yaml
 from PIL import EpsImagePlugin
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.map_builder import MeshMapParameters
-from mbf_mesh_nav.mesh_io import read_mesh
-from mbf_mesh_nav.mesh_report import MeshError
+from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.map.map_builder import MeshMapParameters
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.server import MeshNavigationServer
 
 HILL, FACES = heightfield_mesh(0.1 * np.random.default_rng(3).random((4, 4)), 0.5, 0.5)

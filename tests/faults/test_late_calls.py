@@ -4,16 +4,16 @@ import threading
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal
-from mbf_abstract.clock import WallClock
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanResult
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.bench import SCRIPTED, Bench
 from mbf_abstract.testing.faulty import BusyHang, Hang, drive, obedient
 from mbf_abstract.testing.promises import assert_next_goals_work
 from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.sim_clock import SimClock
 
 GOAL = GetPathGoal(Pose.planar(3.0, 0.0))
 

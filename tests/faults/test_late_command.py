@@ -1,8 +1,8 @@
 """Fault table, row 8: commands after a cancel or after the end of a goal."""
 
-from mbf_abstract.actions.goals import ExePathGoal, RecoveryGoal
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Twist
+from mbf_abstract.goals.goal_types import ExePathGoal, RecoveryGoal
 from mbf_abstract.plugins import RecoveryResult
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive, slow

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from mbf_abstract.actions.goals import ExePathGoal
-from mbf_abstract.config import load_config
-from mbf_abstract.findings import ConfigError
+from mbf_abstract.config.configuration import load_config
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Path
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
-from mbf_costmap_nav.map_description import MapError
-from mbf_costmap_nav.map_io import load_image, load_map
-from mbf_mesh_nav.mesh_io import read_mesh
-from mbf_mesh_nav.repair import MeshError
+from mbf_costmap_nav.files.map_description import MapError
+from mbf_costmap_nav.files.map_io import load_image, load_map
+from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.mesh.repair import MeshError
 
 SMALL = 4_000_000  # bytes; far below every input that is claimed here
 POSES = 100_000

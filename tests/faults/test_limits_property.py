@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.drive.velocity_limits import VelocityLimits
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import AckermannCommand, Twist
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.plugins import ControlResult
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive
-from mbf_abstract.velocity_limits import VelocityLimits
 
 LIMITS = VelocityLimits(max_vx=1.0, min_vx=-0.3, max_vy=0.5, max_wz=2.0, max_steering_angle=0.6)
 number = st.floats(-50.0, 50.0).map(lambda value: round(value, 6))

@@ -4,9 +4,9 @@ import random
 
 import pytest
 
-from mbf_abstract.config import load_config, validate_config
-from mbf_abstract.findings import ConfigError
-from mbf_abstract.registry import PluginRegistry
+from mbf_abstract.config.configuration import load_config, validate_config
+from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.registry import PluginRegistry
 
 GOOD = """\
 backend: none

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.map_description import MapError, read_description
-from mbf_costmap_nav.map_io import load_costmap, load_image, load_map
-from mbf_costmap_nav.zones import load_zones
+from mbf_abstract.time.sim_clock import SimClock
+from mbf_costmap_nav.files.map_description import MapError, read_description
+from mbf_costmap_nav.files.map_io import load_costmap, load_image, load_map
+from mbf_costmap_nav.grid.zones import load_zones
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 
 GOOD = {"image": "map.pgm", "resolution": 0.05, "origin": [0.0, 0.0, 0.0]}
 BAD_DESCRIPTIONS = {

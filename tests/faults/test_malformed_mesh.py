@@ -6,11 +6,11 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.lvr2_io import write_lvr2_mesh
-from mbf_mesh_nav.mesh_io import read_mesh
-from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.repair import REPAIRS, MeshError, checked_mesh
+from mbf_mesh_nav.files.lvr2_io import write_lvr2_mesh
+from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.repair import REPAIRS, MeshError, checked_mesh
 
 
 def good() -> tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,6 @@
 """Fault table, row 13, the core's half: the map's server says that it must not be driven on."""
 
-from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_next_goals_work, assert_stops

@@ -5,12 +5,12 @@ import pytest
 import trimesh
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_abstract.time.sim_clock import SimClock
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 CONFIG = """
 backend: mesh

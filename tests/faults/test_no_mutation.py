@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 import trimesh
 
-from mbf_abstract.actions.goals import ExePathGoal
-from mbf_abstract.config import PluginSpec
+from mbf_abstract.config.configuration import PluginSpec
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.plugins import PluginKind
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.testing.promises import assert_next_goals_work, assert_stops
 from mbf_abstract.testing.scripted import straight_plan
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.plugins import CostmapPlanner
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.plugins import MeshPlanner
 
 CONFIGS = {

@@ -2,10 +2,10 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Twist
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.robot import Odometry
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops
 

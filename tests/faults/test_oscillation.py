@@ -1,7 +1,7 @@
 """Fault table, row 34: a robot that moves without getting anywhere."""
 
-from mbf_abstract.actions.goals import ExePathGoal, MoveBaseGoal
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from mbf_abstract.plugins import ControlResult
 from mbf_abstract.testing.bench import Bench

@@ -2,16 +2,16 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import GetPathGoal
-from mbf_abstract.actions.handle import GoalStatus
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import GetPathGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.bench import SCRIPTED, Bench
 from mbf_abstract.testing.faulty import BusyHang, Hang, slow
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
 from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
+from mbf_abstract.time.sim_clock import SimClock
 
 GOAL = GetPathGoal(Pose.planar(3.0, 0.0))
 

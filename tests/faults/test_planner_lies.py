@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from mbf_abstract.actions.goals import GetPathGoal
 from mbf_abstract.events import EventKind, JsonLinesSink, read_events
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome, is_success
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing import faulty

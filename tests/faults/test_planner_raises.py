@@ -2,9 +2,9 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import GetPathGoal
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work

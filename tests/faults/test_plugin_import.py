@@ -2,16 +2,16 @@
 
 import pytest
 
-from mbf_abstract.config import load_config, validate_config
+from mbf_abstract.config.configuration import load_config, validate_config
+from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.events import EventKind
-from mbf_abstract.findings import ConfigError
 from mbf_abstract.geometry import Pose
-from mbf_abstract.plugin_host import ServerError
-from mbf_abstract.registry import PluginRegistry
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.testing.scripted import ScriptedPlanner
-from mbf_abstract.transforms import TransformBuffer
 
 BAD_PLANNERS = """\
 backend: none

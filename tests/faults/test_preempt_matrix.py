@@ -2,9 +2,9 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, MoveBaseGoal
-from mbf_abstract.actions.handle import GoalStatus
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from mbf_abstract.testing.bench import SCRIPTED, Bench
 from mbf_abstract.testing.faulty import slow

@@ -14,15 +14,15 @@ from pathlib import Path
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.testing.bench import Bench
 
 PROGRAM = """
 import os, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell lets its background jobs ignore it
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # and nohup lets its program ignore this one
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal
-from mbf_abstract.clock import WallClock
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
+from mbf_abstract.time.clock import WallClock
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import BusyHang, Hang, drive
 

@@ -1,6 +1,6 @@
 """Fault table, row 9: the robot ignores its commands."""
 
-from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops

@@ -1,7 +1,7 @@
 """Fault table, row 19: one plugin instance asked for in two slots at once."""
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.testing.bench import SCRIPTED, Bench
 from mbf_abstract.testing.promises import assert_ended_once

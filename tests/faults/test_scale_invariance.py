@@ -7,19 +7,19 @@ that unit too: the answers must be the same but for unit and place.
 import numpy as np
 import pytest
 
+from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PluginKind
-from mbf_abstract.registry import PluginRegistry
 from mbf_abstract.testing.contract.rig import rig
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.plugins import CostmapContext
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.layer import LayerContext
-from mbf_mesh_nav.layer_graph import LayerGraph
 from mbf_mesh_nav.layers.steepness import SteepnessLayer
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import LayerContext
+from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.plugins import MeshContext
 
 START, GOAL, BURIED = (0.37, 0.41), (4.58, 4.33), (2.5, 2.5)

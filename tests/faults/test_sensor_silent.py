@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from mbf_abstract.actions.goals import ExePathGoal
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.goal_types import ExePathGoal
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.sensing import RangeScan
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_abstract.time.sim_clock import SimClock
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 CONFIGS = {
     "mesh": """

@@ -4,13 +4,13 @@ import math
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Pose, Twist, quaternion_from_yaw
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.robot import Odometry
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops
-from mbf_abstract.transform import Transform
 
 AHEAD = [0.9, 3.0, 1000.0, 1.79e9]  # s; the last is time.time() where the clock began at zero
 

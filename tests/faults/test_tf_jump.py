@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, MoveBaseGoal
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work

@@ -1,8 +1,8 @@
 """Fault table, row 11: the localisation falls silent while the robot drives."""
 
-from mbf_abstract.actions.goals import ExePathGoal
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.controller_state import ControllerState
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops

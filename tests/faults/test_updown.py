@@ -6,9 +6,9 @@ import weakref
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, MoveBaseGoal
-from mbf_abstract.actions.handle import GoalStatus
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.promises import assert_ended_once

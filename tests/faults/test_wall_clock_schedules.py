@@ -13,15 +13,15 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, FollowWaypointsGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
-from mbf_abstract.clock import WallClock
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.goals.goal_types import ExePathGoal, FollowWaypointsGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
 from mbf_abstract.testing.bench import SCRIPTED, Bench
 from mbf_abstract.testing.faulty import drive, obedient, slow
 from mbf_abstract.testing.scripted import ScriptedController, straight_plan
+from mbf_abstract.time.clock import WallClock
 
 GOALS_PER_SERVER = 40
 CLIENTS = 4

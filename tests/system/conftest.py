@@ -2,8 +2,8 @@
 
 import pytest
 
-from terrain.scenario import PlanarPose, load_scenario
-from terrain.scenario_world_types import GarageWorld
+from terrain.scenarios.scenario import PlanarPose, load_scenario
+from terrain.scenarios.world_types import GarageWorld
 
 SHORTER = {  # shorter runs that still need what the scenario proves
     "garage_roof": {"world": GarageWorld(type="garage", floors=2)},

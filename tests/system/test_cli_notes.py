@@ -6,9 +6,9 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.layer_graph import LayerGraphError
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.layer_graph import LayerGraphError
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 NARROW = "global_costmap: layer 'inflation': inflation_radius 0.6 m is smaller than the inscribed radius"
 COSTMAPS = """

@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
 from mbf_abstract.commands import doctor
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from terrain.heightfield import Heightfield
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from terrain.worlds.heightfield import Heightfield
 
 OFFICE = Path(__file__).resolve().parents[2] / "terrain" / "data" / "office.yaml"
 HEAVY = ("numba", "scipy", "trimesh", "pybullet", "numpy", "pydantic", "matplotlib", "viser")

@@ -6,11 +6,11 @@ import typer
 from typer.testing import CliRunner
 
 from mbf_abstract.geometry import Pose, Twist
-from terrain.cli import register
-from terrain.recorder import Recorder
-from terrain.recording import Recording, RobotShape
-from terrain.robot_models import HUSKY
-from terrain.verdict import Verdict
+from terrain.commands.run import register
+from terrain.physics.robot_models import HUSKY
+from terrain.recording.recorder import Recorder
+from terrain.recording.recording import Recording, RobotShape
+from terrain.recording.verdict import Verdict
 
 
 def mbf(*arguments):

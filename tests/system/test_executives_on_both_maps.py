@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from mbf_abstract.events import EventKind
-from mbf_abstract.executives.classic_move_base import ClassicMoveBase
-from mbf_abstract.executives.ready_trees import TreeOptions, navigation_tree
+from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
-from terrain.bench import Bench
+from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
+from terrain.session.bench import Bench
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

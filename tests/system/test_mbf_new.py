@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
-from mbf_abstract.registry import PluginRegistry
+from mbf_abstract.config.registry import PluginRegistry
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 INSTALL = ("install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation")

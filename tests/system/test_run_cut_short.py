@@ -15,12 +15,12 @@ from typer.testing import CliRunner
 import terrain
 from mbf_abstract.cli import make_app
 from mbf_abstract.events import EventKind
-from terrain.recording import Recording, RecordingError
-from terrain.recording_parts import PARTS, read_parts
-from terrain.run_folder import read_run
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import PlanarPose, load_scenario
-from terrain.scenario_actors import Walker
+from terrain.recording.recording import Recording, RecordingError
+from terrain.recording.recording_parts import PARTS, read_parts
+from terrain.recording.run_folder import read_run
+from terrain.scenarios.actors import Walker
+from terrain.scenarios.scenario import PlanarPose, load_scenario
+from terrain.session.runner import RunOptions, run_scenario
 from terrain.viewer.live.options import ViewOptions
 
 pytestmark = pytest.mark.timeout(300)

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import MapWorld, PlanarPose, load_scenario
+from terrain.scenarios.scenario import MapWorld, PlanarPose, load_scenario
+from terrain.session.runner import RunOptions, run_scenario
 
 pytestmark = pytest.mark.timeout(300)
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from terrain.dem_io import jacksboro
-from terrain.generate import fractal_terrain
-from terrain.heightfield import Heightfield
-from terrain.world import MAX_HEIGHTFIELD_SAMPLES, BulletWorld
+from terrain.physics.world import MAX_HEIGHTFIELD_SAMPLES, BulletWorld
+from terrain.worlds.elevation_files import jacksboro
+from terrain.worlds.generate import fractal_terrain
+from terrain.worlds.heightfield import Heightfield
 
 LIMIT = 1e-3
 

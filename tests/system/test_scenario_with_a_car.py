@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from terrain.robot_models import CAR
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import load_scenario
+from terrain.physics.robot_models import CAR
+from terrain.scenarios.scenario import load_scenario
+from terrain.session.runner import RunOptions, run_scenario
 
 SCENARIO = """
 name: parking

@@ -8,10 +8,10 @@ import weakref
 import pytest
 
 from mbf_abstract.geometry import Twist
-from terrain.bench import Bench
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import PlanarPose, load_scenario
-from terrain.scenario_actors import Walker
+from terrain.scenarios.actors import Walker
+from terrain.scenarios.scenario import PlanarPose, load_scenario
+from terrain.session.bench import Bench
+from terrain.session.runner import RunOptions, run_scenario
 
 
 @pytest.fixture

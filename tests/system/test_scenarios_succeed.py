@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import load_scenario, shipped_scenarios
+from terrain.scenarios.scenario import load_scenario, shipped_scenarios
+from terrain.session.runner import RunOptions, run_scenario
 
 RUN_ELSEWHERE = {"outdoor", "indoor"}  # test_run_scenarios.py
 

@@ -12,12 +12,12 @@ import pytest
 from distributed import Client
 from pyarrow import parquet
 
-from terrain.sweep_cluster import ClusterError, run_on_cluster
+from terrain.sweeps.cluster import ClusterError, run_on_cluster
 
 pytestmark = pytest.mark.timeout(300)
 
-COMMAND = "import typer; from terrain.sweep_cli import sweep; typer.run(sweep)"
-CONNECT = "import sys; from terrain.sweep_cluster import run_on_cluster; list(run_on_cluster([], sys.argv[1]))"
+COMMAND = "import typer; from terrain.sweeps.command import sweep; typer.run(sweep)"
+CONNECT = "import sys; from terrain.sweeps.cluster import run_on_cluster; list(run_on_cluster([], sys.argv[1]))"
 SCENARIO = """
 name: trial
 proves: A short drive.

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from terrain.table1.arms import ARMS, without_traffic
-from terrain.table1.outdoor_stage import OUTDOOR
-from terrain.table1.repetition import run_repetition
-from terrain.table1.world import WAREHOUSE
+from terrain.experiments.table1.conditions import ARMS, without_traffic
+from terrain.experiments.table1.environments.outdoor_environment import OUTDOOR
+from terrain.experiments.table1.environments.world import WAREHOUSE
+from terrain.experiments.table1.repetition import run_repetition
 
 pytestmark = pytest.mark.timeout(300)  # a leg takes some ten seconds of processor time
 DEPOT = Path(__file__).with_name("table1_depot.yaml")

@@ -6,9 +6,9 @@ import pytest
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
-from terrain.run_folder import read_run
-from terrain.scenario import SHIPPED
-from terrain.sweep_log import SweepLog
+from terrain.recording.run_folder import read_run
+from terrain.scenarios.scenario import SHIPPED
+from terrain.sweeps.log import SweepLog
 
 pytestmark = pytest.mark.timeout(300)
 

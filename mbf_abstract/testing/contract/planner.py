@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.cancel import CancelToken
-from mbf_abstract.clock import wall_seconds
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters
@@ -27,6 +25,8 @@ from mbf_abstract.testing.contract.rig import (
     rig,
     same_context,
 )
+from mbf_abstract.time.cancel import CancelToken
+from mbf_abstract.time.clock import wall_seconds
 
 Problem = tuple[Pose, Pose]
 _SPAN = range(50, 100)

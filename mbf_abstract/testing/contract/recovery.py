@@ -7,12 +7,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from mbf_abstract.cancel import CancelToken
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import AbstractRecovery, RecoveryRequest, RecoveryResult
-from mbf_abstract.robot import RobotStateError
 from mbf_abstract.testing.contract.report import Report
 from mbf_abstract.testing.contract.rig import (
     ContextMaker,
@@ -22,6 +21,7 @@ from mbf_abstract.testing.contract.rig import (
     rig,
     same_context,
 )
+from mbf_abstract.time.cancel import CancelToken
 
 _SPAN = range(150, 200)
 _STOP_WITHIN = 0.2  # s of simulated time

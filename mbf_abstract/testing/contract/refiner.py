@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Path
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.parameters import PluginParameters
@@ -21,6 +20,7 @@ from mbf_abstract.testing.contract.rig import (
     rig,
     same_context,
 )
+from mbf_abstract.time.cancel import CancelToken
 
 _SPAN = range(200, 250)
 

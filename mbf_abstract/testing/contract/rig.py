@@ -9,15 +9,15 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from mbf_abstract.cancel import CancelToken
-from mbf_abstract.clock import WallClock, wall_seconds
+from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import Plugin, PluginContext
-from mbf_abstract.robot import RobotInformation
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.time.cancel import CancelToken
+from mbf_abstract.time.clock import WallClock, wall_seconds
+from mbf_abstract.time.sim_clock import SimClock
 
 P = TypeVar("P", bound=Plugin)
 ContextMaker = Callable[[PluginContext], PluginContext]

@@ -14,10 +14,10 @@ import numpy as np
 
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import FloatArray, Pose
-from terrain.bench import Bench
-from terrain.goal_tour import AskedGoal, GoalTour
-from terrain.rays import StaticRays
-from terrain.scenario_faults import LocalizationJump, SensorFault
+from terrain.scenarios.faults import LocalizationJump, SensorFault
+from terrain.sensors.rays import StaticRays
+from terrain.session.bench import Bench
+from terrain.session.goal_sequence import AskedGoal, GoalTour
 
 MAX_WAITING = 100  # commands; a page that sends more between two steps loses the oldest
 MAX_RANGE = 1e4  # m from the camera to the ground

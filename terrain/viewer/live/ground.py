@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.map_view import GridView, MapView, MeshView
-from mbf_abstract.server import AbstractNavigationServer
-from terrain.recording import Surface
-from terrain.viewer.colours import FLOOR, SLOPE_COLOURS, WALL, cost_colours_up_to
+from mbf_abstract.maps.view import GridView, MapView, MeshView
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from terrain.recording.recording import Surface
 from terrain.viewer.live.overlay import Overlay
-from terrain.viewer.plan_picture import COSTLY, cost_colours
+from terrain.viewer.pictures.colours import FLOOR, SLOPE_COLOURS, WALL, cost_colours_up_to
+from terrain.viewer.pictures.plan_picture import COSTLY, cost_colours
+from terrain.viewer.pictures.shading import FLAT_GROUND, vertex_colours
 from terrain.viewer.scene import add_ground
-from terrain.viewer.shading import FLAT_GROUND, vertex_colours
 
 FloatArray = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import NodeState, TreeState
-from terrain.viewer.event_lines import Line, is_told, line_of
+from terrain.viewer.reports.event_lines import Line, is_told, line_of
 
 MAX_LINES = 60
 

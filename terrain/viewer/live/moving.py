@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.actions.handle import AnyGoalHandle
 from mbf_abstract.geometry import Command, Path, Pose, Twist
-from mbf_abstract.map_view import FieldView
+from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.view import FieldView
 from mbf_abstract.plugins import PlannedMotion, PluginKind
-from mbf_abstract.sensing import RangeScan
-from terrain.bench import Bench
-from terrain.viewer.colours import GOAL, PLANNED
+from terrain.session.bench import Bench
 from terrain.viewer.live.overlay import Overlay
+from terrain.viewer.pictures.colours import GOAL, PLANNED
 from terrain.viewer.scene import (
     LINE_LIFT,
     ActorModels,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from terrain.viewer.page_access import LOOPBACK, PageAccess, is_loopback
+from terrain.viewer.server.page_access import LOOPBACK, PageAccess, is_loopback
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbf_abstract.clock import Clock
+from mbf_abstract.time.clock import Clock
 
 MAX_LAG = 0.5  # s; who is further behind does not catch up
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.geometry import Pose
-from terrain.bench import Bench
-from terrain.goal_tour import GoalTour
+from terrain.session.bench import Bench
+from terrain.session.goal_sequence import GoalTour
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.follow import FollowCamera
 from terrain.viewer.live.ground import Ground
@@ -20,8 +20,8 @@ from terrain.viewer.live.moving import MovingThings
 from terrain.viewer.live.panel import DrivePanel, FaultPanel
 from terrain.viewer.live.plots import History, Plots
 from terrain.viewer.live.status_html import SMALL, actions_html, headline_html, lines_html
+from terrain.viewer.reports.tree_html import tree_html
 from terrain.viewer.scene import add_surroundings, look_at_route, pin_height
-from terrain.viewer.tree_html import tree_html
 
 PANEL_WIDTH = 320  # pixels
 FARTHER = 1.6  # than in a replay, because the panels leave less room for the scene and the labels at its ends

@@ -6,8 +6,8 @@ import math
 from typing import Any, get_args
 
 from mbf_abstract.plugins import PluginKind
-from terrain.bench import Bench
-from terrain.scenario_faults import LocalizationJump, SensorFault
+from terrain.scenarios.faults import LocalizationJump, SensorFault
+from terrain.session.bench import Bench
 from terrain.viewer.live.controls import LiveControls
 
 JUMP = "localisation jumps"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrain.viewer.colours import DRIVEN, PLANNED, SLOPE_COLOURS, Colour
+from terrain.viewer.pictures.colours import DRIVEN, PLANNED, SLOPE_COLOURS, Colour
 
 PERIOD = 0.2  # s of simulated time between two samples
 UNWATCHED_PERIOD = 1.0  # s, while nobody looks

@@ -12,18 +12,18 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from types import FrameType
 
-from mbf_abstract.clock import WallClock
 from mbf_abstract.events import EventKind
-from terrain.bench import Bench
-from terrain.goal_tour import GoalTour
+from mbf_abstract.time.clock import WallClock
+from terrain.session.bench import Bench
+from terrain.session.goal_sequence import GoalTour
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.pace import Pace
 from terrain.viewer.live.page import LivePage, tilt_of
 from terrain.viewer.live.plots import PERIOD, UNWATCHED_PERIOD, History
-from terrain.viewer.page_access import Role, is_loopback
-from terrain.viewer.page_server import page_server
+from terrain.viewer.server.page_access import Role, is_loopback
+from terrain.viewer.server.page_server import page_server
 
 FRAME_PERIOD = 0.1  # s of wall time between two drawings
 

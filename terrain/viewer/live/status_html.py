@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from mbf_abstract.server import AbstractNavigationServer
-from terrain.goal_tour import GoalTour
-from terrain.viewer.event_lines import BAD, GOOD, NEITHER, Line
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from terrain.session.goal_sequence import GoalTour
 from terrain.viewer.live.log import Snapshot
+from terrain.viewer.reports.event_lines import BAD, GOOD, NEITHER, Line
 
 BUSY = "#1f6feb"
 SHOWN_LINES = 12

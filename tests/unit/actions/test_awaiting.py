@@ -5,12 +5,12 @@ import gc
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal
-from mbf_abstract.actions.handle import GoalStatus
-from mbf_abstract.clock import WallClock
 from mbf_abstract.geometry import Pose
-from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.testing.bench import Bench
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.sim_clock import SimClock
 
 CLOCKS = pytest.mark.parametrize("clock", [SimClock, WallClock])
 

@@ -11,15 +11,15 @@ import os
 import numpy as np
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, FollowWaypointsGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.goals.goal_types import ExePathGoal, FollowWaypointsGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive, obedient, slow
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, straight_plan
+from mbf_abstract.time.sim_clock import SimClock
 
 SCHEDULES = int(os.environ.get("MBF_SCHEDULES", "2000"))
 FIRST = int(os.environ.get("MBF_FIRST_SCHEDULE", "0"))

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from mbf_abstract.actions.goals import MoveBaseGoal
-from mbf_abstract.actions.handle import GoalStatus
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import MoveBaseGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
 from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult

@@ -2,9 +2,9 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import MoveBaseGoal
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing.faulty import obedient

@@ -5,8 +5,8 @@ import math
 import pytest
 from pydantic import ValidationError
 
+from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.events import EventKind
-from mbf_abstract.navigation_parameters import NavigationParameters
 
 MBF_DEFAULTS = {
     "planner_frequency": 0.0,

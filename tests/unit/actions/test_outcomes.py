@@ -7,9 +7,9 @@ from pathlib import Path as FilePath
 import pytest
 
 from mbf_abstract import outcomes
-from mbf_abstract.actions.goals import MoveBaseGoal
-from mbf_abstract.actions.handle import GoalStatus
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.goal_types import MoveBaseGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import (
     ExePathOutcome,
     GetPathOutcome,

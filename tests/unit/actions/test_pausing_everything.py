@@ -5,14 +5,14 @@ from itertools import product
 import numpy as np
 import pytest
 
-from mbf_abstract.actions.goals import MoveBaseGoal
-from mbf_abstract.actions.handle import GoalStatus
-from mbf_abstract.clock import WallClock
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import MoveBaseGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.plugins import RecoveryResult
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.faulty import slow
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.sim_clock import SimClock
 
 GOAL = MoveBaseGoal(Pose.planar(0.5, 0.0))
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import GetPathGoal, MoveBaseGoal
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import GetPathGoal, MoveBaseGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing.scripted import straight_plan

@@ -5,11 +5,11 @@ import sys
 import pytest
 from pydantic import ValidationError
 
-from mbf_abstract.actions.goals import GetPathGoal
+from mbf_abstract.config.registry import PluginError
 from mbf_abstract.geometry import Pose
-from mbf_abstract.plugin_host import ServerError
+from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.plugins import PluginKind
-from mbf_abstract.registry import PluginError
+from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.faulty import slow
 from mbf_abstract.testing.scripted import straight_plan
 

@@ -5,18 +5,18 @@ from dataclasses import replace
 
 import pytest
 
-from mbf_abstract.actions.goals import GetPathGoal, MoveBaseGoal, RecoveryGoal
-from mbf_abstract.actions.handle import GoalStatus
-from mbf_abstract.clock import WallClock
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import PluginGone
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import GetPathGoal, MoveBaseGoal, RecoveryGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome as Outcome
-from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PlanResult, PluginKind
+from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import Hang, obedient, slow
 from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
+from mbf_abstract.time.clock import WallClock
 
 TARGET = Pose.planar(3.0, 0.0)
 CANCELED = PlanResult(Outcome.CANCELED, "as told")

@@ -2,8 +2,8 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, GetPathGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_abstract.plugins import RecoveryResult, RefineResult
 from mbf_abstract.testing.faulty import drive, slow

@@ -4,16 +4,16 @@ import asyncio
 
 import pytest
 
-from mbf_abstract.actions.goals import FollowWaypointsGoal, MoveBaseGoal
-from mbf_abstract.actions.handle import GoalStatus
-from mbf_abstract.clock import WallClock
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import FollowWaypointsGoal, MoveBaseGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.sim_clock import SimClock
 
 NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
 NEAR = (Pose.planar(0.3, 0.0), Pose.planar(0.6, 0.0), Pose.planar(0.9, 0.0))

@@ -9,9 +9,9 @@ import pytest
 from rich.console import Console
 
 from mbf_abstract.commands.waiting import waiting
-from terrain.cli import new_run_folder
-from terrain.live_line import LiveLine, progress_text
-from terrain.runner import Progress
+from terrain.commands.live_line import LiveLine, progress_text
+from terrain.commands.run import new_run_folder
+from terrain.session.runner import Progress
 
 DRIVING = Progress(time=12.0, wall_time=3.0, distance_left=34.56, speed=0.8, tilt=math.radians(7.0), state="active")
 

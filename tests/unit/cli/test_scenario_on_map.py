@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from mbf_abstract.findings import ConfigError
-from terrain.floor_plan import write_map
-from terrain.occupancy import OccupancyGrid
-from terrain.scenario import load_scenario
-from terrain.scenario_on_map import far_apart_places, on_map
-from terrain.scenario_world_types import MapWorld
+from mbf_abstract.config.findings import ConfigError
+from terrain.scenarios.on_map import far_apart_places, on_map
+from terrain.scenarios.scenario import load_scenario
+from terrain.scenarios.world_types import MapWorld
+from terrain.worlds.floor_plan import write_map
+from terrain.worlds.occupancy import OccupancyGrid
 
 
 def test_start_and_goal_are_free_far_apart_and_in_one_room():

@@ -6,8 +6,8 @@ import threading
 import numpy as np
 import pytest
 
-from mbf_abstract.clock import Priority, ThreadDetached
-from mbf_abstract.sim_clock import ClockDeadlock, SimClock
+from mbf_abstract.time.clock import Priority, ThreadDetached
+from mbf_abstract.time.sim_clock import ClockDeadlock, SimClock
 
 
 def test_time_jumps_to_the_earliest_wake_up():

@@ -7,13 +7,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from mbf_abstract.actions.goals import GetPathGoal
-from mbf_abstract.clock import WallClock
 from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.sim_clock import ClockDeadlock, SimClock
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.sim_clock import ClockDeadlock, SimClock
 
 NAMES_THE_WAY_OUT = r"waits on the clock for thread 'main'.*with clock\.outside\(\)"
 

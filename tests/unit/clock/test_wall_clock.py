@@ -2,8 +2,8 @@
 
 import pytest
 
-from mbf_abstract.clock import Stopwatch, WallClock, wall_seconds
-from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.time.clock import Stopwatch, WallClock, wall_seconds
+from mbf_abstract.time.sim_clock import SimClock
 
 
 def test_the_wall_clock_starts_near_zero_and_never_runs_backwards():

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mbf_abstract import arithmetic
-from mbf_abstract.geometry import quaternion_from_yaw, rotation_matrix
+from mbf_abstract.geometry import arithmetic, quaternion_from_yaw, rotation_matrix
 
 VECTORS = arrays(np.float64, (7, 3), elements=st.floats(-1e3, 1e3))
 

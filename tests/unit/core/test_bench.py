@@ -5,13 +5,13 @@ import math
 import pytest
 
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.plugins import RefineResult
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.testing.promises import assert_stops
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.time.sim_clock import SimClock
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from mbf_abstract.bounded_files import ArrayFileError, read_arrays, special_file
+from mbf_abstract.config.bounded_files import ArrayFileError, read_arrays, special_file
 
 
 def test_what_is_no_file_with_contents_is_named(tmp_path):

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from mbf_abstract.cancel import CancelToken
+from mbf_abstract.time.cancel import CancelToken
 
 
 def test_a_callback_runs_once_whether_it_comes_before_or_after_the_cancel():

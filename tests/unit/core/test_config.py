@@ -4,11 +4,11 @@ from typing import Literal
 
 import pytest
 
-from mbf_abstract.config import NavigationParameters, PluginDeclaration, load_config, validate_config
-from mbf_abstract.findings import ConfigError
+from mbf_abstract.config.configuration import NavigationParameters, PluginDeclaration, load_config, validate_config
+from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.parameters import ParameterModel, PluginParameters, parameter
 from mbf_abstract.plugins import AbstractPlanner, AbstractRecovery, PlanResult, PluginKind, RecoveryResult
-from mbf_abstract.registry import PluginRegistry
 
 
 class CvpParameters(PluginParameters):
@@ -52,7 +52,7 @@ class CostmapDeclaration(PluginDeclaration):
 @pytest.fixture(autouse=True)
 def nothing_installed(monkeypatch):
     """Hide the entry points of the installed packages."""
-    monkeypatch.setattr("mbf_abstract.registry.entry_points", lambda group: [])
+    monkeypatch.setattr("mbf_abstract.config.registry.entry_points", lambda group: [])
 
 
 def registry(**options):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from mbf_abstract.disc_queries import DiscQueries
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.map_queries import CellState, PlaceAnswer, PlaceQuery
-from mbf_abstract.transform import Transform
-from mbf_abstract.transforms import TransformBuffer, TransformError
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.geometry.transform_buffer import TransformBuffer, TransformError
+from mbf_abstract.maps.disc_queries import DiscQueries
+from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery
 
 
 class HalfPlane(DiscQueries):

@@ -10,11 +10,11 @@ from pathlib import Path
 import numba
 import pytest
 
-from mbf_abstract import kernel_cache
-from mbf_abstract.compilation import told_of_kernels
-from mbf_abstract.kernel_cache import compile_lazily
+from mbf_abstract.compiling import kernel_cache
+from mbf_abstract.compiling.compilation import told_of_kernels
+from mbf_abstract.compiling.kernel_cache import compile_lazily
 
-DECORATOR = "from mbf_abstract.kernel_cache import compile_lazily as kernel\n"
+DECORATOR = "from mbf_abstract.compiling.kernel_cache import compile_lazily as kernel\n"
 STEP = DECORATOR + "@kernel\ndef step(x):\n    return x + {}\n"
 SEARCH = DECORATOR + "from kernels.step import step\n@kernel\ndef search(x):\n    return 10 * step(x)\n"
 CALL = """

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mbf_abstract.execution.path_tracker import CUSP_REACHED, PathTracker
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.path_tracker import CUSP_REACHED, PathTracker
 
 
 def path_through(*corners, spacing=None):

@@ -3,9 +3,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from mbf_abstract import registry as registry_module
+from mbf_abstract.config import registry as registry_module
+from mbf_abstract.config.registry import GROUPS, PluginError, PluginRegistry
 from mbf_abstract.plugins import AbstractPlanner, PlanResult, PluginKind
-from mbf_abstract.registry import GROUPS, PluginError, PluginRegistry
 
 PLUGIN_SOURCE = """
 from mbf_abstract.plugins import AbstractPlanner, PlanResult

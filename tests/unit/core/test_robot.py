@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from mbf_abstract.drive.robot import TRACK_POINTS, TRACK_SPACING, Odometry, RobotInformation, RobotStateError
 from mbf_abstract.geometry import Twist
-from mbf_abstract.robot import TRACK_POINTS, TRACK_SPACING, Odometry, RobotInformation, RobotStateError
-from mbf_abstract.sim_clock import SimClock
-from mbf_abstract.transform import Transform
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.time.sim_clock import SimClock
 
 
 class SilentRobot:

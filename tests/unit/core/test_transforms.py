@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw, rotation_matrix
-from mbf_abstract.transform import InvalidTransformError, Transform, TransformError, rotate, slerp
-from mbf_abstract.transform_cache import MAX_SAMPLES, TransformCache
-from mbf_abstract.transforms import (
+from mbf_abstract.geometry.transform import InvalidTransformError, Transform, TransformError, rotate, slerp
+from mbf_abstract.geometry.transform_buffer import (
     MAX_PENDING_REQUESTS,
     ConnectivityError,
     ExtrapolationError,
@@ -19,6 +18,7 @@ from mbf_abstract.transforms import (
     TransformBuffer,
     UnknownFrameError,
 )
+from mbf_abstract.geometry.transform_cache import MAX_SAMPLES, TransformCache
 
 NANO = 2.0**-30  # about a nanosecond, and a binary fraction, so that sums of stamps are exact
 

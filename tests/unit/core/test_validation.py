@@ -5,9 +5,9 @@ from typing import Literal
 import pytest
 from pydantic import FilePath, model_validator
 
+from mbf_abstract.config.validation import validate
+from mbf_abstract.config.yaml_source import YamlDocument
 from mbf_abstract.parameters import ParameterModel, parameter
-from mbf_abstract.validation import validate
-from mbf_abstract.yaml_source import YamlDocument
 
 
 class Side(Enum):

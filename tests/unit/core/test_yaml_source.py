@@ -2,8 +2,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mbf_abstract.findings import ConfigError, describe_value, format_key_path, suggest
-from mbf_abstract.yaml_source import load_yaml, read_yaml
+from mbf_abstract.config.findings import ConfigError, describe_value, format_key_path, suggest
+from mbf_abstract.config.yaml_source import load_yaml, read_yaml
 
 
 def write(folder, text):

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 
 # The 10 x 10 test map of costmap_2d and Nav2, top row first: # is an obstacle.
 TEN_BY_TEN = """

@@ -5,12 +5,12 @@ import pytest
 
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.parameters import with_changes
-from mbf_abstract.plugin_host import ServerError
-from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.layers.speed_limit import SpeedLimitLayer, SpeedLimitLayerParameters
 
 SEEN = [(2.5, 2.5, 0.1), (2.5, 2.5, 1.1), (7.5, 2.5, 0.3), (7.5, 6.5, 0.3), (8.5, 6.5, 0.3)]

@@ -10,10 +10,10 @@ from PIL import Image
 from pydantic import ValidationError
 
 from mbf_abstract.geometry import Pose
-from mbf_costmap_nav.costmap import LETHAL, Costmap
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.map_description import MapError, MapMode
-from mbf_costmap_nav.map_io import OccupancyMap, save_map
+from mbf_costmap_nav.files.map_description import MapError, MapMode
+from mbf_costmap_nav.files.map_io import OccupancyMap, save_map
+from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 
 HERE = Pose.planar(5.0, 5.0)
 

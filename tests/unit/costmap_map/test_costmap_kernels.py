@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from mbf_costmap_nav.costmap import GridGeometry
-from mbf_costmap_nav.kernels.cover import cover_polygon, fill_polygon, polygon_costs
-from mbf_costmap_nav.kernels.inflation import inflate
-from mbf_costmap_nav.kernels.raytrace import clear_rays, mark_points
-from mbf_costmap_nav.kernels.voxel import clear_voxel_rays, count_bits, project_columns
+from mbf_costmap_nav.grid.costmap import GridGeometry
+from mbf_costmap_nav.kernels.map.footprint_samples import cover_polygon, fill_polygon, polygon_costs
+from mbf_costmap_nav.kernels.map.inflation import inflate
+from mbf_costmap_nav.kernels.map.raytrace import clear_rays, mark_points
+from mbf_costmap_nav.kernels.map.voxel import clear_voxel_rays, count_bits, project_columns
 from mbf_costmap_nav.layers.denoise import small_groups
 from mbf_costmap_nav.layers.inflation import cost_table
 

@@ -4,12 +4,12 @@ from contextlib import contextmanager
 
 import pytest
 
+from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.map_queries import CellState, PlaceQuery
-from mbf_abstract.robot import RobotStateError
-from mbf_abstract.transform import Transform
-from mbf_abstract.transforms import TransformBuffer, TransformError
-from mbf_costmap_nav.queries import CostmapQueries
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.geometry.transform_buffer import TransformBuffer, TransformError
+from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_costmap_nav.map.queries import CostmapQueries
 
 
 class FixedClock:

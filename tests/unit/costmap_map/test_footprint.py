@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_costmap_nav.collision import footprint_costs
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.footprint import Footprint
+from mbf_costmap_nav.grid.collision import footprint_costs
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
 
 CORNERS = st.lists(st.floats(0.0, 2 * math.pi), min_size=3, max_size=8, unique_by=lambda angle: round(angle, 1))
 

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose
-from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, CellBox, Costmap
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.grid.costmap import FREE, LETHAL, UNKNOWN, CellBox, Costmap
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 
 HERE = Pose.planar(5.0, 5.0)
 

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose, quaternion_from_yaw
-from mbf_abstract.transform import Transform
-from mbf_abstract.transforms import TransformBuffer
-from mbf_costmap_nav.costmap import LETHAL, UNKNOWN, Costmap
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.map_io import OccupancyMap, save_map
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_costmap_nav.files.map_io import OccupancyMap, save_map
+from mbf_costmap_nav.grid.costmap import LETHAL, UNKNOWN, Costmap
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 
 WORLD = Costmap(np.random.default_rng(3).integers(0, 254, (20, 30)).astype(np.uint8), 0.5, -4.0, -6.0)
 WALLS = {"resolution": 0.25, "width": 9.0, "height": 7.0, "frame_id": "odom", "track_unknown_space": True} | {

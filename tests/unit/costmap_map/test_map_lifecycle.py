@@ -2,7 +2,7 @@
 
 import pytest
 
-from mbf_costmap_nav.map_lifecycle import MapLifecycle, MapLifecycleParameters
+from mbf_costmap_nav.map.map_lifecycle import MapLifecycle, MapLifecycleParameters
 
 
 class SetClock:

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from mbf_costmap_nav.costmap_config import CostmapParameters
-from mbf_costmap_nav.footprint import Footprint
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.costmap_config import CostmapParameters
 
 
 @pytest.mark.parametrize(

@@ -6,11 +6,11 @@ import sys
 import numpy as np
 import pytest
 
-from mbf_costmap_nav.collision import footprint_costs
-from mbf_costmap_nav.costmap import Costmap, GridGeometry
-from mbf_costmap_nav.costmap_config import CostmapParameters
-from mbf_costmap_nav.footprint import Footprint, parse_number_lists
-from mbf_costmap_nav.kernels.voxel import clear_voxel_line, count_bits, mark_voxels
+from mbf_costmap_nav.grid.collision import footprint_costs
+from mbf_costmap_nav.grid.costmap import Costmap, GridGeometry
+from mbf_costmap_nav.grid.footprint import Footprint, parse_number_lists
+from mbf_costmap_nav.kernels.map.voxel import clear_voxel_line, count_bits, mark_voxels
+from mbf_costmap_nav.map.costmap_config import CostmapParameters
 
 SQUARE = Footprint([(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)])
 DIAMOND = Footprint([(0.0, 0.5), (0.5, 0.0), (0.0, -0.5), (-0.5, 0.0)])

@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose
-from mbf_costmap_nav.costmap import FREE, INSCRIBED, LETHAL, UNKNOWN
+from mbf_costmap_nav.grid.costmap import FREE, INSCRIBED, LETHAL, UNKNOWN
 from mbf_costmap_nav.layers.denoise import small_groups
 from mbf_costmap_nav.layers.inflation import cost_table
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path
-from mbf_abstract.map_queries import CellState
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.kernels.cover import cover_polygon
-from mbf_costmap_nav.kernels.raytrace import clear_rays
-from mbf_costmap_nav.pose_checks import check_path
-from mbf_costmap_nav.zones import Zone
+from mbf_abstract.maps.queries import CellState
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.grid.zones import Zone
+from mbf_costmap_nav.kernels.map.footprint_samples import cover_polygon
+from mbf_costmap_nav.kernels.map.raytrace import clear_rays
+from mbf_costmap_nav.map.pose_checks import check_path
 
 
 def line(x0, y0, x1, y1):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mbf_costmap_nav import turned_map
-from mbf_costmap_nav.map_description import UNKNOWN_OCCUPANCY, MapError, MapMode
-from mbf_costmap_nav.map_io import OccupancyMap, load_image, load_map, save_map
+from mbf_costmap_nav.files.map_description import UNKNOWN_OCCUPANCY, MapError, MapMode
+from mbf_costmap_nav.files.map_io import OccupancyMap, load_image, load_map, save_map
+from mbf_costmap_nav.grid import rotated_map as turned_map
 
 # yaml file: (width, height, resolution, free, occupied, other cells)
 COUNTS = {

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.map_queries import CellState, PlaceQuery
-from mbf_costmap_nav.collision import footprint_costs
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.pose_checks import cells_by_distance, check_path, check_point, check_pose, find_valid_pose
+from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_costmap_nav.grid.collision import footprint_costs
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.pose_checks import cells_by_distance, check_path, check_point, check_pose, find_valid_pose
 
 UNIT_SQUARE = Footprint([(0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5)])
 RECTANGLE = Footprint([(0.75, 0.4), (0.75, -0.4), (-0.75, -0.4), (-0.75, 0.4)])

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from mbf_abstract.geometry import Pose, quaternion_from_yaw
-from mbf_abstract.transform import Transform
-from mbf_costmap_nav.costmap import FREE, LETHAL, UNKNOWN, CellBox, Costmap, GridGeometry
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.resampling import sample_costmap
+from mbf_abstract.geometry.transform import Transform
+from mbf_costmap_nav.grid.costmap import FREE, LETHAL, UNKNOWN, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.grid.resampling import sample_costmap
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 
 
 def one_by_one(source, grid, box, outside, T_source_grid=None):

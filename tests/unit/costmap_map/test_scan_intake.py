@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Pose, quaternion_from_yaw
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.geometry.transform_buffer import ExtrapolationError, TransformBuffer, TransformError
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
-from mbf_abstract.sensing import RangeScan
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transform import Transform
-from mbf_abstract.transforms import ExtrapolationError, TransformBuffer, TransformError
+from mbf_abstract.time.sim_clock import SimClock
 
 MAP = """
   width: 8.0

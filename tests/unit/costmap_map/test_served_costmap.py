@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal, RecoveryGoal
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.map_queries import CellState
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.goal_types import ExePathGoal, RecoveryGoal
+from mbf_abstract.maps.queries import CellState
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import PluginKind
-from mbf_abstract.sensing import RangeScan
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.time.sim_clock import SimClock
 
 CONFIG = """
 backend: costmap

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.transforms import TransformBuffer
-from mbf_costmap_nav.costmap import Costmap, GridGeometry
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_costmap_nav.grid.costmap import Costmap, GridGeometry
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.plugins import CostmapContext
 
 SQUARE_ROBOT = Footprint([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]])

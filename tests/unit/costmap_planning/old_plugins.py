@@ -1,7 +1,7 @@
 """Plugins written the nav_core way, for the test of the wrappers."""
 
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.nav_core import BaseGlobalPlanner, BaseLocalPlanner, RecoveryBehavior
+from mbf_abstract.server.nav_core import BaseGlobalPlanner, BaseLocalPlanner, RecoveryBehavior
 
 
 class OldPlanner(BaseGlobalPlanner):

@@ -7,10 +7,10 @@ import re
 import numpy as np
 import pytest
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
+from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
 from mbf_costmap_nav.planners.straight_line import StraightLinePlanner

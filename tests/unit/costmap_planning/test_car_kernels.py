@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.footprint_check import covering_points
-from mbf_costmap_nav.kernels.car_curves import curve_between
-from mbf_costmap_nav.kernels.car_ground import driven_cost, fitting_cost, ground_of, pose_cost
-from mbf_costmap_nav.kernels.driven_arcs import (
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.grid.footprint_check import covering_points
+from mbf_costmap_nav.kernels.car.curves import curve_between
+from mbf_costmap_nav.kernels.car.ground import driven_cost, fitting_cost, ground_of, pose_cost
+from mbf_costmap_nav.kernels.car.motion_primitives import (
     BACKWARD_SIDE,
     FORWARD_SIDE,
     MOTIONS,
@@ -28,8 +28,8 @@ from mbf_costmap_nav.kernels.driven_arcs import (
     sample_arc,
     steering_of,
 )
-from mbf_costmap_nav.kernels.shorter_drive import drive_costs, shortened
-from mbf_costmap_nav.kernels.state_tree import best_state, new_tree, with_state
+from mbf_costmap_nav.kernels.car.shorter_drive import drive_costs, shortened
+from mbf_costmap_nav.kernels.car.state_tree import best_state, new_tree, with_state
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
 
 seeds = st.integers(0, 2**32 - 1)

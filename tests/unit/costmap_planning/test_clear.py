@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.map_queries import CellState
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.queries import CellState
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import RecoveryOutcome
-from mbf_abstract.sensing import RangeScan
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
-from mbf_costmap_nav.map_io import OccupancyMap, save_map
+from mbf_abstract.time.sim_clock import SimClock
+from mbf_costmap_nav.files.map_io import OccupancyMap, save_map
 
 CONFIG = """
 backend: costmap

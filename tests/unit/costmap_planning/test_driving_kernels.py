@@ -8,21 +8,21 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mbf_costmap_nav.controllers.mppi import smoothing_matrix
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.footprint_check import FootprintCheck
-from mbf_costmap_nav.kernels.critics import (
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.kernels.control.critics import (
     alignment,
     furthest_reached,
     mean_angle_to,
     mean_distance_to_point,
     mean_of,
 )
-from mbf_costmap_nav.kernels.footprint_cost import OUTSIDE, footprint_cost
-from mbf_costmap_nav.kernels.line_cells import cost_along
-from mbf_costmap_nav.kernels.rollout import blend
-from mbf_costmap_nav.kernels.smoothing import relax_path
-from mbf_costmap_nav.kernels.sonar import FADE_DISTANCE, LEAST_PROBABILITY, occupied_given_reading, update_cone
+from mbf_costmap_nav.kernels.control.rollout import blend
+from mbf_costmap_nav.kernels.control.smoothing import relax_path
+from mbf_costmap_nav.kernels.map.footprint_cost import OUTSIDE, footprint_cost
+from mbf_costmap_nav.kernels.map.line_cells import cost_along
+from mbf_costmap_nav.kernels.map.sonar import FADE_DISTANCE, LEAST_PROBABILITY, occupied_given_reading, update_cone
 
 seeds = st.integers(0, 2**32 - 1)
 NOT_CANCELED = np.zeros(1, dtype=np.uint8)

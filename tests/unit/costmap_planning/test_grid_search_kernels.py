@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from mbf_costmap_nav.kernels.grid_line import line_cost
-from mbf_costmap_nav.kernels.grid_path import trace_cells, trace_gradient
-from mbf_costmap_nav.kernels.grid_search import CANCELED, EXHAUSTED, FOUND, pad_cells, search
-from mbf_costmap_nav.kernels.search_cells import new_records
-from mbf_costmap_nav.kernels.short_lines import TOUCHED, crossed_cells, trace_lines
-from mbf_costmap_nav.kernels.theta_star import theta_search
-from mbf_costmap_nav.search_grid import traversal_table
+from mbf_costmap_nav.kernels.search.grid_line import line_cost
+from mbf_costmap_nav.kernels.search.grid_path import trace_cells, trace_gradient
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FOUND, pad_cells, search
+from mbf_costmap_nav.kernels.search.search_cells import new_records
+from mbf_costmap_nav.kernels.search.short_lines import TOUCHED, crossed_cells, trace_lines
+from mbf_costmap_nav.kernels.search.theta_star import theta_search
+from mbf_costmap_nav.planning.search_grid import traversal_table
 
 NO_CANCEL = np.zeros(1, dtype=np.uint8)
 small_maps = hnp.arrays(

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose, normalize_angle
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.kernels.car_curves import car_curve, sample_word
-from mbf_costmap_nav.kernels.nearest_cell import nearest_reached
+from mbf_abstract.time.cancel import CancelToken
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.kernels.car.curves import car_curve, sample_word
+from mbf_costmap_nav.kernels.search.nearest_cell import nearest_reached
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
 
 coordinates, angles = st.floats(-6, 6), st.floats(-math.pi, math.pi)

@@ -6,8 +6,8 @@ import pytest
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist, quaternion_from_yaw
+from mbf_abstract.geometry.transform_buffer import Transform, TransformBuffer
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
-from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import ControlRequest, RecoveryRequest
-from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import Transform, TransformBuffer
+from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.controllers.dwa import DwaController
 from mbf_costmap_nav.controllers.mppi import MppiController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
-from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.recoveries.back_up import BackUpRecovery
 from mbf_costmap_nav.recoveries.clear import ClearRecovery
 from mbf_costmap_nav.recoveries.escape import EscapeRecovery

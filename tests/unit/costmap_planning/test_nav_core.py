@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from mbf_abstract.findings import ConfigError
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.simple_goal import SimpleGoal
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
-from mbf_abstract.sim_clock import SimClock
-from mbf_abstract.simple_goal import SimpleGoal
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.time.sim_clock import SimClock
 
 CONFIG = """
 backend: costmap

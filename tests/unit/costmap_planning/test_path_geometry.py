@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose
-from mbf_costmap_nav.path_geometry import (
+from mbf_costmap_nav.control.path_geometry import (
     arc_lengths,
     circle_crossing,
     distance_to_path,
     look_ahead_point,
     resample,
 )
-from mbf_costmap_nav.path_handling import to_base_frame
+from mbf_costmap_nav.control.path_handling import to_base_frame
 
 X_AXIS = np.column_stack([np.arange(10.0), np.zeros(10)])
 

@@ -12,7 +12,7 @@ from mbf_costmap_nav.controllers.dwa import DwaController
 from mbf_costmap_nav.controllers.mppi import MppiController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
-from mbf_costmap_nav.costmap import Costmap
+from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
 
 FREE_MAP = Costmap(np.zeros((160, 160), dtype=np.uint8), 0.05, -4.0, -4.0)

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.kernels.grid_search import pad_cells
-from mbf_costmap_nav.kernels.search_cells import _fill
-from mbf_costmap_nav.path_geometry import resample
+from mbf_costmap_nav.control.path_geometry import resample
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.kernels.search.grid_search import pad_cells
+from mbf_costmap_nav.kernels.search.search_cells import _fill
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner

@@ -9,25 +9,25 @@ from pydantic import ValidationError
 
 from mbf_abstract.execution.oscillation import OscillationDetector
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.map_queries import CellState
+from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
-from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.controllers.dwa import DwaController
 from mbf_costmap_nav.controllers.mppi import MppiController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.footprint_check import FootprintCheck, arc_poses
-from mbf_costmap_nav.kernels.cover import cover_polygon
-from mbf_costmap_nav.layer import LayerContext
+from mbf_costmap_nav.files.map_io import load_image
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck, arc_poses
+from mbf_costmap_nav.kernels.map.footprint_samples import cover_polygon
 from mbf_costmap_nav.layers.speed_limit import SpeedLimitLayer
-from mbf_costmap_nav.map_io import load_image
+from mbf_costmap_nav.map.layer import LayerContext
+from mbf_costmap_nav.map.pose_checks import check_path
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
 from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
-from mbf_costmap_nav.pose_checks import check_path
 
 PLANNERS = [AStarPlanner, DijkstraPlanner, ThetaStarPlanner]
 FREE_MAP = Costmap(np.zeros((200, 200), dtype=np.uint8), 0.05, -5.0, -5.0)

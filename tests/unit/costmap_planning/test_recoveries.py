@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.footprint_check import FootprintCheck
+from mbf_abstract.time.cancel import CancelToken
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.recoveries.back_up import BackUpRecovery
 from mbf_costmap_nav.recoveries.clear import ClearRecovery
 from mbf_costmap_nav.recoveries.drive_on_heading import DriveOnHeadingRecovery

@@ -9,12 +9,12 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.costmap_config import CostmapParameters, build_layered_costmap
-from mbf_costmap_nav.footprint import Footprint
-from mbf_costmap_nav.layer import LayerContext
-from mbf_costmap_nav.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.layers.static import StaticLayer
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
+from mbf_costmap_nav.map.layer import LayerContext
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.planners.astar import AStarPlanner
 
 SQUARE = Footprint([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]])

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.relaxation import NO_SLACK, Relaxation, Slack
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.plugins import ControlRequest, PluginKind
-from mbf_abstract.relaxation import NO_SLACK, Relaxation, Slack
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
+from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 
 CONFIG = """

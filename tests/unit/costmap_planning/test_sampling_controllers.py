@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
+from mbf_costmap_nav.control.trajectory_scoring import footprint_discs
 from mbf_costmap_nav.controllers.dwa import DwaController, sample_velocities, sample_window, slowed_down
 from mbf_costmap_nav.controllers.mppi import MppiController
-from mbf_costmap_nav.costmap import Costmap
 from mbf_costmap_nav.critics.obstacle import VALUE_OF_COST
-from mbf_costmap_nav.kernels.critics import alignment, furthest_reached, map_costs, mean_angle_to
-from mbf_costmap_nav.kernels.rollout import add_noise, clip_velocities, integrate
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.kernels.control.critics import alignment, furthest_reached, map_costs, mean_angle_to
+from mbf_costmap_nav.kernels.control.rollout import add_noise, clip_velocities, integrate
 from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
-from mbf_costmap_nav.trajectory_scoring import footprint_discs
 
 CONTROLLERS = [DwaController, MppiController]
 FREE_MAP = Costmap(np.zeros((200, 200), dtype=np.uint8), 0.05, -5.0, -5.0)
@@ -150,7 +150,7 @@ def test_dynamic_window(current, low, high, change, count, expected):
 
 
 def test_discs_cover_a_long_robot_and_one_disc_a_square_one(make_plugin):
-    from mbf_costmap_nav.footprint import Footprint
+    from mbf_costmap_nav.grid.footprint import Footprint
 
     square = Footprint([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]])
     long = Footprint([[0.6, 0.2], [-0.4, 0.2], [-0.4, -0.2], [0.6, -0.2]])

@@ -7,18 +7,18 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from mbf_abstract.cancel import CancelToken
-from mbf_abstract.findings import ConfigError
+from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.registry import PluginError
 from mbf_abstract.geometry import Path, Pose, Twist, quaternion_from_yaw
+from mbf_abstract.geometry.transform_buffer import Transform, TransformBuffer
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
-from mbf_abstract.registry import PluginError
-from mbf_abstract.server_factory import read_config
-from mbf_abstract.transforms import Transform, TransformBuffer
+from mbf_abstract.server.factory import read_config
+from mbf_abstract.time.cancel import CancelToken
+from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
-from mbf_costmap_nav.costmap import Costmap
-from mbf_costmap_nav.kernels.line_cells import cost_along
-from mbf_costmap_nav.path_geometry import resample
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.kernels.map.line_cells import cost_along
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.refiners.smoother import SmootherRefiner, curvatures
 

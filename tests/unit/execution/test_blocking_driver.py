@@ -4,13 +4,13 @@ import math
 
 import pytest
 
-from mbf_abstract.clock import Priority
-from mbf_abstract.drive_commands import command_problem, stands_still
+from mbf_abstract.drive.commands import command_problem, stands_still
+from mbf_abstract.drive.velocity_gate import VelocityGate
+from mbf_abstract.drive.velocity_limits import VelocityLimits
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import AckermannCommand, Twist
-from mbf_abstract.sim_clock import SimClock
-from mbf_abstract.velocity_gate import VelocityGate
-from mbf_abstract.velocity_limits import VelocityLimits
+from mbf_abstract.time.clock import Priority
+from mbf_abstract.time.sim_clock import SimClock
 
 FORWARD = Twist.planar(0.5)
 

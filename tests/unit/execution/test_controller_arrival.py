@@ -2,14 +2,14 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import ExePathGoal
+from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.arrival import ArrivalCheck
+from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome as Outcome
-from mbf_abstract.path_tracker import PathTracker
 from mbf_abstract.plugins import ControlResult
-from mbf_abstract.robot import Odometry
 from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.scripted import ScriptedController
 

@@ -4,13 +4,13 @@ import threading
 
 import pytest
 
-from mbf_abstract.clock import WallClock
-from mbf_abstract.execution.driver_check import DriverError, check_driver
+from mbf_abstract.drive.driver_check import DriverError, check_driver
+from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Twist
-from mbf_abstract.robot import Odometry
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.sim_clock import SimClock
 
 
 class Good:

@@ -2,14 +2,14 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import RecoveryGoal, RefinePathGoal
-from mbf_abstract.actions.handle import GoalStatus
-from mbf_abstract.clock import WallClock
 from mbf_abstract.geometry import Path, Twist
+from mbf_abstract.goals.goal_types import RecoveryGoal, RefinePathGoal
+from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import RecoveryOutcome, RefinePathOutcome
 from mbf_abstract.plugins import RecoveryResult, RefineResult
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.faulty import Hang, obedient, slow
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.sim_clock import SimClock
 
 DONE = RecoveryResult(RecoveryOutcome.SUCCESS, "")
 

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mbf_abstract.drive.velocity_gate import VelocityGate
+from mbf_abstract.drive.velocity_limits import VelocityLimits
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import AckermannCommand, Twist
-from mbf_abstract.sim_clock import SimClock
-from mbf_abstract.velocity_gate import VelocityGate
-from mbf_abstract.velocity_limits import VelocityLimits
+from mbf_abstract.time.sim_clock import SimClock
 
 FORWARD = Twist.planar(0.5)
 

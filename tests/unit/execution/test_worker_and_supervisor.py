@@ -2,12 +2,12 @@
 
 import pytest
 
-from mbf_abstract.clock import ThreadDetached
 from mbf_abstract.events import EventBus, EventKind, MemorySink
-from mbf_abstract.execution.callbacks import CallbackThread
 from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.execution.worker import Worker
-from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.goals.callbacks import CallbackThread
+from mbf_abstract.time.clock import ThreadDetached
+from mbf_abstract.time.sim_clock import SimClock
 
 
 @pytest.fixture

@@ -2,14 +2,14 @@
 
 import pytest
 
-from mbf_abstract.clock import Priority
 from mbf_abstract.events import EventKind
-from mbf_abstract.executives.classic_move_base import ClassicMoveBase, ClassicSettings
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
 from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.time.clock import Priority
+from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase, ClassicSettings
 
 GOAL = Pose.planar(2.0, 0.0)
 NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")

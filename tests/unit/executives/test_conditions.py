@@ -4,13 +4,13 @@ import pytest
 from py_trees.common import Status
 from py_trees.composites import Sequence
 
-from mbf_abstract.actions.goals import ActionResult
-from mbf_abstract.executives.classic_move_base import ClassicMoveBase, ClassicSettings
 from mbf_abstract.executives.conditions import Do, GoalReached, TruncatePath, WouldRecoveryHelp
 from mbf_abstract.executives.leaves import ExePath, GetPath
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.goal_types import ActionResult
 from mbf_abstract.outcomes import GetPathOutcome
+from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase, ClassicSettings
 
 GOAL = Pose.planar(2.0, 0.0)
 

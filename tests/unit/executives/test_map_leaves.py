@@ -5,13 +5,13 @@ from py_trees.common import Status
 
 from mbf_abstract.events import EventKind
 from mbf_abstract.executives.map_leaves import CheckPath, CheckPoint, CheckPose, ClearMap, PathBlocked
-from mbf_abstract.executives.ready_trees import TreeOptions, navigation_tree
+from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
-from mbf_abstract.map_queries import CellState, PathAnswer, PlaceAnswer
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.maps.queries import CellState, PathAnswer, PlaceAnswer
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.testing.bench import MapFreeServer
-from mbf_abstract.transforms import TransformError
 
 GOAL = Pose.planar(1.0, 0.0)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from mbf_abstract.events import EventKind
-from mbf_abstract.executives.ready_trees import TreeOptions, control_tree, navigation_tree, planning_tree
+from mbf_abstract.executives.reference_trees import TreeOptions, control_tree, navigation_tree, planning_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome

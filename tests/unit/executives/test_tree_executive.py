@@ -11,12 +11,10 @@ from py_trees.behaviours import Running
 from py_trees.common import Status
 from typer.testing import CliRunner
 
-from mbf_abstract.clock import Priority
 from mbf_abstract.events import EventKind
-from mbf_abstract.executives.classic_move_base import ClassicMoveBase
 from mbf_abstract.executives.conditions import Do
 from mbf_abstract.executives.leaves import ExePath, GetPath, MoveBase, Recovery
-from mbf_abstract.executives.ready_trees import READY_TREES, TreeOptions, navigation_tree
+from mbf_abstract.executives.reference_trees import READY_TREES, TreeOptions, navigation_tree
 from mbf_abstract.executives.state_machine import State, StateMachine
 from mbf_abstract.executives.tree_command import register
 from mbf_abstract.executives.tree_drawing import as_dot, as_svg, as_text, draw_tree
@@ -24,9 +22,11 @@ from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
-from mbf_abstract.sim_clock import SimClock
 from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.time.clock import Priority
+from mbf_abstract.time.sim_clock import SimClock
+from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
 
 GOAL = Pose.planar(1.5, 0.0)
 NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")

@@ -6,9 +6,9 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.mesh_io import read_mesh
-from mbf_mesh_nav.repair import MeshError
+from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.repair import MeshError
 
 VERTICES, FACES = heightfield_mesh(np.random.default_rng(0).random((12, 10)), 0.1, 0.1)
 MESH = trimesh.Trimesh(VERTICES, FACES, process=False)

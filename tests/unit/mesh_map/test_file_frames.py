@@ -7,12 +7,12 @@ import pytest
 import trimesh
 
 from mbf_abstract.commands.bench import standing_server
-from mbf_abstract.server_factory import read_config
-from mbf_mesh_nav.file_frames import FileFrame, file_frame, on_the_map
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map, default_layers
-from mbf_mesh_nav.mesh_io import read_mesh
-from mbf_mesh_nav.mesh_report import MeshError
+from mbf_abstract.server.factory import read_config
+from mbf_mesh_nav.files.file_frames import FileFrame, file_frame, on_the_map
+from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map, default_layers
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 HILL, FACES = heightfield_mesh(0.1 * np.random.default_rng(3).random((6, 9)), 0.5, 0.5)
 Y_UP = np.column_stack([HILL[:, 0], HILL[:, 2], -HILL[:, 1]])

@@ -6,11 +6,11 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
-from mbf_mesh_nav.mesh_io import read_mesh
-from mbf_mesh_nav.mesh_report import MeshError
-from mbf_mesh_nav.repair import checked_mesh
+from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+from mbf_mesh_nav.mesh.repair import checked_mesh
 
 rotation_matrix = trimesh.transformations.rotation_matrix
 translation_matrix = trimesh.transformations.translation_matrix

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.layer import NOTHING_CHANGED, IntArray, LayerContext, LayerParameters, MeshLayer
-from mbf_mesh_nav.layer_graph import LayerGraph, LayerGraphError, dependency_order
 from mbf_mesh_nav.layers.border import BorderLayer
 from mbf_mesh_nav.layers.max_combination import MaxCombinationLayer
 from mbf_mesh_nav.layers.mean import MeanLayer
 from mbf_mesh_nav.layers.weighted_sum import WeightedSumLayer
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerContext, LayerParameters, MeshLayer
+from mbf_mesh_nav.map.layer_graph import LayerGraph, LayerGraphError, dependency_order
+from mbf_mesh_nav.map.mesh_map import MeshMap
 
 MESH = MeshMap.from_heights(np.zeros((4, 5)), 1.0, 1.0)
 EVERYTHING = np.arange(20, dtype=np.int32)

@@ -4,11 +4,11 @@ import h5py
 import numpy as np
 import pytest
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.lvr2_io import LAYOUTS, read_lvr2_vertex_attributes, write_lvr2_map, write_lvr2_mesh
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
-from mbf_mesh_nav.mesh_io import read_mesh
-from mbf_mesh_nav.repair import MeshError
+from mbf_mesh_nav.files.lvr2_io import LAYOUTS, read_lvr2_vertex_attributes, write_lvr2_map, write_lvr2_mesh
+from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.repair import MeshError
 
 VERTICES, FACES = heightfield_mesh(np.random.default_rng(0).random((12, 10)) * 0.1, 0.1, 0.1)
 

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.kernels.inflation import front_arrival
-from mbf_mesh_nav.layer import LayerContext
+from mbf_mesh_nav.kernels.layers.inflation import front_arrival
 from mbf_mesh_nav.layers.inflation import InflationLayer, InflationParameters
 from mbf_mesh_nav.layers.keep_out import KeepOutLayer, KeepOutParameters
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import LayerContext
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 
 def chain(mesh: MeshMap, lethal: np.ndarray, **parameters: float) -> tuple[KeepOutLayer, InflationLayer]:

@@ -6,10 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.kernels.neighbourhood_layers import height_differences
-from mbf_mesh_nav.kernels.polygons import inside_polygon
-from mbf_mesh_nav.layer import LayerContext, MeshLayer
+from mbf_mesh_nav.kernels.layers.neighbourhood_layers import height_differences
+from mbf_mesh_nav.kernels.mesh.polygons import inside_polygon
 from mbf_mesh_nav.layers.border import BorderLayer
 from mbf_mesh_nav.layers.clearance import ClearanceLayer
 from mbf_mesh_nav.layers.height_diff import HeightDiffLayer
@@ -18,7 +16,9 @@ from mbf_mesh_nav.layers.label import LabelLayer
 from mbf_mesh_nav.layers.ridge import RidgeLayer
 from mbf_mesh_nav.layers.roughness import RoughnessLayer
 from mbf_mesh_nav.layers.steepness import SteepnessLayer
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 
 def computed(mesh: MeshMap, layer_class: type[MeshLayer], **parameters: object) -> MeshLayer:

@@ -10,17 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.files.lvr2_io import write_lvr2_mesh
+from mbf_mesh_nav.files.mesh_io import read_mesh
 from mbf_mesh_nav.layers.roughness import RoughnessLayer
-from mbf_mesh_nav.lvr2_io import write_lvr2_mesh
-from mbf_mesh_nav.map_builder import (
+from mbf_mesh_nav.map.map_builder import (
     LayerGraphError,
     MeshMapParameters,
     build_mesh_map,
     default_layers,
 )
-from mbf_mesh_nav.mesh_io import read_mesh
-from mbf_mesh_nav.repair import MeshError
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.repair import MeshError
 
 VERTICES, FACES = heightfield_mesh(np.random.default_rng(0).random((12, 10)) * 0.1, 0.1, 0.1)
 
@@ -159,7 +159,7 @@ def test_a_cached_layer_is_computed_anew_when_its_code_has_changed(tmp_path, mon
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     code = (
-        "import numpy as np\nfrom mbf_mesh_nav.layer import MeshLayer\n\n\nclass Flat(MeshLayer):\n"
+        "import numpy as np\nfrom mbf_mesh_nav.map.layer import MeshLayer\n\n\nclass Flat(MeshLayer):\n"
         "    cacheable = True\n\n    def compute(self):\n"
         "        return np.full(self.topology.vertex_count, {cost}, np.float32), self._lethal\n"
     )

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from mbf_abstract.sensing import RangeScan
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.layer_graph import LayerGraphError
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
-from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.range_image import RangeImage
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_mesh_nav.map.layer_graph import LayerGraphError
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.range_image import RangeImage
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 SENSOR = [0.0, 2.0, 0.5]
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.map_queries import CellState, PlaceQuery
-from mbf_abstract.transforms import TransformBuffer
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.layer import MeshLayer
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
-from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.queries import MeshQueries
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_mesh_nav.map.layer import MeshLayer
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.queries import MeshQueries
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 
 class StandingRobot:

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from mbf_mesh_nav.densify import densify
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.repair import REPAIRS, MeshError, checked_mesh
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.densify import densify
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.repair import REPAIRS, MeshError, checked_mesh
 
 
 def good() -> tuple[np.ndarray, np.ndarray]:

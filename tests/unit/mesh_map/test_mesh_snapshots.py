@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.snapshot import SnapshotSeries
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.snapshot import SnapshotSeries
 
 
 @pytest.fixture(scope="module")

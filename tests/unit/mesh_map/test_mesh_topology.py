@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 
 def random_map(seed: int, nx: int = 7, ny: int = 6, shuffled: bool = True) -> tuple[MeshMap, np.ndarray, np.ndarray]:

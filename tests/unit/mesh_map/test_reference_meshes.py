@@ -7,10 +7,10 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
-from mbf_mesh_nav.mesh_io import read_mesh
-from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.repair import MeshError, checked_mesh
+from mbf_mesh_nav.files.mesh_io import read_mesh
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.repair import MeshError, checked_mesh
 
 # file, vertices after joining identical ones, faces of the file, components, defects that need a repair
 PUBLISHED = [

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mbf_mesh_nav.kernels.slopes import inclinations, tilt_of_normals
+from mbf_mesh_nav.kernels.mesh.slopes import inclinations, tilt_of_normals
 
 HEADINGS = np.arange(16) * 2.0 * math.pi / 16
 

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.kernels.bounding_boxes import closest_on_face
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.kernels.mesh.bounding_boxes import closest_on_face
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 
 def random_soup(seed: int, count: int = 40, stretch: float = 1.0) -> MeshMap:

@@ -6,16 +6,16 @@ import trimesh
 
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.plugin_host import ServerError
 from mbf_abstract.plugins import PluginKind
-from mbf_abstract.sim_clock import SimClock
+from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.loopback import LoopbackRobot
-from mbf_abstract.transforms import TransformBuffer
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.lvr2_io import read_lvr2_vertex_attributes
-from mbf_mesh_nav.repair import MeshError
+from mbf_abstract.time.sim_clock import SimClock
+from mbf_mesh_nav.files.lvr2_io import read_lvr2_vertex_attributes
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.repair import MeshError
 
 CONFIG = """
 backend: mesh

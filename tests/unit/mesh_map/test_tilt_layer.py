@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.layer import LayerContext
-from mbf_mesh_nav.layer_graph import LayerGraphError
 from mbf_mesh_nav.layers.tilt import HEADINGS, TiltLayer, TiltParameters, heading_index
-from mbf_mesh_nav.map_builder import MeshMapParameters, build_mesh_map
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import LayerContext
+from mbf_mesh_nav.map.layer_graph import LayerGraphError
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 CORNERS = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
 YAWS = 2.0 * np.pi * np.arange(HEADINGS) / HEADINGS

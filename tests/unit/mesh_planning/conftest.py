@@ -5,9 +5,9 @@ import pytest
 
 from mbf_abstract.geometry import Pose, Twist, quaternions_from_axes
 from mbf_abstract.plugins import ControlRequest
-from mbf_mesh_nav.layer import LayerContext, MeshLayer
-from mbf_mesh_nav.layer_graph import LayerGraph
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
+from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.plugins import MeshContext
 
 

@@ -9,8 +9,8 @@ import trimesh
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.kernels.funnel import pull_taut
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.kernels.wave.funnel import pull_taut
+from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 

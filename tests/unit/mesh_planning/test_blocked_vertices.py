@@ -4,11 +4,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.blocked_vertices import BlockedVertices
-from mbf_mesh_nav.layer import NOTHING_CHANGED, LayerContext
-from mbf_mesh_nav.layer_graph import LayerGraph
 from mbf_mesh_nav.layers.keep_out import KeepOutLayer, KeepOutParameters
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerContext
+from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.search.blocked_vertices import BlockedVertices
 
 COSTS = [0.0, 0.5, 1.0, 2.0, np.inf, np.nan]
 

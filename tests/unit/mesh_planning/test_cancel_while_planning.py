@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from mbf_abstract.cancel import CancelToken
-from mbf_abstract.clock import WallClock
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav import wave_search
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_abstract.time.cancel import CancelToken
+from mbf_abstract.time.clock import WallClock
+from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.cvp import CVPPlanner
+from mbf_mesh_nav.search import wave_search
 
 SIDE = 700
 

@@ -9,13 +9,13 @@ import trimesh
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.kernels.corners import build_corner_ends, write_corner_weights
-from mbf_mesh_nav.kernels.cvp import propagate_wave
-from mbf_mesh_nav.kernels.fronts import unfolded_distance
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.kernels.mesh.corners import build_corner_ends, write_corner_weights
+from mbf_mesh_nav.kernels.wave.cvp import propagate_wave
+from mbf_mesh_nav.kernels.wave.fronts import unfolded_distance
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.motion.vector_field import VectorField
 from mbf_mesh_nav.planners.cvp import CVPPlanner
-from mbf_mesh_nav.vector_field import VectorField
 
 
 def wave_from_vertex(mesh_map, source, weights=None, blocked=None, step=0.5):

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Path, Pose
-from mbf_mesh_nav.final_approach import dubins_curve, with_final_approach, with_first_turn
-from mbf_mesh_nav.heightfield_mesh import heightfield_mesh
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.search.final_approach import dubins_curve, with_final_approach, with_first_turn
 
 PLACES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-math.pi, math.pi))
 

@@ -7,22 +7,22 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
-from mbf_abstract.map_queries import CellState, PlaceQuery
+from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest, RecoveryRequest
+from mbf_abstract.time.cancel import CancelToken
 from mbf_mesh_nav.controllers.mppi import MPPIController
 from mbf_mesh_nav.controllers.path_follower import PathFollower
-from mbf_mesh_nav.kernels.forbidden_ground import LETHAL_HARDNESS, hardness_at, may_enter
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS, hardness_at, may_enter
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.pose_checks import check_point, check_pose
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
 from mbf_mesh_nav.planners.repairing import RepairingPlanner
-from mbf_mesh_nav.pose_checks import check_point, check_pose
 from mbf_mesh_nav.recoveries.back_up import BackUpRecovery
 from mbf_mesh_nav.recoveries.escape import EscapeRecovery
 

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.heading_limits import NO_CHASSIS, ground_of
-from mbf_mesh_nav.kernels.footprint_sweep import scratch_for
-from mbf_mesh_nav.kernels.heading_astar import DRIVABLE, HEADING_STEP, HEADINGS, search_with_heading
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for
+from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, HEADING_STEP, HEADINGS, search_with_heading
+from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner, may_turn_to
+from mbf_mesh_nav.search.heading_limits import NO_CHASSIS, ground_of
 
 
 def passed_headings(heading, new):

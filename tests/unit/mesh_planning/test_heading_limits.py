@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.end_stretches import headings_within
-from mbf_mesh_nav.heading_limits import FootprintLimits, NormalLimits
-from mbf_mesh_nav.kernels.heading_astar import DRIVABLE
-from mbf_mesh_nav.layer import LayerContext
-from mbf_mesh_nav.layer_graph import LayerGraph
+from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE
 from mbf_mesh_nav.layers.tilt import TiltLayer, TiltParameters
-from mbf_mesh_nav.locate import SurfacePoint
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import LayerContext
+from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.mesh.surface_point import passes_blocked_corner
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
-from mbf_mesh_nav.surface_point import passes_blocked_corner
+from mbf_mesh_nav.search.end_stretches import headings_within
+from mbf_mesh_nav.search.heading_limits import FootprintLimits, NormalLimits
 
 ROUNDING = 1e-6
 """Heights are linear between the places looked at, so nothing but rounding is left."""

@@ -4,19 +4,19 @@ import networkx
 import numpy as np
 import pytest
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose
-from mbf_abstract.map_queries import PlaceQuery
+from mbf_abstract.maps.queries import PlaceQuery
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_abstract.time.cancel import CancelToken
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.pose_checks import find_valid_pose
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
 from mbf_mesh_nav.planners.repairing import RepairingPlanner
-from mbf_mesh_nav.pose_checks import find_valid_pose
 
 PLANNERS = [DijkstraPlanner, AStarPlanner, CVPPlanner, RepairingPlanner, AnyAnglePlanner, HeadingAStarPlanner]
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.maps.relaxation import NO_SLACK, Slack
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
-from mbf_abstract.relaxation import NO_SLACK, Slack
-from mbf_mesh_nav.layer import NOTHING_CHANGED, LayerContext
-from mbf_mesh_nav.layer_graph import LayerGraph
+from mbf_abstract.time.cancel import CancelToken
 from mbf_mesh_nav.layers.inflation import InflationLayer
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerContext
+from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.recoveries.back_up import BackUpRecovery
 from mbf_mesh_nav.recoveries.clear_layers import ClearLayersRecovery
 from mbf_mesh_nav.recoveries.escape import EscapeRecovery

@@ -6,11 +6,20 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.kernels.astar import search_towards
-from mbf_mesh_nav.kernels.bucket_queue import EMPTY, RING, entry_of, item_of, key_of, next_bucket, put, remove_least
 from mbf_mesh_nav.kernels.compiled import kernel
-from mbf_mesh_nav.kernels.dijkstra import propagate_distances
-from mbf_mesh_nav.kernels.indexed_heap import push_or_decrease, remove_top, top_item, top_key
+from mbf_mesh_nav.kernels.search.astar import search_towards
+from mbf_mesh_nav.kernels.search.dijkstra import propagate_distances
+from mbf_mesh_nav.kernels.search.indexed_heap import push_or_decrease, remove_top, top_item, top_key
+from mbf_mesh_nav.kernels.wave.bucket_queue import (
+    EMPTY,
+    RING,
+    entry_of,
+    item_of,
+    key_of,
+    next_bucket,
+    put,
+    remove_least,
+)
 
 NO_INTS = np.zeros(0, np.int32)
 CALM = np.zeros(1, np.uint8)

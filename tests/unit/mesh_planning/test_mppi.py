@@ -9,7 +9,7 @@ from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_mesh_nav.controllers.mppi import MPPIController
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 
 
@@ -209,7 +209,7 @@ def test_two_controllers_with_one_seed_give_the_same_commands(make_plugin, hills
 
 
 def test_a_side_slope_is_avoided_when_tilt_weighs(make_plugin, drive, pose_on):
-    from mbf_mesh_nav.mesh_map import MeshMap
+    from mbf_mesh_nav.map.mesh_map import MeshMap
 
     x, y = np.meshgrid(np.arange(61) * 0.1, np.arange(61) * 0.1)
     ridge = MeshMap.from_heights(0.6 * np.exp(-(((x - 3) / 0.8) ** 2) - ((y - 3) / 0.5) ** 2), 0.1, 0.1)

@@ -10,9 +10,9 @@ from pygeodesic import geodesic
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.kernels.strip_detours import pass_vertices
-from mbf_mesh_nav.kernels.strips import link_faces, straighten
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.kernels.wave.corridor_detours import pass_vertices
+from mbf_mesh_nav.kernels.wave.corridors import link_faces, straighten
+from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 

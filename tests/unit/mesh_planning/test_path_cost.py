@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.kernels.path_costs import way_cost
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.kernels.motion.path_costs import way_cost
+from mbf_mesh_nav.map.mesh_map import MeshMap
 
 
 def naive_cost(mesh, costs, factor, positions, point_faces):

@@ -83,7 +83,7 @@ def test_an_empty_path_and_a_path_in_another_frame_are_refused(make_plugin, plai
 
 
 def test_steep_ground_is_driven_more_slowly(make_plugin, pose_on):
-    from mbf_mesh_nav.mesh_map import MeshMap
+    from mbf_mesh_nav.map.mesh_map import MeshMap
 
     ramp = MeshMap.from_heights(np.tile(0.4 * np.arange(41) * 0.2, (21, 1)), 0.2, 0.2)
     follower = make_plugin(PathFollower, ramp)

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import quaternions_from_axes
-from mbf_mesh_nav.kernels.path_poses import poses_along
+from mbf_mesh_nav.kernels.motion.path_poses import poses_along
 
 
 @given(seed=st.integers(0, 10**6))

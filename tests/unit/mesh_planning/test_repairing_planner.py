@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_abstract.cancel import CancelToken
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.mesh_map import REMEMBERED_CHANGES, MeshMap
+from mbf_abstract.time.cancel import CancelToken
+from mbf_mesh_nav.map.mesh_map import REMEMBERED_CHANGES, MeshMap
 from mbf_mesh_nav.planners.repairing import RepairingPlanner
 
 REQUEST = PlanRequest(Pose.planar(0.31, 0.27), Pose.planar(3.72, 3.58))

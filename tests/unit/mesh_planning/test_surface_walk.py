@@ -8,8 +8,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.kernels.surface_walk import tangent, turned, walk
-from mbf_mesh_nav.mesh_map import MeshMap
+from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned, walk
+from mbf_mesh_nav.map.mesh_map import MeshMap
 
 
 def step(mesh_map, face, point, direction, distance):

@@ -4,11 +4,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.layer import NOTHING_CHANGED
-from mbf_mesh_nav.leg_search import LegQuery
-from mbf_mesh_nav.mesh_map import MeshMap
-from mbf_mesh_nav.surface_point import surface_point_at_vertex
-from mbf_mesh_nav.wave_search import WaveSearch
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.surface_point import surface_point_at_vertex
+from mbf_mesh_nav.search.leg_search import LegQuery
+from mbf_mesh_nav.search.wave_search import WaveSearch
 
 
 def query_between_corners(mesh_map):

@@ -5,16 +5,16 @@ import math
 
 import pytest
 
-from mbf_abstract.actions.goals import MoveBaseResult
+from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.geometry import Pose
-from mbf_abstract.navigation_parameters import NavigationParameters
+from mbf_abstract.goals.goal_types import MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
-from terrain.arrival import Arrival, arrival_tolerance
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import PlanarPose, load_scenario
-from terrain.scenario_faults import LocalizationJump
-from terrain.scenario_limits import Limits
-from terrain.scenario_noise import LocalizationNoise
+from terrain.scenarios.faults import LocalizationJump
+from terrain.scenarios.limits import Limits
+from terrain.scenarios.noise import LocalizationNoise
+from terrain.scenarios.scenario import PlanarPose, load_scenario
+from terrain.session.arrival import Arrival, arrival_tolerance
+from terrain.session.runner import RunOptions, run_scenario
 
 
 def test_an_arrival_compares_truth_and_belief_with_the_goal():

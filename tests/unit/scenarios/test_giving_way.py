@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import pytest
 
 from mbf_abstract.geometry import Pose
-from terrain.actors import RouteWalker
-from terrain.kinematic_robot import KinematicWorld
-from terrain.robot_models import TURTLEBOT, RobotSpec
+from terrain.physics.actors import RouteWalker
+from terrain.physics.kinematic_robot import KinematicWorld
+from terrain.physics.robot_models import TURTLEBOT, RobotSpec
 
 ROUTE = [[0.0, 0.0], [10.0, 0.0]]
 

@@ -5,26 +5,26 @@ import math
 import numpy as np
 import pytest
 
-from mbf_abstract.findings import ConfigError
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.tilt import tilt_of
-from terrain.command_delay import CommandDelay
-from terrain.ego_sensors import Localization
-from terrain.generate import flat_terrain
-from terrain.heightfield import Heightfield
-from terrain.kinematic_robot import KinematicRobot
-from terrain.kinematic_world import KinematicWorld
-from terrain.occupancy import OccupancyGrid
-from terrain.robot_models import HUSKY, TURTLEBOT
-from terrain.robots import WheeledRobot
-from terrain.runner import RunOptions, run_scenario
-from terrain.scenario import load_scenario, shipped_scenarios
-from terrain.scenario_noise import LocalizationNoise, MapNoise
-from terrain.scenario_perturbation import Disturbance, Perturbation, draw_disturbance
-from terrain.scenario_places import PlanarPose
-from terrain.scenario_sensors import make_localization
-from terrain.scenario_stage import set_stage, with_noise
-from terrain.world import BulletWorld
+from mbf_abstract.geometry.tilt import tilt_of
+from terrain.physics.command_delay import CommandDelay
+from terrain.physics.kinematic_robot import KinematicRobot
+from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.robot_models import HUSKY, TURTLEBOT
+from terrain.physics.robots import WheeledRobot
+from terrain.physics.world import BulletWorld
+from terrain.scenarios.environment import set_stage, with_noise
+from terrain.scenarios.noise import LocalizationNoise, MapNoise
+from terrain.scenarios.perturbation import Disturbance, Perturbation, draw_disturbance
+from terrain.scenarios.places import PlanarPose
+from terrain.scenarios.scenario import load_scenario, shipped_scenarios
+from terrain.scenarios.sensors import make_localization
+from terrain.sensors.proprioception import Localization
+from terrain.session.runner import RunOptions, run_scenario
+from terrain.worlds.generate import flat_terrain
+from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.occupancy import OccupancyGrid
 
 FULL = Perturbation(start_position=0.05, start_yaw=3.0, friction=0.2, mass=0.1)
 

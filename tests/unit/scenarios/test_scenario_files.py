@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mbf_abstract.findings import ConfigError
-from terrain.map_files import MapFiles
-from terrain.scenario import load_scenario
-from terrain.scenario_noise import MapNoise
-from terrain.scenario_stage import set_stage
-from terrain.scenario_world import build_world
-from terrain.scenario_world_types import (
+from mbf_abstract.config.findings import ConfigError
+from terrain.scenarios.environment import set_stage
+from terrain.scenarios.noise import MapNoise
+from terrain.scenarios.scenario import load_scenario
+from terrain.scenarios.world import build_world
+from terrain.scenarios.world_types import (
     BridgeWorld,
     GarageWorld,
     GeneratedWorld,
@@ -18,6 +17,7 @@ from terrain.scenario_world_types import (
     MeshWorld,
     OfficeWorld,
 )
+from terrain.worlds.map_files import MapFiles
 
 PLAIN = """
 name: trial

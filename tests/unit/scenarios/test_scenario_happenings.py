@@ -6,23 +6,23 @@ import numpy as np
 import pytest
 import yaml
 
-from mbf_abstract.findings import ConfigError
+from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Pose
-from mbf_abstract.sensing import RangeScan
-from terrain.ego_sensors import Localization
-from terrain.kinematic_robot import KinematicRobot
-from terrain.kinematic_world import KinematicWorld
-from terrain.map_files import MapFiles
-from terrain.mishaps import MishapKind
-from terrain.robot_models import TURTLEBOT
-from terrain.scenario import load_scenario
-from terrain.scenario_actors import Crowd, Door, OtherRobot, Walker, add_actors
-from terrain.scenario_faults import FaultSchedule, LocalizationJump, SensorFault, seen_from
-from terrain.scenario_limits import Limits, broken_limits
-from terrain.scenario_noise import MapNoise
-from terrain.scenario_settings import apply_settings, apply_world_settings
-from terrain.scenario_world import build_world
-from terrain.scenario_world_types import OfficeWorld
+from mbf_abstract.maps.sensing import RangeScan
+from terrain.physics.incidents import MishapKind
+from terrain.physics.kinematic_robot import KinematicRobot
+from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.robot_models import TURTLEBOT
+from terrain.scenarios.actors import Crowd, Door, OtherRobot, Walker, add_actors
+from terrain.scenarios.faults import FaultSchedule, LocalizationJump, SensorFault, seen_from
+from terrain.scenarios.limits import Limits, broken_limits
+from terrain.scenarios.noise import MapNoise
+from terrain.scenarios.scenario import load_scenario
+from terrain.scenarios.settings import apply_settings, apply_world_settings
+from terrain.scenarios.world import build_world
+from terrain.scenarios.world_types import OfficeWorld
+from terrain.sensors.proprioception import Localization
+from terrain.worlds.map_files import MapFiles
 
 
 class ClockOnly:

@@ -3,11 +3,11 @@
 import pytest
 
 from mbf_abstract.geometry import Twist
-from terrain.bench import Bench
-from terrain.scenario import PlanarPose, Sensor, load_scenario
-from terrain.scenario_faults import LocalizationJump, SensorFault
-from terrain.scenario_noise import LocalizationNoise
-from terrain.scenario_world_types import GeneratedWorld
+from terrain.scenarios.faults import LocalizationJump, SensorFault
+from terrain.scenarios.noise import LocalizationNoise
+from terrain.scenarios.scenario import PlanarPose, Sensor, load_scenario
+from terrain.scenarios.world_types import GeneratedWorld
+from terrain.session.bench import Bench
 
 CAMERA = Sensor(name="camera", type="depth", rays=16, rate=5.0)
 

@@ -5,12 +5,12 @@ import csv
 import pytest
 import typer
 
-from mbf_abstract.findings import ConfigError
-from terrain.scenario import MapWorld, load_scenario
-from terrain.sweep import SweepRun, hash_of, plan_sweep
-from terrain.sweep_cli import parse_seeds, parse_settings
-from terrain.sweep_log import SweepLog
-from terrain.sweep_report import summarise, write_tables
+from mbf_abstract.config.findings import ConfigError
+from terrain.scenarios.scenario import MapWorld, load_scenario
+from terrain.sweeps.command import parse_seeds, parse_settings
+from terrain.sweeps.log import SweepLog
+from terrain.sweeps.report import summarise, write_tables
+from terrain.sweeps.sweep import SweepRun, hash_of, plan_sweep
 
 
 def row(seed, variant="planner=cvp", success=True, **more):

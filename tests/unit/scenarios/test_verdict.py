@@ -2,11 +2,11 @@
 
 import pytest
 
-from mbf_abstract.actions.goals import MoveBaseResult
+from mbf_abstract.goals.goal_types import MoveBaseResult
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
-from terrain.mishaps import MishapKind
-from terrain.scenario_limits import Limits
-from terrain.verdict import UNFINISHED, judge
+from terrain.physics.incidents import MishapKind
+from terrain.recording.verdict import UNFINISHED, judge
+from terrain.scenarios.limits import Limits
 
 ARRIVED = MoveBaseResult(MoveBaseOutcome.SUCCESS, "goal reached")
 BLOCKED = MoveBaseResult(ExePathOutcome.BLOCKED_PATH, "a box")

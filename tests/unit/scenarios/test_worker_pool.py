@@ -4,7 +4,7 @@ import os
 import signal
 
 from mbf_abstract.testing.bench import Bench
-from terrain.worker_pool import run_in_workers
+from terrain.sweeps.worker_pool import run_in_workers
 
 
 def end_once(marker):

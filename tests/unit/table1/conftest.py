@@ -3,7 +3,7 @@
 import pytest
 
 from mbf_abstract.events import Event, EventKind
-from terrain.table1.counting import Leg, Tally
+from terrain.experiments.table1.counting import Leg, Tally
 
 
 @pytest.fixture

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from mbf_abstract.findings import ConfigError
-from terrain.table1 import campaign as campaign_module
-from terrain.table1.campaign import Campaign, hash_of_parameters, tally_of
-from terrain.table1.world import WAREHOUSE, load_world
+from mbf_abstract.config.findings import ConfigError
+from terrain.experiments.table1 import campaign as campaign_module
+from terrain.experiments.table1.campaign import Campaign, hash_of_parameters, tally_of
+from terrain.experiments.table1.environments.world import WAREHOUSE, load_world
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def test_a_run_that_was_cut_off_in_the_middle_of_its_line_is_done_again(tmp_path
 def test_runs_of_other_parameters_do_not_count(tmp_path, work, monkeypatch):
     job = Campaign(tmp_path, WAREHOUSE).job("B", 0)
     dict(Campaign(tmp_path, WAREHOUSE).rows([job]))
-    monkeypatch.setattr("terrain.table1.traffic.DWELL", 6.0)
+    monkeypatch.setattr("terrain.experiments.table1.environments.traffic.DWELL", 6.0)
     dict(Campaign(tmp_path, WAREHOUSE).rows([job]))
     assert work == ["B/0", "B/0"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.events import EventKind
-from terrain.table1.counting import ACTIVITIES, count
+from terrain.experiments.table1.counting import ACTIVITIES, count
 
 
 def one_leg(log, end="reached", begin=10.0, finish=30.0):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from terrain.table1.gates import (
+from terrain.experiments.table1.acceptance_checks import (
     falls_along_the_list,
     no_more_hand_overs_than_plans,
     no_traffic,

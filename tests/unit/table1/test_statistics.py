@@ -6,7 +6,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from terrain.table1.statistics import clear_share, entropy, paired_ratio, wilcoxon_p
+from terrain.experiments.table1.statistics import clear_share, entropy, paired_ratio, wilcoxon_p
 
 
 def test_equal_pairs_have_a_ratio_of_one_without_spread():

@@ -5,9 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from terrain.table1.robot import HALF_LENGTH
-from terrain.table1.traffic import DWELL, STOP_DISTANCE, Box, Shuttle, TrafficRays, make_traffic
-from terrain.table1.world import load_world
+from terrain.experiments.table1.environments.robot import HALF_LENGTH
+from terrain.experiments.table1.environments.traffic import (
+    DWELL,
+    STOP_DISTANCE,
+    Box,
+    Shuttle,
+    TrafficRays,
+    make_traffic,
+)
+from terrain.experiments.table1.environments.world import load_world
 
 STEP = 1.0 / 60.0
 LINE = [(0.0, 0.0), (10.0, 0.0)]

@@ -2,8 +2,8 @@
 
 import pytest
 
-from terrain.table1.statistics import compare
-from terrain.table1.verdict import judge, verdict
+from terrain.experiments.table1.statistics import compare
+from terrain.experiments.table1.verdict import judge, verdict
 
 
 def judged(a, b):

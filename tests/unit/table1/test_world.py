@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 from scipy import ndimage
 
-from terrain.table1.robot import CARRIER
-from terrain.table1.traffic import make_traffic
-from terrain.table1.world import load_world
+from terrain.experiments.table1.environments.robot import CARRIER
+from terrain.experiments.table1.environments.traffic import make_traffic
+from terrain.experiments.table1.environments.world import load_world
 
 
 def test_the_warehouse_is_thirty_metres_square_with_cells_of_five_centimetres():

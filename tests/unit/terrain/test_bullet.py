@@ -7,9 +7,20 @@ WITHOUT_PYBULLET = """
 import sys
 sys.modules["pybullet"] = sys.modules["matplotlib"] = sys.modules["embreex"] = None
 import terrain
-from terrain import actors, dem_io, floor_plan, generate, indoor, kinematic_robot, multi_level, rays, robots, sensors
-from terrain import simulation, slope_map, world
-from terrain.bullet import SimulatorMissingError
+from terrain.physics import actors
+from terrain.worlds import elevation_files as dem_io
+from terrain.worlds import floor_plan
+from terrain.worlds import generate
+from terrain.physics import indoor
+from terrain.physics import kinematic_robot
+from terrain.worlds import multi_level
+from terrain.sensors import rays
+from terrain.physics import robots
+from terrain.sensors import lidar as sensors
+from terrain.physics import simulation
+from terrain.worlds import slope_map
+from terrain.physics import world
+from terrain.physics.bullet import SimulatorMissingError
 try:
     world.BulletWorld()
 except SimulatorMissingError as error:

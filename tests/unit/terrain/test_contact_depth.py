@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from terrain.contact_depth import depth_in_cells, depth_in_circle, depth_in_polygon, placed
+from terrain.physics.contact_depth import depth_in_cells, depth_in_circle, depth_in_polygon, placed
 
 CAR = np.array([[-0.17, -0.29], [0.75, -0.29], [0.75, 0.29], [-0.17, 0.29]])
 BOX = np.array([[-0.4, -0.2], [0.4, -0.2], [0.4, 0.2], [-0.4, 0.2]])

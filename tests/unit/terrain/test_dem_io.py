@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from terrain.dem_io import TerrainFileError, jacksboro, read_dem, read_elevation
+from terrain.worlds.elevation_files import TerrainFileError, jacksboro, read_dem, read_elevation
 
 
 def test_jacksboro_is_shrunk_isotropically() -> None:

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import AckermannCommand, Twist
-from terrain.drive import commanded_twist, steering_angle, twist_from_wheels, wheel_targets
-from terrain.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
+from terrain.physics.drive import commanded_twist, steering_angle, twist_from_wheels, wheel_targets
+from terrain.physics.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
 
 
 @given(st.sampled_from([HUSKY, TURTLEBOT]), st.floats(-0.6, 0.6), st.floats(-1.8, 1.8))

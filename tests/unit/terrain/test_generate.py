@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from terrain import generate
-from terrain.generate import flat_terrain, fractal_terrain
+from terrain.worlds import generate
+from terrain.worlds.generate import flat_terrain, fractal_terrain
 
 
 def rng(seed: int = 1) -> np.random.Generator:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from terrain.heightfield import Heightfield
+from terrain.worlds.heightfield import Heightfield
 
 
 def random_field(seed: int = 0, ny: int = 7, nx: int = 11) -> Heightfield:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from terrain.mesh_world import MeshFileError, read_mesh_world
-from terrain.world import BulletWorld
+from terrain.physics.world import BulletWorld
+from terrain.worlds.mesh_world import MeshFileError, read_mesh_world
 
 
 def test_a_mesh_with_y_up_is_turned_and_scaled(tmp_path: Path) -> None:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.tilt import tilt_of
-from terrain.mishaps import MishapKind, MishapMonitor, MotionSample, Thing, roll_pitch
+from mbf_abstract.geometry.tilt import tilt_of
+from terrain.physics.incidents import MishapKind, MishapMonitor, MotionSample, Thing, roll_pitch
 
 
 def rolled(angle: float, stamp: float = 0.0, x: float = 0.0) -> Pose:

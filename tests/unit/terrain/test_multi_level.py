@@ -7,11 +7,11 @@ import pytest
 import trimesh
 
 from mbf_abstract.geometry import Twist, normalize_angle
-from terrain.multi_level import MULTI_LEVEL_WORLDS, MultiLevelWorld, parking_garage
-from terrain.robot_models import HUSKY
-from terrain.robots import WheeledRobot
-from terrain.simulation import Simulation
-from terrain.world import BulletWorld
+from terrain.physics.robot_models import HUSKY
+from terrain.physics.robots import WheeledRobot
+from terrain.physics.simulation import Simulation
+from terrain.physics.world import BulletWorld
+from terrain.worlds.multi_level import MULTI_LEVEL_WORLDS, MultiLevelWorld, parking_garage
 
 
 def ground_of(world: MultiLevelWorld) -> trimesh.Trimesh:

@@ -11,12 +11,19 @@ from hypothesis.extra.numpy import arrays
 from PIL import Image
 from scipy import ndimage
 
-from mbf_abstract.findings import ConfigError
-from terrain.floor_plan import DATA_FOLDER, OFFICE_MAP, FloorPlanError, read_floor_plan, write_map, write_office_map
-from terrain.indoor import add_building
-from terrain.occupancy import OccupancyGrid, merge_rectangles, read_occupancy, wall_triangles
-from terrain.robot_models import TURTLEBOT
-from terrain.world import BulletWorld
+from mbf_abstract.config.findings import ConfigError
+from terrain.physics.indoor import add_building
+from terrain.physics.robot_models import TURTLEBOT
+from terrain.physics.world import BulletWorld
+from terrain.worlds.floor_plan import (
+    DATA_FOLDER,
+    OFFICE_MAP,
+    FloorPlanError,
+    read_floor_plan,
+    write_map,
+    write_office_map,
+)
+from terrain.worlds.occupancy import OccupancyGrid, merge_rectangles, read_occupancy, wall_triangles
 
 
 @settings(max_examples=80, deadline=None)

@@ -5,13 +5,13 @@ import math
 import numpy as np
 
 from mbf_abstract.geometry import Twist
-from terrain.generate import flat_terrain
-from terrain.heightfield import Heightfield
-from terrain.mishaps import MishapKind
-from terrain.robot_models import HUSKY
-from terrain.robots import WheeledRobot
-from terrain.simulation import Simulation
-from terrain.world import BulletWorld
+from terrain.physics.incidents import MishapKind
+from terrain.physics.robot_models import HUSKY
+from terrain.physics.robots import WheeledRobot
+from terrain.physics.simulation import Simulation
+from terrain.physics.world import BulletWorld
+from terrain.worlds.generate import flat_terrain
+from terrain.worlds.heightfield import Heightfield
 
 
 def drive_along_x(terrain: Heightfield, command: Twist, seconds: float) -> Simulation:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from terrain.rays import StaticRays
+from terrain.sensors.rays import StaticRays
 
 
 def first_hit_of_all(vertices, faces, origin, direction, max_range):

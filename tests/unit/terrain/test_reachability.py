@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from terrain.generate import fractal_terrain
-from terrain.heightfield import Heightfield
-from terrain.reachability import DrivingLimits, allowed_states, is_reachable
-from terrain.robot_models import HUSKY
+from benchmarks.reachability import DrivingLimits, allowed_states, is_reachable
+from terrain.physics.robot_models import HUSKY
+from terrain.worlds.generate import fractal_terrain
+from terrain.worlds.heightfield import Heightfield
 
 SPACING = 0.25
 START, GOAL = (2.0, 5.0, 0.0), (10.0, 5.0)

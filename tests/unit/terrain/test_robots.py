@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist, normalize_angle
-from mbf_abstract.tilt import tilt_of
-from terrain.generate import fractal_terrain
-from terrain.heightfield import Heightfield
-from terrain.mishaps import MishapKind, MishapMonitor
-from terrain.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
-from terrain.robots import WheeledRobot
-from terrain.world import BulletWorld
+from mbf_abstract.geometry.tilt import tilt_of
+from terrain.physics.incidents import MishapKind, MishapMonitor
+from terrain.physics.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
+from terrain.physics.robots import WheeledRobot
+from terrain.physics.world import BulletWorld
+from terrain.worlds.generate import fractal_terrain
+from terrain.worlds.heightfield import Heightfield
 
 
 def drive(world: BulletWorld, robot: WheeledRobot, command: Twist | AckermannCommand, seconds: float) -> list[Pose]:
@@ -145,8 +145,8 @@ def test_a_wall_is_a_collision_and_leaves_the_robot_stuck() -> None:
 
 def test_importing_and_loading_prints_nothing() -> None:
     code = (
-        "from terrain.world import BulletWorld; from terrain.robots import WheeledRobot; "
-        "from terrain.robot_models import HUSKY; from mbf_abstract.geometry import Pose; "
+        "from terrain.physics.world import BulletWorld; from terrain.physics.robots import WheeledRobot; "
+        "from terrain.physics.robot_models import HUSKY; from mbf_abstract.geometry import Pose; "
         "w = BulletWorld(); WheeledRobot(w, HUSKY, Pose.planar(0, 0)); w.close()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)

@@ -6,7 +6,7 @@ import pytest
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
-from terrain.run_digest import RunDigest
+from terrain.recording.run_digest import RunDigest
 
 
 def digest_of(*entries, time=0.5):

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose, Twist
-from terrain.ego_sensors import Imu, Localization, WheelOdometry
-from terrain.generate import fractal_terrain
-from terrain.kinematic_world import KinematicWorld
-from terrain.rays import MovingRays, StaticRays
-from terrain.robot_models import TURTLEBOT
-from terrain.robots import WheeledRobot
-from terrain.sensors import Lidar, camera_directions, planar_directions, ring_directions
-from terrain.world import BulletWorld
+from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.robot_models import TURTLEBOT
+from terrain.physics.robots import WheeledRobot
+from terrain.physics.world import BulletWorld
+from terrain.sensors.lidar import Lidar, camera_directions, planar_directions, ring_directions
+from terrain.sensors.proprioception import Imu, Localization, WheelOdometry
+from terrain.sensors.rays import MovingRays, StaticRays
+from terrain.worlds.generate import fractal_terrain
 
 
 class PosedRobot:

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from terrain.heightfield import Heightfield
-from terrain.occupancy import OccupancyGrid
-from terrain.recording import Surface
-from terrain.shortest_way import free_floor, shortest_way
+from terrain.recording.recording import Surface
+from terrain.worlds.geodesics import free_floor, shortest_way
+from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.occupancy import OccupancyGrid
 
 LONGEST = 1.03
 

@@ -6,23 +6,23 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
-from mbf_abstract.sensing import RangeScan
-from terrain.actors import RouteWalker, SlidingDoor, other_robot, random_route
-from terrain.ego_sensors import Imu, WheelOdometry
-from terrain.floor_plan import OFFICE_MAP
-from terrain.heightfield import Heightfield
-from terrain.indoor import add_building
-from terrain.kinematic_robot import KinematicRobot
-from terrain.kinematic_world import KinematicWorld
-from terrain.mishaps import MishapKind, Thing
-from terrain.occupancy import OccupancyGrid, read_occupancy
-from terrain.rays import MovingRays, StaticRays
-from terrain.recording import RobotShape
-from terrain.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
-from terrain.robots import WheeledRobot
-from terrain.sensors import Lidar, planar_directions
-from terrain.simulation import Simulation
-from terrain.world import BulletWorld
+from mbf_abstract.maps.sensing import RangeScan
+from terrain.physics.actors import RouteWalker, SlidingDoor, other_robot, random_route
+from terrain.physics.incidents import MishapKind, Thing
+from terrain.physics.indoor import add_building
+from terrain.physics.kinematic_robot import KinematicRobot
+from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
+from terrain.physics.robots import WheeledRobot
+from terrain.physics.simulation import Simulation
+from terrain.physics.world import BulletWorld
+from terrain.recording.recording import RobotShape
+from terrain.sensors.lidar import Lidar, planar_directions
+from terrain.sensors.proprioception import Imu, WheelOdometry
+from terrain.sensors.rays import MovingRays, StaticRays
+from terrain.worlds.floor_plan import OFFICE_MAP
+from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.occupancy import OccupancyGrid, read_occupancy
 
 
 def office_run(seed: int) -> tuple[list[Pose], list[RangeScan]]:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from terrain.heightfield import Heightfield
-from terrain.slope_map import OCCUPIED, cell_slopes, slope_grid, slope_occupancy, write_slope_map
+from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.slope_map import OCCUPIED, cell_slopes, slope_grid, slope_occupancy, write_slope_map
 
 
 def plane(degrees: float) -> Heightfield:

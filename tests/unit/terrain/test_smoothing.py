@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from terrain.smoothing import smoothed
+from terrain.worlds.smoothing import smoothed
 
 
 @pytest.mark.parametrize("sigma", [(0.4, 0.4), (1.5, 3.0), (6.0, 2.0)])

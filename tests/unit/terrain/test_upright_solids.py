@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose
-from terrain.rays import StaticRays
-from terrain.solids import cylinder_triangles
-from terrain.upright_solids import SolidRays, UprightSolid
+from terrain.sensors.rays import StaticRays
+from terrain.worlds.solids import cylinder_triangles
+from terrain.worlds.upright_solids import SolidRays, UprightSolid
 
 SIZES = {"box": (1.2, 0.5, 1.6), "cylinder": (0.4, 1.6)}
 

@@ -7,15 +7,15 @@ import pytest
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose, Twist
-from terrain.heightfield import Heightfield
-from terrain.occupancy import OccupancyGrid, wall_triangles
-from terrain.recorder import Recorder
-from terrain.recording import Recording, RobotShape, Surface
-from terrain.robot_models import HUSKY, TURTLEBOT
-from terrain.scenario import PlanarPose, Scenario, Sensor, load_scenario
-from terrain.scenario_world_types import GeneratedWorld
-from terrain.solids import box_triangles
-from terrain.verdict import Verdict
+from terrain.physics.robot_models import HUSKY, TURTLEBOT
+from terrain.recording.recorder import Recorder
+from terrain.recording.recording import Recording, RobotShape, Surface
+from terrain.recording.verdict import Verdict
+from terrain.scenarios.scenario import PlanarPose, Scenario, Sensor, load_scenario
+from terrain.scenarios.world_types import GeneratedWorld
+from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.occupancy import OccupancyGrid, wall_triangles
+from terrain.worlds.solids import box_triangles
 
 RATE = 10.0
 

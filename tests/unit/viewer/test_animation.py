@@ -4,12 +4,12 @@ import numpy as np
 from PIL import Image
 
 from mbf_abstract.geometry import Pose
-from terrain.recorder import Recorder
-from terrain.recording import RobotShape
-from terrain.robot_models import HUSKY
-from terrain.verdict import Verdict
-from terrain.viewer.animation import FRAMES, SIZE, Camera, draw_world, write_animation
-from terrain.viewer.colours import BODY, DRIVEN, OBSTACLE, PLANNED
+from terrain.physics.robot_models import HUSKY
+from terrain.recording.recorder import Recorder
+from terrain.recording.recording import RobotShape
+from terrain.recording.verdict import Verdict
+from terrain.viewer.pictures.animation import FRAMES, SIZE, Camera, draw_world, write_animation
+from terrain.viewer.pictures.colours import BODY, DRIVEN, OBSTACLE, PLANNED
 
 
 def frames_of(file):

@@ -9,23 +9,23 @@ from PIL import Image
 from rich.console import Console
 from typer.testing import CliRunner
 
-from mbf_abstract.actions.goals import MoveBaseResult
 from mbf_abstract.cli import make_app
 from mbf_abstract.commands.reporting import readable_errors
+from mbf_abstract.config.yaml_source import load_yaml
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.yaml_source import load_yaml
-from terrain.live_line import LiveLine
-from terrain.metrics import measure
-from terrain.recorder import Recorder
-from terrain.recording import RobotShape
-from terrain.robot_models import HUSKY
-from terrain.scenario_limits import Limits
-from terrain.verdict import judge
+from mbf_abstract.goals.goal_types import MoveBaseResult
+from terrain.commands.live_line import LiveLine
+from terrain.physics.robot_models import HUSKY
+from terrain.recording.metrics import measure
+from terrain.recording.recorder import Recorder
+from terrain.recording.recording import RobotShape
+from terrain.recording.verdict import judge
+from terrain.recording.whole_files import replacing, write_whole
+from terrain.scenarios.limits import Limits
 from terrain.viewer import results
-from terrain.viewer.animation import write_animation
+from terrain.viewer.pictures.animation import write_animation
 from terrain.viewer.results import write_results
-from terrain.whole_files import replacing, write_whole
 
 TEXTS = [
     r"$\frac$", "$$", "$x_{", "\ud800", "a\udfff b", "[/x]", "[bold]", "</script><b>", "\x00\x07", "x" * 20_000,

@@ -6,8 +6,8 @@ import re
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
-from terrain.metrics import measure
-from terrain.viewer.comparison import compare_metrics, comparison_html
+from terrain.recording.metrics import measure
+from terrain.viewer.reports.comparison import compare_metrics, comparison_html
 
 
 def compare(*arguments):

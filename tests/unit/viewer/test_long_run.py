@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Twist
-from terrain.generate import fractal_terrain
-from terrain.recorder import Recorder
-from terrain.recording import RobotShape, Surface
-from terrain.robot_models import HUSKY
-from terrain.verdict import Verdict
-from terrain.viewer.mcap_log import write_mcap
+from terrain.physics.robot_models import HUSKY
+from terrain.recording.recorder import Recorder
+from terrain.recording.recording import RobotShape, Surface
+from terrain.recording.verdict import Verdict
+from terrain.viewer.logs.mcap_log import write_mcap
 from terrain.viewer.replay import write_replay
+from terrain.worlds.generate import fractal_terrain
 
 MOST = 15e6  # bytes
 DURATION, RATE = 300.0, 10.0

@@ -12,17 +12,17 @@ from mcap_protobuf.decoder import DecoderFactory as ProtobufDecoderFactory
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose
-from mbf_abstract.map_view import GridView, MeshView
-from terrain.actor_track import ActorTrack
-from terrain.bench import Bench
-from terrain.recorder import MAP_PERIOD, Recorder
-from terrain.recording import RobotShape
-from terrain.robot_models import HUSKY
-from terrain.verdict import Verdict
-from terrain.viewer.colours import WALL
-from terrain.viewer.foxglove_messages import MAP_LIFT, nanoseconds
-from terrain.viewer.mcap_log import write_mcap
-from terrain.viewer.run_messages import action_states
+from mbf_abstract.maps.view import GridView, MeshView
+from terrain.physics.robot_models import HUSKY
+from terrain.recording.actor_track import ActorTrack
+from terrain.recording.recorder import MAP_PERIOD, Recorder
+from terrain.recording.recording import RobotShape
+from terrain.recording.verdict import Verdict
+from terrain.session.bench import Bench
+from terrain.viewer.logs.foxglove_messages import MAP_LIFT, nanoseconds
+from terrain.viewer.logs.mcap_log import write_mcap
+from terrain.viewer.logs.run_messages import action_states
+from terrain.viewer.pictures.colours import WALL
 
 SCHEMAS = {
     "/tf": "foxglove.FrameTransforms",

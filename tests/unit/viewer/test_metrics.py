@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose, Twist
-from terrain.metrics import count_stops, cross_track_errors, measure
-from terrain.mishaps import roll_pitch
-from terrain.recorder import Recorder
-from terrain.recording import RobotShape
-from terrain.robot_models import HUSKY
-from terrain.verdict import Verdict
+from terrain.physics.incidents import roll_pitch
+from terrain.physics.robot_models import HUSKY
+from terrain.recording.metrics import count_stops, cross_track_errors, measure
+from terrain.recording.recorder import Recorder
+from terrain.recording.recording import RobotShape
+from terrain.recording.verdict import Verdict
 
 
 def straight_run(goals):

@@ -8,14 +8,14 @@ import pytest
 from PIL import Image
 
 from mbf_abstract.geometry import Pose
-from terrain.actor_track import ActorTrack
-from terrain.recorder import Recorder
-from terrain.recording import RobotShape, Surface
-from terrain.robot_models import HUSKY
-from terrain.verdict import Verdict
-from terrain.viewer.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, WALL, linear_for_viewer, slope_colours
-from terrain.viewer.picture import picture_png, write_picture
-from terrain.viewer.shading import shaded_triangles, vertex_colours
+from terrain.physics.robot_models import HUSKY
+from terrain.recording.actor_track import ActorTrack
+from terrain.recording.recorder import Recorder
+from terrain.recording.recording import RobotShape, Surface
+from terrain.recording.verdict import Verdict
+from terrain.viewer.pictures.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, WALL, linear_for_viewer, slope_colours
+from terrain.viewer.pictures.picture import picture_png, write_picture
+from terrain.viewer.pictures.shading import shaded_triangles, vertex_colours
 
 
 def pixels_of(png):

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_abstract.map_view import GridView
-from terrain.viewer.plan_picture import shrunk
+from mbf_abstract.maps.view import GridView
+from terrain.viewer.pictures.plan_picture import shrunk
 
 
 @settings(max_examples=60, deadline=None)

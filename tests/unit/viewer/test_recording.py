@@ -7,13 +7,13 @@ import pytest
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
-from mbf_abstract.map_view import GridView, MeshView
-from terrain.mishaps import Thing
-from terrain.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, Recorder
-from terrain.recording import Recording, RecordingError, RobotShape
-from terrain.robot_models import CAR, HUSKY, TURTLEBOT
-from terrain.solids import cylinder_triangles
-from terrain.verdict import Verdict
+from mbf_abstract.maps.view import GridView, MeshView
+from terrain.physics.incidents import Thing
+from terrain.physics.robot_models import CAR, HUSKY, TURTLEBOT
+from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, Recorder
+from terrain.recording.recording import Recording, RecordingError, RobotShape
+from terrain.recording.verdict import Verdict
+from terrain.worlds.solids import cylinder_triangles
 
 
 @pytest.mark.parametrize("name", ["hill_recording", "office_recording"])

@@ -10,14 +10,14 @@ import pytest
 import zstandard
 
 from mbf_abstract.geometry import Pose
-from terrain.actor_track import ActorTrack
-from terrain.recorder import Recorder
-from terrain.recording import RobotShape
-from terrain.robot_models import HUSKY
-from terrain.solids import cylinder_triangles
-from terrain.verdict import Verdict
+from terrain.physics.robot_models import HUSKY
+from terrain.recording.actor_track import ActorTrack
+from terrain.recording.recorder import Recorder
+from terrain.recording.recording import RobotShape
+from terrain.recording.verdict import Verdict
 from terrain.viewer.replay import FRAME_RATE, MAX_FRAMES, frame_indices, replay_html, status_text, write_replay
 from terrain.viewer.scene import wheel_angles
+from terrain.worlds.solids import cylinder_triangles
 
 
 def test_frames_come_at_the_frame_rate_with_first_and_last():

@@ -8,14 +8,14 @@ import pytest
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose
-from terrain.metrics import measure
-from terrain.recorder import Recorder
-from terrain.recording import RobotShape
-from terrain.robot_models import HUSKY
-from terrain.verdict import Verdict
-from terrain.viewer.page import MAX_ROWS
-from terrain.viewer.report import report_html, write_report
-from terrain.viewer.timeline import Bar, action_bars, plugin_bars, timeline_svg
+from terrain.physics.robot_models import HUSKY
+from terrain.recording.metrics import measure
+from terrain.recording.recorder import Recorder
+from terrain.recording.recording import RobotShape
+from terrain.recording.verdict import Verdict
+from terrain.viewer.reports.page import MAX_ROWS
+from terrain.viewer.reports.report import report_html, write_report
+from terrain.viewer.reports.timeline import Bar, action_bars, plugin_bars, timeline_svg
 
 
 def report_of(recording):

@@ -5,7 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
-from terrain.viewer.rerun_log import write_rrd
+from terrain.viewer.logs.rerun_log import write_rrd
 
 chunks = pytest.importorskip("rerun.chunk", reason="Rerun has no packages for this Python")
 

@@ -6,8 +6,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from terrain.viewer.page_access import PageAccess, Role
-from terrain.viewer.page_server import page_server
+from terrain.viewer.server.page_access import PageAccess, Role
+from terrain.viewer.server.page_server import page_server
 
 pytestmark = pytest.mark.timeout(300)
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from terrain.bench import Bench
-from terrain.goal_drivers import make_goal_driver
-from terrain.goal_tour import GoalTour
+from terrain.session.bench import Bench
+from terrain.session.executives import make_goal_driver
+from terrain.session.goal_sequence import GoalTour
 from terrain.viewer.live.controls import LiveControls
 
 

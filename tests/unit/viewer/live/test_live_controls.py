@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.events import EventKind
-from terrain.scenario_faults import LocalizationJump, SensorFault
+from terrain.scenarios.faults import LocalizationJump, SensorFault
 from terrain.viewer.live.controls import MAX_WAITING
 
 DOWN = (0.0, 0.0, -1.0)

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from mbf_abstract.map_view import GridView, MeshView
-from terrain.bench import Bench
-from terrain.goal_drivers import make_goal_driver
-from terrain.goal_tour import GoalTour
-from terrain.scenario import PlanarPose, load_scenario
-from terrain.scenario_actors import OtherRobot, Walker
+from mbf_abstract.maps.view import GridView, MeshView
+from terrain.scenarios.actors import OtherRobot, Walker
+from terrain.scenarios.scenario import PlanarPose, load_scenario
+from terrain.session.bench import Bench
+from terrain.session.executives import make_goal_driver
+from terrain.session.goal_sequence import GoalTour
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.page import LivePage
 from terrain.viewer.live.plots import History
-from terrain.viewer.page_server import page_server
+from terrain.viewer.server.page_server import page_server
 
 NODES = ("ground", "map", "local_map", "lethal", "robot", "plan", "track", "ahead", "field", "scan", "goal_asked_for")
 

@@ -6,9 +6,8 @@ import pytest
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import NodeState
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist, quaternion_from_yaw
-from mbf_abstract.map_view import FieldView, GridView
-from mbf_abstract.sim_clock import SimClock
-from terrain.viewer.colours import FLOOR, WALL, cost_ramp
+from mbf_abstract.maps.view import FieldView, GridView
+from mbf_abstract.time.sim_clock import SimClock
 from terrain.viewer.live.follow import first_direction
 from terrain.viewer.live.ground import costs_at, legend_html
 from terrain.viewer.live.log import LiveLog
@@ -18,8 +17,9 @@ from terrain.viewer.live.overlay import Overlay
 from terrain.viewer.live.pace import MAX_LAG, Pace
 from terrain.viewer.live.plots import LENGTH, PERIOD, History
 from terrain.viewer.live.status_html import lines_html
-from terrain.viewer.page_server import page_server
-from terrain.viewer.tree_html import tree_html
+from terrain.viewer.pictures.colours import FLOOR, WALL, cost_ramp
+from terrain.viewer.reports.tree_html import tree_html
+from terrain.viewer.server.page_server import page_server
 
 
 # ------------------------------------------------------------------------------------------------- scene

@@ -12,10 +12,10 @@ from websockets.asyncio.client import connect
 
 from mbf_abstract.cli import make_app
 from mbf_abstract.events import EventKind
-from terrain.bench import Bench
-from terrain.goal_drivers import make_goal_driver
-from terrain.goal_tour import GoalTour
-from terrain.runner import RunOptions, run_scenario
+from terrain.session.bench import Bench
+from terrain.session.executives import make_goal_driver
+from terrain.session.goal_sequence import GoalTour
+from terrain.session.runner import RunOptions, run_scenario
 from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.session import LiveSession
 

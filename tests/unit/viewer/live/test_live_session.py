@@ -6,15 +6,15 @@ import urllib.request
 
 import pytest
 
-from mbf_abstract.clock import WallClock
 from mbf_abstract.events import EventKind, read_events
-from terrain.bench import Bench
-from terrain.goal_drivers import EXECUTIVES, make_goal_driver
-from terrain.goal_tour import GoalTour
-from terrain.runner import RunOptions, run_scenario
+from mbf_abstract.time.clock import WallClock
+from terrain.session.bench import Bench
+from terrain.session.executives import EXECUTIVES, make_goal_driver
+from terrain.session.goal_sequence import GoalTour
+from terrain.session.runner import RunOptions, run_scenario
 from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.session import LiveSession
-from terrain.viewer.picture import ViewerMissing
+from terrain.viewer.pictures.picture import ViewerMissing
 
 
 def run(meadow, folder, **options):

@@ -14,10 +14,10 @@ import viser
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from terrain.viewer.page_access import NOBODY, PageAccess, Role, is_loopback
-from terrain.viewer.page_guard import MAX_REFUSED, MAX_VISITORS
-from terrain.viewer.page_messages import is_allowed
-from terrain.viewer.page_server import page_server
+from terrain.viewer.server.page_access import NOBODY, PageAccess, Role, is_loopback
+from terrain.viewer.server.page_guard import MAX_REFUSED, MAX_VISITORS
+from terrain.viewer.server.page_messages import is_allowed
+from terrain.viewer.server.page_server import page_server
 
 PORT = 18500
 PROTOCOL = [f"viser-v{viser.__version__}"]

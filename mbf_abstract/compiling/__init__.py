@@ -1,0 +1,1 @@
+"""How numba kernels are compiled, cached and kept out of a plugin's patience."""

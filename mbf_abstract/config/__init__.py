@@ -1,0 +1,1 @@
+"""Configuration files: reading, validation with all findings at once, the registry of plugin types."""

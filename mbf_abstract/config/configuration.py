@@ -1,0 +1,295 @@
+"""From a configuration file to validated models and plugin classes, with every mistake reported at once.
+
+A configuration has MBF's shape: navigation parameters at the top, ordered plugin lists, a block of parameters per
+plugin name, and the map sections that the server of the backend declares::
+
+    backend: mesh
+    controller_frequency: 20.0
+    planners:
+      - {name: cvp, type: cvp}
+    cvp: {cost_limit: 0.9}
+    mesh_map:
+      mesh_file: hill.ply
+      layers:
+        - {name: steepness, type: steepness}
+      steepness: {threshold: 0.5}
+
+Two steps, because only the backend's server knows its sections: ``load_config`` reads the file and finds the backend,
+``validate_config`` checks the rest.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+from mbf_abstract.config.findings import ConfigError, Finding, KeyPath, suggest
+from mbf_abstract.config.map_section import LayerSpec, Section, SectionValidator
+from mbf_abstract.config.navigation_parameters import NavigationParameters
+from mbf_abstract.config.registry import PluginError, PluginRegistry
+from mbf_abstract.config.validation import validate
+from mbf_abstract.config.yaml_source import YamlDocument, read_yaml
+from mbf_abstract.parameters import ParameterModel, PluginParameters, parameter
+from mbf_abstract.plugins import Plugin, PluginKind
+
+__all__ = [
+    "Config",
+    "ConfigError",
+    "Finding",
+    "LayerSpec",
+    "NavigationParameters",
+    "PluginDeclaration",
+    "PluginSpec",
+    "RawConfig",
+    "Section",
+    "SkippedPlugin",
+    "load_config",
+    "validate_config",
+]
+
+PLUGIN_LISTS: dict[str, PluginKind] = {
+    "planners": PluginKind.PLANNER,
+    "controllers": PluginKind.CONTROLLER,
+    "recovery_behaviors": PluginKind.RECOVERY,
+    "refiners": PluginKind.REFINER,
+}
+"""Key of the list and kind of its plugins."""
+
+_OWN_KEYS = ("backend", "allow_module_types", *PLUGIN_LISTS)
+
+
+class PluginDeclaration(ParameterModel):
+    """One item of a plugin list. A server may derive it to add keys of its own, e.g. which costmap to use."""
+
+    name: str = parameter(..., "Name of the instance; its parameters stand in the block of this name.")
+    type: str = parameter(..., "Type of the plugin: a registered name or module:Class.")
+    optional: bool = parameter(False, "Whether to go on without this plugin if its class cannot be loaded.")
+
+
+@dataclass(frozen=True)
+class PluginSpec:
+    """One plugin that is ready to be constructed.
+
+    Attributes
+    ----------
+    options : mapping
+        Keys of the declaration that the server added.
+    line : int
+        Line of the declaration, for errors of the constructor.
+    """
+
+    kind: PluginKind
+    name: str
+    type_name: str
+    plugin_class: type[Plugin]
+    parameters: PluginParameters
+    options: Mapping[str, Any] = field(default_factory=dict)
+    line: int = 0
+    optional: bool = False
+
+
+@dataclass(frozen=True)
+class SkippedPlugin:
+    """An optional plugin that is left out, and why."""
+
+    kind: PluginKind
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class RawConfig:
+    """A configuration file whose backend is known and nothing else is checked."""
+
+    backend: str
+    allow_module_types: bool
+    document: YamlDocument
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.document.path
+
+
+@dataclass(frozen=True)
+class Config:
+    """A configuration in which everything is legal.
+
+    Attributes
+    ----------
+    plugins : tuple of PluginSpec
+        In the order of the lists; the first of a kind is that kind's default.
+    sections : mapping of str to Section
+        The map sections that the server declared.
+    """
+
+    backend: str
+    path: Path
+    parameters: NavigationParameters
+    plugins: tuple[PluginSpec, ...] = ()
+    skipped: tuple[SkippedPlugin, ...] = ()
+    sections: Mapping[str, Section] = field(default_factory=dict)
+
+    def plugins_of(self, kind: PluginKind) -> list[PluginSpec]:
+        """Plugins of one kind, in order."""
+        return [spec for spec in self.plugins if spec.kind is kind]
+
+
+def load_config(path: str | os.PathLike[str]) -> RawConfig:
+    """Read a configuration file as far as its backend.
+
+    Raises
+    ------
+    ConfigError
+        The file is not usable YAML, or names no backend. Lesser findings are kept for ``validate_config``.
+    """
+    findings: list[Finding] = []
+    document = read_yaml(path, findings)
+    if document is None:
+        raise ConfigError(findings)
+    backend = document.data.get("backend")
+    if not isinstance(backend, str) or not backend:
+        got = "nothing" if backend is None else repr(backend)
+        raise ConfigError([*findings, document.finding(("backend",), "costmap, mesh or module:Class", got)])
+    allowed = document.data.get("allow_module_types", True)
+    if not isinstance(allowed, bool):
+        findings.append(document.finding(("allow_module_types",), "true or false", repr(allowed)))
+        allowed = False
+    return RawConfig(backend, allowed, document, tuple(findings))
+
+
+def validate_config(
+    raw: RawConfig,
+    sections: Mapping[str, type[ParameterModel]],
+    registry: PluginRegistry,
+    declaration: type[PluginDeclaration] = PluginDeclaration,
+) -> Config:
+    """Check a whole configuration and load the classes it names.
+
+    Parameters
+    ----------
+    raw : RawConfig
+    sections : mapping of str to type
+        Map sections of the server, by key. A model with a field ``layers`` has a block per layer inside its section.
+    registry : PluginRegistry
+        Of the server's backend.
+    declaration : type
+        Items of the plugin lists.
+
+    Raises
+    ------
+    ConfigError
+        Everything that is wrong with the file.
+    """
+    return _Validation(raw, sections, registry, declaration).run()
+
+
+class _Validation:
+    """One pass over a configuration; collects findings and results."""
+
+    def __init__(
+        self,
+        raw: RawConfig,
+        sections: Mapping[str, type[ParameterModel]],
+        registry: PluginRegistry,
+        declaration: type[PluginDeclaration],
+    ) -> None:
+        self.raw = raw
+        self.document = raw.document
+        self.data = raw.document.data
+        self.sections = sections
+        self.registry = registry
+        self.declaration = declaration
+        self.findings = list(raw.findings)
+        self.plugins: list[PluginSpec] = []
+        self.skipped: list[SkippedPlugin] = []
+        self.lines_of_names: dict[str, int] = {}
+
+    def run(self) -> Config:
+        parameters = self._parameters()
+        for key, kind in PLUGIN_LISTS.items():
+            self._plugin_list(key, kind)
+        validator = SectionValidator(self.document, self.registry, self.findings)
+        sections = {key: validator.validate(model, key) for key, model in self.sections.items()}
+        self._unknown_keys()
+        if self.findings or parameters is None:
+            raise ConfigError(self.findings)
+        checked = {key: section for key, section in sections.items() if section is not None}
+        plugins, skipped = tuple(self.plugins), tuple(self.skipped)
+        return Config(self.raw.backend, self.document.path, parameters, plugins, skipped, checked)
+
+    def _parameters(self) -> NavigationParameters | None:
+        own = {key: value for key, value in self.data.items() if key in NavigationParameters.model_fields}
+        return validate(NavigationParameters, own, self.document, (), self.findings)
+
+    def _plugin_list(self, key: str, kind: PluginKind) -> None:
+        items = self.data.get(key)
+        if items is None:
+            return
+        if not isinstance(items, list):
+            self._report((key,), "a list of {name, type}", repr(items)[:60])
+            return
+        for index, item in enumerate(items):
+            declared = validate(self.declaration, item, self.document, (key, index), self.findings)
+            name = declared.name if declared else item.get("name") if isinstance(item, dict) else None
+            if isinstance(name, str) and self._name_is_free(name, (key, index, "name")) and declared:
+                self._plugin(kind, declared, (key, index))
+
+    def _name_is_free(self, name: str, path: KeyPath) -> bool:
+        if name in self.lines_of_names:
+            hint = f"first in line {self.lines_of_names[name]}"
+            self._report(path, "a name no other plugin has", repr(name), hint)
+            return False
+        self.lines_of_names[name] = self.document.line(path)
+        if not name or name in _OWN_KEYS or name in NavigationParameters.model_fields or name in self.sections:
+            self._report(path, "a name that is no key of the configuration", repr(name))
+            return False
+        return True
+
+    def _plugin(self, kind: PluginKind, declared: PluginDeclaration, path: KeyPath) -> None:
+        try:
+            plugin_class = cast("type[Plugin]", self.registry.load(kind, declared.type))
+        except PluginError as error:
+            if declared.optional:
+                self.skipped.append(SkippedPlugin(kind, declared.name, str(error)))
+            else:
+                self._report((*path, "type"), f"a type of {kind.value} that loads", repr(declared.type), error.reason)
+            return
+        block = self.data.get(declared.name)
+        parameters = validate(plugin_class.Parameters, block, self.document, (declared.name,), self.findings)
+        if parameters is None:
+            return
+        self._inner_plugins(plugin_class, parameters, (declared.name,))
+        options = declared.model_dump(exclude=set(PluginDeclaration.model_fields))
+        line, name = self.document.line(path), declared.name
+        spec = PluginSpec(kind, name, declared.type, plugin_class, parameters, options, line, declared.optional)
+        self.plugins.append(spec)
+
+    def _inner_plugins(self, plugin_class: type[Plugin], parameters: PluginParameters, path: KeyPath) -> None:
+        """Check the plugins that stand in the block of another one, by the same registry and the same rules."""
+        for inner in plugin_class.inner_plugins:
+            type_name, block_path = getattr(parameters, inner.type_key), (*path, inner.block_key)
+            try:
+                inner_class = cast("type[Plugin]", self.registry.load(inner.kind, type_name))
+            except PluginError as error:
+                expected = f"a type of {inner.kind.value} that loads"
+                self._report((*path, inner.type_key), expected, repr(type_name), error.reason)
+                continue
+            block = getattr(parameters, inner.block_key)
+            checked = validate(inner_class.Parameters, block, self.document, block_path, self.findings)
+            if checked is not None:
+                self._inner_plugins(inner_class, checked, block_path)
+
+    def _unknown_keys(self) -> None:
+        known = [*_OWN_KEYS, *NavigationParameters.model_fields, *self.sections, *self.lines_of_names]
+        expected = "a known key, a section of this backend or a plugin's name"
+        for key in self.data:
+            if key not in known:
+                self._report((key,), expected, repr(key), suggest(key, known))
+
+    def _report(self, path: KeyPath, expected: str, got: str, hint: str = "") -> None:
+        self.findings.append(self.document.finding(path, expected, got, hint))

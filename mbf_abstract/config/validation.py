@@ -1,0 +1,191 @@
+"""Validation of blocks of a YAML document against parameter models, with findings instead of exceptions.
+
+Types are strict: ``"5"``, ``5.0`` and ``true`` are no whole numbers, but ``5`` is a number, a list is a tuple, and a
+text is an enum value or a file path. A relative file path counts from the folder of the file it stands in.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from mbf_abstract.config.findings import Finding, KeyPath, describe_value, suggest
+from mbf_abstract.config.yaml_source import YamlDocument
+from mbf_abstract.parameters import ParameterModel
+
+Model = TypeVar("Model", bound=ParameterModel)
+
+_MAX_LISTED_KEYS = 15
+_EXPECTED = {
+    "bool_type": "true or false",
+    "string_type": "a text",
+    "model_type": "a block of keys",
+    "dict_type": "a block of keys",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "path_type": "a file path",
+    "path_not_file": "a file that exists",
+    "path_not_directory": "a folder that exists",
+    "missing": "a value",
+}
+_NUMBER_ERRORS = {
+    "float_type",
+    "int_type",
+    "int_from_float",
+    "finite_number",
+    "greater_than",
+    "greater_than_equal",
+    "less_than",
+    "less_than_equal",
+}
+
+
+def validate(
+    model: type[Model], data: object, document: YamlDocument, key_path: KeyPath, findings: list[Finding]
+) -> Model | None:
+    """Make a ``model`` of one block of a document.
+
+    Parameters
+    ----------
+    model : subclass of ParameterModel
+    data : object
+        The block, usually a mapping; None counts as an empty block.
+    document : YamlDocument
+        Where the block comes from; gives lines and the folder of relative paths.
+    key_path : KeyPath
+        Where the block stands in the document.
+    findings : list of Finding
+        Everything that is wrong is appended here.
+
+    Returns
+    -------
+    Model or None
+        None if something is wrong with this block.
+    """
+    block = {} if data is None else _with_absolute_paths(model, data, document.path.parent)
+    try:
+        return model.model_validate_json(json.dumps(block, default=str), strict=True)
+    except ValidationError as error:
+        findings.extend(_findings_of(model, block, error.errors(include_url=False), document, key_path))
+        return None
+
+
+def describe_range(field: FieldInfo) -> str:
+    """Return a field's legal range and unit as text, e.g. ``> 0 and <= 5 m``; empty if it has neither."""
+    bounds = []
+    for name, sign in (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<=")):
+        bounds += [f"{sign} {getattr(part, name):g}" for part in field.metadata if hasattr(part, name)]
+    extra = field.json_schema_extra
+    unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    return " ".join(part for part in (" and ".join(bounds), unit) if part)
+
+
+def _findings_of(
+    model: type[ParameterModel], block: object, errors: list[ErrorDetails], document: YamlDocument, key_path: KeyPath
+) -> list[Finding]:
+    """One finding per key: the alternatives of a union, which pydantic reports one by one, are joined by "or"."""
+    found: dict[KeyPath, Finding] = {}
+    for error in errors:
+        loc = _location_in_data(block, error)
+        finding = _finding_of(model, error, loc, document, key_path)
+        earlier = found.get(loc)
+        if earlier is not None and earlier.expected != finding.expected:
+            expected = f"{earlier.expected} or {finding.expected}"
+            finding = document.finding((*key_path, *loc), expected, finding.got, finding.hint)
+        found[loc] = finding
+    return list(found.values())
+
+
+def _finding_of(
+    model: type[ParameterModel], error: ErrorDetails, loc: KeyPath, document: YamlDocument, key_path: KeyPath
+) -> Finding:
+    path = (*key_path, *loc)
+    if error["type"] == "extra_forbidden":
+        known = list(_model_at(model, loc[:-1]).model_fields)
+        return document.finding(path, "a known key", repr(loc[-1]), _key_hint(str(loc[-1]), known))
+    got = "nothing" if error["type"] == "missing" else describe_value(error["input"])
+    return document.finding(path, _expected(model, error, loc), got)
+
+
+def _expected(model: type[ParameterModel], error: ErrorDetails, loc: KeyPath) -> str:
+    field = _field_at(model, loc)
+    limits = describe_range(field) if field is not None else ""
+    if error["type"] in _NUMBER_ERRORS:
+        whole = error["type"].startswith("int") or (field is not None and field.annotation is int)
+        number = "a whole number" if whole else "a finite number" if error["type"] == "finite_number" else "a number"
+        return f"{number} {limits}".strip()
+    if error["type"] == "missing":
+        return f"a value {limits}".strip()
+    text = _EXPECTED.get(error["type"]) or error["msg"].removeprefix("Value error, ")
+    return text.removeprefix("Input should be ")
+
+
+def _key_hint(key: str, known: list[str]) -> str:
+    closest = suggest(key, known)
+    if closest or not known:
+        return closest
+    more = ", ..." if len(known) > _MAX_LISTED_KEYS else ""
+    return "known keys: " + ", ".join(known[:_MAX_LISTED_KEYS]) + more
+
+
+def _location_in_data(block: object, error: ErrorDetails) -> KeyPath:
+    """Return the part of pydantic's location that exists in the data; the rest names alternatives of a union."""
+    loc: KeyPath = ()
+    for part in error["loc"]:
+        known = range(len(block)) if isinstance(block, list) else block if isinstance(block, dict) else ()
+        inside = part in known
+        if not inside:
+            return (*loc, part) if error["type"] == "missing" else loc
+        loc = (*loc, part)
+        block = block[part]  # type: ignore[index]
+    return loc
+
+
+def _field_at(model: type[BaseModel], loc: KeyPath) -> FieldInfo | None:
+    """Return the field that a location ends in, or whose items it points into."""
+    field: FieldInfo | None = None
+    current: type[BaseModel] | None = model
+    for part in loc:
+        if isinstance(part, str):
+            field = current.model_fields.get(part) if current is not None else None
+            current = _inner_model(field.annotation) if field is not None else None
+    return field
+
+
+def _model_at(model: type[BaseModel], loc: KeyPath) -> type[BaseModel]:
+    field = _field_at(model, loc)
+    return (_inner_model(field.annotation) if field is not None else None) or model
+
+
+def _inner_model(annotation: Any) -> type[BaseModel] | None:
+    arguments = get_args(annotation)  # for Python 3.10 tuple[float, float] is a type, too
+    if not arguments and isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for arg in arguments if (found := _inner_model(arg))), None)
+
+
+def _with_absolute_paths(model: type[BaseModel], data: object, folder: Path) -> object:
+    """Copy of ``data`` whose texts in fields of type ``Path`` are absolute; ``~`` is the home folder."""
+    if not isinstance(data, Mapping):
+        return data
+    resolved = dict(data)
+    for name, field in model.model_fields.items():
+        value = resolved.get(name)
+        inner = _inner_model(field.annotation)
+        if isinstance(value, str) and _holds_a_path(field.annotation):
+            resolved[name] = str(folder.absolute() / Path(value).expanduser())
+        elif inner is not None and isinstance(value, list):
+            resolved[name] = [_with_absolute_paths(inner, item, folder) for item in value]
+        elif inner is not None and isinstance(value, Mapping):
+            resolved[name] = _with_absolute_paths(inner, value, folder)
+    return resolved
+
+
+def _holds_a_path(annotation: Any) -> bool:
+    return annotation is Path or any(_holds_a_path(arg) for arg in get_args(annotation))

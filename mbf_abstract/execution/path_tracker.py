@@ -1,0 +1,256 @@
+"""Where on its path a robot is: the one tracker of all controllers, on grids and on meshes.
+
+Progress is monotone. From the last progress on, the search follows the path to the point nearest to the robot and ends
+where the path leads away from it, so a path that crosses itself, runs back beside itself, climbs storeys or ends where
+it began is followed in order, however sparse its poses are. At a *cusp*, where the driving direction changes or the
+path turns back on itself, the search waits until the robot has come to it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from copy import copy
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.arithmetic import norm, scalar_products
+from mbf_abstract.geometry.transform import Transform
+
+FloatArray = NDArray[np.float64]
+
+SEARCH_WINDOW = 2.0
+"""How far ahead of the last progress [m] the nearest point is searched."""
+CUSP_REACHED = 0.1
+"""This near [m] to a cusp, along the path, the robot goes on to the part of the path behind it."""
+LEADS_AWAY = (1.5, 0.1)
+"""The path leads away where it is farther from the robot than this factor times the least distance plus this [m]."""
+SAME_PLACE = 0.3
+"""A robot joins a path at the earliest place that is at most this much farther off [m] than the nearest one."""
+ARM, GAINED = 0.2, 0.2
+"""A path turns back on itself where two of its points, ``ARM`` [m] before and behind, are nearer than ``GAINED`` [m].
+
+That is a turn of 120 degrees; on a smooth bend, one of a radius below 0.11 m.
+"""
+CHUNK = 32
+"""So many segments are looked at in one go."""
+_POSITION_NOISE = 1e-9  # [m]
+
+
+class PathTracker:
+    """One path and a robot's progress on it.
+
+    Parameters
+    ----------
+    path : Path
+        One without poses has no length, and must not be updated.
+    dimensions : {2, 3}
+        2 = seen from above, heights do not count.
+
+    Attributes
+    ----------
+    points : (n, dimensions) float64
+        Positions of the path [m].
+    lengths : (n,) float64
+        Length along the path [m] at each pose.
+    reverse : (n - 1,) bool
+        Segments that are driven backward: they lead against the heading of their poses.
+    cusps : (k,) float64
+        Lengths along the path [m] of its cusps, and of its end.
+    progress : float
+        Length along the path [m] of the point the robot has got to.
+    deviation : float
+        Distance [m] of the robot from that point.
+    """
+
+    def __init__(self, path: Path, dimensions: int = 3) -> None:
+        self.path = path
+        self.points: FloatArray = np.ascontiguousarray(path.positions[:, :dimensions])
+        self.lengths = polyline_lengths(self.points)
+        self.reverse = reverse_segments(path, self.points)
+        switches = self.lengths[1:-1][self.reverse[1:] != self.reverse[:-1]]
+        self.cusps: FloatArray = np.unique(np.concatenate([switches, self._turns_back(), self.lengths[-1:]]))
+        self.progress = 0.0
+        self.deviation = 0.0
+        self._joined = False
+        self._segment = 0
+
+    @property
+    def goal(self) -> Pose:
+        """Last pose of the path."""
+        return self.path[len(self.path) - 1]
+
+    @property
+    def length(self) -> float:
+        """Length of the path [m]."""
+        return float(self.lengths[-1]) if len(self.lengths) else 0.0
+
+    @property
+    def remaining(self) -> float:
+        """Length [m] left along the path."""
+        return self.length - self.progress
+
+    @property
+    def driving_backward(self) -> bool:
+        """Whether the segment ahead is driven in reverse."""
+        return bool(len(self.reverse)) and bool(self.reverse[min(self._segment, len(self.reverse) - 1)])
+
+    @property
+    def next_cusp(self) -> float:
+        """Length along the path [m] of the next cusp, or of the end."""
+        ahead = int(np.searchsorted(self.cusps, self.progress + _POSITION_NOISE))
+        return float(self.cusps[min(ahead, len(self.cusps) - 1)])
+
+    @property
+    def to_cusp(self) -> float:
+        """Length [m] to the next cusp, or to the end."""
+        return self.next_cusp - self.progress
+
+    @property
+    def on_last_section(self) -> bool:
+        """Whether no cusp is left before the end."""
+        return self.next_cusp >= self.length
+
+    def has_arrived(self, dist_tolerance: float) -> bool:
+        """Whether the robot has come along the path to within ``dist_tolerance`` [m] of its end."""
+        return self.remaining <= dist_tolerance + _POSITION_NOISE
+
+    def update(self, position: ArrayLike) -> None:
+        """Move the progress on to where a robot at ``position`` (dimensions,) [m] is; it never goes back."""
+        robot = np.asarray(position, dtype=np.float64)
+        window = SEARCH_WINDOW
+        if not self._joined:
+            self._joined, window = True, math.inf
+            self._advance(self._joining_place(robot))
+        cusp = self.next_cusp
+        place = robot.tolist()
+        self._advance(self._nearest_ahead(place, min(self.progress + window, cusp)))
+        if cusp < self.length and cusp - self.progress <= CUSP_REACHED:
+            self._advance(cusp)
+        self.deviation = _norm(c - r for c, r in zip(self._point_at(self.progress), place, strict=True))
+
+    def seen_from(self, transform: Transform) -> PathTracker:
+        """Return the same path and progress in the transform's parent frame."""
+        moved = copy(self)
+        moved.path = transform.apply_to_path(self.path)
+        moved.points = np.ascontiguousarray(moved.path.positions[:, : self.points.shape[1]])
+        return moved
+
+    def point_at(self, length: float) -> FloatArray:
+        """Point (dimensions,) of the path at ``length`` [m] along it, clamped to its ends."""
+        return np.array(self._point_at(length))
+
+    def _point_at(self, length: float) -> list[float]:
+        """As ``points_at``, to the bit, without the cost of array calls."""
+        segment = int(self.lengths.searchsorted(length, side="right")) - 1
+        if segment < 0 or segment == len(self.lengths) - 1:
+            return list(self.points[max(segment, 0)].tolist())
+        begin, end = self.lengths[segment : segment + 2].tolist()
+        corner, following = self.points[segment : segment + 2].tolist()
+        return [(f - c) / (end - begin) * (length - begin) + c for c, f in zip(corner, following, strict=True)]
+
+    def points_at(self, lengths: FloatArray) -> FloatArray:
+        """Points (m, dimensions) of the path at ``lengths`` (m,) [m] along it, clamped to its ends."""
+        return np.stack([np.interp(lengths, self.lengths, column) for column in self.points.T], axis=-1)
+
+    def ahead(self, distance: float) -> FloatArray:
+        """Points (m, dimensions) of the path from the progress on, over ``distance`` [m]; at least two."""
+        return self._stretch(min(self.progress + distance, self.length))
+
+    def _advance(self, progress: float) -> None:
+        self.progress = progress
+        self._segment = max(int(np.searchsorted(self.lengths, progress + _POSITION_NOISE, side="right")) - 1, 0)
+
+    def _nearest_ahead(self, robot: list[float], end: float) -> float:
+        """Length along the path [m], up to ``end``, of the point nearest to a robot; the earliest of equals.
+
+        A plain loop: the path leads away from a robot that is on it within a few segments.
+        """
+        best, least = self.progress, math.inf
+        factor, margin = LEADS_AWAY
+        for begin, length, corner, following in self._segments_from(self._segment):
+            if begin >= end and least < math.inf:
+                break
+            scale = max(length, _POSITION_NOISE)
+            side = [(f - c) / scale for c, f in zip(corner, following, strict=True)]
+            along = sum((r - c) * s for r, c, s in zip(robot, corner, side, strict=True))
+            along = min(max(along, self.progress - begin), end - begin, length)
+            gap = _norm(r - c - along * s for r, c, s in zip(robot, corner, side, strict=True))
+            if gap < least - _POSITION_NOISE:
+                best, least = begin + along, gap
+            if _norm(r - f for r, f in zip(robot, following, strict=True)) > factor * least + margin:
+                break
+        return max(best, self.progress)
+
+    def _segments_from(self, first: int) -> Iterator[tuple[float, float, list[float], list[float]]]:
+        """Segments from one on: length of the path before it [m], its own [m], its two ends."""
+        for chunk in range(first, len(self.points) - 1, CHUNK):
+            corners, lengths = self.points[chunk : chunk + CHUNK + 1], self.lengths[chunk : chunk + CHUNK + 1]
+            ends, begins = corners.tolist(), lengths.tolist()
+            for k in range(len(ends) - 1):
+                yield begins[k], begins[k + 1] - begins[k], ends[k], ends[k + 1]
+
+    def _stretch(self, end: float) -> FloatArray:
+        """Points of the path from the progress to ``end`` [m] along it."""
+        first = int(np.searchsorted(self.lengths, self.progress + _POSITION_NOISE, side="right"))
+        last = int(np.searchsorted(self.lengths, end - _POSITION_NOISE, side="left"))
+        ends = self.points_at(np.array([self.progress, end]))
+        return np.concatenate([ends[:1], self.points[first : max(last, first)], ends[1:]])
+
+    def _joining_place(self, robot: FloatArray) -> float:
+        """Length along the path [m] from which on a robot that comes to it looks for its place."""
+        if len(self.points) < 2:
+            return 0.0
+        sides, offsets = np.diff(self.points, axis=0), robot - self.points[:-1]
+        shares = np.clip(
+            scalar_products(offsets, sides) / np.maximum(scalar_products(sides, sides), _POSITION_NOISE), 0.0, 1.0
+        )
+        gaps = norm(offsets - shares[:, None] * sides)
+        return float(self.lengths[int(np.argmax(gaps <= gaps.min() + SAME_PLACE))])
+
+    def _turns_back(self) -> FloatArray:
+        """Lengths along the path [m] of the poses at which it turns back on itself: one, the sharpest, a turn."""
+        inner = self.lengths[(self.lengths >= ARM) & (self.lengths <= self.length - ARM)]
+        if not len(inner):
+            return inner
+        before, behind = self.points_at(inner - ARM), self.points_at(inner + ARM)
+        gained = norm(behind - before)
+        turning, gained = inner[gained < GAINED], gained[gained < GAINED]
+        turns = np.split(np.arange(len(turning)), np.flatnonzero(np.diff(turning) > ARM) + 1)
+        return turning[np.array([turn[np.argmin(gained[turn])] for turn in turns if len(turn)], dtype=np.intp)]
+
+
+def polyline_lengths(points: FloatArray) -> FloatArray:
+    """(n,) length [m] along a polyline (n, k) from its first point to each point."""
+    steps = np.diff(points, axis=0)
+    return np.concatenate([[0.0], np.cumsum(norm(steps))])[: len(points)]
+
+
+def _norm(components: Iterable[float]) -> float:
+    total = 0.0
+    for component in components:
+        total += component * component
+    return math.sqrt(total)
+
+
+def reverse_segments(path: Path, points: FloatArray) -> NDArray[np.bool_]:
+    """(n - 1,) bool: which segments lead against the heading of their poses.
+
+    The first and the last pose carry the orientations that were asked for, not the direction of travel: the segments
+    there are backward only if their other neighbour is too, or both their poses say so. A path of two poses is driven
+    forward.
+    """
+    count = len(points)
+    if count < 3:
+        return np.zeros(max(count - 1, 0), dtype=bool)
+    assert path.orientations is not None
+    x, y, z, w = path.orientations.T
+    headings = np.column_stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
+    headings, steps = headings[:, : points.shape[1]], np.diff(points, axis=0)
+    at_start, at_end = scalar_products(steps, headings[:-1]) < -1e-9, scalar_products(steps, headings[1:]) < -1e-9
+    reverse = at_start & at_end
+    reverse[0] = at_end[0] and (at_start[0] or reverse[1])
+    reverse[-1] = at_start[-1] and (at_end[-1] or reverse[-2])
+    return reverse

@@ -1,0 +1,156 @@
+"""A path: poses in one frame as arrays, with the same promises as single poses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbf_abstract.geometry.arithmetic import norm, scalar_products
+from mbf_abstract.geometry.pose import Pose
+from mbf_abstract.geometry.rotations import (
+    QUATERNION_NORM_TOLERANCE,
+    FloatArray,
+    NonFiniteError,
+    Quaternion,
+    quaternions_from_axes,
+)
+
+
+def _refuse_wrong_pose(positions: FloatArray, orientations: FloatArray, squared_norms: FloatArray) -> None:
+    """Name the first pose of a path that is not finite, or else the first whose quaternion is not of unit length."""
+    infinite = ~(np.isfinite(positions).all(axis=1) & np.isfinite(orientations).all(axis=1))
+    if infinite.any():
+        i = int(np.argmax(infinite))
+        raise NonFiniteError(f"pose {i} of the path is not finite: {positions[i].tolist()} {orientations[i].tolist()}")
+    i = int(np.argmax(np.abs(squared_norms - 1.0) > QUATERNION_NORM_TOLERANCE))
+    raise ValueError(f"orientation of pose {i} has squared norm {squared_norms[i]:.6g}, expected 1")
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A sequence of poses in one frame, stored as two read-only arrays.
+
+    Parameters
+    ----------
+    positions : (n, 3) float64
+        Positions [m]; copied.
+    orientations : (n, 4) float64
+        Unit quaternions x y z w; copied. Without them every pose looks along +x.
+    frame_id : str
+        Frame of all poses.
+    stamp : float
+        Time of planning [s].
+    guidance : object
+        What a planner hands on to a controller that can use more than poses, e.g. a vector field. The core never
+        looks at it.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, a non-finite number (named by index) or a quaternion that is not of unit length.
+    """
+
+    positions: FloatArray
+    orientations: FloatArray | None = None
+    frame_id: str = "map"
+    stamp: float = 0.0
+    guidance: Any = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        positions = np.array(self.positions, dtype=np.float64).reshape(-1, 3)
+        if self.orientations is None:
+            orientations = np.tile([0.0, 0.0, 0.0, 1.0], (len(positions), 1))
+        else:
+            orientations = np.array(self.orientations, dtype=np.float64).reshape(-1, 4)
+        if len(positions) != len(orientations):
+            raise ValueError(f"{len(positions)} positions but {len(orientations)} orientations")
+        # Whole arrays first: which pose is wrong is looked for only if one may be.
+        norms = scalar_products(orientations, orientations)
+        is_unit = np.abs(norms - 1.0) <= QUATERNION_NORM_TOLERANCE
+        if not (is_unit.all() and np.isfinite(positions).all()):
+            _refuse_wrong_pose(positions, orientations, norms)
+        positions.flags.writeable = False
+        orientations.flags.writeable = False
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "orientations", orientations)
+
+    @classmethod
+    def from_poses(cls, poses: Sequence[Pose], stamp: float = 0.0) -> Path:
+        """Build a path of poses that share one frame; raises ValueError where they do not."""
+        frames = {pose.frame_id for pose in poses}
+        if len(frames) > 1:
+            raise ValueError(f"the poses of a path must share one frame, got {sorted(frames)}")
+        return cls(
+            np.array([pose.position for pose in poses], dtype=np.float64).reshape(-1, 3),
+            np.array([pose.orientation for pose in poses], dtype=np.float64).reshape(-1, 4),
+            frames.pop() if frames else "map",
+            stamp,
+        )
+
+    @classmethod
+    def from_points(
+        cls,
+        positions: ArrayLike,
+        final_orientation: Quaternion | None = None,
+        normals: ArrayLike | None = None,
+        frame_id: str = "map",
+        stamp: float = 0.0,
+        guidance: Any = None,
+    ) -> Path:
+        """Build a path through ``positions`` (n, 3) whose poses head to the next point.
+
+        Parameters
+        ----------
+        final_orientation : quaternion, optional
+            Orientation of the last pose; without it the last pose keeps the heading of the one before.
+        normals : (n, 3) float, optional
+            Surface normals, the poses' z axes; without them z is up.
+        """
+        points = np.asarray(positions, dtype=np.float64).reshape(-1, 3)
+        ahead = np.tile([1.0, 0.0, 0.0], (len(points), 1))
+        steps = np.diff(points, axis=0)
+        moving = np.flatnonzero(steps.any(axis=1))
+        if moving.size:  # a repeated point looks where the next one looks, the last one where the one before looked
+            following = np.minimum(np.searchsorted(moving, np.arange(len(points))), moving.size - 1)
+            ahead = steps[moving[following]]
+        up = np.tile([0.0, 0.0, 1.0], (len(points), 1)) if normals is None else np.asarray(normals, dtype=float)
+        orientations = quaternions_from_axes(ahead, up) if len(points) else np.zeros((0, 4))
+        if final_orientation is not None and len(points):
+            orientations[-1] = final_orientation
+        return cls(points, orientations, frame_id, stamp, guidance)
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    @overload
+    def __getitem__(self, index: int) -> Pose: ...
+    @overload
+    def __getitem__(self, index: slice) -> Path: ...
+    def __getitem__(self, index: int | slice) -> Pose | Path:
+        assert self.orientations is not None
+        if isinstance(index, slice):
+            return replace(self, positions=self.positions[index], orientations=self.orientations[index])
+        x, y, z = self.positions[index].tolist()
+        qx, qy, qz, qw = self.orientations[index].tolist()
+        return Pose((x, y, z), (qx, qy, qz, qw), self.frame_id, self.stamp)
+
+    def __iter__(self) -> Iterator[Pose]:
+        return (self[i] for i in range(len(self)))
+
+    @property
+    def length(self) -> float:
+        """Sum of the 3D lengths of the path's segments [m]."""
+        return float(norm(np.diff(self.positions, axis=0)).sum())
+
+    @property
+    def remaining_lengths(self) -> FloatArray:
+        """(n,) float64, length [m] along the path from each pose to the last one."""
+        segments = norm(np.diff(self.positions, axis=0))
+        return np.concatenate([np.cumsum(segments[::-1])[::-1], [0.0]]) if len(self) else np.zeros(0)
+
+    def __repr__(self) -> str:
+        return f"<Path of {len(self)} poses, {self.length:.2f} m, frame {self.frame_id!r}>"

@@ -1,0 +1,303 @@
+"""Goals, results and feedback of the actions, with the fields of ``mbf_msgs``.
+
+An empty plugin name means the first one loaded (for a running ``exe_path``: the running one). All values are frozen;
+a goal object can be sent any number of times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mbf_abstract.geometry import Command, Path, Pose
+from mbf_abstract.goals.goal_area import GoalArea
+from mbf_abstract.outcomes import is_success, outcome_name
+
+WaypointTask = Callable[[int, Pose], None]
+"""What is done at a waypoint, called with its index and pose."""
+
+
+@dataclass(frozen=True)
+class GetPathGoal:
+    """Ask for a path.
+
+    Attributes
+    ----------
+    target_pose : Pose
+    start_pose : Pose, optional
+        None = from where the robot is.
+    planner : str
+    dist_tolerance, angle_tolerance : float, optional
+        How far [m, rad] from the target the path may end where the target itself cannot be reached; 0 = exactly there,
+        None = the server's tolerances (with a ``goal_area`` 0: the area is tolerance enough).
+    via : tuple of Pose
+        Poses to pass on the way, in order.
+    goal_area : GoalArea, optional
+        Any place inside will do; ``target_pose`` is then not looked at.
+    concurrency_slot : int
+        0..255; goals in different slots run in parallel, a new goal in a used slot preempts.
+    """
+
+    target_pose: Pose
+    start_pose: Pose | None = None
+    planner: str = ""
+    dist_tolerance: float | None = None
+    angle_tolerance: float | None = None
+    via: tuple[Pose, ...] = ()
+    goal_area: GoalArea | None = None
+    concurrency_slot: int = 0
+
+
+@dataclass(frozen=True)
+class ExePathGoal:
+    """Follow a path. Tolerances [m, rad] of None are the server's ``dist_tolerance`` and ``angle_tolerance``.
+
+    With a ``goal_area`` the robot has arrived as soon as it is inside, whatever controller and tolerances say.
+    """
+
+    path: Path
+    controller: str = ""
+    dist_tolerance: float | None = None
+    angle_tolerance: float | None = None
+    goal_area: GoalArea | None = None
+    concurrency_slot: int = 0
+
+
+@dataclass(frozen=True)
+class RecoveryGoal:
+    """Run a recovery behaviour."""
+
+    behavior: str = ""
+    concurrency_slot: int = 0
+
+
+@dataclass(frozen=True)
+class RefinePathGoal:
+    """Improve a path."""
+
+    path: Path
+    refiner: str = ""
+    concurrency_slot: int = 0
+
+
+@dataclass(frozen=True)
+class MoveBaseGoal:
+    """Go to a pose: plan, follow, recover.
+
+    Attributes
+    ----------
+    recovery_behaviors : tuple of str, optional
+        Names to try in order; None = all that are loaded, in load order; empty = none.
+    dist_tolerance, angle_tolerance : float, optional
+        Arrival tolerances [m, rad], None = the server's. Where the target cannot be reached, the path may end that far
+        from it too; the robot then comes the nearer to the path's end, at least to a quarter of the tolerance.
+    goal_area : GoalArea, optional
+        Go to the cheapest place inside instead of to ``target_pose``, and stop as soon as inside.
+    """
+
+    target_pose: Pose
+    planner: str = ""
+    controller: str = ""
+    recovery_behaviors: tuple[str, ...] | None = None
+    dist_tolerance: float | None = None
+    angle_tolerance: float | None = None
+    goal_area: GoalArea | None = None
+
+
+@dataclass(frozen=True)
+class FollowWaypointsGoal:
+    """Visit poses in order, each with a ``move_base`` goal.
+
+    Attributes
+    ----------
+    waypoints : tuple of Pose
+    loops : int
+        How often the whole list is visited; ValueError if it is not at least 1.
+    stop_on_failure : bool
+        End the tour at the first visit that fails; otherwise go on to the next pose.
+    task : callable, optional
+        Called as ``task(index, pose)`` at every pose that was reached, while the robot stands there. It may take its
+        time; one that raises ends the tour with INTERNAL_ERROR.
+    planner, controller, recovery_behaviors, dist_tolerance, angle_tolerance
+        As in ``MoveBaseGoal``.
+    """
+
+    waypoints: tuple[Pose, ...]
+    loops: int = 1
+    stop_on_failure: bool = True
+    task: WaypointTask | None = None
+    planner: str = ""
+    controller: str = ""
+    recovery_behaviors: tuple[str, ...] | None = None
+    dist_tolerance: float | None = None
+    angle_tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "waypoints", tuple(self.waypoints))
+        if self.loops < 1:
+            raise ValueError(f"loops must be at least 1, got {self.loops}")
+
+    @property
+    def visits(self) -> int:
+        """How many visits the tour has."""
+        return len(self.waypoints) * self.loops
+
+    def visit(self, number: int) -> MoveBaseGoal:
+        """Return the goal of one visit, counted from 0 over all loops."""
+        return MoveBaseGoal(
+            self.waypoints[number % len(self.waypoints)],
+            self.planner,
+            self.controller,
+            self.recovery_behaviors,
+            self.dist_tolerance,
+            self.angle_tolerance,
+        )
+
+
+@dataclass(frozen=True)
+class ActionResult:
+    """What every result has: an outcome code (success < 10) and a text that is never empty."""
+
+    outcome: int
+    message: str
+
+    def __post_init__(self) -> None:
+        if not self.message:
+            object.__setattr__(self, "message", outcome_name(self.outcome))
+
+    @property
+    def success(self) -> bool:
+        """Whether the outcome is below 10."""
+        return is_success(self.outcome)
+
+    @property
+    def outcome_name(self) -> str:
+        """Readable name of the outcome."""
+        return outcome_name(self.outcome)
+
+
+@dataclass(frozen=True)
+class GetPathResult(ActionResult):
+    """Path in the global frame and its cost (the path's length where the planner gives none).
+
+    ``plugin_outcome`` and ``plugin_message`` are the planner's own last words, also where patience ran out.
+    ``permanent`` says of a failure that planning anew cannot change it.
+    """
+
+    path: Path | None = None
+    cost: float = 0.0
+    planner: str = ""
+    plugin_outcome: int | None = None
+    plugin_message: str = ""
+    permanent: bool = False
+
+
+@dataclass(frozen=True)
+class ExePathResult(ActionResult):
+    """Where the robot ended, and how far [m, rad] from the last pose of the path."""
+
+    final_pose: Pose | None = None
+    dist_to_goal: float = float("inf")
+    angle_to_goal: float = float("inf")
+    controller: str = ""
+    plugin_outcome: int | None = None
+    plugin_message: str = ""
+
+
+@dataclass(frozen=True)
+class RecoveryResultMessage(ActionResult):
+    """The behaviour that ran."""
+
+    used_plugin: str = ""
+
+
+@dataclass(frozen=True)
+class RefinePathResult(ActionResult):
+    """The refined path, how far its end moved, and its length divided by the original's.
+
+    Without success ``refined_path`` is the path of the goal: it can be driven, as it could before.
+    """
+
+    refined_path: Path | None = None
+    final_position_error: float = 0.0
+    final_orientation_error: float = 0.0
+    path_length_ratio: float = 1.0
+    refiner: str = ""
+
+
+@dataclass(frozen=True)
+class MoveBaseResult(ActionResult):
+    """Where the robot ended, and how far [m, rad] from the target."""
+
+    final_pose: Pose | None = None
+    dist_to_goal: float = float("inf")
+    angle_to_goal: float = float("inf")
+
+
+@dataclass(frozen=True)
+class FollowWaypointsResult(ActionResult):
+    """What became of a tour: one result per visit, in order of visits.
+
+    The outcome is SUCCESS if every visit succeeded, else that of the first one that failed; CANCELED and INTERNAL_ERROR
+    are the tour's own.
+    """
+
+    results: tuple[MoveBaseResult, ...] = ()
+
+    @property
+    def failed(self) -> tuple[int, ...]:
+        """Numbers of the visits that failed."""
+        return tuple(number for number, result in enumerate(self.results) if not result.success)
+
+
+@dataclass(frozen=True)
+class ExePathFeedback:
+    """One observed control cycle.
+
+    Attributes
+    ----------
+    outcome, message
+        Of the last controller call, also of a failed one that is being retried.
+    dist_to_goal, angle_to_goal : float
+        Straight distance [m] and rotation [rad] to the last pose of the path.
+    distance_along_path : float
+        Distance to go along the path [m].
+    time_to_goal : float
+        ``distance_along_path`` at the mean speed so far [s]; infinite while the robot has not moved.
+    last_command : Command, optional
+        What the plugin computed, also where something else was sent.
+    """
+
+    outcome: int
+    message: str
+    current_pose: Pose
+    dist_to_goal: float
+    angle_to_goal: float
+    distance_along_path: float
+    time_to_goal: float
+    last_command: Command | None = None
+
+
+@dataclass(frozen=True)
+class FollowWaypointsFeedback:
+    """Where a tour is.
+
+    Attributes
+    ----------
+    visit, waypoint : int
+        The present visit, counted from 0 over all loops, and the index of its pose.
+    results : tuple of MoveBaseResult
+        The visits that have ended.
+    driving : ExePathFeedback, optional
+        How the present visit gets on; None when it has just ended.
+    """
+
+    visit: int
+    waypoint: int
+    results: tuple[MoveBaseResult, ...]
+    driving: ExePathFeedback | None
+
+
+@dataclass(frozen=True)
+class NoFeedback:
+    """Feedback of the actions that have none; never published."""

@@ -1,0 +1,1 @@
+"""The abstract navigation server, the plugins it hosts, and its factory."""

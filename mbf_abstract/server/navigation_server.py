@@ -1,0 +1,327 @@
+"""The abstract navigation server: owns the runtime, the plugins and the six actions. It knows no map.
+
+A server of a map derives it and overrides hooks only: make the map, make a plugin's context, say whether the map may be
+driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_costmap_nav.server``,
+``mbf_mesh_nav.server``.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import fields
+from pathlib import Path as FilePath
+from typing import Any, ClassVar
+
+from mbf_abstract.actions.exe_path import ExePathAction
+from mbf_abstract.actions.follow_waypoints import FollowWaypointsAction
+from mbf_abstract.actions.get_path import GetPathAction
+from mbf_abstract.actions.move_base import MoveBaseAction
+from mbf_abstract.actions.recovery import RecoveryAction
+from mbf_abstract.actions.refine_path import RefinePathAction
+from mbf_abstract.config.configuration import Config
+from mbf_abstract.config.navigation_parameters import READ_ONCE, NavigationParameters
+from mbf_abstract.drive.driver_check import check_driver
+from mbf_abstract.drive.robot import Robot, RobotInformation, turning_radius_of
+from mbf_abstract.drive.velocity_gate import VelocityGate
+from mbf_abstract.drive.velocity_limits import VelocityLimits
+from mbf_abstract.events import EventBus, EventKind
+from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.execution.supervisor import Supervisor
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.callbacks import CallbackThread
+from mbf_abstract.maps.queries import MapQueries
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.view import FieldView, FloorMap, MapView
+from mbf_abstract.parameters import ParameterModel
+from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
+from mbf_abstract.server.plugin_host import PluginHost
+from mbf_abstract.server.process_end import ProcessEndWatch
+from mbf_abstract.time.clock import Clock
+from mbf_abstract.time.sim_clock import SimClock
+
+
+class AbstractNavigationServer(PluginHost):
+    """Actions, plugins and the velocity gate of one robot; use it as a context manager or call ``close``.
+
+    Parameters
+    ----------
+    config : Config
+        A validated configuration.
+    robot : Robot
+        The robot's driver; DriverError if it is none.
+    clock : Clock
+        ``WallClock`` for a real robot, ``SimClock`` for simulated time.
+    transforms : TransformBuffer, optional
+        Where the robot's pose is published.
+    events : EventBus, optional
+        Where events go.
+    seed : int
+        Seed of the plugins' random generators.
+    """
+
+    config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {}
+    """Top-level blocks of a configuration that describe this server's map."""
+
+    def __init__(
+        self,
+        config: Config,
+        robot: Robot,
+        clock: Clock,
+        transforms: TransformBuffer | None = None,
+        events: EventBus | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.config = config
+        self._closed = False
+        check_driver(robot, clock)
+        self._own_turning_radius = turning_radius_of(robot)
+        super().__init__(self._make_runtime(config.parameters, robot, clock, transforms, events), seed)
+        self._process_end = ProcessEndWatch(self.runtime.gate)
+        try:
+            self.load_map(config)
+            for spec in config.plugins:
+                self.load_plugin(spec)
+        except BaseException:
+            self.close()
+            raise
+        self.get_path = GetPathAction(self.runtime, self.plugins)
+        self.exe_path = ExePathAction(self.runtime, self.plugins)
+        self.recovery = RecoveryAction(self.runtime, self.plugins)
+        self.refine_path = RefinePathAction(self.runtime, self.plugins)
+        self.move_base = MoveBaseAction(self.runtime, self.plugins, self.get_path, self.exe_path, self.recovery)
+        self.follow_waypoints = FollowWaypointsAction(self.runtime, self.move_base)
+
+    # --------------------------------------------------------------------------- hooks for a map's server
+    @abstractmethod
+    def load_map(self, config: Config) -> None:
+        """Make the map from the configuration's sections; raises where its files are bad."""
+
+    @property
+    @abstractmethod
+    def queries(self) -> MapQueries:
+        """The map-independent questions, answered by this server's map."""
+
+    @abstractmethod
+    def take_scan(self, scan: RangeScan) -> None:
+        """Feed what a sensor saw into the map; in any known frame, raises TransformError where it is not known."""
+
+    @classmethod
+    def config_for_map(cls, file: FilePath, unknown_is_free: bool = True) -> str | None:
+        """YAML text of a sane configuration for a bare map file; None if this server does not read such files.
+
+        ``unknown_is_free`` tells whether plans may lead over what the map does not know, where it can say so.
+        """
+        return None
+
+    @classmethod
+    def read_floor(cls, file: FilePath) -> FloorMap | None:
+        """What a map file says of a floor; None if this server does not read such files, or maps have no cells.
+
+        Raises
+        ------
+        ConfigError
+            The file is damaged, or too large.
+        """
+        return None
+
+    ground_is_level: ClassVar[bool] = False
+    """Whether all ground is at height 0, so that a place needs no z."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of the configuration: what was left out of it, and what the map server found."""
+        left_out = (
+            f"left out: optional {skipped.kind.name.lower()} {skipped.name!r}: {skipped.reason}"
+            for skipped in self.config.skipped
+        )
+        kept = self.runtime.events.memory
+        found = (str(event.data.get("message", "")) for event in (kept.of_kind(EventKind.MAP) if kept else ()))
+        return (*left_out, *found, *self._curve_notes())
+
+    def _curve_notes(self) -> Iterator[str]:
+        """Plugins whose curves are tighter than the robot's."""
+        tightest = self.runtime.gate.limits.min_turning_radius
+        for kind in (PluginKind.PLANNER, PluginKind.CONTROLLER):
+            for plugin in self.plugins.all_of(kind):
+                name = f"{kind.name.lower()} {plugin.name!r}"
+                radius = getattr(plugin.instance.parameters, "min_turning_radius", None)
+                if radius is not None and 0.0 < radius < tightest:
+                    yield f"{name}: min_turning_radius {radius:g} m is tighter than the robot's {tightest:.2f} m"
+                if tightest > 0.0 and getattr(plugin.instance, "turns_on_the_spot", False):
+                    yield f"{name} turns on the spot, which the robot cannot: its tightest curve is {tightest:.2f} m"
+
+    def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
+        """Heights [m] of the ground at a place of the global frame, the best to stand on first; () without any."""
+        return (0.0,)
+
+    def ground_pose(self, x: float, y: float, yaw: float = 0.0) -> Pose:
+        """Pose on the ground in the global frame: on the lowest free storey, at height 0 where there is no ground."""
+        heights = self.ground_heights(x, y)
+        return Pose.planar(x, y, yaw, heights[0] if heights else 0.0, frame_id=self.config.parameters.global_frame)
+
+    @property
+    def map_views(self) -> tuple[str, ...]:
+        """Names of what ``map_view`` can show: maps or layers, the one planners see first."""
+        return ()
+
+    def map_view(self, name: str = "") -> MapView | None:
+        """What the map, or one of ``map_views``, looks like; None if this server has nothing to show."""
+        return None
+
+    def field_view(self, path: Path) -> FieldView | None:
+        """Directions that a planner has found together with a path; None where it has only found the path."""
+        return None
+
+    def map_problem(self) -> str:
+        """Why the map must not be driven on right now; empty = it is current."""
+        return ""
+
+    def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
+        """Keep the map alive while a goal of this kind runs."""
+        return nullcontext()
+
+    def close_map(self) -> None:
+        """Give back what the map holds; called once, after all goals were canceled."""
+
+    # --------------------------------------------------------------------------------------- parameters
+    def set_parameters(self, **changes: Any) -> None:
+        """Change the server's parameters at run time, all or none.
+
+        Raises
+        ------
+        ValueError
+            A value is not legal (pydantic's ValidationError is one), or a parameter is read once, at the start.
+        """
+        old = self.runtime.parameters
+        base = self.config.parameters if changes.pop("restore_defaults", False) else old
+        new = NavigationParameters.model_validate({**base.model_dump(), **changes})
+        fixed = [name for name in READ_ONCE if getattr(new, name) != getattr(old, name)]
+        if fixed:
+            raise ValueError(f"{', '.join(fixed)}: read once, at the start, and cannot be changed at run time")
+        self.runtime.parameters = new
+        self._put_into_effect(new)
+        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "server", **changes)
+
+    def _put_into_effect(self, parameters: NavigationParameters) -> None:
+        """Hand parameters to those parts that keep a copy."""
+        runtime = self.runtime
+        runtime.gate.limits = _limits(parameters, self._own_turning_radius)
+        runtime.gate.command_timeout = parameters.command_timeout
+        runtime.robot.max_pose_age = runtime.robot.max_velocity_age = parameters.tf_timeout
+        if isinstance(runtime.clock, SimClock):
+            runtime.clock.hang_guard = parameters.hang_guard
+
+    def warm_up(self, start: Pose, goal: Pose, on_step: Callable[[str], None] = lambda text: None) -> None:
+        """Call every planner and controller once, without moving, so that their kernels are compiled before a goal.
+
+        Parameters
+        ----------
+        start, goal : Pose
+            In the global frame; a plan between them is made with every planner.
+        on_step : callable
+            Told the name of each plugin before its turn, and which of how many it is.
+        """
+        path = Path.from_poses([start, goal])
+        planners, controllers = self.plugins.all_of(PluginKind.PLANNER), self.plugins.all_of(PluginKind.CONTROLLER)
+        count = len(planners) + len(controllers)
+        for number, planner in enumerate(planners, start=1):
+            on_step(f"warming up planner {planner.name} ({number} of {count})")
+            result = planner.instance.make_plan(PlanRequest(start, goal))
+            path = result.path if result.success and result.path is not None else path
+        for number, controller in enumerate(controllers, start=len(planners) + 1):
+            on_step(f"warming up controller {controller.name} ({number} of {count})")
+            controller.instance.set_plan(path)
+            controller.instance.compute_velocity_commands(ControlRequest(start, Twist()))
+            controller.instance.is_goal_reached(start, self.runtime.parameters.dist_tolerance, 0.1)
+
+    # --------------------------------------------------------------------------------------- life cycle
+    def cancel_all(self, reason: str = "all goals canceled") -> None:
+        """Cancel every running goal; never waits."""
+        for action in self._actions():
+            action.cancel_all(reason)
+
+    def pause_all(self) -> None:
+        """Pause every running goal: the robot stands, all goals are kept; idempotent, never waits."""
+        for action in self._actions():
+            for handle in action.unfinished:
+                handle.pause()
+
+    def resume_all(self) -> None:
+        """Let every paused goal go on."""
+        for action in self._actions():
+            for handle in action.unfinished:
+                handle.resume()
+
+    def close(self) -> None:
+        """Stop the robot for good, cancel everything, end the threads; idempotent, never waits for a plugin."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self.runtime.gate.close()
+        finally:  # also after a Ctrl-C that came just then
+            self._process_end.end()
+            for action in self._actions():
+                action.close()
+            self.runtime.callbacks.close()
+            self.runtime.supervisor.close()
+            self.close_map()
+        self.runtime.clock.settle()  # or the threads would stay for ever where nobody uses the clock any more
+
+    def __enter__(self) -> AbstractNavigationServer:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def _actions(self) -> list[Any]:
+        names = ("follow_waypoints", "move_base", "get_path", "exe_path", "recovery", "refine_path")
+        return [getattr(self, name) for name in names if hasattr(self, name)]
+
+    def _make_runtime(
+        self,
+        parameters: NavigationParameters,
+        robot: Robot,
+        clock: Clock,
+        transforms: TransformBuffer | None,
+        events: EventBus | None,
+    ) -> Runtime:
+        transforms = transforms or TransformBuffer(parameters.tf_cache_time)
+        transforms.follow_clock(clock.now)
+        events = events or EventBus(clock.now)
+        supervisor = Supervisor(clock, events)
+        runtime = Runtime(
+            clock=clock,
+            events=events,
+            supervisor=supervisor,
+            callbacks=CallbackThread(clock, events, supervisor),
+            gate=VelocityGate(
+                robot, clock, events, _limits(parameters, self._own_turning_radius), parameters.command_timeout
+            ),
+            robot=RobotInformation(
+                robot,
+                transforms,
+                clock,
+                parameters.global_frame,
+                parameters.robot_frame,
+                max_pose_age=parameters.tf_timeout,
+                max_velocity_age=parameters.tf_timeout,
+                uses_odometry=bool(parameters.odom_topic),
+            ),
+            transforms=transforms,
+            parameters=parameters,
+            map_hooks=self,
+        )
+        if isinstance(clock, SimClock):
+            clock.hang_guard = parameters.hang_guard
+        return runtime
+
+
+def _limits(parameters: NavigationParameters, own_turning_radius: float) -> VelocityLimits:
+    """Limits of the parameters; where they do not give a turning radius [m], the robot's own."""
+    given = {limit.name: getattr(parameters, limit.name) for limit in fields(VelocityLimits)}
+    limits = {name: value for name, value in given.items() if value is not None}
+    return VelocityLimits(**{"min_turning_radius": own_turning_radius, **limits})

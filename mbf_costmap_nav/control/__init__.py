@@ -1,0 +1,1 @@
+"""What the controllers and the recoveries that move the robot share."""

@@ -1,0 +1,128 @@
+"""From sampled velocities to scored trajectories: what the sampling controllers (DWA, MPPI) share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_costmap_nav.control.path_handling import ControlCycle
+from mbf_costmap_nav.critics import ALL_CRITICS, Critic, CriticParameters, Rollouts
+from mbf_costmap_nav.critics.obstacle import COLLISION
+from mbf_costmap_nav.grid.costmap import INSCRIBED, LETHAL
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.kernels.control.rollout import integrate
+
+Float32Array = NDArray[np.float32]
+
+PATH_SPACING = 0.1
+"""Distance [m] of the path points the critics compare with."""
+
+
+def build_critics(weights: CriticParameters) -> Mapping[str, Critic]:
+    """All critics that have a weight; the obstacle critic always, because it marks collisions."""
+    chosen = {name: getattr(weights, name) for name in ALL_CRITICS}
+    return {name: ALL_CRITICS[name](weight) for name, weight in chosen.items() if weight > 0.0 or name == "obstacle"}
+
+
+def roll_out(
+    cycle: ControlCycle,
+    velocities: Float32Array,
+    dt: float,
+    reach: float,
+    poses: Float32Array | None = None,
+    turning_radius: float = 0.0,
+) -> Rollouts:
+    """Integrate velocities (3, steps, samples) and lay out the path ahead for the critics.
+
+    Parameters
+    ----------
+    poses : (3, steps, samples) float32, optional
+        Buffer for the trajectories, overwritten.
+    dt : float
+        Length of a step [s].
+    reach : float
+        Farthest a sample can get [m]; the path is laid out a little beyond.
+    turning_radius : float
+        Of the tightest curve the velocities hold [m]; 0 = they may turn on the spot.
+    """
+    pose, tracker = cycle.request.pose, cycle.tracker
+    points, free = _path_ahead(cycle, 1.3 * reach + 6 * PATH_SPACING)
+    goal = tracker.goal
+    poses = np.empty_like(velocities) if poses is None else poses
+    integrate(velocities, pose.yaw, dt, poses)
+    return Rollouts(
+        poses,
+        velocities,
+        (points - (pose.x, pose.y)).astype(np.float32),
+        free,
+        PATH_SPACING,
+        tracker.remaining,
+        (goal.x - pose.x, goal.y - pose.y, goal.yaw),
+        tracker.on_last_section,
+        tracker.driving_backward,
+        cycle.goal_tolerance,
+        cycle.costmap,
+        (pose.x, pose.y),
+        footprint_discs(cycle.footprint.footprint),
+        turning_radius,
+    )
+
+
+def _path_ahead(cycle: ControlCycle, length: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Points (m, 2) of the path over ``length`` [m] from the progress on, or to its end, and which of them are free.
+
+    From a cusp they run straight on, and what lies there does not count.
+    """
+    tracker = cycle.tracker
+    on_path = min(length, tracker.to_cusp)
+    along = tracker.progress + np.append(np.arange(0.0, on_path, PATH_SPACING), on_path)
+    points = tracker.points_at(along)
+    free = _free_points(cycle, points)
+    if tracker.on_last_section or on_path == length:
+        return points, free
+    step = points[-1] - tracker.point_at(tracker.next_cusp - PATH_SPACING)
+    beyond = np.arange(1.0, math.ceil((length - on_path) / PATH_SPACING) + 1.0)
+    run_out = points[-1] + beyond[:, None] * step
+    return np.concatenate([points, run_out]), np.concatenate([free, np.ones(len(run_out), dtype=bool)])
+
+
+def _free_points(cycle: ControlCycle, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(m,) bool: whether path points lie in cells below the inscribed cost; unknown and outside are free."""
+    cells, inside = cycle.costmap.world_to_cells(points)
+    free = np.ones(len(points), dtype=bool)
+    costs = cycle.costmap.cells[cells[inside, 1], cells[inside, 0]]
+    free[inside] = (costs < INSCRIBED) | (costs > LETHAL)
+    return free
+
+
+def score(critics: Mapping[str, Critic], rollouts: Rollouts) -> Float32Array:
+    """Sum (samples,) of the weighted critics; a collision costs ``COLLISION``."""
+    total = np.zeros(rollouts.samples, dtype=np.float32)
+    for critic in critics.values():
+        cost = critic.score(rollouts)
+        if cost is not None:
+            total += np.float32(critic.weight) * cost
+    total[rollouts.collided] += np.float32(COLLISION)
+    return total
+
+
+def footprint_discs(footprint: Footprint) -> Float32Array:
+    """Offsets (k,) [m] along x of discs of the inscribed radius that cover the footprint's middle line."""
+    if len(footprint.vertices) < 3:
+        return np.zeros(1, dtype=np.float32)
+    front, back = footprint.vertices[:, 0].max(), footprint.vertices[:, 0].min()
+    first, last = back + footprint.inscribed_radius, front - footprint.inscribed_radius
+    if last - first < 0.25 * footprint.inscribed_radius:
+        return np.zeros(1, dtype=np.float32)
+    count = 1 + math.ceil((last - first) / footprint.inscribed_radius)
+    return np.linspace(first, last, count).astype(np.float32)
+
+
+def is_free(cycle: ControlCycle, trajectory: Float32Array) -> bool:
+    """Whether the full footprint is free of lethal cells along a trajectory (3, steps) relative to the robot."""
+    poses = np.ascontiguousarray(trajectory.T, dtype=np.float64)
+    poses[:, :2] += (cycle.request.pose.x, cycle.request.pose.y)
+    return cycle.footprint.first_collision(cycle.costmap, poses) < 0

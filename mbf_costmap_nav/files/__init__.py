@@ -1,0 +1,1 @@
+"""Maps on disk in the format of map_server."""

@@ -1,0 +1,300 @@
+"""Maps on disk in map_server's format: a YAML file that describes a grey image (pgm, png or bmp).
+
+Reading turns every grey value into an occupancy (see ``map_description``). Image rows run from top to bottom, map rows
+from bottom to top. The channels of an image are averaged, then rounded: in mode trinary those of colour and opacity,
+if there is one, as in map_server; else those of colour alone. In mode scale a pixel that is not opaque is unknown.
+
+Origins with a yaw are kept in ``OccupancyMap``. A ``Costmap`` has axes parallel to its frame, so ``to_costmap``
+resamples such a map onto the smallest upright grid around it (see ``turned_map``).
+
+A bad file raises one ``MapError`` that names the file and the reason. The number of cells, also of the upright grid, is
+checked against a limit before memory is taken for them.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+
+from mbf_abstract.config.bounded_files import special_file
+from mbf_abstract.config.findings import describe_value
+from mbf_costmap_nav.files.map_description import (
+    OCCUPIED,
+    UNKNOWN_OCCUPANCY,
+    MapDescription,
+    MapError,
+    MapMode,
+    OccupancyArray,
+    read_description,
+    validated_description,
+)
+from mbf_costmap_nav.grid.costmap import FREE, LETHAL, MAX_CELLS, UNKNOWN, Costmap
+from mbf_costmap_nav.grid.rotated_map import turned_upright, upright_shape
+
+IMAGE_SUFFIXES = {".pgm", ".png", ".bmp"}
+BARE_IMAGE_RESOLUTION = 0.05  # m, what most map makers use
+IMAGE_FORMATS = ("PPM", "PNG", "BMP")
+"""What Pillow may try; for some of its other formats it starts programs."""
+GREY_MODES = {"1", "L", "LA", "P", "RGB", "RGBA"}
+"""Pillow's names of the 8-bit pixel layouts we read."""
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyMap:
+    """A map file's content, bottom row first.
+
+    Attributes
+    ----------
+    occupancy : (height, width) uint8
+        0 free .. 100 occupied, 255 unknown; any value in mode raw.
+    resolution : float
+        Side of a cell [m].
+    origin : (x, y, yaw)
+        Pose [m, m, rad] of the lower-left corner of cell (0, 0).
+    """
+
+    occupancy: OccupancyArray
+    resolution: float
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def upright(self, max_cells: int = MAX_CELLS) -> OccupancyMap:
+        """Return the same map with yaw 0, resampled if it has a yaw.
+
+        Raises
+        ------
+        ValueError
+            The smallest upright grid around it has more than ``max_cells`` cells.
+        """
+        x, y, yaw = self.origin
+        if math.remainder(yaw, 2.0 * math.pi) == 0.0:
+            return self
+        occupancy, (dx, dy) = turned_upright(self.occupancy, yaw, max_cells)
+        return OccupancyMap(occupancy, self.resolution, (x + dx * self.resolution, y + dy * self.resolution, 0.0))
+
+    def to_costmap(
+        self, frame_id: str = "map", track_unknown_space: bool = True, max_cells: int = MAX_CELLS
+    ) -> Costmap:
+        """Costs of the map: occupied is lethal, free is free, anything between is scaled to 1..253.
+
+        In mode raw all values from 100 to 254 are occupied, as for costmap_2d.
+
+        Parameters
+        ----------
+        frame_id : str
+            Frame the map's origin is given in.
+        track_unknown_space : bool
+            Keep unknown cells unknown; otherwise they become free.
+        max_cells : int
+            As for ``upright``, whose ValueError it raises.
+        """
+        table = np.full(256, UNKNOWN if track_unknown_space else FREE, dtype=np.uint8)
+        table[:OCCUPIED] = np.arange(OCCUPIED) * LETHAL // OCCUPIED
+        table[OCCUPIED:UNKNOWN_OCCUPANCY] = LETHAL
+        flat = self.upright(max_cells)
+        return Costmap(table[flat.occupancy], flat.resolution, flat.origin[0], flat.origin[1], frame_id)
+
+
+def load_map(file: Path | str, max_cells: int = MAX_CELLS, *, confined: bool = False) -> OccupancyMap:
+    """Read a map_server YAML file and the image it names.
+
+    Parameters
+    ----------
+    confined : bool
+        Refuse an image out of the YAML file's folder; for files that come from somebody else.
+
+    Raises
+    ------
+    MapError
+        Anything wrong with either file, or more than ``max_cells`` cells.
+    """
+    file = Path(file)
+    description = read_description(file)
+    image = file.parent / description.image
+    if confined and not _lies_in(image, file.parent):
+        got = describe_value(description.image)
+        raise MapError(file, f"image: expected a file in the folder of the map (confine_images), got {got}")
+    return _decode(image, max_cells, description)
+
+
+def _lies_in(file: Path, folder: Path) -> bool:
+    try:
+        return file.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError):  # a name too long, a circle of links
+        return False
+
+
+def load_costmap(
+    file: Path | str,
+    frame_id: str = "map",
+    track_unknown_space: bool = True,
+    *,
+    confined: bool = False,
+    max_cells: int = MAX_CELLS,
+) -> Costmap:
+    """Read a map_server YAML file, or a bare image, as a costmap, see ``OccupancyMap.to_costmap``."""
+    occupancy = load_map_file(file, confined=confined, max_cells=max_cells)
+    return occupancy.to_costmap(frame_id, track_unknown_space, max_cells)
+
+
+def load_map_file(file: Path | str, *, confined: bool = False, max_cells: int = MAX_CELLS) -> OccupancyMap:
+    """Read a map_server YAML file, or a bare image.
+
+    A bare image is described by the YAML file of the same name beside it; without one its cells have
+    ``BARE_IMAGE_RESOLUTION`` and its lower left corner is the origin.
+    """
+    file = Path(file)
+    description = file.with_suffix(".yaml") if file.suffix.lower() in IMAGE_SUFFIXES else file
+    bare = description != file and not description.is_file()
+    if bare:
+        return load_image(file, BARE_IMAGE_RESOLUTION, max_cells=max_cells)
+    return load_map(description, max_cells, confined=confined)
+
+
+def load_image(
+    file: Path | str,
+    resolution: float,
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    *,
+    negate: bool = False,
+    occupied_thresh: float = 0.65,
+    free_thresh: float = 0.196,
+    mode: MapMode = MapMode.TRINARY,
+    max_cells: int = MAX_CELLS,
+) -> OccupancyMap:
+    """Read a bare image that has no YAML file; the arguments are the keys of one.
+
+    Raises
+    ------
+    MapError
+        The image is unusable, or an argument is.
+    """
+    file = Path(file)
+    keys = {
+        "image": file.name,
+        "resolution": resolution,
+        "origin": origin,
+        "negate": negate,
+        "occupied_thresh": occupied_thresh,
+        "free_thresh": free_thresh,
+        "mode": mode,
+    }
+    return _decode(file, max_cells, validated_description(file, keys))
+
+
+def _read_pixels(file: Path, max_cells: int, mode: MapMode) -> NDArray[np.uint8]:
+    """Grey and opacity (height, width, 2) uint8 of an image, top row first; the mode says what grey is the mean of."""
+    if kind := special_file(file):
+        raise MapError(file, f"expected an image, got {kind}")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit below decides
+            image = Image.open(file, formats=IMAGE_FORMATS)
+        with image:
+            width, height = image.size
+            if width * height > max_cells:
+                raise MapError(file, f"{width} x {height} pixels are more than the limit of {max_cells} cells")
+            if image.mode not in GREY_MODES:
+                raise MapError(file, f"has pixels of type {image.mode!r}; expected 8-bit grey or colour")
+            has_opacity = "A" in image.mode or "transparency" in image.info
+            pixels = np.asarray(image.convert("RGBA"), dtype=np.uint8)
+    except Image.DecompressionBombError as error:
+        raise MapError(file, f"has too many pixels: {error}") from error
+    except UnidentifiedImageError as error:
+        raise MapError(file, "is no image that can be read (pgm, png, bmp)") from error
+    except (OSError, ValueError, SyntaxError) as error:  # Pillow reports damaged files by any of these
+        raise MapError(file, getattr(error, "strerror", None) or f"damaged image: {error}") from error
+    channels = 4 if mode is MapMode.TRINARY and has_opacity else 3
+    total = pixels[..., :channels].sum(axis=2, dtype=np.uint16)
+    return np.stack([((total + channels // 2) // channels).astype(np.uint8), pixels[..., 3]], axis=2)
+
+
+def _decode(file: Path, max_cells: int, description: MapDescription) -> OccupancyMap:
+    pixels = _read_pixels(file, max_cells, description.mode)
+    try:
+        upright_shape(pixels.shape[:2], description.origin[2], max_cells)
+    except ValueError as error:
+        raise MapError(file, str(error)) from error
+    occupancy = description.occupancy_of_grey()[pixels[..., 0]]
+    if description.mode is MapMode.SCALE:
+        occupancy[pixels[..., 1] < 255] = UNKNOWN_OCCUPANCY
+    return OccupancyMap(np.ascontiguousarray(occupancy[::-1]), description.resolution, description.origin)
+
+
+def save_map(
+    file: Path | str,
+    content: OccupancyMap,
+    *,
+    image_format: str = "pgm",
+    mode: MapMode | str = MapMode.TRINARY,
+    negate: bool = False,
+    occupied_thresh: float = 0.65,
+    free_thresh: float = 0.196,
+) -> None:
+    """Write ``file`` (YAML) and an image of the same name beside it, so that ``load_map`` gives the same map.
+
+    Parameters
+    ----------
+    image_format : {"pgm", "png", "bmp"}
+    mode : MapMode or its value
+        Trinary keeps 0, 100 and unknown; raw keeps every value; scale keeps 0..100, and unknown only in a png.
+    occupied_thresh, free_thresh : float
+        In scale mode 99 exists only if ``occupied_thresh`` is a multiple of 1/255, such as 0.6.
+
+    Raises
+    ------
+    MapError
+        The map is empty or holds an occupancy that this mode and these thresholds cannot express, an argument is not
+        legal, ``file`` has the image's name, or a file cannot be written.
+    """
+    file = Path(file)
+    image_file = file.with_suffix(f".{image_format}")
+    if image_format not in ("pgm", "png", "bmp"):
+        raise MapError(image_file, f"image_format must be pgm, png or bmp, got {image_format!r}")
+    if image_file == file:
+        raise MapError(file, "is the name of the image; the YAML file beside it needs another one, such as .yaml")
+    if content.occupancy.dtype != np.uint8 or content.occupancy.ndim != 2 or content.occupancy.size == 0:
+        got = f"{content.occupancy.dtype} {content.occupancy.shape}"
+        raise MapError(file, f"expected occupancies as (height, width) uint8 with at least one cell, got {got}")
+    keys: dict[str, object] = {
+        "image": image_file.name,
+        "mode": getattr(mode, "value", mode),
+        "resolution": content.resolution,
+        "origin": list(content.origin),
+        "negate": int(negate),
+        "occupied_thresh": occupied_thresh,
+        "free_thresh": free_thresh,
+    }
+    description = validated_description(file, keys)
+    grey, opaque = _encode(image_file, content.occupancy[::-1], description)
+    try:
+        image = Image.fromarray(grey)
+        if not opaque.all():
+            image.putalpha(Image.fromarray(np.where(opaque, np.uint8(255), np.uint8(0))))
+        image.save(image_file, format="PPM" if image_format == "pgm" else image_format.upper())
+        file.write_text(yaml.safe_dump(keys, sort_keys=False), encoding="utf-8")
+    except OSError as error:
+        raise MapError(file, error.strerror or str(error)) from error
+
+
+def _encode(
+    file: Path, occupancy: OccupancyArray, description: MapDescription
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Grey values that decode to ``occupancy``, and which pixels are opaque."""
+    occupancy_of_grey = description.occupancy_of_grey()
+    grey_of_occupancy = np.zeros(256, dtype=np.uint8)
+    grey_of_occupancy[occupancy_of_grey] = np.arange(256)  # of several grey values the brightest wins
+    expressible = np.isin(np.arange(256), occupancy_of_grey)
+    opaque = np.ones(occupancy.shape, dtype=bool)
+    if description.mode is MapMode.SCALE and file.suffix == ".png":
+        opaque = occupancy != UNKNOWN_OCCUPANCY
+    lost = np.setdiff1d(np.unique(occupancy[opaque]), np.flatnonzero(expressible))
+    if lost.size:
+        raise MapError(file, f"mode {description.mode.value} cannot express the occupancies {lost.tolist()}")
+    return grey_of_occupancy[occupancy], opaque

@@ -1,0 +1,105 @@
+"""Does the robot fit at a pose? The footprint prepared for fast checks of many poses on a costmap snapshot.
+
+When to use: inside controllers, recoveries and kinematic planners. When not: a client's question about one pose, which
+the queries answer with an exact cover of cells. Unknown cells and the world outside the map do not collide: a rolling
+window always ends somewhere.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry.arithmetic import plane_rotation, rotated
+from mbf_costmap_nav.control.path_geometry import resample
+from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.kernels.map.footprint_cost import first_collision, footprint_cost
+
+FloatArray = NDArray[np.float64]
+
+
+class FootprintCheck:
+    """A footprint as points that cover it.
+
+    Attributes
+    ----------
+    footprint : Footprint
+    samples : (n, 2) float64
+        Covering points in the base frame [m], outline first; the origin alone for a point robot.
+    """
+
+    def __init__(self, footprint: Footprint, resolution: float) -> None:
+        self.footprint = footprint
+        self.samples = covering_points(footprint.vertices, resolution)
+
+    def cost(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
+        """Largest cost under the footprint; -1 if it leaves the map."""
+        return int(
+            footprint_cost(
+                costmap.cells, costmap.resolution, costmap.origin_x, costmap.origin_y, self.samples, x, y, yaw
+            )
+        )
+
+    def collides(self, costmap: Costmap, x: float, y: float, yaw: float) -> bool:
+        """Whether a lethal cell lies under the footprint."""
+        return self.cost(costmap, x, y, yaw) == LETHAL
+
+    def lethal_count(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
+        """Number of covering points on lethal cells: a measure of how deep the robot is in a collision."""
+        points = rotated(plane_rotation(yaw), self.samples) + np.array([x, y])
+        cells, inside = costmap.world_to_cells(points)
+        return int(np.count_nonzero(costmap.cells[cells[inside, 1], cells[inside, 0]] == LETHAL))
+
+    def outside_count(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
+        """Number of covering points off the map."""
+        points = rotated(plane_rotation(yaw), self.samples) + np.array([x, y])
+        return int(np.count_nonzero(~costmap.world_to_cells(points)[1]))
+
+    def first_collision(self, costmap: Costmap, poses: FloatArray) -> int:
+        """Index of the first colliding pose of (n, 3) poses (x, y, yaw), or -1."""
+        return int(
+            first_collision(costmap.cells, costmap.resolution, costmap.origin_x, costmap.origin_y, self.samples, poses)
+        )
+
+
+def covering_points(vertices: FloatArray, resolution: float) -> FloatArray:
+    """Points (n, 2) on the outline of a polygon, half a cell apart, and inside it, a cell apart."""
+    if len(vertices) < 3:
+        return np.zeros((1, 2))
+    outline = resample(np.vstack([vertices, vertices[:1]]), 0.5 * resolution)[:-1]
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    counts = [max(2, math.ceil(extent / resolution) + 1) for extent in high - low]
+    axes = [np.linspace(low[k], high[k], counts[k])[1:-1] for k in range(2)]
+    lattice = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    return np.ascontiguousarray(np.vstack([outline, lattice[_inside(vertices, lattice)]]))
+
+
+def _inside(vertices: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
+    """(n,) bool: whether points lie in a simple polygon (crossing number)."""
+    inside = np.zeros(len(points), dtype=bool)
+    for a, b in zip(vertices, np.roll(vertices, -1, axis=0), strict=True):
+        spans = (a[1] > points[:, 1]) != (b[1] > points[:, 1])
+        height = b[1] - a[1] if b[1] != a[1] else 1.0
+        inside ^= spans & (points[:, 0] < a[0] + (points[:, 1] - a[1]) * (b[0] - a[0]) / height)
+    return inside
+
+
+def arc_poses(
+    pose: tuple[float, float, float], vx: float, vy: float, wz: float, duration: float, step: float
+) -> FloatArray:
+    """Poses (n, 3) of a body that keeps a velocity, every ``step`` [s] up to ``duration``, the start left out.
+
+    Exact integration of a constant twist (vx, vy [m/s], wz [rad/s]).
+    """
+    x, y, yaw = pose
+    times = np.append(np.arange(step, duration, step), duration)
+    angles = wz * times
+    # integral of the rotation over time: sin(a)/w and (1 - cos(a))/w, stable where w vanishes
+    sine = times * np.sinc(angles / np.pi)
+    versine = times * np.sinc(angles / (2.0 * np.pi)) * np.sin(angles / 2.0)
+    forward, left = vx * sine - vy * versine, vx * versine + vy * sine
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.column_stack([x + c * forward - s * left, y + s * forward + c * left, yaw + angles])

@@ -1,0 +1,137 @@
+"""The cells of one map as another grid sees them: a floor plan or mask under a costmap of another resolution or frame.
+
+Each cell takes the value of the source at its centre. A finer or turned source has cells that no centre hits: a wall or
+a painted line one cell wide would vanish. So every cost of the source is written once more into the grid's cell in
+which its own centre lies, where it is the higher one: nothing gets lost, and nothing gets wider than a cell.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry.transform import Transform
+from mbf_costmap_nav.grid.costmap import FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.grid.placement import mapped
+
+ON_A_BORDER = 1e-6
+"""A centre this close [cells] below a border counts as above it, so that rounding never moves it to and fro: on a grid
+half a cell beside its source every centre lies on one, and each wall would be lost here and twice as thick there."""
+
+
+def sample_costmap(
+    source: Costmap, geometry: GridGeometry, box: CellBox, outside: int, T_source_grid: Transform | None = None
+) -> CellArray:
+    """Values of ``source`` in the cells of another grid.
+
+    Parameters
+    ----------
+    source : Costmap
+    geometry : GridGeometry
+    box : CellBox
+        Cells of ``geometry`` to fill.
+    outside : int
+        Value of cells that are not on ``source``.
+    T_source_grid : Transform, optional
+        From the grid's frame to the source's; none where they are the same.
+
+    Returns
+    -------
+    (box rows, box columns) uint8
+    """
+    if box.empty:
+        return np.full((max(box.y1 - box.y0, 0), max(box.x1 - box.x0, 0)), outside, dtype=np.uint8)
+    if T_source_grid is not None:
+        return _sample_transformed(source, geometry, box, outside, T_source_grid)
+    values = _at_centres(source, geometry, box, outside)
+    if source.resolution < geometry.resolution:
+        columns = _cells_of_centres(source.origin_x, source, source.width, geometry.origin_x, geometry, box.x0)
+        rows = _cells_of_centres(source.origin_y, source, source.height, geometry.origin_y, geometry, box.y0)
+        _raise_by_blocks(values, source.cells, rows, columns)
+    return values
+
+
+def _at_centres(source: Costmap, geometry: GridGeometry, box: CellBox, outside: int) -> CellArray:
+    """Value of the source at the centre of each cell."""
+    x = geometry.origin_x + (np.arange(box.x0, box.x1) + 0.5) * geometry.resolution
+    y = geometry.origin_y + (np.arange(box.y0, box.y1) + 0.5) * geometry.resolution
+    ix, iy = _cells(x, source.origin_x, source), _cells(y, source.origin_y, source)
+    columns, rows = (ix >= 0) & (ix < source.width), (iy >= 0) & (iy < source.height)
+    values = np.full((len(y), len(x)), outside, dtype=np.uint8)
+    values[np.ix_(rows, columns)] = source.cells[np.ix_(iy[rows], ix[columns])]
+    return values
+
+
+def _cells_of_centres(
+    source_origin: float, source: Costmap, count: int, origin: float, geometry: GridGeometry, start: int
+) -> NDArray[np.int64]:
+    """Index, counted from ``start``, of the cell in which each of the source's ``count`` centres along an axis lies."""
+    centres = source_origin + (np.arange(count) + 0.5) * source.resolution
+    return _cells(centres, origin, geometry) - start
+
+
+def _cells(
+    points: NDArray[np.floating[Any]], lower: float | NDArray[np.float64], grid: GridGeometry
+) -> NDArray[np.int64]:
+    """Index of the cell of ``grid``, counted from its corner ``lower`` [m], in which each point [m] lies."""
+    return np.asarray(np.floor((points - lower) / grid.resolution + ON_A_BORDER), dtype=np.int64)
+
+
+def _raise_by_blocks(values: CellArray, cells: CellArray, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> None:
+    """Raise each value to the highest cost of the source's cells in it; ``rows`` and ``columns`` never fall."""
+    seen_rows = slice(*np.searchsorted(rows, [0, values.shape[0]]).tolist())
+    seen_columns = slice(*np.searchsorted(columns, [0, values.shape[1]]).tolist())
+    into_rows, first_rows = np.unique(rows[seen_rows], return_index=True)
+    into_columns, first_columns = np.unique(columns[seen_columns], return_index=True)
+    if not (into_rows.size and into_columns.size):
+        return
+    costs = _known(cells[seen_rows, seen_columns])
+    highest = np.maximum.reduceat(np.maximum.reduceat(costs, first_rows, axis=0), first_columns, axis=1)
+    place = np.ix_(into_rows, into_columns)
+    values[place] = _higher(values[place], highest)
+
+
+def _sample_transformed(
+    source: Costmap, geometry: GridGeometry, box: CellBox, outside: int, T_source_grid: Transform
+) -> CellArray:
+    values = np.full((box.y1 - box.y0, box.x1 - box.x0), outside, dtype=np.uint8)
+    lower = np.array([geometry.origin_x, geometry.origin_y]) + np.array([box.x0, box.y0]) * geometry.resolution
+    rows, columns = (axis.ravel() for axis in np.indices(values.shape))
+    centres = lower + (np.column_stack([columns, rows]) + 0.5) * geometry.resolution
+    ix, iy = _cells(mapped(T_source_grid, centres), np.array([source.origin_x, source.origin_y]), source).T
+    inside = (ix >= 0) & (ix < source.width) & (iy >= 0) & (iy < source.height)
+    values[rows[inside], columns[inside]] = source.cells[iy[inside], ix[inside]]
+
+    part = _around(source, lower, values.shape, geometry.resolution, T_source_grid)
+    costs = _known(source.cells[part.slices])
+    iy, ix = np.nonzero(costs)
+    points = mapped(T_source_grid.inverse(), source.cells_to_world(np.column_stack([ix + part.x0, iy + part.y0])))
+    x, y = _cells(points, lower, geometry).T
+    seen = (x >= 0) & (x < values.shape[1]) & (y >= 0) & (y < values.shape[0])
+    highest = np.zeros_like(values)
+    np.maximum.at(highest, (y[seen], x[seen]), costs[iy[seen], ix[seen]])
+    return _higher(values, highest)
+
+
+def _around(
+    source: Costmap, lower: NDArray[np.float64], shape: tuple[int, ...], resolution: float, T_source_grid: Transform
+) -> CellBox:
+    """Cells of the source in which a part of the grid, (rows, columns) from ``lower`` [m] on, may lie."""
+    extent = np.array([[0, 0], [shape[1], 0], [0, shape[0]], [shape[1], shape[0]]]) * resolution
+    corners = (mapped(T_source_grid, lower + extent) - (source.origin_x, source.origin_y)) / source.resolution
+    (x0, y0), (x1, y1) = np.floor(corners.min(axis=0)), np.ceil(corners.max(axis=0))
+    around = CellBox(int(x0), int(y0), int(x1), int(y1)).grown(1).clipped(source.geometry.box)
+    return CellBox(0, 0, 0, 0) if around.empty else around
+
+
+def _known(cells: CellArray) -> CellArray:
+    """Costs with unknown as free: it raises nothing."""
+    return np.where(cells == UNKNOWN, np.uint8(FREE), cells)
+
+
+def _higher(values: CellArray, costs: CellArray) -> CellArray:
+    """The higher of both where there is a cost; unknown gives way to any cost, but not to free."""
+    raises = (costs > FREE) & ((values == UNKNOWN) | (costs > values))
+    return np.where(raises, costs, values)

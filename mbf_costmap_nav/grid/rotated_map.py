@@ -1,0 +1,114 @@
+"""Occupancies whose image is turned against its frame, on the smallest upright grid around them.
+
+Each new cell takes the value at its centre; what lies outside the turned image is unknown. Occupied cells that no new
+centre hits are written once more where their own centre lies, so that no obstacle gets lost. The work is done in blocks
+of rows: beside the maps themselves it needs little memory, however large they are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry.arithmetic import plane_rotation, rotated, rotated_back
+from mbf_costmap_nav.files.map_description import OCCUPIED, UNKNOWN_OCCUPANCY, OccupancyArray
+
+BLOCK_CELLS = 500_000
+"""Cells worked on at a time; each takes about 100 bytes meanwhile."""
+
+
+def upright_shape(shape: tuple[int, ...], yaw: float, max_cells: int) -> tuple[tuple[int, int], NDArray[np.float64]]:
+    """Size of the smallest upright grid around a turned image, and where it begins.
+
+    Parameters
+    ----------
+    shape : (height, width)
+        Of the image [cells].
+    yaw : float
+        Turn [rad] around the corner of cell (0, 0).
+    max_cells : int
+
+    Returns
+    -------
+    (height, width) : int
+    lower : (2,) float64
+        Lower-left corner (x, y) of the grid [cells], seen from the corner of cell (0, 0).
+
+    Raises
+    ------
+    ValueError
+        It has more than ``max_cells`` cells.
+    """
+    height, width = shape
+    if math.remainder(yaw, 2.0 * math.pi) == 0.0:
+        return (height, width), np.zeros(2)
+    corners = rotated(plane_rotation(yaw), [[0, 0], [width, 0], [width, height], [0, height]])
+    lower = corners.min(axis=0)
+    columns, rows = np.ceil(corners.max(axis=0) - lower - 1e-9).astype(int).tolist()
+    if rows * columns > max_cells:
+        raise ValueError(f"turned by {yaw:g} rad it needs {columns} x {rows} cells, more than the limit of {max_cells}")
+    return (rows, columns), lower
+
+
+def turned_upright(occupancy: OccupancyArray, yaw: float, max_cells: int) -> tuple[OccupancyArray, tuple[float, float]]:
+    """Return the occupancies on an upright grid, and the grid's lower-left corner [cells] seen from the old one.
+
+    Parameters
+    ----------
+    occupancy : (height, width) uint8
+        Bottom row first.
+    yaw : float
+        Turn [rad] around the corner of cell (0, 0).
+    max_cells : int
+
+    Raises
+    ------
+    ValueError
+        The new grid has more than ``max_cells`` cells.
+    """
+    shape, lower = upright_shape(occupancy.shape, yaw, max_cells)
+    upright = np.full(shape, UNKNOWN_OCCUPANCY, dtype=np.uint8)
+    rotation = plane_rotation(yaw)
+    for block in _row_blocks(shape):
+        _fill(upright, block, occupancy, lower, rotation)
+    for block in _row_blocks(occupancy.shape):
+        _write_obstacles(upright, block, occupancy, lower, rotation)
+    return upright, (float(lower[0]), float(lower[1]))
+
+
+def _row_blocks(shape: tuple[int, ...]) -> Iterator[slice]:
+    rows = max(1, BLOCK_CELLS // shape[1])
+    return (slice(start, min(start + rows, shape[0])) for start in range(0, shape[0], rows))
+
+
+def _fill(
+    upright: OccupancyArray,
+    block: slice,
+    occupancy: OccupancyArray,
+    lower: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+) -> None:
+    """Give each cell of the block the value at its centre."""
+    height, width = occupancy.shape
+    columns, rows = np.meshgrid(np.arange(upright.shape[1]), np.arange(block.start, block.stop))
+    source = np.floor(rotated_back(rotation, np.stack([columns, rows], axis=-1) + 0.5 + lower)).astype(np.int64)
+    inside = np.all((source >= 0) & (source < (width, height)), axis=-1)
+    upright[block][inside] = occupancy[source[inside][:, 1], source[inside][:, 0]]
+
+
+def _write_obstacles(
+    upright: OccupancyArray,
+    block: slice,
+    occupancy: OccupancyArray,
+    lower: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+) -> None:
+    """Write the occupied cells of the old block where their centres lie."""
+    part = occupancy[block]
+    rows, columns = np.nonzero((part >= OCCUPIED) & (part != UNKNOWN_OCCUPANCY))
+    points = rotated(rotation, np.column_stack([columns, rows + block.start]) + 0.5) - lower
+    cells = np.minimum(points.astype(np.int64), (upright.shape[1] - 1, upright.shape[0] - 1))
+    upright[cells[:, 1], cells[:, 0]] = part[rows, columns]

@@ -1,0 +1,73 @@
+"""Areas with a meaning of their own: polygons from YAML and mask images, for the keep-out and speed-limit layers.
+
+A zones file is a YAML mapping with one list::
+
+    zones:
+      - {name: stairs, polygon: [[1.0, 2.0], [3.0, 2.0], [3.0, 4.0]]}
+      - {name: ramp, polygon: [[5.0, 0.0], [7.0, 0.0], [7.0, 2.0], [5.0, 2.0]], speed_limit: 0.3}
+
+Coordinates are metres in the costmap's frame, unless the layer is told another (``map_frame``). A mask image is a
+map_server map; it may have another grid than the costmap (see ``resampling``).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import field_validator
+
+from mbf_abstract.config.findings import Finding
+from mbf_abstract.config.validation import validate
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_costmap_nav.files.map_description import MapError, read_mapping, told
+
+
+class Zone(ParameterModel):
+    """One polygon."""
+
+    name: str = parameter(..., "Name for messages.")
+    polygon: tuple[tuple[float, float], ...] = parameter(..., "Corners in order, at least three.", unit="m")
+    speed_limit: float | None = parameter(None, "Limit inside, for the speed-limit layer.", ge=0.0)
+
+    @field_validator("polygon")
+    @classmethod
+    def _is_an_area(cls, corners: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        if len(corners) < 3:
+            raise ValueError(f"a zone needs at least 3 corners, got {len(corners)}")
+        return corners
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Corners (n, 2) [m]."""
+        return np.array(self.polygon, dtype=np.float64)
+
+    def contains(self, x: float, y: float) -> bool:
+        """Whether the point (x, y) [m] lies inside (crossing number; points on the border go either way)."""
+        ax, ay = self.corners.T
+        bx, by = np.roll(ax, -1), np.roll(ay, -1)
+        spans = (ay > y) != (by > y)
+        crossings = ax[spans] + (bx[spans] - ax[spans]) * (y - ay[spans]) / (by[spans] - ay[spans])
+        return bool(np.count_nonzero(crossings > x) % 2)
+
+
+class ZonesFile(ParameterModel):
+    """Content of a zones file."""
+
+    zones: tuple[Zone, ...] = parameter(..., "The zones.")
+
+
+def load_zones(file: Path) -> tuple[Zone, ...]:
+    """Read a zones file.
+
+    Raises
+    ------
+    MapError
+        The file is missing, breaks a limit of ``mbf_abstract.config.yaml_source``, or holds something else than zones.
+    """
+    document, findings = read_mapping(file), list[Finding]()
+    content = validate(ZonesFile, document.data, document, (), findings)
+    if content is None:
+        raise MapError(file, told(findings))
+    return content.zones

@@ -1,0 +1,1 @@
+"""Compiled search of Hybrid A* and the curves of a car."""

@@ -1,0 +1,146 @@
+"""The ground under a car: where its footprint fits, and what the centre's cell costs there.
+
+When to use: thousands of poses of one footprint on one snapshot (``hybrid_astar``). When not: one pose or a few, for
+which ``pose_cost`` alone is enough.
+
+Most poses are far from obstacles, and one look at each of a few cells proves it: the ``discs`` cover the footprint, and
+no lethal cell is near the centre of any. Only where one of the cells is ``tight`` are the covering points looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_costmap_nav.grid.costmap import LETHAL
+from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.map.footprint_cost import footprint_cost
+from mbf_costmap_nav.kernels.map.inflation import LARGEST_RADIUS, inflate
+from mbf_costmap_nav.kernels.map.line_cells import cost_along
+
+FloatArray = NDArray[np.float64]
+
+CELL_DIAGONAL = 1.415
+"""Two points are as near as the centres of their cells, give or take half a diagonal [cells] for each."""
+GOLDEN_RATIO = 0.6180339887498949
+
+
+class Ground(NamedTuple):
+    """A snapshot and the footprint on it.
+
+    Attributes
+    ----------
+    cells : (height, width) uint8
+    unknown : int
+        Cost that an unknown cell under the centre counts as; 254 to keep out of them.
+    geometry : (resolution, origin_x, origin_y)
+        [m].
+    samples : (n, 2) float64
+        Covering points of the footprint in the base frame [m], neighbours far apart so that a collision shows early.
+    discs : (k, 2) float64
+        Centres [m] of the discs that cover the samples.
+    tight : (height, width) uint8
+        0 where a disc lies on the map and off lethal cells.
+    """
+
+    cells: NDArray[np.uint8]
+    unknown: int
+    geometry: FloatArray
+    samples: FloatArray
+    discs: FloatArray
+    tight: NDArray[np.uint8]
+
+
+def ground_of(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, samples: FloatArray) -> Ground:
+    """Prepare a snapshot for a footprint's covering points (n, 2) [m]; the arguments are those of ``Ground``."""
+    order = np.argsort((np.arange(len(samples)) * GOLDEN_RATIO) % 1.0, kind="stable")
+    discs = _disc_centres(samples)
+    gaps = np.hypot(samples[:, None, 0] - discs[None, :, 0], samples[:, None, 1] - discs[None, :, 1])
+    radius = min(LARGEST_RADIUS, math.ceil(gaps.min(axis=1).max() / geometry[0] + CELL_DIAGONAL))
+    tight = np.zeros_like(cells)
+    if radius == LARGEST_RADIUS:
+        tight[:] = 1  # a robot of hundreds of cells: all its points are looked at
+    height, width = cells.shape
+    seeds = (cells == LETHAL).astype(np.uint8)
+    inflate(tight, seeds, (0, 0, width, height), np.ones(radius * radius + 1, dtype=np.uint8), radius, 1)
+    for border in (tight[:radius], tight[-radius:], tight[:, :radius], tight[:, -radius:]):
+        border[:] = 1
+    return Ground(cells, unknown, geometry, np.ascontiguousarray(samples[order]), discs, tight)
+
+
+def _disc_centres(samples: FloatArray) -> FloatArray:
+    """Centres (k, 2) of equal discs in a row along the longer side of the samples' box, two for each square."""
+    low, high = samples.min(axis=0), samples.max(axis=0)
+    extent = high - low
+    along = int(np.argmax(extent))
+    count = min(16, 2 * math.ceil(extent[along] / max(extent[1 - along], 0.1 * extent[along]))) if extent[along] else 1
+    centres = np.tile(0.5 * (low + high), (count, 1))
+    centres[:, along] = low[along] + (np.arange(count) + 0.5) * extent[along] / count
+    return centres
+
+
+@kernel
+def pose_cost(
+    cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, samples: FloatArray, pose: FloatArray
+) -> int:
+    """Cost of the centre's cell at a pose (x, y, yaw), or -1 if the robot does not fit there.
+
+    ``geometry`` is (resolution, origin_x, origin_y); a centre in an unknown cell counts as ``unknown``.
+    """
+    cost = _centre_cost(cells, unknown, geometry, pose)
+    if cost < 0:
+        return -1
+    worst = footprint_cost(cells, geometry[0], geometry[1], geometry[2], samples, pose[0], pose[1], pose[2])
+    return -1 if worst == 254 or worst < 0 else cost
+
+
+@kernel
+def _centre_cost(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, pose: FloatArray) -> int:
+    ix = int(np.floor((pose[0] - geometry[1]) / geometry[0]))
+    iy = int(np.floor((pose[1] - geometry[2]) / geometry[0]))
+    if ix < 0 or iy < 0 or ix >= cells.shape[1] or iy >= cells.shape[0]:
+        return -1
+    cost = int(cells[iy, ix]) if cells[iy, ix] < 255 else unknown
+    return cost if cost < 253 else -1
+
+
+@kernel
+def fitting_cost(ground: Ground, pose: FloatArray) -> int:
+    """What ``pose_cost`` says of the ground, sooner where no obstacle is near."""
+    geometry = ground.geometry
+    cost = _centre_cost(ground.cells, ground.unknown, geometry, pose)
+    if cost < 0:
+        return -1
+    x, y = (pose[0] - geometry[1]) / geometry[0], (pose[1] - geometry[2]) / geometry[0]
+    c, s = np.cos(pose[2]) / geometry[0], np.sin(pose[2]) / geometry[0]
+    height, width = ground.cells.shape
+    for i in range(ground.discs.shape[0]):
+        forward, left = ground.discs[i, 0], ground.discs[i, 1]
+        ix, iy = int(np.floor(x + c * forward - s * left)), int(np.floor(y + s * forward + c * left))
+        if ix < 0 or iy < 0 or ix >= width or iy >= height or ground.tight[iy, ix] != 0:
+            return int(pose_cost(ground.cells, ground.unknown, geometry, ground.samples, pose))
+    return cost
+
+
+@kernel
+def driven_cost(ground: Ground, start: FloatArray, poses: FloatArray) -> float:
+    """Mean cost of the centre over poses (n, 3) that are driven one after the other from ``start``, or -1.
+
+    -1: the robot does not fit at one of them, or its centre crosses a blocked cell on the way to it. 0 without poses.
+    """
+    total, geometry = 0.0, ground.geometry
+    x, y = (start[0] - geometry[1]) / geometry[0], (start[1] - geometry[2]) / geometry[0]
+    for i in range(poses.shape[0]):
+        x_next, y_next = (poses[i, 0] - geometry[1]) / geometry[0], (poses[i, 1] - geometry[2]) / geometry[0]
+        cost = fitting_cost(ground, poses[i])
+        if cost < 0:
+            return -1.0
+        cells_apart = abs(np.floor(x_next) - np.floor(x)) + abs(np.floor(y_next) - np.floor(y))
+        if cells_apart > 1.0 and cost_along(ground.cells, ground.unknown, x, y, x_next, y_next) >= 253:
+            return -1.0
+        total += cost
+        x, y = x_next, y_next
+    return float(total / max(1, poses.shape[0]))

@@ -1,0 +1,287 @@
+"""Hybrid A*: a search over positions and headings whose steps are arcs a car can drive, from both ends at once.
+
+States are continuous; two of them are the same if they fall into one bin of position and one of ``HEADINGS`` of
+heading. One tree grows from the start and one, against the direction of driving, from the goal; the one with fewer open
+states is next. So a place that is hard to leave or to enter is worked out near by, not by a search of everything else,
+and a goal that cannot be entered is known as soon as the states around it are spent.
+
+The heuristic is the larger of the cost-to-go over the cells, in the measure that arcs are weighed in, and of the free
+curve of a car. Curves that join the trees (analytic expansion) are tried from each tree to the root of the other, and
+where the trees meet in a bin, between states a little before and behind it.
+
+Formula: Dolgov, Thrun, Montemerlo, Diebel 2010, without its Voronoi field: cells' costs do that here. The order is that
+of weighted A* (Pohl 1970), the choice of the side Pohl's (1971).
+"""
+
+from __future__ import annotations
+
+import heapq
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_costmap_nav.kernels.car.curves import curve_between, sample_word
+from mbf_costmap_nav.kernels.car.ground import Ground, driven_cost
+from mbf_costmap_nav.kernels.car.motion_primitives import (
+    BACKWARD_SIDE,
+    FORWARD_MOTIONS,
+    FORWARD_SIDE,
+    MOTIONS,
+    NO_MOTION,
+    Car,
+    change_of,
+    curve_cost,
+    direction_of,
+    path_from_root,
+    sample_arc,
+    steering_of,
+    weight_of,
+)
+from mbf_costmap_nav.kernels.car.state_tree import StateTree, best_state, new_tree, with_state
+from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FOUND
+
+FloatArray = NDArray[np.float64]
+Field = NDArray[np.float32]
+Heap = list[tuple[float, int]]
+
+GAVE_UP, NEARBY = 3, 4
+"""Further states of a finished search: the limit of states was met; a state within the tolerance was taken."""
+
+HEADINGS = 72
+CURVE_RANGE = 3.0
+"""Beyond this many turning radii the free curve adds little to the heuristic and is not computed."""
+HEURISTIC_WEIGHT = 1.5
+"""The cost of the arcs found is within about this factor of the best; the fewer states, the larger it is."""
+WORTH_WHILE = 1.1
+"""A state replaces the one in its bin only if it is better by this factor; half of all states are spared."""
+ANCESTORS = (1, 2, 4, 8, 16)
+"""How many arcs before and behind a meeting of the trees a curve is tried to join them."""
+MEETINGS_PER_TRY = 8
+SPARE_STATES = 500
+"""With a way known, the search for a better one goes on for half of the states so far, and these."""
+
+
+class Target(NamedTuple):
+    """What a tree grows to: the other root's ``pose`` (3,), and the ``field`` (height, width) of costs [m] to it."""
+
+    pose: FloatArray
+    field: Field
+
+
+class Joint(NamedTuple):
+    """The best way so far: its ``cost`` (1,) [m], its ``states`` (2,) of both trees, the ``word`` (5, 2) between."""
+
+    cost: FloatArray
+    states: NDArray[np.int64]
+    word: FloatArray
+
+
+@kernel
+def _heuristic(ground: Ground, car: Car, side: float, pose: FloatArray, target: Target) -> float:
+    """Larger of the field [m] at the pose's cell and the length of the free curve."""
+    geometry = ground.geometry
+    ix, iy = int((pose[0] - geometry[1]) / geometry[0]), int((pose[1] - geometry[2]) / geometry[0])
+    around = float(target.field[iy, ix] * geometry[0])
+    if around > CURVE_RANGE * car.radius:
+        return around
+    ends = (pose, target.pose) if side == FORWARD_SIDE else (target.pose, pose)
+    free_curve = np.abs(curve_between(ends[0], ends[1], car.radius, car.reversing)[:, 1]).sum() * car.radius
+    return float(max(free_curve, around))
+
+
+@kernel
+def _bin_of(ground: Ground, car: Car, pose: FloatArray) -> int:
+    """Number of the state's bin."""
+    geometry = ground.geometry
+    ix, iy = int((pose[0] - geometry[1]) / car.bin_size), int((pose[1] - geometry[2]) / car.bin_size)
+    heading = int(np.floor(pose[2] / (2.0 * np.pi) * HEADINGS + 0.5)) % HEADINGS
+    return ((iy << 28) + ix) * HEADINGS + heading
+
+
+@kernel
+def _join(
+    ground: Ground, car: Car, side: float, tree: StateTree, other: StateTree, states: tuple[int, int], joint: Joint
+) -> None:
+    """Try the free curve between a state of a tree and one of the other; keep it if it is the best way so far."""
+    first, second = (tree, other) if side == FORWARD_SIDE else (other, tree)
+    a, b = states if side == FORWARD_SIDE else (states[1], states[0])
+    limit = joint.cost[0] - first.g[a] - second.g[b]
+    if limit <= 0.0:
+        return
+    word = curve_between(first.poses[a], second.poses[b], car.radius, car.reversing)
+    before, after = direction_of(first.motions[a]), direction_of(second.motions[b])
+    cost = curve_cost(ground, car, first.poses[a], word, before, after, limit)
+    if cost < limit:
+        joint.cost[0] = first.g[a] + cost + second.g[b]
+        joint.states[0], joint.states[1] = a, b
+        joint.word[:] = word
+
+
+@kernel
+def _ancestor(tree: StateTree, state: int, generations: int) -> int:
+    """State so many arcs nearer to the root, or the root."""
+    for _ in range(generations):
+        if tree.parents[state] >= 0:
+            state = tree.parents[state]
+    return state
+
+
+@kernel
+def _try_joints(
+    ground: Ground,
+    car: Car,
+    side: float,
+    trees: tuple[StateTree, StateTree],
+    target: Target,
+    state: int,
+    waits: NDArray[np.int64],
+    joint: Joint,
+) -> None:
+    """Try curves to the other root, more often the nearer it is, and to the other tree where it is met.
+
+    ``waits`` (2,): how many states, and how many meetings, to let pass before the next try of either.
+    """
+    tree, other = trees
+    waits[0] -= 1
+    if waits[0] <= 0:
+        waits[0] = int(_heuristic(ground, car, side, tree.poses[state], target) / (2.0 * car.step))
+        _join(ground, car, side, tree, other, (state, 0), joint)
+    met = best_state(other, tree.bins[state])
+    if met < 0:
+        return
+    waits[1] -= 1
+    if waits[1] <= 0:
+        waits[1] = MEETINGS_PER_TRY
+        for generations in ANCESTORS:
+            ends = (_ancestor(tree, state, generations), _ancestor(other, met, generations))
+            _join(ground, car, side, tree, other, ends, joint)
+
+
+@kernel
+def _grow(
+    ground: Ground, car: Car, side: float, tree: StateTree, target: Target, state: int, heap: Heap, arc: FloatArray
+) -> StateTree:
+    """Add what six arcs (three if the car may not reverse) reach; what no free ground would improve is not looked at.
+
+    ``arc`` (pieces, 3) is room to work in. The tree it returns may stand in other memory.
+    """
+    pose = tree.poses[state]
+    for motion in range(MOTIONS if car.reversing else FORWARD_MOTIONS):
+        sample_arc(pose, motion, side, car, arc)
+        reached, direction = arc[car.pieces - 1], direction_of(motion)
+        bin_reached = _bin_of(ground, car, reached)
+        known = best_state(tree, bin_reached)
+        g_known = tree.g[known] / WORTH_WHILE if known >= 0 else np.inf
+        g_before = tree.g[state] + change_of(car, direction_of(tree.motions[state]), direction)
+        free_cost = car.step * weight_of(car, steering_of(motion), direction)
+        if g_known <= g_before + free_cost:
+            continue
+        cost = driven_cost(ground, pose, arc)
+        g_new = g_before + free_cost * (1.0 + car.cost_factor * cost / 252.0)
+        if cost < 0.0 or g_known <= g_new:
+            continue
+        estimate = _heuristic(ground, car, side, reached, target)
+        if estimate < np.inf:
+            heapq.heappush(heap, (g_new + HEURISTIC_WEIGHT * estimate, tree.made[0]))
+            tree = with_state(tree, reached, g_new, bin_reached, state, motion)
+    return tree
+
+
+@kernel
+def _nearest_state(tree: StateTree, goal: FloatArray, tolerance: float) -> int:
+    """Nearest state of a tree to the goal, within ``tolerance`` [m] and half a heading bin; or -1."""
+    best, nearest = tolerance, -1
+    for i in range(tree.made[0]):
+        distance = np.hypot(tree.poses[i, 0] - goal[0], tree.poses[i, 1] - goal[1])
+        turn = abs((tree.poses[i, 2] - goal[2] + np.pi) % (2.0 * np.pi) - np.pi)
+        if distance <= best and turn <= np.pi / HEADINGS:
+            best, nearest = distance, i
+    return nearest
+
+
+@kernel
+def hybrid_search(
+    ground: Ground,
+    car: Car,
+    from_start: Target,
+    from_goal: Target,
+    wanted: FloatArray,
+    tolerance: float,
+    max_states: int,
+    cancel_flag: NDArray[np.uint8],
+) -> tuple[int, FloatArray, float, int]:
+    """Search a way from the start to the goal.
+
+    Parameters
+    ----------
+    ground : Ground
+    car : Car
+    from_start, from_goal : Target
+        What the trees from the start and from the goal grow to: the goal with the cost-to-go to it, and the start with
+        the cost from there, in cells; inf where there is no way.
+    wanted : (3,) float64
+    tolerance : float
+        If the goal is not reached, the state nearest to ``wanted`` that can be, at most so far [m] away and of its
+        heading, will do; 0 = none will.
+    max_states : int
+        Give up after so many states of both trees.
+
+    Returns
+    -------
+    status : int
+        FOUND (the path ends at the goal), NEARBY (within the tolerance of ``wanted``), EXHAUSTED, GAVE_UP or CANCELED.
+    poses : (m, 3) float64
+        From the start to the end, at most the resolution apart.
+    cost : float
+        Of the way [m], weighted.
+    states : int
+        How many were made.
+    """
+    start, goal = from_goal.pose, from_start.pose
+    tree = new_tree(start, _bin_of(ground, car, start), NO_MOTION)
+    other = new_tree(goal, _bin_of(ground, car, goal), NO_MOTION)
+    heap, other_heap = [(0.0, 0)], [(0.0, 0)]
+    waits, other_waits = np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64)
+    joint = Joint(np.full(1, np.inf), np.zeros(2, dtype=np.int64), np.zeros((5, 2)))
+    arc, nothing = np.empty((car.pieces, 3)), np.empty((0, 3))
+    status, last_count = EXHAUSTED, max_states
+    while len(heap) > 0 and (len(other_heap) > 0 or tolerance > 0.0):
+        count = tree.made[0] + other.made[0]
+        if cancel_flag[0] != 0:
+            return CANCELED, nothing, 0.0, count
+        # 1. With a way at hand, stop when none of the open states promises a better one, or it took long enough.
+        if joint.cost[0] < np.inf:
+            last_count = min(last_count, count + count // 2 + SPARE_STATES)
+            most_promising = max(heap[0][0], other_heap[0][0]) if len(other_heap) > 0 else heap[0][0]
+            if joint.cost[0] <= most_promising:
+                break
+        if count >= last_count:
+            status = GAVE_UP
+            break
+        # 2. The smaller side is next.
+        if len(other_heap) == 0 or len(heap) <= len(other_heap):
+            state = heapq.heappop(heap)[1]
+            if best_state(tree, tree.bins[state]) == state:
+                _try_joints(ground, car, FORWARD_SIDE, (tree, other), from_start, state, waits, joint)
+                tree = _grow(ground, car, FORWARD_SIDE, tree, from_start, state, heap, arc)
+        else:
+            state = heapq.heappop(other_heap)[1]
+            if best_state(other, other.bins[state]) == state:
+                _try_joints(ground, car, BACKWARD_SIDE, (other, tree), from_goal, state, other_waits, joint)
+                other = _grow(ground, car, BACKWARD_SIDE, other, from_goal, state, other_heap, arc)
+
+    # 3. The arcs from the start, the curve, the arcs to the goal; without a way the state that will do.
+    count = tree.made[0] + other.made[0]
+    if joint.cost[0] < np.inf:
+        a, b = joint.states
+        pose = tree.poses[a]
+        curve = sample_word(pose[0], pose[1], pose[2], joint.word, car.radius, ground.geometry[0])
+        behind = path_from_root(other, b, BACKWARD_SIDE, car)[::-1]
+        path = np.concatenate((path_from_root(tree, a, FORWARD_SIDE, car), curve, behind[1:]))
+        return FOUND, path, joint.cost[0], count
+    last = _nearest_state(tree, wanted, tolerance) if tolerance > 0.0 else -1
+    if last < 0:
+        return status, nothing, 0.0, count
+    return NEARBY, path_from_root(tree, last, FORWARD_SIDE, car), tree.g[last], count

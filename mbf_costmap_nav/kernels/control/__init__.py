@@ -1,0 +1,1 @@
+"""Compiled rollouts and critics of the sampling controllers, and path smoothing."""

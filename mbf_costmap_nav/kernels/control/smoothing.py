@@ -1,0 +1,75 @@
+"""Relaxation of a path's points against each other, their origin, and the costs around them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.map.line_cells import cost_along
+
+UNKNOWN_AS = 0
+"""Unknown cells do not push a path away."""
+
+
+@kernel
+def relax_path(
+    cells: NDArray[np.uint8],
+    points: NDArray[np.float64],
+    data_weight: float,
+    smooth_weight: float,
+    highest_cost: int,
+    tolerance: float,
+    max_sweeps: int,
+    cancel_flag: NDArray[np.uint8],
+) -> tuple[NDArray[np.float64], int]:
+    """Gauss-Seidel sweeps of the classic path smoother: pull each point to its origin and to its neighbours' middle.
+
+    A point only moves where the lines to its neighbours have costs of at most ``highest_cost``, or lower ones than now,
+    so a path never enters lethal cells and gets no nearer to obstacles than that.
+
+    Parameters
+    ----------
+    points : (n, 2) float64
+        In cell units (cell (ix, iy) spans ix .. ix + 1); the first and the last stay.
+    tolerance : float
+        Largest motion [cells] of a sweep at which to stop.
+
+    Returns
+    -------
+    smoothed : (n, 2) float64
+    sweeps : int
+        Number of sweeps done.
+    """
+    smoothed = points.copy()
+    for sweep in range(max_sweeps):
+        if cancel_flag[0] != 0:
+            return smoothed, sweep
+        largest = 0.0
+        for i in range(1, smoothed.shape[0] - 1):
+            x, y = smoothed[i, 0], smoothed[i, 1]
+            x_new = (
+                x
+                + data_weight * (points[i, 0] - x)
+                + smooth_weight * (smoothed[i - 1, 0] + smoothed[i + 1, 0] - 2.0 * x)
+            )
+            y_new = (
+                y
+                + data_weight * (points[i, 1] - y)
+                + smooth_weight * (smoothed[i - 1, 1] + smoothed[i + 1, 1] - 2.0 * y)
+            )
+            before, after = smoothed[i - 1], smoothed[i + 1]
+            cost = max(
+                cost_along(cells, UNKNOWN_AS, before[0], before[1], x_new, y_new),
+                cost_along(cells, UNKNOWN_AS, x_new, y_new, after[0], after[1]),
+            )
+            if cost > highest_cost and cost >= max(
+                cost_along(cells, UNKNOWN_AS, before[0], before[1], x, y),
+                cost_along(cells, UNKNOWN_AS, x, y, after[0], after[1]),
+            ):
+                continue
+            smoothed[i, 0], smoothed[i, 1] = x_new, y_new
+            largest = max(largest, max(abs(x_new - x), abs(y_new - y)))
+        if largest < tolerance:
+            return smoothed, sweep + 1
+    return smoothed, max_sweeps

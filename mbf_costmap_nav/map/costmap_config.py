@@ -1,0 +1,219 @@
+"""Building a ``LayeredCostmap`` from configuration.
+
+A costmap's block has the keys of ``CostmapParameters``; each layer's own parameters stand in a block of the layer's
+name, the way MBF writes its plugin lists::
+
+    global_costmap:
+      resolution: 0.05
+      robot_radius: 0.25
+      layers:
+        - {name: walls, type: static}
+        - {name: inflation, type: inflation}
+      walls: {map_file: office.yaml}
+      inflation: {inflation_radius: 0.6}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from pydantic import field_validator, model_validator
+
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE
+from mbf_abstract.parameters import ParameterModel, PluginParameters, parameter
+from mbf_costmap_nav.grid.costmap import MAX_CELLS, Costmap, GridGeometry
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext, LayerParameters
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
+
+BUILTIN_LAYERS = {
+    "static": "mbf_costmap_nav.layers.static:StaticLayer",
+    "obstacle": "mbf_costmap_nav.layers.obstacle:ObstacleLayer",
+    "voxel": "mbf_costmap_nav.layers.voxel:VoxelLayer",
+    "range_sensor": "mbf_costmap_nav.layers.range_sensor:RangeSensorLayer",
+    "denoise": "mbf_costmap_nav.layers.denoise:DenoiseLayer",
+    "inflation": "mbf_costmap_nav.layers.inflation:InflationLayer",
+    "keepout": "mbf_costmap_nav.layers.keepout:KeepoutLayer",
+    "speed_limit": "mbf_costmap_nav.layers.speed_limit:SpeedLimitLayer",
+}
+"""Types of the layers that ship, as "module:Class"."""
+
+LayerResolver = Callable[[str], type[CostmapLayer]]
+
+
+class LayerEntry(ParameterModel):
+    """One line of the layer list."""
+
+    name: str = parameter(..., "Name of the layer; its parameters stand in the block of this name.")
+    type: str = parameter(..., "Type of the layer: a built-in name, an entry point, or module:Class.")
+
+
+class CostmapParameters(ParameterModel):
+    """Parameters of one costmap, with costmap_2d's names and defaults."""
+
+    frame_id: str = parameter(
+        "map", "Frame of the grid; plans are made in global_frame, a local map may be in odom.", dynamic=False
+    )
+    rolling_window: bool = parameter(False, "Keep the grid centred on the robot.", dynamic=False)
+    width: float = parameter(10.0, "Extent along x; a static map replaces it.", unit="m", gt=0.0, dynamic=False)
+    height: float = parameter(10.0, "Extent along y; a static map replaces it.", unit="m", gt=0.0, dynamic=False)
+    resolution: float = parameter(0.1, "Side of a cell.", unit="m", ge=1e-4, le=1e3, dynamic=False)
+    origin_x: float = parameter(0.0, "X of the lower-left corner.", unit="m", dynamic=False)
+    origin_y: float = parameter(0.0, "Y of the lower-left corner.", unit="m", dynamic=False)
+    robot_radius: float = parameter(0.46, "Radius of a round robot; a footprint replaces it.", unit="m", ge=0.0)
+    footprint: str | list[tuple[float, float]] | None = parameter(
+        None, "Corners of the robot, [[x, y], ...] or the same as text.", unit="m"
+    )
+    footprint_padding: float = parameter(0.01, "Padding of the footprint (costmap_2d's sign rule).", unit="m", ge=0.0)
+    track_unknown_space: bool = parameter(False, "Whether unknown is a value of its own.", dynamic=False)
+    update_frequency: float = parameter(
+        5.0, "How often the server updates the map.", unit="Hz", gt=0.0, le=1000.0, dynamic=False
+    )
+    max_age: float = parameter(
+        2.0, "Time after the last update at which the map stops being current; 0 = never.", unit="s", ge=0.0
+    )
+    transform_tolerance: float = parameter(
+        TRANSFORM_TOLERANCE,
+        "A scan this much newer than the newest transform is placed by that one; a newer one is not used.",
+        unit="s",
+        ge=0.0,
+        le=10.0,
+        dynamic=False,
+    )
+    confine_images: bool = parameter(
+        False, "Refuse maps and masks whose image lies out of their YAML file's folder.", dynamic=False
+    )
+    max_cells: int = parameter(
+        MAX_CELLS,
+        "Larger grids, maps and masks are refused before memory is taken.",
+        ge=1,
+        le=178_000_000,  # Pillow opens no larger images
+        dynamic=False,
+    )
+    layers: tuple[LayerEntry, ...] = parameter((), "Layers in order of writing.", dynamic=False)
+
+    @field_validator("footprint")
+    @classmethod
+    def _footprint_is_a_polygon(
+        cls, value: str | list[tuple[float, float]] | None
+    ) -> str | list[tuple[float, float]] | None:
+        if value is not None:
+            Footprint.parse(value)
+        return value
+
+    @model_validator(mode="after")
+    def _size_has_a_limit(self) -> CostmapParameters:
+        columns, rows = self.width / self.resolution, self.height / self.resolution
+        if columns * rows > self.max_cells:
+            raise ValueError(
+                f"at most {self.max_cells} cells (max_cells), not the {columns:g} x {rows:g} of width, height and "
+                "resolution"
+            )
+        return self
+
+    def robot_footprint(self) -> Footprint:
+        """Return the robot's outline without padding."""
+        return Footprint.circle(self.robot_radius) if self.footprint is None else Footprint.parse(self.footprint)
+
+    def geometry(self) -> GridGeometry:
+        """Return the grid these numbers describe, with at least one cell."""
+        columns = max(1, round(self.width / self.resolution))
+        rows = max(1, round(self.height / self.resolution))
+        return GridGeometry(columns, rows, self.resolution, self.origin_x, self.origin_y)
+
+
+def builtin_layer(type_name: str) -> type[CostmapLayer]:
+    """Class of a built-in layer type, or of "module:Class".
+
+    Raises
+    ------
+    ValueError
+        The type is unknown, cannot be imported, or is no layer.
+    """
+    location = BUILTIN_LAYERS.get(type_name, type_name)
+    module_name, colon, class_name = location.partition(":")
+    if not colon:
+        raise ValueError(f"unknown layer type {type_name!r}; known are {sorted(BUILTIN_LAYERS)}, or module:Class")
+    try:
+        found = getattr(import_module(module_name), class_name)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"layer type {type_name!r} cannot be imported: {error}") from error
+    if not (isinstance(found, type) and issubclass(found, CostmapLayer)):
+        raise ValueError(f"layer type {type_name!r} is no CostmapLayer")
+    return found
+
+
+def build_layered_costmap(
+    parameters: CostmapParameters,
+    layer_blocks: Mapping[str, Mapping[str, Any] | PluginParameters] | None = None,
+    *,
+    resolve_layer: LayerResolver = builtin_layer,
+    base_folder: Path | str = ".",
+    static_map: Costmap | None = None,
+    transforms: TransformBuffer | None = None,
+) -> LayeredCostmap:
+    """Make a costmap with its layers.
+
+    Parameters
+    ----------
+    parameters : CostmapParameters
+        The costmap's block without the blocks of its layers.
+    layer_blocks : mapping
+        Layer name -> its block, raw or validated already; a layer without one gets its defaults.
+    resolve_layer : callable
+        Class of a layer type; a server hands over its registry's look-up.
+    base_folder : path
+        Where relative file names in layer blocks start.
+    static_map : Costmap, optional
+        Map of static layers that name no file.
+    transforms : TransformBuffer, optional
+        For layers whose data is in another frame than the costmap.
+
+    Raises
+    ------
+    ValueError
+        Unknown layer type, bad layer parameters (pydantic's ValidationError is one), a block no layer has, or two
+        layers of one name.
+    MapError
+        A layer's map file cannot be used.
+    """
+    blocks = dict(layer_blocks or {})
+    layers: list[CostmapLayer] = []
+    for entry in parameters.layers:
+        layer_class = resolve_layer(entry.type)
+        block = blocks.pop(entry.name, {})
+        layer_parameters = block if isinstance(block, LayerParameters) else layer_class.Parameters.model_validate(block)
+        layers.append(
+            layer_class(
+                LayerContext(
+                    name=entry.name,
+                    parameters=layer_parameters,
+                    frame_id=parameters.frame_id,
+                    rolling_window=parameters.rolling_window,
+                    track_unknown_space=parameters.track_unknown_space,
+                    base_folder=Path(base_folder),
+                    confine_images=parameters.confine_images,
+                    static_map=static_map,
+                    transforms=transforms,
+                    max_cells=parameters.max_cells,
+                )
+            )
+        )
+    if blocks:
+        raise ValueError(
+            f"blocks {sorted(blocks)} belong to no layer, the layers are {[e.name for e in parameters.layers]}"
+        )
+    return LayeredCostmap(
+        parameters.geometry(),
+        layers,
+        parameters.robot_footprint(),
+        footprint_padding=parameters.footprint_padding,
+        frame_id=parameters.frame_id,
+        rolling_window=parameters.rolling_window,
+        track_unknown_space=parameters.track_unknown_space,
+        max_age=parameters.max_age,
+    )

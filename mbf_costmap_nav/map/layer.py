@@ -1,0 +1,214 @@
+"""The interface of a costmap layer, and a base for layers that keep cells of their own.
+
+One update of a ``LayeredCostmap`` runs in two passes over its layers, in the configured order:
+
+1. ``update_bounds``: a layer takes in what it learnt and returns the box of cells that may change, grown from the box
+   of the layers before it.
+2. ``update_costs``: the box is reset and every layer writes its part into the shared cells.
+
+All hooks run while the costmap's lock is held: they must not call back into the costmap, and must not wait.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import ClassVar, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_costmap_nav.grid.costmap import FREE, MAX_CELLS, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.grid.footprint import Footprint
+
+CellType = TypeVar("CellType", bound=np.generic)
+
+
+class LayerParameters(PluginParameters):
+    """Parameters every layer has."""
+
+    enabled: bool = parameter(True, "Whether the layer takes part in updates.")
+
+
+class CombinationMethod(str, Enum):
+    """How a layer's cells enter the costmap."""
+
+    OVERWRITE = "overwrite"
+    MAXIMUM = "maximum"
+    MAXIMUM_WITHOUT_UNKNOWN_OVERWRITE = "maximum_without_unknown_overwrite"
+
+
+@dataclass(frozen=True)
+class LayerContext:
+    """What every layer is constructed with.
+
+    Attributes
+    ----------
+    name : str
+        Name of the layer in the configuration.
+    parameters : LayerParameters
+        Validated instance of the layer class's ``Parameters``.
+    frame_id : str
+        Frame of the costmap.
+    rolling_window : bool
+        Whether the grid moves with the robot.
+    track_unknown_space : bool
+        Whether unknown is a value of its own; otherwise unknown cells count as free.
+    base_folder : Path
+        Relative file names of the configuration start here.
+    confine_images : bool
+        Whether the image of a map or mask must lie in the folder of its YAML file.
+    max_cells : int
+        Larger maps and masks are refused before memory is taken.
+    static_map : Costmap, optional
+        A map handed over by the program instead of a file.
+    transforms : TransformBuffer, optional
+        Where the frames of the layer's data are looked up; without it everything must be in the costmap's frame.
+    """
+
+    name: str
+    parameters: LayerParameters
+    frame_id: str = "map"
+    rolling_window: bool = False
+    track_unknown_space: bool = False
+    base_folder: Path = field(default_factory=Path)
+    confine_images: bool = False
+    static_map: Costmap | None = None
+    transforms: TransformBuffer | None = None
+    max_cells: int = MAX_CELLS
+
+
+class CostmapLayer(ABC):
+    """One source of costs. ``geometry`` is the costmap's grid, set before the first update."""
+
+    Parameters: ClassVar[type[LayerParameters]] = LayerParameters
+    contract_check: ClassVar[str] = "mbf_costmap_nav.testing:check_layer"
+    clearable: ClassVar[bool] = True
+    """Whether clearing an area means this layer although nobody named it; false for what no sensor brings back."""
+    geometry: GridGeometry
+
+    def __init__(self, context: LayerContext) -> None:
+        self.name = context.name
+        self.parameters = context.parameters
+        self.track_unknown_space = context.track_unknown_space
+        self.rolling_window = context.rolling_window
+
+    def preferred_geometry(self) -> GridGeometry | None:
+        """Grid the costmap should have because of this layer (a static map); None = any."""
+        return None
+
+    def match_geometry(self, geometry: GridGeometry) -> None:
+        """Take over a new grid and forget all cells."""
+        self.geometry = geometry
+
+    def shift(self, geometry: GridGeometry, dx: int, dy: int) -> None:
+        """Take over the grid of a rolling window that moved by (dx, dy) cells; keep the cells of the overlap."""
+        self.geometry = geometry
+
+    def set_footprint(self, footprint: Footprint) -> None:  # noqa: B027 - an optional hook
+        """Take over the robot's (padded) footprint."""
+
+    def parameters_changed(self) -> None:  # noqa: B027 - an optional hook
+        """Take over ``parameters``, which have just been replaced; the next update recomputes the whole map.
+
+        Needed only where something was derived from them. May raise ValueError: the old ones are then put back.
+        """
+
+    def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
+        """Take in new data; return ``box`` grown by the cells that may change (it may reach beyond the grid)."""
+        return box
+
+    @abstractmethod
+    def update_costs(self, cells: CellArray, box: CellBox) -> None:
+        """Write this layer's costs into ``cells[box.slices]``; ``box`` lies on the grid."""
+
+    def reset(self) -> None:  # noqa: B027 - an optional hook
+        """Forget everything the layer has gathered; a static layer returns to its map."""
+
+    def clear_area(self, box: CellBox, inside: bool) -> None:  # noqa: B027 - an optional hook
+        """Forget the cells in ``box``, or all cells out of it (``inside`` false)."""
+
+    def currency_problem(self, now: float) -> str:
+        """Why the layer's data is too old at ``now`` [s]; empty while it is current."""
+        return ""
+
+    @property
+    def lasting(self) -> bool:
+        """Whether no sensor has a part in its cells, and no frame moves them: what it forbids stays forbidden."""
+        return False
+
+    def doubt(self) -> str:
+        """What is legal but hardly meant in the layer's parameters, given the footprint; empty if nothing is."""
+        return ""
+
+    def speed_limit(self, x: float, y: float, full_speed: float) -> float:
+        """Allowed speed [m/s] at the point (x, y) [m], at most ``full_speed``."""
+        return full_speed
+
+
+class GridLayer(CostmapLayer):
+    """A layer that keeps its own cells and combines them into the costmap."""
+
+    cells: CellArray
+
+    @property
+    def default_value(self) -> int:
+        """What a cell without information holds."""
+        return UNKNOWN if self.track_unknown_space else FREE
+
+    def match_geometry(self, geometry: GridGeometry) -> None:
+        """Allocate cells of the default value."""
+        super().match_geometry(geometry)
+        self.cells = np.full((geometry.height, geometry.width), self.default_value, dtype=np.uint8)
+
+    def shift(self, geometry: GridGeometry, dx: int, dy: int) -> None:
+        """Move the kept cells; new ones get the default value."""
+        super().shift(geometry, dx, dy)
+        self.cells = shifted(self.cells, dx, dy, self.default_value)
+
+    def reset(self) -> None:
+        """Set all cells to the default value."""
+        self.cells.fill(self.default_value)
+
+    def clear_area(self, box: CellBox, inside: bool) -> None:
+        """Set the cells inside or outside of ``box`` to the default value."""
+        clear_cells(self.cells, box.clipped(self.geometry.box), inside, self.default_value)
+
+
+def shifted(cells: NDArray[CellType], dx: int, dy: int, fill: float) -> NDArray[CellType]:
+    """Return the cells seen by a window that moved by (dx, dy) cells; what was outside becomes ``fill``."""
+    height, width = cells.shape
+    moved = np.full_like(cells, fill)
+    if abs(dx) < width and abs(dy) < height:
+        source = cells[max(dy, 0) : height + min(dy, 0), max(dx, 0) : width + min(dx, 0)]
+        moved[max(-dy, 0) : height + min(-dy, 0), max(-dx, 0) : width + min(-dx, 0)] = source
+    return moved
+
+
+def clear_cells(cells: NDArray[CellType], box: CellBox, inside: bool, value: float) -> None:
+    """Set the cells inside ``box`` to ``value``, or all others (``inside`` false). ``box`` lies on the grid."""
+    if inside:
+        if not box.empty:
+            cells[box.slices] = value
+        return
+    kept = None if box.empty else cells[box.slices].copy()
+    cells.fill(value)
+    if kept is not None:
+        cells[box.slices] = kept
+
+
+def combine(cells: CellArray, layer_cells: CellArray, box: CellBox, method: CombinationMethod) -> None:
+    """Write a layer's cells of ``box`` into the costmap's; unknown layer cells change nothing under a maximum."""
+    old, new = cells[box.slices], layer_cells[box.slices]
+    if method is CombinationMethod.OVERWRITE:
+        np.copyto(old, new, where=new != UNKNOWN)
+    elif method is CombinationMethod.MAXIMUM:
+        # Unknown is the largest byte, but it gives way to anything known.
+        np.copyto(old, new, where=(new != UNKNOWN) & ((old == UNKNOWN) | (old < new)))
+    else:
+        np.copyto(old, new, where=(new != UNKNOWN) & (old != UNKNOWN) & (old < new))

@@ -1,0 +1,400 @@
+"""A costmap made of ordered layers, shared by everything that navigates on it.
+
+Only the box of cells that a layer reports as changed is recomputed. Plugins never see the cells that are being
+written: ``snapshot`` hands out a read-only copy, cached until the next change. One lock protects the cells; it is held
+for the time of one update, never while code of a plugin or a server runs.
+
+When to use: for each map of a costmap server, a static one of the size of its map file and a rolling one around the
+robot. When not: for a single fixed grid (tests, offline planning) a plain ``Costmap`` is enough.
+
+The order of work, bounds and the combination rules are those of costmap_2d.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbf_abstract.geometry import Pose
+from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.layers_in_sum import doubts_about, lasting_map
+from mbf_costmap_nav.map.layer import CostmapLayer, LayerParameters, shifted
+from mbf_costmap_nav.map.sensor_data import Observation, SensorLayer
+
+
+class LayeredCostmap:
+    """Layers, the cells they produce, and the questions a server asks.
+
+    Parameters
+    ----------
+    geometry : GridGeometry
+        Grid of the map; a layer that prefers another one (a static map) replaces it unless the window rolls.
+    layers : sequence of CostmapLayer
+        In order of writing. Names must be unique.
+    footprint : Footprint
+        The robot's outline without padding.
+    footprint_padding : float
+        Padding [m] by costmap_2d's sign rule; layers and radii use the padded outline.
+    frame_id : str
+        Frame of the grid.
+    rolling_window : bool
+        Keep the grid centred on the robot, moving by whole cells.
+    track_unknown_space : bool
+        Start cells as unknown instead of free.
+    max_age : float
+        Seconds after the last update at which the map stops being current; 0 = never.
+
+    Raises
+    ------
+    ValueError
+        Two layers share a name.
+    """
+
+    def __init__(
+        self,
+        geometry: GridGeometry,
+        layers: Sequence[CostmapLayer],
+        footprint: Footprint,
+        *,
+        footprint_padding: float = 0.0,
+        frame_id: str = "map",
+        rolling_window: bool = False,
+        track_unknown_space: bool = False,
+        max_age: float = 0.0,
+    ) -> None:
+        names = [layer.name for layer in layers]
+        if len(set(names)) != len(names):
+            raise ValueError(f"the layers of a costmap need different names, got {names}")
+        if not rolling_window:
+            geometry = next((own for layer in layers if (own := layer.preferred_geometry())), geometry)
+        self.frame_id = frame_id
+        self.rolling_window = rolling_window
+        self.max_age = max_age
+        self.layers = {layer.name: layer for layer in layers}
+        self._lock = threading.Lock()
+        self._default_value = UNKNOWN if track_unknown_space else FREE
+        self._geometry = geometry
+        self._cells: CellArray = np.full((geometry.height, geometry.width), self._default_value, dtype=np.uint8)
+        self._footprint_padding = footprint_padding
+        self._version = 0
+        self._last_update: float | None = None
+        self._pending = geometry.box
+        self._snapshot: Costmap | None = None
+        for layer in layers:
+            layer.match_geometry(geometry)
+        self.set_footprint(footprint)
+
+    # ------------------------------------------------------------------------------------------------ reading
+    @property
+    def geometry(self) -> GridGeometry:
+        """The current grid; it moves with the robot if the window rolls."""
+        return self._geometry
+
+    @property
+    def resolution(self) -> float:
+        """Side of a cell [m]."""
+        return self._geometry.resolution
+
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of all observation sources of the layers, sorted."""
+        return tuple(sorted({name for layer in self.layers.values() for name in _sources(layer)}))
+
+    @property
+    def last_update(self) -> float | None:
+        """Time [s] of the last update; None before the first one."""
+        return self._last_update
+
+    @property
+    def inscribed_radius(self) -> float:
+        """Distance [m] from the base to the nearest side of the padded footprint."""
+        return self.footprint.inscribed_radius
+
+    @property
+    def circumscribed_radius(self) -> float:
+        """Distance [m] from the base to the farthest corner of the padded footprint."""
+        return self.footprint.circumscribed_radius
+
+    def layer(self, name: str) -> CostmapLayer:
+        """One layer; raises KeyError with the known ones if there is none of that name."""
+        if name not in self.layers:
+            raise KeyError(f"the costmap has no layer {name!r}, only {list(self.layers)}")
+        return self.layers[name]
+
+    def snapshot(self) -> Costmap:
+        """Read-only copy of the map as of the last update; the same object until the map changes."""
+        with self._lock:
+            if self._snapshot is None:
+                cells = self._cells.copy()
+                cells.flags.writeable = False
+                grid = self._geometry
+                self._snapshot = Costmap(
+                    cells,
+                    grid.resolution,
+                    grid.origin_x,
+                    grid.origin_y,
+                    self.frame_id,
+                    self._last_update or 0.0,
+                    self._version,
+                )
+            return self._snapshot
+
+    def lasting(self) -> Costmap | None:
+        """The map as it were if no sensor saw anything, see ``layers_in_sum``; None where that is moot."""
+        with self._lock:
+            if self.rolling_window or self._last_update is None:
+                return None
+            self._pending = self._geometry.box  # layers may keep notes of the cells they are asked for
+            return lasting_map(list(self._enabled_layers()), self._geometry, self._default_value, self.frame_id)
+
+    def is_current(self, now: float) -> bool:
+        """Whether a command may be computed on this map at ``now`` [s]."""
+        return not self.currency_problem(now)
+
+    def currency_problem(self, now: float) -> str:
+        """Why the map is not current at ``now`` [s]: the age of the map, or the silent sensor; empty if it is."""
+        with self._lock:
+            if self._last_update is None:
+                return "the costmap has not been updated yet"
+            age = now - self._last_update
+            if 0.0 < self.max_age < age:
+                return f"the last update of the costmap is {age:.2f} s old, allowed are {self.max_age:.2f} s"
+            problems = (layer.currency_problem(now) for layer in self._enabled_layers())
+            return next((problem for problem in problems if problem), "")
+
+    def doubts(self) -> list[str]:
+        """What is legal but hardly meant in the layers' parameters, e.g. an inflation narrower than the robot."""
+        with self._lock:
+            return doubts_about(list(self._enabled_layers()), self.inscribed_radius)
+
+    def speed_limit(self, x: float, y: float, full_speed: float) -> float:
+        """Lowest speed [m/s] the layers allow at the point (x, y) [m]; ``full_speed`` where there is no limit."""
+        with self._lock:
+            return min((layer.speed_limit(x, y, full_speed) for layer in self._enabled_layers()), default=full_speed)
+
+    # ----------------------------------------------------------------------------------------------- updating
+    def update(self, robot_pose: Pose | None, now: float) -> CellBox:
+        """Bring the map up to ``now`` [s] and return the box of cells that were recomputed.
+
+        Parameters
+        ----------
+        robot_pose : Pose or None
+            Pose of the base in ``frame_id``. While it is unknown (None) a rolling window stays where it is, and nothing
+            is cleared under the robot.
+
+        Raises
+        ------
+        ValueError
+            The pose is in another frame.
+        """
+        if robot_pose is not None and robot_pose.frame_id != self.frame_id:
+            raise ValueError(f"robot pose is in frame {robot_pose.frame_id!r}, the costmap in {self.frame_id!r}")
+        with self._lock:
+            if self.rolling_window and robot_pose is not None:
+                self._follow(robot_pose)
+            box = self._pending
+            self._pending = self._geometry.box  # stays so if a layer raises: the next update then repairs everything
+            for layer in self._enabled_layers():
+                box = layer.update_bounds(robot_pose, now, box)
+            box = box.clipped(self._geometry.box)
+            if not box.empty:
+                self._cells[box.slices] = self._default_value
+                for layer in self._enabled_layers():
+                    layer.update_costs(self._cells, box)
+                self._version += 1
+                self._snapshot = None
+            self._pending = EMPTY_BOX
+            self._last_update = now
+            return EMPTY_BOX if box.empty else box
+
+    def _follow(self, robot_pose: Pose) -> None:
+        """Move the window so that the robot is in its middle; origins stay multiples of the resolution."""
+        grid = self._geometry
+        ix = round(robot_pose.x / grid.resolution - grid.width / 2)
+        iy = round(robot_pose.y / grid.resolution - grid.height / 2)
+        dx = ix - round(grid.origin_x / grid.resolution)
+        dy = iy - round(grid.origin_y / grid.resolution)
+        if dx == 0 and dy == 0:
+            return
+        self._geometry = GridGeometry(
+            grid.width, grid.height, grid.resolution, ix * grid.resolution, iy * grid.resolution
+        )
+        self._cells = shifted(self._cells, dx, dy, self._default_value)
+        for layer in self.layers.values():
+            layer.shift(self._geometry, dx, dy)
+        self._pending = self._geometry.box
+
+    def _enabled_layers(self) -> Iterable[CostmapLayer]:
+        return (layer for layer in self.layers.values() if layer.parameters.enabled)
+
+    # --------------------------------------------------------------------------------------- changes at run time
+    def set_footprint(self, footprint: Footprint, padding: float | None = None) -> None:
+        """Replace the robot's outline (given without padding), e.g. when it lifts a load; ``padding`` [m] too if given.
+
+        The effect on the cells is visible after the next update.
+        """
+        with self._lock:
+            self._footprint_padding = self._footprint_padding if padding is None else padding
+            self.unpadded_footprint = footprint
+            self.footprint = footprint.padded(self._footprint_padding)
+            for layer in self.layers.values():
+                layer.set_footprint(self.footprint)
+            self._pending = self._geometry.box
+
+    def set_layer_parameters(self, name: str, parameters: LayerParameters) -> None:
+        """Replace the parameters of a layer; the effect is visible after the next update, which recomputes everything.
+
+        Raises
+        ------
+        KeyError
+            There is no such layer.
+        ValueError
+            The layer does not take them; the old ones stay.
+        """
+        with self._lock:
+            layer = self.layer(name)
+            old, layer.parameters = layer.parameters, parameters
+            self._pending = self._geometry.box
+            try:
+                layer.parameters_changed()
+            except BaseException:
+                layer.parameters = old
+                layer.parameters_changed()
+                raise
+
+    # ------------------------------------------------------------------------------------------- sensor input
+    def insert_points(self, source: str, points: ArrayLike, sensor_origin: ArrayLike, stamp: float) -> int:
+        """Hand a point cloud to all layers that listen to ``source``; it is used by the next update.
+
+        Parameters
+        ----------
+        source : str
+            Name of an observation source in a layer's parameters.
+        points : (n, 3) float
+            Hits [m] in the costmap's frame. Rows that are not finite are dropped.
+        sensor_origin : (3,) float
+            Position [m] of the sensor in the costmap's frame when it measured.
+        stamp : float
+            Time of the measurement [s].
+
+        Returns
+        -------
+        int
+            Number of layers that took it.
+
+        Raises
+        ------
+        ValueError
+            No layer has such a source.
+        """
+        return self._insert(source, Observation.of_points(points, sensor_origin, stamp))
+
+    def insert_scan(
+        self, source: str, sensor_origin: ArrayLike, ends: ArrayLike, hit_mask: ArrayLike, stamp: float
+    ) -> int:
+        """Hand a scan to all layers that listen to ``source``: rays that clear, and mark where they hit.
+
+        Parameters
+        ----------
+        source : str
+        sensor_origin : (3,) float
+            Position [m] of the sensor in the costmap's frame.
+        ends : (n, 3) float
+            End points [m] of the rays in the costmap's frame; for a miss the point at the sensor's range.
+        hit_mask : (n,) bool
+            Whether the ray hit something at its end.
+        stamp : float
+            Time of the measurement [s].
+
+        Returns
+        -------
+        int
+            Number of layers that took it.
+
+        Raises
+        ------
+        ValueError
+            No layer has such a source.
+        """
+        return self._insert(source, Observation.of_scan(sensor_origin, ends, hit_mask, stamp))
+
+    def _insert(self, source: str, observation: Observation) -> int:
+        with self._lock:
+            listening = [
+                layer
+                for layer in self.layers.values()
+                if isinstance(layer, SensorLayer) and source in layer.source_names
+            ]
+            if not listening:
+                raise ValueError(f"no layer has an observation source {source!r}, known are {list(self.source_names)}")
+            for layer in listening:
+                layer.insert(source, observation)
+        return len(listening)
+
+    # ----------------------------------------------------------------------------------------------- clearing
+    def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
+        """Reset layers (all by default) to what they know without sensors; return their names.
+
+        The effect is visible after the next update. A static layer returns to its map.
+
+        Raises
+        ------
+        KeyError
+            A name is no layer of this map.
+        """
+        with self._lock:
+            chosen = self._chosen(layer_names)
+            for layer in chosen:
+                layer.reset()
+            self._pending = self._geometry.box
+        return [layer.name for layer in chosen]
+
+    def clear_area(
+        self,
+        center_x: float,
+        center_y: float,
+        size: float,
+        *,
+        layer_names: Iterable[str] | None = None,
+        inside: bool = False,
+    ) -> list[str]:
+        """Clear layers outside, or inside, a square window around a point; return their names.
+
+        By default these are the layers that sensors fill again (``CostmapLayer.clearable``), not the floor plan. A
+        static layer that is named loses the area until ``clear``.
+
+        Parameters
+        ----------
+        center_x, center_y : float
+            Middle of the window [m] in the map's frame, usually the robot.
+        size : float
+            Side of the window [m].
+        inside : bool
+            Clear the window itself; otherwise everything but the window, as move_base's clear_costmap_recovery.
+
+        Raises
+        ------
+        KeyError
+            A name is no layer of this map.
+        """
+        with self._lock:
+            clearable = [name for name, layer in self.layers.items() if layer.clearable]
+            chosen = self._chosen(clearable if layer_names is None else layer_names)
+            x0, y0 = self._geometry.world_to_cell_unbounded(center_x - size / 2, center_y - size / 2)
+            x1, y1 = self._geometry.world_to_cell_unbounded(center_x + size / 2, center_y + size / 2)
+            window = CellBox(x0 + 1, y0 + 1, x1, y1)  # costmap_2d's window leaves out its border cells
+            for layer in chosen:
+                layer.clear_area(window, inside)
+            self._pending = self._geometry.box
+        return [layer.name for layer in chosen]
+
+    def _chosen(self, layer_names: Iterable[str] | None) -> list[CostmapLayer]:
+        return list(self.layers.values()) if layer_names is None else [self.layer(name) for name in layer_names]
+
+
+def _sources(layer: CostmapLayer) -> tuple[str, ...]:
+    return layer.source_names if isinstance(layer, SensorLayer) else ()

@@ -1,0 +1,89 @@
+"""Scans on their way into the maps: to each map that listens, placed by the transform of the moment they were measured.
+
+A robot that turns at 1 rad/s turns by 6 degrees in the 0.1 s that a scan may be old when it arrives; placed by the
+newest transform, everything it saw would be marked beside its place. So a scan is placed by the transform at its own
+stamp, interpolated. A scan that is newer than the newest transform by at most ``transform_tolerance`` is placed by
+that one, as a driver that delivers scans before the odometry of the same moment would otherwise never be heard; nothing
+is extrapolated. A scan that is newer still, or older than the history (``tf_cache_time``), is not used.
+
+One map that cannot place a scan does not keep it from the others. What a user would otherwise look for in vain is told
+once in the event log: a source that no map knows, and a map that cannot place what another one takes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from mbf_abstract.events import EventKind
+from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
+
+MAX_TOLD = 100
+"""Bound of what is remembered as told, however many names a faulty driver invents."""
+
+
+class ScanIntake:
+    """Hands scans to maps.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        Of the server.
+    maps : mapping of name to (LayeredCostmap, float)
+        Each map, and how much newer [s] than its newest transform a scan for it may be.
+    """
+
+    def __init__(self, runtime: Runtime, maps: Mapping[str, tuple[LayeredCostmap, float]]) -> None:
+        self._runtime = runtime
+        self._maps = maps
+        self._told: set[tuple[str, str]] = set()
+
+    def take(self, scan: RangeScan) -> None:
+        """Insert a scan into every map that listens to its source and can place it.
+
+        Raises
+        ------
+        TransformError
+            None of the maps that listen can place it.
+        ValueError
+            The stamp is not finite.
+        """
+        if not math.isfinite(scan.stamp):
+            raise ValueError(f"the stamp of a scan must be finite, got {scan.stamp} from source {scan.source!r}")
+        listening = [name for name, (costmap, _) in self._maps.items() if scan.source in costmap.source_names]
+        if not listening:
+            self._tell_unknown(scan.source)
+            return
+        refused = {name: error for name in listening if (error := self._insert(name, scan)) is not None}
+        if len(refused) == len(listening):
+            raise refused[listening[0]]
+        for name in listening:
+            self._tell_refused(name, scan.source, refused.get(name))
+
+    def _insert(self, name: str, scan: RangeScan) -> TransformError | None:
+        costmap, tolerance = self._maps[name]
+        try:
+            placed = scan.in_frame(costmap.frame_id, self._runtime.transforms, tolerance)
+        except TransformError as error:
+            return error
+        costmap.insert_scan(placed.source, placed.origin, placed.ends, placed.hits, placed.stamp)
+        return None
+
+    def _tell_unknown(self, source: str) -> None:
+        known = sorted({name for costmap, _ in self._maps.values() for name in costmap.source_names})
+        if known:  # maps without any source are meant to see nothing
+            self._tell("take_scan", source, f"no layer listens to the source {source!r}, known are {known}")
+
+    def _tell_refused(self, name: str, source: str, error: TransformError | None) -> None:
+        if error is None:
+            self._told.discard((name, source))
+        else:
+            self._tell(name, source, f"the scans of {source!r} cannot be placed: {error}")
+
+    def _tell(self, where: str, source: str, message: str) -> None:
+        if (where, source) not in self._told and len(self._told) < MAX_TOLD:
+            self._told.add((where, source))
+            self._runtime.events.emit(EventKind.FAULT, where, where="take_scan", message=message)

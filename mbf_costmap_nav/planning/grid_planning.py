@@ -1,0 +1,202 @@
+"""What the grid planners share: the checks, tolerance and via poses, and the way from cells to a path.
+
+A grid planner derives ``GridPlanner`` and writes one method, ``search``: from a start to a goal on a ``SearchGrid``.
+Everything a client can ask for beside that - exact start and goal poses, goal tolerance, via poses, outcomes with a
+message that names cell, cost and distance, cancelling - is done once, here.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.parameters import PluginParameters
+from mbf_abstract.plugins import PlanRequest, PlanResult
+from mbf_costmap_nav.control.path_geometry import arc_lengths, resample
+from mbf_costmap_nav.grid.costmap import INSCRIBED, Costmap
+from mbf_costmap_nav.lasting_walls import stays_unreachable
+from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.planning.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchRoom
+from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
+
+NEAR_END = 0.75
+"""Points this near [cells] to an exact start or goal are dropped: going there first would be a step back."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """What a search found: points on the map from the start to the end, and the cost [m, weighted].
+
+    ``reached_goal`` is False where the leg ends at the nearest reachable cell within the tolerance instead. Without a
+    way, or when the token was set, there are no points.
+    """
+
+    points: NDArray[np.float64]
+    cost: float = 0.0
+    reached_goal: bool = True
+
+
+NO_LEG = Leg(np.zeros((0, 2)))
+
+
+class GridPlanner(CostmapPlanner):
+    """Base of the planners that search over cells."""
+
+    Parameters: ClassVar[type[PluginParameters]] = GridPlannerParameters
+    parameters: GridPlannerParameters
+
+    def __init__(self, context: CostmapContext) -> None:
+        super().__init__(context)
+        self._room = SearchRoom()
+
+    @property
+    def pose_spacing(self) -> float:
+        """Largest distance [m] of two poses of the path; 0 = as the search gives them."""
+        return 0.0
+
+    @abstractmethod
+    def search(self, grid: SearchGrid, start: Pose, goal: Pose, tolerance: float) -> Leg:
+        """Find a way from ``start``, in a free cell, to the goal or to a reachable cell within ``tolerance`` [m] of it.
+
+        The grid's token is to be polled.
+        """
+
+    def make_plan(self, request: PlanRequest) -> PlanResult:
+        """Plan from the start over the via poses to the goal."""
+        check_tolerance(request.dist_tolerance)
+        grid = SearchGrid.build(self.costmap.snapshot(), self.parameters, request.cancel_token, self._room)
+        poses = (request.start, *request.via, request.goal)
+        failure = self._check_start(grid, request.start)
+        pieces: list[NDArray[np.float64]] = []
+        cost, reached_goal = 0.0, True
+        for number, (start, goal) in enumerate(pairwise(poses)):
+            is_last = number == len(poses) - 2
+            tolerance = request.dist_tolerance if is_last else 0.0
+            name = "goal" if is_last else f"via pose {number}"
+            failure = failure or _check_goal(grid, goal, tolerance, name)
+            leg = NO_LEG if failure or request.cancel_token.cancelled else self.search(grid, start, goal, tolerance)
+            if request.cancel_token.cancelled:
+                return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
+            if len(leg.points) == 0:
+                failure = failure or _no_path(grid, start, goal, tolerance, name)
+                return unless_lasting(failure, self.costmap, start, goal, tolerance, self.parameters.lethal_cost)
+            reached_goal = leg.reached_goal and grid.costmap.contains(goal.x, goal.y)
+            piece = _with_exact_ends(grid, leg.points, start, goal if reached_goal else None)
+            pieces.append(resample(piece, self.pose_spacing) if self.pose_spacing > 0.0 else piece)
+            cost += leg.cost
+        path = _assemble(pieces, request, reached_goal, grid.costmap.frame_id, self.clock.now())
+        message = f"{len(path)} poses, {path.length:.2f} m"
+        if not reached_goal:
+            off = math.dist(path.positions[-1][:2], (request.goal.x, request.goal.y))
+            message += f", ends {off:.2f} m from the goal (tolerance {request.dist_tolerance:.2f} m)"
+        return PlanResult(GetPathOutcome.SUCCESS, message, path, cost)
+
+    def _check_start(self, grid: SearchGrid, start: Pose) -> PlanResult | None:
+        cell = grid.costmap.world_to_cell(start.x, start.y)
+        if cell is None:
+            return off_map(grid.costmap, start, "start")
+        if grid.is_blocked(cell):
+            return PlanResult(GetPathOutcome.BLOCKED_START, _blocked(grid, "start", start, cell))
+        return None
+
+
+def unless_lasting(
+    failure: PlanResult,
+    costmap: LayeredCostmap,
+    start: Pose,
+    goal: Pose,
+    tolerance: float,
+    lethal_cost: int = INSCRIBED,
+) -> PlanResult:
+    """Return a failure to find a way, as a permanent one where lasting walls part start and goal."""
+    if failure.outcome not in (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL):
+        return failure
+    if not stays_unreachable(costmap, start, goal, tolerance, lethal_cost):
+        return failure
+    text = f"{failure.message}; walls of the static map part them, whatever else moves away"
+    return replace(failure, message=text, permanent=True)
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Raise ValueError unless a tolerance [m] is 0 or more; inf means anywhere."""
+    if not tolerance >= 0.0:
+        raise ValueError(f"dist_tolerance must be 0 m or more (inf = anywhere), got {tolerance}")
+
+
+def off_map(costmap: Costmap, pose: Pose, name: str, tolerance: float = 0.0) -> PlanResult | None:
+    """Say that a pose is off the map, unless a cell's centre is within ``tolerance`` [m] of it."""
+    centre = costmap.cell_to_world(*costmap.world_to_cell_clamped(pose.x, pose.y))
+    if costmap.contains(pose.x, pose.y) or math.dist(centre, (pose.x, pose.y)) <= tolerance:
+        return None
+    return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{name} ({pose.x:.2f}, {pose.y:.2f}) is outside {costmap}")
+
+
+def _check_goal(grid: SearchGrid, goal: Pose, tolerance: float, name: str) -> PlanResult | None:
+    cell = grid.cell_of(goal)
+    if grid.is_blocked(cell) and tolerance <= 0.0 and grid.costmap.contains(goal.x, goal.y):
+        return PlanResult(GetPathOutcome.BLOCKED_GOAL, _blocked(grid, name, goal, cell))
+    return off_map(grid.costmap, goal, name, tolerance)
+
+
+def _blocked(grid: SearchGrid, name: str, pose: Pose, cell: Cell) -> str:
+    return f"{name} ({pose.x:.2f}, {pose.y:.2f}) lies in cell {cell} of cost {grid.costmap.cost(*cell)}"
+
+
+def _no_path(grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, name: str) -> PlanResult:
+    """Tell a goal without a reachable cell around it from a goal behind walls."""
+    cell = grid.cell_of(goal)
+    if grid.is_blocked(cell) or not grid.costmap.contains(goal.x, goal.y):
+        text = f"{_blocked(grid, name, goal, cell)}, and no cell within {tolerance:.2f} m of it can be reached"
+        return PlanResult(GetPathOutcome.BLOCKED_GOAL, text)
+    distance = math.hypot(goal.x - start.x, goal.y - start.y)
+    text = (
+        f"no way from ({start.x:.2f}, {start.y:.2f}) to the {name} ({goal.x:.2f}, {goal.y:.2f}), {distance:.2f} m away"
+    )
+    return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)
+
+
+def _with_exact_ends(
+    grid: SearchGrid, points: NDArray[np.float64], start: Pose, goal: Pose | None
+) -> NDArray[np.float64]:
+    """Put the exact start, and the exact goal if it was reached, in the place of the centres of their cells."""
+    points = _from_exactly(grid, np.array([start.x, start.y]), points)
+    return points if goal is None else _from_exactly(grid, np.array([goal.x, goal.y]), points[::-1])[::-1]
+
+
+def _from_exactly(grid: SearchGrid, exact: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Begin with a point of the first point's cell instead of that point, and of what lies as near.
+
+    Where the line from there to the rest is blocked, all points stay: in its own cell it is free.
+    """
+    if len(points) == 1:
+        return np.stack([exact, points[0]])
+    far = np.hypot(*(points[1:-1] - exact).T) > NEAR_END * grid.costmap.resolution
+    rest = points[1 + (int(np.argmax(far)) if far.any() else len(far)) :]
+    return np.vstack([exact, rest if grid.is_free_line(exact, rest[0]) else points])
+
+
+def heights_along(points: NDArray[np.float64], request: PlanRequest) -> NDArray[np.float64]:
+    """Heights [m] of a path on a flat map: from the start's to the goal's in even measure, as no map knows better."""
+    along = arc_lengths(points)
+    share = along / along[-1] if along[-1] > 0.0 else along
+    return np.asarray(request.start.z + share * (request.goal.z - request.start.z))
+
+
+def _assemble(
+    pieces: list[NDArray[np.float64]], request: PlanRequest, reached_goal: bool, frame_id: str, stamp: float
+) -> Path:
+    """Join the legs; inner poses head along the path, the first and the last keep the orientations asked for."""
+    points = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
+    path = Path.from_points(np.column_stack([points, heights_along(points, request)]), request.goal.orientation)
+    assert path.orientations is not None
+    orientations = path.orientations.copy()
+    orientations[0] = request.start.orientation
+    return Path(path.positions, orientations, frame_id, stamp)

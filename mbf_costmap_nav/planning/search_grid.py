@@ -1,0 +1,151 @@
+"""One snapshot of a costmap as the grid planners search it: padded, weighted, and asked about lines and ends.
+
+When to use: by planners that search over cells. When not: anything that only looks cells up; ``Costmap`` does that.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.time.cancel import CancelToken
+from mbf_costmap_nav.grid.costmap import LETHAL, UNKNOWN, Costmap
+from mbf_costmap_nav.kernels.map.line_cells import cost_along
+from mbf_costmap_nav.kernels.search.grid_search import pad_cells
+from mbf_costmap_nav.kernels.search.nearest_cell import nearest_reached
+from mbf_costmap_nav.kernels.search.search_cells import Records, new_records
+
+Cell = tuple[int, int]
+
+NO_ROBOT = np.zeros((0, 2))
+"""Covering points of a robot that fits everywhere."""
+
+
+class GridPlannerParameters(PluginParameters):
+    """Parameters every grid planner has."""
+
+    cost_factor: float = parameter(
+        3.0, "How much longer a way through cells of cost 252 counts, in lengths; 0 = shortest way.", ge=0.0, le=1000.0
+    )
+    lethal_cost: int = parameter(
+        253, "Cells of this cost and above are obstacles (unknown is asked apart).", ge=1, le=254
+    )
+    allow_unknown: bool = parameter(True, "Plan through unknown cells, counted like cost 252.")
+
+
+class SearchRoom:
+    """Memory of one planner's grid searches, kept from plan to plan.
+
+    Fresh pages from the system take a tenth of a search, and twice as long as the search after others used them.
+    """
+
+    def __init__(self) -> None:
+        self._records = new_records(0)
+
+    def records(self, count: int) -> Records:
+        """Return ``count`` records that hold anything, the same ones for the same count."""
+        if len(self._records) != count:
+            self._records = new_records(count)
+        return self._records
+
+
+@dataclass(frozen=True)
+class SearchGrid:
+    """One snapshot, prepared for the kernels: flat and padded by one blocked cell on every side.
+
+    Attributes
+    ----------
+    costmap : Costmap
+    cells : (n,) uint8
+        Flat padded costs.
+    stride : int
+        Row length of the padded grid.
+    table : (256,) float32
+        Traversal of each cost, 1 for free, inf for blocked.
+    token : CancelToken
+        Ends long answers early; what they say then means nothing.
+    room : SearchRoom
+        The planner's memory for ``grid_search.search``, of which the last one's result stands in it.
+    """
+
+    costmap: Costmap
+    cells: NDArray[np.uint8]
+    stride: int
+    table: NDArray[np.float32]
+    token: CancelToken
+    room: SearchRoom
+
+    @classmethod
+    def build(
+        cls,
+        costmap: Costmap,
+        parameters: GridPlannerParameters,
+        token: CancelToken,
+        room: SearchRoom | None = None,
+    ) -> SearchGrid:
+        """Prepare a snapshot by the costs a planner wants."""
+        table = traversal_table(parameters.cost_factor, parameters.lethal_cost, parameters.allow_unknown)
+        return cls(
+            costmap, pad_cells(costmap.cells, LETHAL, token.flag), costmap.width + 2, table, token, room or SearchRoom()
+        )
+
+    def records(self) -> Records:
+        """Return memory for a search on this grid; what stands in it is that of the last one."""
+        return self.room.records(self.cells.size)
+
+    @property
+    def geometry(self) -> NDArray[np.float64]:
+        """(resolution, origin_x, origin_y) [m], as the kernels take it."""
+        return np.array([self.costmap.resolution, self.costmap.origin_x, self.costmap.origin_y])
+
+    def index(self, cell: Cell) -> int:
+        """Flat padded index of a cell (ix, iy)."""
+        return (cell[1] + 1) * self.stride + cell[0] + 1
+
+    def cell_of(self, pose: Pose) -> Cell:
+        """Cell that holds a pose, or the nearest one of the map."""
+        return self.costmap.world_to_cell_clamped(pose.x, pose.y)
+
+    def points(self, indices: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Centres (n, 2) [m] of flat padded indices (n,)."""
+        return self.costmap.cells_to_world(np.column_stack([indices % self.stride - 1, indices // self.stride - 1]))
+
+    def is_blocked(self, cell: Cell) -> bool:
+        """Whether the planner may not enter a cell."""
+        return math.isinf(self.table[self.costmap.cost(*cell)])
+
+    def is_free_line(self, a: ArrayLike, b: ArrayLike) -> bool:
+        """Whether the line between two points (x, y) [m] runs through no blocked cell and does not leave the map."""
+        (x0, y0), (x1, y1) = ((np.asarray(p) - self.geometry[1:]) / self.costmap.resolution for p in (a, b))
+        unknown = LETHAL if math.isinf(self.table[UNKNOWN]) else 0
+        first_blocked = int(np.argmax(np.isinf(self.table[:UNKNOWN])))
+        return int(cost_along(self.costmap.cells, unknown, x0, y0, x1, y1)) < first_blocked
+
+    def nearest_reached(
+        self, g: NDArray[np.float32], goal: Pose, tolerance: float, samples: NDArray[np.float64] = NO_ROBOT
+    ) -> Cell | None:
+        """Cell of finite ``g`` whose centre is nearest to the goal, at most ``tolerance`` [m] away; None without one.
+
+        Equally near cells are told apart by their ``g``. With covering points ``samples`` (n, 2) [m] the robot must fit
+        there at the goal's heading.
+        """
+        unknown = LETHAL if math.isinf(self.table[UNKNOWN]) else LETHAL - 2
+        wanted = np.array([goal.x, goal.y, goal.yaw])
+        ix, iy = nearest_reached(
+            g, self.costmap.cells, unknown, self.geometry, samples, wanted, tolerance, self.token.flag
+        )
+        return None if ix < 0 else (int(ix), int(iy))
+
+
+def traversal_table(cost_factor: float, lethal_cost: int, allow_unknown: bool) -> NDArray[np.float32]:
+    """(256,) float32: what a cell's cost makes of a metre, 1 + cost_factor * cost / 252; inf where blocked."""
+    costs = np.minimum(np.arange(256), 252)
+    table = (1.0 + cost_factor * costs / 252.0).astype(np.float32)
+    table[lethal_cost:UNKNOWN] = np.inf
+    table[UNKNOWN] = table[UNKNOWN] if allow_unknown else np.inf
+    return table

@@ -1,0 +1,1 @@
+"""Meshes and elevation models on disk."""

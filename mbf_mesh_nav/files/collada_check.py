@@ -1,0 +1,72 @@
+"""What has to hold in a COLLADA file before a reader unfolds it: nodes that instance nodes are no cycle, and few.
+
+A few lines of ``instance_node``, each using the one before several times, ask for billions of copies of a mesh. Here
+the copies are counted, not made. Numbers by the COLLADA 1.4.1 specification (Khronos Group), chapter 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+
+MAX_INSTANCES = 100_000
+"""Uses of geometries in a scene; the largest of the field's own maps has a few hundred."""
+GEOMETRY, NODE_USE, NODE = "instance_geometry", "instance_node", "node"
+SCENES = "visual_scene"
+
+
+def check_collada(path: Path) -> None:
+    """Count the uses of geometries in every visual scene.
+
+    Raises
+    ------
+    MeshError
+        Nodes instance each other in a cycle, or geometries are used more than ``MAX_INSTANCES`` times.
+    """
+    from lxml import etree
+
+    try:
+        # Entities are left alone: they could name other files, or grow without end. Large files are legal here.
+        parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
+        root = etree.parse(str(path), parser).getroot()
+    except (etree.XMLSyntaxError, ValueError) as error:
+        raise MeshError(str(path), [f"cannot be read as dae: {error}"]) from error
+    elements = [element for element in root.iter() if isinstance(element.tag, str)]
+    nodes = {element.get("id"): element for element in elements if _name(element) == NODE and element.get("id")}
+    counts = _count_uses(nodes, path)
+    for scene in elements:
+        if _name(scene) == SCENES and (used := _uses(scene, counts)) > MAX_INSTANCES:
+            raise MeshError(str(path), [f"{used} uses of geometries through its nodes, the limit is {MAX_INSTANCES}"])
+
+
+def _count_uses(nodes: dict[str, Any], path: Path) -> dict[str, int]:
+    """Uses of geometries in each node of a name: those below it, and those of the nodes it instances.
+
+    Nodes are counted after those they use; where none can be next, the rest goes round.
+    """
+    waits = {name: {used for used in _used_nodes(node) if used in nodes} for name, node in nodes.items()}
+    counts: dict[str, int] = {}
+    while ready := [name for name, used in waits.items() if used <= counts.keys()]:
+        for name in ready:
+            counts[name] = _uses(nodes[name], counts)
+            del waits[name]
+    if waits:
+        raise MeshError(str(path), [f"its nodes instance each other in a cycle, e.g. '{min(waits):.40}'"])
+    return counts
+
+
+def _uses(element: Any, counts: dict[str, int]) -> int:
+    own = sum(1 for below in element.iter() if _name(below) == GEOMETRY)
+    return own + sum(counts.get(name, 0) for name in _used_nodes(element))
+
+
+def _used_nodes(element: Any) -> Iterable[str]:
+    return (below.get("url", "").removeprefix("#") for below in element.iter() if _name(below) == NODE_USE)
+
+
+def _name(element: Any) -> str:
+    """Name of an element without its namespace; empty for comments and such."""
+    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""

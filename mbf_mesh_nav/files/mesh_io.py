@@ -1,0 +1,88 @@
+"""Reading meshes from files: PLY, OBJ, STL, OFF, DAE, glTF through trimesh, the HDF5 layouts of lvr2, elevation models.
+
+Whatever is wrong with a file comes out as one ``MeshError`` that names it. A file is only read, never changed.
+Coordinates come out in metres with z up, whatever axis and unit the file has (``file_frames``); mesh_navigation leaves
+a file's up axis alone.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mbf_mesh_nav.files.elevation_files import elevation_readers, read_elevation
+from mbf_mesh_nav.files.file_frames import file_frame, on_the_map
+from mbf_mesh_nav.files.scene_reader import MeshArrays, read_scene
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+
+TRIMESH_FORMATS = frozenset({".ply", ".obj", ".stl", ".off", ".dae", ".gltf", ".glb"})
+HDF5_FORMATS = frozenset({".h5", ".hdf5"})
+SPLIT_CORNERS = frozenset({".stl", ".obj", ".dae", ".gltf", ".glb"})
+"""Formats whose files, or readers, give faces, materials, parts or seams of a texture corners of their own."""
+MAX_FILE_BYTES = 4 * 2**30
+MAX_FACES = 10_000_000
+
+
+def read_mesh(
+    file: str | Path, part: str = "", max_faces: int = MAX_FACES, *, up_axis: str = "", unit: float = 0.0
+) -> MeshArrays:
+    """Read one mesh.
+
+    Parameters
+    ----------
+    file : path
+        The ending decides the format.
+    part : str
+        Which part of the file: a path of node names through a scene graph ("building/floor_2"), the name of an OBJ
+        file's object, or the group of an HDF5 file. "" and "/" mean everything, joined (HDF5: the only mesh in the
+        file). Elevation models have none.
+    max_faces : int
+        Larger meshes are refused before anything is built from them.
+    up_axis : str
+        Axis of the file that points up, "x", "y" or "z"; "" = what the file or its format says.
+    unit : float
+        Length of the file's unit [m]; 0 = what the file says.
+
+    Returns
+    -------
+    vertices : (V, 3) float64
+        In the coordinates of the scene, turned to z up [m].
+    faces : (F, 3) int64
+
+    Raises
+    ------
+    MeshError
+        Missing, unreadable, cut off, too large, no such part, or no triangle in it.
+    """
+    path = Path(file)
+    ending = path.suffix.lower()
+    if ending not in (known := known_endings()):
+        raise MeshError(str(path), [f"unknown ending '{ending}', known are: {', '.join(sorted(known))}"])
+    if not path.is_file():
+        raise MeshError(str(path), ["there is no such file"])
+    if path.stat().st_size > MAX_FILE_BYTES:
+        raise MeshError(str(path), [f"{path.stat().st_size} bytes, the limit is {MAX_FILE_BYTES}"])
+    if ending in elevation_readers():
+        if up_axis or unit:
+            raise MeshError(str(path), ["an elevation model takes neither up_axis nor unit"])
+        vertices, faces = read_elevation(path, max_faces)
+    else:
+        frame = file_frame(path, up_axis, unit)
+        points, faces = _read_points(path, part, max_faces)
+        vertices = on_the_map(points, frame)
+    if len(faces) == 0:
+        raise MeshError(str(path), ["there is no face in it"])
+    return vertices, faces
+
+
+def _read_points(path: Path, part: str, max_faces: int) -> MeshArrays:
+    """Vertices in the coordinates of the file, and faces."""
+    if path.suffix.lower() in HDF5_FORMATS:
+        from mbf_mesh_nav.files.lvr2_io import read_lvr2_mesh  # h5py only for those who use it
+
+        return read_lvr2_mesh(path, part, max_faces)
+    return read_scene(path, part.strip("/"), max_faces)
+
+
+def known_endings() -> frozenset[str]:
+    """Endings of the files that can be read, with their dots."""
+    return TRIMESH_FORMATS | HDF5_FORMATS | frozenset(elevation_readers())

@@ -1,0 +1,125 @@
+"""Refusing files that end too early, of the formats whose readers would take them for smaller meshes.
+
+A download that broke off, a full disk: the file is there, its text is legal up to its end, and the robot drives on
+half a map. PLY and OFF say in their header how much is to come, a binary STL too, a text STL ends with a word. OBJ
+says nothing of the kind: a cut one is told from a whole one only if its last line is too short. Binary PLY, glTF and
+DAE need no check, their readers notice.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+
+MAX_HEADER_LINES = 10_000
+LONGEST_LINE = 4096
+STL_HEADER_BYTES, STL_FACE_BYTES = 84, 50
+
+
+def refuse_cut_file(path: Path) -> None:
+    """Compare what a file promises with what is there.
+
+    Raises
+    ------
+    MeshError
+        The file is cut off; says what was expected and what was found.
+    ValueError
+        The header has no numbers where they belong.
+    """
+    checks = {".ply": _check_ply, ".off": _check_off, ".stl": _check_stl, ".obj": _check_obj}
+    check = checks.get(path.suffix.lower())
+    if check is not None:
+        with path.open("rb") as file:
+            check(path, file)
+
+
+def _check_ply(path: Path, file: BinaryIO) -> None:
+    promised: dict[str, int] = {}
+    is_text = False
+    for _ in range(MAX_HEADER_LINES):
+        words = file.readline().split()
+        if words[:1] == [b"format"]:
+            is_text = words[1:2] == [b"ascii"]
+        elif words[:1] == [b"element"]:
+            promised[words[1].decode()] = int(words[2])
+        elif words[:1] == [b"end_header"]:
+            break
+    if is_text:
+        faces_last = list(promised)[-1:] == ["face"]
+        _compare(path, promised, _count_lines((line for line in file if line.strip()), faces_last))
+
+
+def _check_off(path: Path, file: BinaryIO) -> None:
+    lines = (line for raw in file if (line := raw.split(b"#")[0].strip()))
+    first = next(lines, b"")
+    if b"OFF" not in first:
+        return  # the reader says what is wrong
+    counts = (first.split(b"OFF", 1)[1].strip() or next(lines, b"")).split()
+    if len(counts) < 2:
+        raise MeshError(str(path), ["the file is cut off before the numbers of vertices and faces"])
+    _compare(path, {"vertex": int(counts[0]), "face": int(counts[1])}, _count_lines(lines, faces_last=True))
+
+
+def _count_lines(lines: Iterator[bytes], faces_last: bool) -> int:
+    """Count lines; if the last ones are faces, the very last only if it has all the corners its first number says."""
+    count, last = 0, b""
+    for number, line in enumerate(lines, start=1):
+        count, last = number, line
+    words = last.split()
+    is_short = faces_last and words[:1] != [] and words[0].isdigit() and len(words) <= int(words[0])
+    return count - 1 if is_short else count
+
+
+def _compare(path: Path, promised: dict[str, int], lines: int) -> None:
+    """Refuse a file of one line an element that has fewer lines than promised."""
+    if lines >= sum(promised.values()):
+        return
+    left = lines
+    found = {}
+    for element, count in promised.items():
+        found[element] = min(count, left)
+        left -= found[element]
+    expected = ", ".join(f"{count} of element {element}" for element, count in promised.items())
+    present = ", ".join(f"{count} of {element}" for element, count in found.items())
+    raise MeshError(str(path), [f"the file is cut off: expected {expected}; found {present}"])
+
+
+def _check_stl(path: Path, file: BinaryIO) -> None:
+    size, head = os.fstat(file.fileno()).st_size, file.read(STL_HEADER_BYTES)
+    expected = int.from_bytes(head[80:], "little")
+    if len(head) == STL_HEADER_BYTES and size >= STL_HEADER_BYTES + STL_FACE_BYTES * expected:
+        return
+    # Some binary files begin with "solid", too, but zeros follow, which no text has.
+    if head.lstrip().lower().startswith(b"solid") and b"\0" not in head + file.read(STL_FACE_BYTES):
+        file.seek(0)
+        _check_text_stl(path, file)
+    elif len(head) < STL_HEADER_BYTES:
+        raise MeshError(str(path), [f"the file is cut off after {size} bytes, within its header"])
+    else:
+        found = (size - STL_HEADER_BYTES) // STL_FACE_BYTES
+        raise MeshError(str(path), [f"the file is cut off: expected {expected} faces, found {found}"])
+
+
+def _check_text_stl(path: Path, file: BinaryIO) -> None:
+    begun = ended = 0
+    last = b""
+    for line in (line for line in file if line.strip()):
+        last = line.split()[0].lower()
+        begun += last == b"facet"
+        ended += last == b"endfacet"
+    if last != b"endsolid":
+        text = f"the file is cut off: {begun} faces begin and {ended} end, and there is no endsolid after them"
+        raise MeshError(str(path), [text])
+
+
+def _check_obj(path: Path, file: BinaryIO) -> None:
+    file.seek(max(os.fstat(file.fileno()).st_size - LONGEST_LINE, 0))
+    last = file.read().rpartition(b"\n")[2]
+    words = last.split()
+    if words[:1] in ([b"v"], [b"f"]) and len(words) < 4:
+        text = last.decode(errors="replace")
+        raise MeshError(str(path), [f"the file is cut off: its last line is '{text}', expected three numbers or more"])

@@ -1,0 +1,306 @@
+"""How far a four-wheeled footprint uses the limits of its tilt anywhere on a straight drive, not at samples of it.
+
+Seen from above every wheel moves along a line, so its height is linear as long as it stays on its face. The drive is
+swept from one change of a face to the next: between two of them all slopes are linear and greatest at one of both, and
+the surface below the belly rises above the plane of the wheels by a quadratic, whose greatest value is known.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.layers.footprint_settling import LEAST_UPWARD, MAX_STEPS, face_below
+from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, row
+from mbf_mesh_nav.kernels.search.dijkstra import Int32Array
+
+
+class Ground(NamedTuple):
+    """Arrays of a ``MeshTopology``."""
+
+    vertices: Float64Array
+    faces: Int32Array
+    face_normals: Float64Array
+    face_neighbours: Int32Array
+    vertex_face_offsets: Int32Array
+    vertex_faces: Int32Array
+    neighbour_offsets: Int32Array
+    neighbours: Int32Array
+
+
+class Chassis(NamedTuple):
+    """Measures [m] of a robot and its limits: greatest slopes (tangents) across, up and down, height of the belly [m].
+
+    A rigid body stands on three wheels, see ``footprint_settling``; then the slopes of single sides and axles count.
+    """
+
+    wheelbase: float
+    track: float
+    rigid: bool
+    roll: float
+    pitch_up: float
+    pitch_down: float
+    clearance: float
+
+
+class Scratch(NamedTuple):
+    """Memory of one search: who saw a vertex last (V,), members (V,), the last mark (1,), wheels and their faces."""
+
+    seen: Int32Array
+    members: Int32Array
+    mark: Int32Array
+    wheels: Float64Array
+    wheel_faces: Int32Array
+
+
+def scratch_for(vertex_count: int) -> Scratch:
+    """Fresh memory."""
+    seen, members = np.full(vertex_count, -1, dtype=np.int32), np.empty(vertex_count, dtype=np.int32)
+    mark, wheel_faces = np.zeros(1, dtype=np.int32), np.empty(4, dtype=np.int32)
+    return Scratch(seen, members, mark, np.empty((4, 2), dtype=np.float64), wheel_faces)
+
+
+@kernel
+def greatest_use(
+    ground: Ground,
+    chassis: Chassis,
+    scratch: Scratch,
+    face: int,
+    start: Vector,
+    end: Vector,
+    cosine: float,
+    sine: float,
+) -> float:
+    """Greatest share of a limit anywhere between two points [m] of a face; inf where a wheel has no ground.
+
+    Parameters
+    ----------
+    start, end : (float, float, float)
+        The middle of the footprint goes straight from one to the other; the same point twice is standing there.
+    cosine, sine : float
+        Of the heading.
+    """
+    x, y = end[0] - start[0], end[1] - start[1]
+    for wheel in range(4):  # front left, rear left, rear right, front right
+        forward = (0.5 if wheel == 0 or wheel == 3 else -0.5) * chassis.wheelbase
+        left = (0.5 if wheel < 2 else -0.5) * chassis.track
+        scratch.wheels[wheel, 0] = start[0] + cosine * forward - sine * left
+        scratch.wheels[wheel, 1] = start[1] + sine * forward + cosine * left
+        below = face_below(
+            ground.vertices,
+            ground.faces,
+            ground.face_normals,
+            ground.face_neighbours,
+            face,
+            scratch.wheels[wheel, 0],
+            scratch.wheels[wheel, 1],
+        )
+        if below < 0:
+            return np.inf
+        scratch.wheel_faces[wheel] = below
+    size = _gather_below(ground, chassis, scratch, face, start, end)
+    worst, now, stalled = 0.0, 0.0, 0
+    while True:
+        # 1. Until when does every wheel stay on its face?
+        until, leaving, side = 1.0, Count(-1), Count(-1)
+        for wheel in range(4):
+            moment, corner = _leaves_face(ground, scratch, wheel, x, y)
+            if moment < until:
+                until, leaving, side = moment, Count(wheel), Count(corner)
+        until = max(until, now)
+        # 2. The slopes at the begin and at the end of that, and the belly in between.
+        first = _plane(ground, chassis, scratch, now, x, y)
+        last = _plane(ground, chassis, scratch, until, x, y)
+        worst = max(worst, first[3], last[3])
+        if chassis.clearance < np.inf:
+            middle = max(
+                start[2] + now * (end[2] - start[2]) - first[0], start[2] + until * (end[2] - start[2]) - last[0]
+            )
+            bump = max(middle, _highest_below(ground, chassis, scratch, size, start, x, y, cosine, sine, now, until))
+            worst = max(worst, bump / chassis.clearance)
+        # 3. On to the next face.
+        if leaving < 0:
+            return worst
+        following = Count(ground.face_neighbours[scratch.wheel_faces[leaving], side])
+        stalled = stalled + 1 if until <= now else 0
+        if following < 0 or ground.face_normals[following, 2] < LEAST_UPWARD or stalled > MAX_STEPS:
+            return np.inf
+        scratch.wheel_faces[leaving] = following
+        now = until
+
+
+@inner_kernel
+def edge_use(ground: Ground, chassis: Chassis, scratch: Scratch, begin: int, end: int) -> float:
+    """``greatest_use`` from one vertex to its neighbour; inf where no face beside the edge carries a wheel."""
+    best, best_z = Count(-1), LEAST_UPWARD
+    for position in range(ground.vertex_face_offsets[begin], ground.vertex_face_offsets[begin + 1]):
+        face = Count(ground.vertex_faces[position])
+        corners = ground.faces[face]
+        beside = corners[0] == end or corners[1] == end or corners[2] == end
+        if beside and ground.face_normals[face, 2] >= best_z:
+            best, best_z = face, ground.face_normals[face, 2]
+    start, goal = row(ground.vertices, Count(begin)), row(ground.vertices, Count(end))
+    x, y = goal[0] - start[0], goal[1] - start[1]
+    length = math.sqrt(x * x + y * y)
+    if best < 0 or length == 0.0:
+        return np.inf
+    return greatest_use(ground, chassis, scratch, best, start, goal, x / length, y / length)
+
+
+@inner_kernel
+def _leaves_face(ground: Ground, scratch: Scratch, wheel: int, x: float, y: float) -> tuple[float, int]:
+    """When (share of the drive) a wheel leaves its face, and over which side; inf if it never does."""
+    face = scratch.wheel_faces[wheel]
+    leaves, side = np.inf, Count(-1)
+    for corner in range(3):
+        a, b = ground.faces[face, corner], ground.faces[face, (corner + 1) % 3]
+        ax, ay = ground.vertices[a, 0], ground.vertices[a, 1]
+        bx, by = ground.vertices[b, 0] - ax, ground.vertices[b, 1] - ay
+        inside = bx * (scratch.wheels[wheel, 1] - ay) - by * (scratch.wheels[wheel, 0] - ax)
+        rate = bx * y - by * x
+        if rate < 0.0 and -inside / rate < leaves:
+            leaves, side = -inside / rate, Count(corner)
+    return leaves, side
+
+
+@inner_kernel
+def _plane(
+    ground: Ground, chassis: Chassis, scratch: Scratch, moment: float, x: float, y: float
+) -> tuple[float, float, float, float]:
+    """Height of the middle of the wheels, slopes forward and to the left, and the greatest share of a slope's limit."""
+    front_left = _height(ground, scratch, 0, moment, x, y)
+    rear_left = _height(ground, scratch, 1, moment, x, y)
+    rear_right = _height(ground, scratch, 2, moment, x, y)
+    front_right = _height(ground, scratch, 3, moment, x, y)
+    left, right = (front_left - rear_left) / chassis.wheelbase, (front_right - rear_right) / chassis.wheelbase
+    front, rear = (front_left - front_right) / chassis.track, (rear_left - rear_right) / chassis.track
+    forward, leftward = 0.5 * (left + right), 0.5 * (front + rear)
+    if not chassis.rigid:
+        left, right, front, rear = forward, forward, leftward, leftward
+    up, down, across = max(left, right), max(-left, -right), max(abs(front), abs(rear))
+    use = max(across / chassis.roll, up / chassis.pitch_up, down / chassis.pitch_down)
+    return 0.25 * (front_left + rear_left + rear_right + front_right), forward, leftward, use
+
+
+@inner_kernel
+def _height(ground: Ground, scratch: Scratch, wheel: int, moment: float, x: float, y: float) -> float:
+    """Height [m] below a wheel at a share of the drive, on the plane of its face."""
+    face = scratch.wheel_faces[wheel]
+    a = ground.faces[face, 0]
+    right = scratch.wheels[wheel, 0] + moment * x - ground.vertices[a, 0]
+    ahead = scratch.wheels[wheel, 1] + moment * y - ground.vertices[a, 1]
+    slope = ground.face_normals[face, 0] * right + ground.face_normals[face, 1] * ahead
+    return float(ground.vertices[a, 2] - slope / ground.face_normals[face, 2])
+
+
+@inner_kernel
+def _gather_below(ground: Ground, chassis: Chassis, scratch: Scratch, face: int, start: Vector, end: Vector) -> int:
+    """Write the vertices the belly could touch into ``members`` and return their number.
+
+    As in ``footprint_settling``, with the line of the drive instead of one vertex: within a radius of it, and
+    connected there, beginning at the corners of the face, by vertices at most so much higher or lower.
+    """
+    radius = 0.5 * math.sqrt(chassis.wheelbase * chassis.wheelbase + chassis.track * chassis.track)
+    scratch.mark[0] += 1
+    mark, size, reader = scratch.mark[0], Count(0), Count(0)
+    for corner in range(3):
+        vertex = Count(ground.faces[face, corner])
+        scratch.seen[vertex] = mark
+        scratch.members[size] = vertex
+        size += 1
+    x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+    squared = x * x + y * y
+    while reader < size:
+        vertex = Count(scratch.members[reader])
+        reader += 1
+        share = _share_beside(ground.vertices, vertex, start, x, y, squared)
+        if abs(ground.vertices[vertex, 2] - start[2] - share * z) > radius:
+            continue
+        for entry in range(ground.neighbour_offsets[vertex], ground.neighbour_offsets[vertex + 1]):
+            other = Count(ground.neighbours[entry])
+            if scratch.seen[other] == mark:
+                continue
+            scratch.seen[other] = mark
+            share = _share_beside(ground.vertices, other, start, x, y, squared)
+            dx = ground.vertices[other, 0] - start[0] - share * x
+            dy = ground.vertices[other, 1] - start[1] - share * y
+            if dx * dx + dy * dy < radius * radius:
+                scratch.members[size] = other
+                size += 1
+    return size  # type: ignore[no-any-return]
+
+
+@inner_kernel
+def _share_beside(vertices: Float64Array, vertex: int, start: Vector, x: float, y: float, squared: float) -> float:
+    """Where on the line, as a share of it, a vertex is nearest, seen from above."""
+    if squared == 0.0:
+        return 0.0
+    along = (vertices[vertex, 0] - start[0]) * x + (vertices[vertex, 1] - start[1]) * y
+    return float(min(max(along / squared, 0.0), 1.0))
+
+
+@inner_kernel
+def _highest_below(
+    ground: Ground,
+    chassis: Chassis,
+    scratch: Scratch,
+    size: int,
+    start: Vector,
+    x: float,
+    y: float,
+    cosine: float,
+    sine: float,
+    now: float,
+    until: float,
+) -> float:
+    """How far [m] a vertex below the belly rises above the plane of the wheels, at most, between two moments."""
+    highest, length = -math.inf, cosine * x + sine * y
+    for index in range(size):
+        vertex = scratch.members[index]
+        dx, dy = ground.vertices[vertex, 0] - start[0], ground.vertices[vertex, 1] - start[1]
+        forward, left = cosine * dx + sine * dy, cosine * dy - sine * dx
+        if abs(left) > 0.5 * chassis.track:
+            continue
+        # It is below the body from the moment the front passes it until the rear has.
+        begin, end = now, until
+        if length > 0.0:
+            begin, end = (
+                max(begin, (forward - 0.5 * chassis.wheelbase) / length),
+                min(end, (forward + 0.5 * chassis.wheelbase) / length),
+            )
+        elif abs(forward) > 0.5 * chassis.wheelbase:
+            continue
+        if begin > end:
+            continue
+        z, half = ground.vertices[vertex, 2], 0.5 * (begin + end)
+        first, middle, last = (
+            z - _plane_at(ground, chassis, scratch, begin, x, y, forward - begin * length, left),
+            z - _plane_at(ground, chassis, scratch, half, x, y, forward - half * length, left),
+            z - _plane_at(ground, chassis, scratch, end, x, y, forward - end * length, left),
+        )
+        highest = max(highest, first, last)
+        # The parabola through the three, over shares of the interval: its top may lie between them.
+        bend = 2.0 * (first + last - 2.0 * middle)
+        rise = last - first - bend
+        if bend < 0.0 and 0.0 < rise < -2.0 * bend:
+            highest = max(highest, first - 0.25 * rise * rise / bend)
+    return float(highest)
+
+
+@inner_kernel
+def _plane_at(
+    ground: Ground,
+    chassis: Chassis,
+    scratch: Scratch,
+    moment: float,
+    x: float,
+    y: float,
+    forward: float,
+    left: float,
+) -> float:
+    """Height [m] of the plane of the wheels at a place of the body."""
+    middle, rise_forward, rise_left, _ = _plane(ground, chassis, scratch, moment, x, y)
+    return float(middle + rise_forward * forward + rise_left * left)

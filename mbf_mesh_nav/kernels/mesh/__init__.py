@@ -1,0 +1,1 @@
+"""Compiled geometry of triangle meshes: topology, box trees, rays, walks on the surface."""

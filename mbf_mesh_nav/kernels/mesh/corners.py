@@ -1,0 +1,71 @@
+"""Corner records: for every (vertex, incident face) the two other corners and the weights of the three edges.
+
+A wave that unfolds triangles needs them at each incident face of a vertex. Written one after the other they are 20
+bytes a record, and the wave never searches for a face or an edge. The ends depend on the mesh alone; the weights
+follow the map's costs, at the price of what changed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL, FlagArray, Float32Array, Int32Array
+
+
+@kernel
+def build_corner_ends(faces: Int32Array, vertex_face_offsets: Int32Array, vertex_faces: Int32Array) -> Int32Array:
+    """Other corners (3F, 2) int32 of the records, aligned with ``vertex_faces``: (v, first, second) is ccw."""
+    ends = np.empty((len(vertex_faces), 2), dtype=np.int32)
+    for vertex in range(len(vertex_face_offsets) - 1):
+        for record in range(Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + 1])):
+            face = Index(vertex_faces[record])
+            corner = 0
+            while faces[face, corner] != vertex:
+                corner += 1
+            ends[record, 0], ends[record, 1] = faces[face, (corner + 1) % 3], faces[face, (corner + 2) % 3]
+    return ends
+
+
+@kernel
+def write_corner_weights(
+    vertex_face_offsets: Int32Array,
+    corner_ends: Int32Array,
+    neighbour_offsets: Int32Array,
+    neighbours: Int32Array,
+    edge_weights: Float32Array,
+    changed: Int32Array,
+    corner_weights: Float32Array,
+    cancel_flag: FlagArray,
+) -> bool:
+    """Write the weights of all records that have an edge at one of the ``changed`` vertices (c,).
+
+    A record's weights (3F, 3) are those of its edges to the first and to the second other corner, and between these.
+    ``cancel_flag`` (1,) is polled; returns False if it ended the call, and the weights are good for nothing then.
+    """
+    is_written = np.zeros(len(neighbour_offsets), dtype=np.bool_)
+    for place in range(len(changed)):
+        if place % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
+            return False
+        center = Index(changed[place])
+        for slot in range(Index(neighbour_offsets[center]), Index(neighbour_offsets[center + ONE]) + ONE):
+            # Its neighbours, and at last itself.
+            vertex = Index(neighbours[slot]) if slot < Index(neighbour_offsets[center + ONE]) else center
+            if is_written[vertex]:
+                continue
+            is_written[vertex] = True
+            for record in range(Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + ONE])):
+                first, second = Index(corner_ends[record, 0]), Index(corner_ends[record, 1])
+                corner_weights[record, 0] = edge_weights[slot_of(neighbour_offsets, neighbours, vertex, first)]
+                corner_weights[record, 1] = edge_weights[slot_of(neighbour_offsets, neighbours, vertex, second)]
+                corner_weights[record, 2] = edge_weights[slot_of(neighbour_offsets, neighbours, first, second)]
+    return True
+
+
+@inner_kernel
+def slot_of(neighbour_offsets: Int32Array, neighbours: Int32Array, vertex: int, other: int) -> int:
+    """Where ``other`` stands in the ascending list of a vertex: after all that are less. Without a branch to guess."""
+    slot = Index(neighbour_offsets[vertex])
+    for entry in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
+        slot += Index(Index(neighbours[entry]) < other)
+    return slot  # type: ignore[no-any-return]

@@ -1,0 +1,82 @@
+"""Angles of the surface from its normals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.mesh.vectors import Float64Array
+from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Float32Array, Int32Array
+
+
+@kernel
+def inclinations(normals: Float64Array) -> Float32Array:
+    """Angle (V,) float32 [rad] between unit normals (V, 3) and the vertical, from 0 to pi."""
+    angles = np.empty(normals.shape[0], dtype=np.float32)
+    for vertex in range(normals.shape[0]):
+        angles[vertex] = math.acos(min(max(normals[vertex, 2], -1.0), 1.0))
+    return angles
+
+
+@kernel
+def tilt_of_normals(
+    normals: Float64Array, headings: Float64Array, max_roll: float, max_pitch: float
+) -> tuple[BoolArray, Float32Array]:
+    """Which headings a robot that stands on a vertex' tangent plane may have, and its roll there.
+
+    Parameters
+    ----------
+    normals : (V, 3) float64
+        Unit normals.
+    headings : (H,) float64
+        About the vertical [rad].
+    max_roll, max_pitch : float
+        Limits of the magnitudes [rad].
+
+    Returns
+    -------
+    allowed : (V, H) bool
+    roll : (V, H) float32
+        [rad], left side up positive.
+    """
+    vertex_count, heading_count = normals.shape[0], headings.shape[0]
+    allowed = np.empty((vertex_count, heading_count), dtype=np.bool_)
+    rolls = np.empty((vertex_count, heading_count), dtype=np.float32)
+    for heading in range(heading_count):
+        cosine, sine = math.cos(headings[heading]), math.sin(headings[heading])
+        for vertex in range(vertex_count):
+            x, y, up = normals[vertex, 0], normals[vertex, 1], normals[vertex, 2]
+            pitch, roll = math.atan2(-(x * cosine + y * sine), up), math.atan2(-(y * cosine - x * sine), up)
+            allowed[vertex, heading] = abs(roll) <= max_roll and abs(pitch) <= max_pitch
+            rolls[vertex, heading] = roll
+    return allowed, rolls
+
+
+@kernel
+def slopes_of_edges(
+    vertices: Float64Array,
+    neighbour_offsets: Int32Array,
+    neighbours: Int32Array,
+    normals: Float64Array,
+    max_roll: float,
+    max_pitch: float,
+) -> BoolArray:
+    """Which directed edges (2E,) a robot on the tangent plane may drive along, at the very heading of the edge.
+
+    Between both ends the normal goes from one to the other in proportion, so roll and pitch are greatest at an end.
+    """
+    allowed = np.empty(len(neighbours), dtype=np.bool_)
+    for vertex in range(len(vertices)):
+        for slot in range(neighbour_offsets[vertex], neighbour_offsets[vertex + 1]):
+            other = neighbours[slot]
+            dx, dy = vertices[other, 0] - vertices[vertex, 0], vertices[other, 1] - vertices[vertex, 1]
+            length = math.sqrt(dx * dx + dy * dy)
+            worst = 0.0 if length > 0.0 else np.inf
+            for end in (Count(vertex), Count(other)):
+                x, y, up = normals[end, 0], normals[end, 1], normals[end, 2] * length
+                roll, pitch = abs(math.atan2(y * dx - x * dy, up)), abs(math.atan2(x * dx + y * dy, up))
+                worst = max(worst, roll / max_roll, pitch / max_pitch)
+            allowed[slot] = worst <= 1.0
+    return allowed

@@ -1,0 +1,1 @@
+"""Compiled rollouts on the surface, poses and costs along paths."""

@@ -1,0 +1,125 @@
+"""Rollouts of many control sequences over the surface, each scored by the critics in one pass.
+
+A rollout turns and walks from face to face (``surface_walk.py``), so its poses are on the surface by construction.
+Critics, summed over the steps: *path* (squared distance to the path), *cost* (mean cost of the face), *tilt* (roll and
+pitch of the robot over their limits), *turn* (yaw rate); at the end *goal* (path length left) and *heading* (towards
+the path ahead). A step into a forbidden face or over a border ends the rollout as a collision.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.mesh.surface_walk import turned, walk
+from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, cross, difference, dot, norm, row
+from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.search.forbidden_surface import hardness_at, may_enter
+
+PATH, COST, TILT, TURN, GOAL, HEADING = range(6)
+"""Positions of the critics in the weights array."""
+
+
+@kernel
+def score_rollouts(
+    vertices: Float64Array,
+    faces: Int32Array,
+    face_neighbours: Int32Array,
+    face_normals: Float64Array,
+    costs: Float32Array,
+    hardness: Float32Array,
+    start_face: int,
+    start: Vector,
+    heading: Vector,
+    controls: NDArray[np.float64],
+    period: float,
+    path_points: Float64Array,
+    remaining: Float64Array,
+    weights: Float64Array,
+    tilt_limits: tuple[float, float],
+    facing: float,
+) -> tuple[Float64Array, BoolArray]:
+    """Score every sequence of ``controls``.
+
+    Parameters
+    ----------
+    vertices, faces, face_neighbours, face_normals
+        The mesh.
+    costs, hardness : (V,) float32
+        The current map; how ground is forbidden, and where a rollout that starts there may go, says
+        ``forbidden_ground.py``.
+    start_face, start, heading
+        The robot: face, point [m], unit direction in the face.
+    controls : (n, t, 2) float64
+        Forward speed [m/s] and yaw rate [rad/s] per step.
+    period : float
+        Length of a step [s].
+    path_points, remaining : (m, 3), (m,) float64
+        The path ahead, evenly sampled, and the path length [m] left from each point.
+    weights : (6,) float64
+        Of the critics, in the order of this module's constants.
+    tilt_limits : (float, float)
+        Roll and pitch [rad] that cost 1 each.
+    facing : float
+        1 where the robot looks along the path, -1 where it drives it backward.
+
+    Returns
+    -------
+    scores : (n,) float64
+    collided : (n,) bool
+    """
+    sequence_count, step_count, _ = controls.shape
+    scores = np.empty(sequence_count, dtype=np.float64)
+    collided = np.zeros(sequence_count, dtype=np.bool_)
+    sin_roll, sin_pitch = math.sin(tilt_limits[0]), math.sin(tilt_limits[1])
+    for sequence in range(sequence_count):
+        face, point, direction = start_face, start, heading
+        stands_on = hardness_at(vertices, faces, hardness, face, point)
+        nearest = Count(0)
+        score = 0.0
+        for step in range(step_count):
+            # 1. Move: turn, then walk (backwards along the opposite direction).
+            speed, yaw_rate = controls[sequence, step, 0], controls[sequence, step, 1]
+            direction = turned(direction, row(face_normals, face), yaw_rate * period)
+            sign = 1.0 if speed >= 0.0 else -1.0
+            way = (sign * direction[0], sign * direction[1], sign * direction[2])
+            distance = abs(speed) * period
+            face, point, way, walked = walk(vertices, faces, face_neighbours, face_normals, face, point, way, distance)
+            direction = (sign * way[0], sign * way[1], sign * way[2])
+            # 2. Collisions end the rollout.
+            comes_to = hardness_at(vertices, faces, hardness, face, point)
+            if walked < distance - 1e-9 or not may_enter(stands_on, comes_to):
+                collided[sequence] = True
+                break
+            stands_on = comes_to
+            # 3. The path point nearest to here is at or after the one of the step before.
+            gap = _squared_distance(path_points, nearest, point)
+            while nearest + 1 < len(path_points) and _squared_distance(path_points, nearest + 1, point) <= gap:
+                nearest += 1
+                gap = _squared_distance(path_points, nearest, point)
+            # 4. Critics of the step.
+            score += weights[PATH] * gap + weights[TURN] * yaw_rate * yaw_rate
+            mean_cost = (costs[faces[face, 0]] + costs[faces[face, 1]] + costs[faces[face, 2]]) / 3.0
+            score += weights[COST] * min(mean_cost, 2.0)
+            roll = cross(row(face_normals, face), direction)[2] / sin_roll
+            pitch = direction[2] / sin_pitch
+            score += weights[TILT] * (roll * roll + pitch * pitch)
+        # 5. Critics of the end.
+        score /= step_count
+        score += weights[GOAL] * (remaining[nearest] + math.sqrt(_squared_distance(path_points, nearest, point)))
+        target = row(path_points, min(nearest + 3, len(path_points) - 1))
+        ahead = difference(target, point)
+        length = norm(ahead)
+        if length > 0.1:
+            score += weights[HEADING] * (1.0 - facing * dot(ahead, direction) / length)
+        scores[sequence] = score
+    return scores, collided
+
+
+@inner_kernel
+def _squared_distance(points: Float64Array, index: int, point: Vector) -> float:
+    offset = difference(row(points, index), point)
+    return dot(offset, offset)

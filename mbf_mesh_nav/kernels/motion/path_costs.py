@@ -1,0 +1,46 @@
+"""Length and collected cost of a way through faces."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.compiled import Count, kernel
+from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, between, cross, difference, dot, norm, row, triangle
+
+_LEAST_WEIGHT = 1e-9  # of the corners with a finite cost, lest a cost is divided by zero
+
+
+@kernel
+def way_cost(
+    vertices: Float64Array,
+    faces: NDArray[np.int32],
+    costs: NDArray[np.float32],
+    factor: float,
+    positions: Float64Array,
+    point_faces: NDArray[np.int32],
+) -> float:
+    """Length plus ``factor`` times the cost in the middle of each step [m]; steps in order, see ``cost_along``."""
+    total = 0.0
+    for index in range(1, len(positions)):
+        start, end, face = row(positions, index - 1), row(positions, index), Count(point_faces[index])
+        length = norm(difference(end, start))
+        if factor == 0.0:
+            total += length
+            continue
+        a, b, c = triangle(vertices, faces, face)
+        ab, ac, offset = difference(b, a), difference(c, a), difference(between(start, end, 0.5), a)
+        normal = cross(ab, ac)
+        squared = dot(normal, normal)
+        weight_b, weight_c = dot(cross(offset, ac), normal) / squared, dot(cross(ab, offset), normal) / squared
+        weights = 1.0 - weight_b - weight_c, weight_b, weight_c
+        collected = weight = 0.0
+        for corner in range(3):
+            cost = float(costs[faces[face, corner]])
+            if math.isfinite(cost):
+                collected += weights[corner] * cost
+                weight += weights[corner]
+        total += length * (1.0 + factor * collected / max(weight, _LEAST_WEIGHT))
+    return total

@@ -1,0 +1,146 @@
+"""A* over (vertex, heading): the same hill may be climbed straight up and forbidden sideways.
+
+A state is ``vertex * HEADINGS + heading``. A move turns on the spot to the heading of an edge, over headings that are
+all allowed there, and drives along the edge; it costs the edge's weight, lengthened by the roll it brings, plus the
+turn. Whether the tilt allows an edge at the very heading of the edge, all along it, is found out when a search first
+wants to take it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
+from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, Ground, Scratch, edge_use
+from mbf_mesh_nav.kernels.search.astar import straight_line_bound
+from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.search.indexed_heap import push_or_decrease, remove_top, top_item, top_key
+
+HEADINGS = 16
+HEADING_STEP = 2.0 * math.pi / HEADINGS
+UNKNOWN, DRIVABLE, FORBIDDEN = 0, 1, 2
+"""What is known of a directed edge."""
+
+
+@kernel
+def search_with_heading(
+    vertices: NDArray[np.float64],
+    neighbour_offsets: Int32Array,
+    neighbours: Int32Array,
+    edge_weights: Float32Array,
+    edge_headings: NDArray[np.uint8],
+    blocked: BoolArray,
+    allowed: BoolArray,
+    roll: Float32Array,
+    roll_cost: float,
+    turning_cost: float,
+    distances: Float32Array,
+    predecessors: Int32Array,
+    seeds: Int32Array,
+    targets: Int32Array,
+    target_offsets: Float32Array,
+    target_headings: Int32Array,
+    goal: NDArray[np.float64],
+    edges: NDArray[np.uint8],
+    ground: Ground,
+    chassis: Chassis,
+    scratch: Scratch,
+    cancel_flag: FlagArray,
+) -> tuple[int, float]:
+    """Relax ``distances`` and ``predecessors`` in place until the best target state is settled.
+
+    Parameters
+    ----------
+    vertices, neighbour_offsets, neighbours, edge_weights, blocked
+        The graph, as in ``dijkstra.propagate_distances``.
+    edge_headings : (2E,) uint8
+        Heading of each directed edge, 0 to 15.
+    allowed, roll : (V, 16) bool, (V, 16) float32 [rad]
+        Where the robot may stand with which heading, and how it rolls there.
+    roll_cost, turning_cost : float
+        Extra lengths per length and rad of roll; extra length [m] per rad turned.
+    distances, predecessors : (16 V,) float32 [m], (16 V,) int32
+        Per state; inf and -1 except at seeds.
+    seeds : (s,) int32
+        Start states.
+    targets, target_offsets : (t,) int32, (t,) float32 [m]
+        Goal vertices and what is left from them to the goal.
+    target_headings : (t,) int32
+        Turning to it at the goal vertex costs, too, and has to be allowed; -1 = any heading will do.
+    goal : (3,) float64 [m]
+    edges : (2E,) uint8
+        Whether a directed edge may be driven; what is ``UNKNOWN`` is found out and written here.
+    ground, chassis, scratch
+        The surface, the robot and its limits, see ``footprint_sweep``.
+    cancel_flag : (1,) uint8
+
+    Returns
+    -------
+    state : int
+        The best target state, -1 if there is none, -2 if cancelled.
+    total : float
+        What the way there costs [m], the rest to the goal and the last turn included.
+    """
+    state_count = len(distances)
+    heap = np.empty(state_count, dtype=np.uint64)
+    positions = np.full(state_count, -1, dtype=np.int32)
+    size = Count(0)
+    for seed in seeds:
+        key = distances[seed] + straight_line_bound(vertices, Index(seed // HEADINGS), goal)
+        size = push_or_decrease(heap, positions, size, Index(seed), key)
+    best_state, best_total = -1, np.inf
+    settled = 0
+    while size > 0 and top_key(heap) < best_total:
+        if settled % CANCEL_POLL_INTERVAL == 0 and cancel_flag[0] != 0:
+            return -2, np.inf
+        state = Count(top_item(heap))
+        size = remove_top(heap, positions, size)
+        settled += 1
+        vertex, heading = state // HEADINGS, state % HEADINGS
+        for i in range(len(targets)):
+            if targets[i] == vertex:
+                turn = 0 if target_headings[i] < 0 else _shortest_turn(heading, target_headings[i])
+                total = distances[state] + target_offsets[i] + turning_cost * HEADING_STEP * abs(turn)
+                if total < best_total and _may_turn(allowed, vertex, heading, turn):
+                    best_state, best_total = state, total
+        for slot in range(neighbour_offsets[vertex], neighbour_offsets[vertex + 1]):
+            neighbour, new_heading = neighbours[slot], Count(edge_headings[slot])
+            if blocked[neighbour] or not allowed[neighbour, new_heading]:
+                continue
+            turn = _shortest_turn(heading, new_heading)
+            if not _may_turn(allowed, vertex, heading, turn):
+                continue
+            drive = edge_weights[slot] * (1.0 + roll_cost * abs(roll[neighbour, new_heading]))
+            candidate = np.float32(distances[state] + drive + turning_cost * HEADING_STEP * abs(turn))
+            following = neighbour * HEADINGS + new_heading
+            if candidate < distances[following]:
+                if edges[slot] == UNKNOWN:
+                    use = edge_use(ground, chassis, scratch, Count(vertex), Count(neighbour))
+                    edges[slot] = DRIVABLE if use <= 1.0 else FORBIDDEN
+                if edges[slot] == FORBIDDEN:
+                    continue
+                distances[following] = candidate
+                predecessors[following] = state
+                key = candidate + straight_line_bound(vertices, Index(neighbour), goal)
+                size = push_or_decrease(heap, positions, size, Index(following), key)
+    return best_state, best_total
+
+
+@inner_kernel
+def _shortest_turn(heading: int, new_heading: int) -> int:
+    """Steps to turn from one heading to another the short way, left positive."""
+    turn = (int(new_heading) - int(heading)) % HEADINGS
+    return turn if turn <= HEADINGS // 2 else turn - HEADINGS
+
+
+@inner_kernel
+def _may_turn(allowed: BoolArray, vertex: int, heading: int, turn: int) -> bool:
+    """Whether all headings the robot passes, the new one included, are allowed at the vertex."""
+    step = 1 if turn > 0 else -1
+    for passed in range(1, abs(turn) + 1):
+        if not allowed[vertex, (heading + step * passed) % HEADINGS]:
+            return False
+    return True

@@ -1,0 +1,89 @@
+"""Repairing a shortest-path field after local cost changes: forget what hung on the change, keep the rest.
+
+The field is a tree of predecessors. Only vertices whose way leads over a changed vertex can be wrong; they are reset,
+and their intact neighbours become the seeds of a new wave that ``dijkstra.propagate_distances`` runs to the same fixed
+point a search from scratch reaches. (The idea of Ramalingam and Reps, 1996, with a whole subtree at a time.)
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
+from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Float32Array, Int32Array
+
+_RESET: Any = np.uint8(1)
+_SEED: Any = np.uint8(2)
+
+
+@kernel
+def forget_changed_ways(
+    neighbour_offsets: Int32Array,
+    neighbours: Int32Array,
+    blocked: BoolArray,
+    distances: Float32Array,
+    predecessors: Int32Array,
+    roots: Int32Array,
+    root_distances: Float32Array,
+    changed: Int32Array,
+) -> Int32Array:
+    """Reset, in place, all vertices whose way leads over a changed vertex; return the seeds of the repair.
+
+    Parameters
+    ----------
+    neighbour_offsets, neighbours : (V+1,), (2E,) int32
+    blocked : (V,) bool
+        The new blocked vertices.
+    distances, predecessors : (V,) float32, (V,) int32
+        The old field; reset vertices get inf and -1.
+    roots, root_distances : (r,) int32, (r,) float32
+        Seeds of the field, a few, which keep their distance.
+    changed : (c,) int32
+        Vertices whose cost or flag changed, i.e. at which the weight of any edge may have changed.
+
+    Returns
+    -------
+    seeds : (s,) int32
+        Reached vertices beside reset ones, and the roots among those.
+    """
+    reset = np.empty(len(distances), dtype=np.int32)
+    seeds = np.empty(len(distances), dtype=np.int32)
+    state = np.zeros(len(distances), dtype=np.uint8)
+    count, seed_count, reader = Index(0), Index(0), Index(0)
+    for changed_vertex in changed:
+        vertex = Index(changed_vertex)
+        if state[vertex] == 0:
+            state[vertex] = _RESET
+            reset[count] = vertex
+            count += ONE
+    # 1. Reset the changed vertices and everything behind them.
+    while reader < count:
+        vertex = Index(reset[reader])
+        reader += ONE
+        distances[vertex] = np.inf
+        predecessors[vertex] = -1
+        for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
+            child = Index(neighbours[slot])
+            if Index(predecessors[child]) == vertex and state[child] == 0:
+                state[child] = _RESET
+                reset[count] = child
+                count += ONE
+    for index in range(len(roots)):
+        root = Index(roots[index])
+        if state[root] == _RESET and not blocked[root]:
+            distances[root] = root_distances[index]
+            state[root] = _SEED
+            seeds[seed_count] = root
+            seed_count += ONE
+    # 2. The wave starts again from what is intact around them.
+    for index in range(count):
+        vertex = Index(reset[index])
+        for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
+            other = Index(neighbours[slot])
+            if state[other] == 0 and distances[other] < np.inf:
+                state[other] = _SEED
+                seeds[seed_count] = other
+                seed_count += ONE
+    return seeds[:seed_count].copy()

@@ -1,0 +1,1 @@
+"""Compiled continuous wave over faces: propagation, descent and string pulling."""

@@ -1,0 +1,319 @@
+"""Strips of free faces along a path, and turning them to the other side of the vertices at which the path bends.
+
+Within a strip the shortest path is found by ``funnel.pull_taut``. Where it bends round a vertex, the faces on the other
+side of that vertex may make it shorter still: if the angle it leaves there is less than half a turn. Turned again and
+again, the strip becomes that of a geodesic, a path that is shortest among its neighbours (Xin and Wang 2007; Sharp and
+Crane 2020 turn edges instead of faces).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, difference, dot, norm, row
+from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Int32Array
+from mbf_mesh_nav.kernels.wave.funnel import pull_taut
+
+_AT_VERTEX = 1e-7  # m; a crossing this near to the end of a portal is that vertex
+_LESS_THAN_HALF_A_TURN = math.pi - 1e-6
+_MAX_TURNS_A_FACE = 50  # tries; a bound, a traced strip needs a turn for few of its faces
+
+
+@kernel
+def link_faces(
+    faces: Int32Array, face_neighbours: Int32Array, blocked: BoolArray, point_faces: Int32Array
+) -> tuple[Int32Array, Int32Array]:
+    """Join the faces of a path to strips in which each shares an edge with the next.
+
+    Parameters
+    ----------
+    faces, face_neighbours, blocked : (F, 3) int32, (F, 3) int32, (V,) bool
+        The mesh; a face with a blocked corner is in no strip.
+    point_faces : (n,) int32
+        The face in which the way to each point lies.
+
+    Returns
+    -------
+    strip : (s,) int32
+        The faces of all strips.
+    pieces : (p, 4) int32
+        Of every piece of the path its first and last point, and where its strip begins and ends; an empty one where
+        the path is not among free faces.
+    """
+    strip = np.empty(2 * len(point_faces) + 64, dtype=np.int32)
+    pieces = np.empty((len(point_faces), 4), dtype=np.int32)
+    count, begin, piece_count, first = Count(0), Count(0), Count(0), Count(0)
+    for index in range(1, len(point_faces)):
+        following = Count(point_faces[index])
+        is_free = not _is_blocked(faces[following], blocked)
+        if index > 1:
+            linked = Count(-1)
+            if is_free and count > begin:
+                strip, linked = _linked(faces, face_neighbours, blocked, strip, begin, count, following)
+            if linked >= 0:
+                count = linked
+                continue
+            if not is_free and count == begin:
+                continue  # one more point of a piece without a strip
+            _end_piece(pieces, piece_count, first, index - 1, begin, count)
+            piece_count, first, begin = piece_count + 1, Count(index - 1), Count(count)
+        if is_free:
+            if count + 1 > len(strip):
+                strip = _grown(strip)
+            strip[count] = following
+            count += 1
+    _end_piece(pieces, piece_count, first, len(point_faces) - 1, begin, count)
+    return strip[:count].copy(), pieces[: piece_count + 1].copy()
+
+
+@inner_kernel
+def _end_piece(pieces: Int32Array, index: int, first: int, last: int, begin: int, end: int) -> None:
+    pieces[index, 0], pieces[index, 1], pieces[index, 2], pieces[index, 3] = first, last, begin, end
+
+
+@inner_kernel
+def _grown(strip: Int32Array) -> Int32Array:
+    longer = np.empty(2 * len(strip), dtype=np.int32)
+    for index in range(len(strip)):
+        longer[index] = strip[index]
+    return longer
+
+
+@inner_kernel
+def _is_blocked(corners: Int32Array, blocked: BoolArray) -> bool:
+    return bool(blocked[corners[0]] or blocked[corners[1]] or blocked[corners[2]])
+
+
+@inner_kernel
+def corner_of(corners: Int32Array, vertex: int) -> int:
+    """Number of a vertex among the corners of a face, -1 if it is none of them."""
+    for corner in range(3):
+        if corners[corner] == vertex:
+            return Count(corner)  # type: ignore[no-any-return]
+    return Count(-1)  # type: ignore[no-any-return]
+
+
+@inner_kernel
+def _linked(
+    faces: Int32Array,
+    face_neighbours: Int32Array,
+    blocked: BoolArray,
+    strip: Int32Array,
+    begin: int,
+    count: int,
+    following: int,
+) -> tuple[Int32Array, int]:
+    """Lead the strip on to a face: at once, or by the shorter free fan round a common vertex; (strip, length or -1)."""
+    last = Count(strip[count - 1])
+    if last == following:
+        return strip, count
+    for side in range(3):
+        if face_neighbours[last, side] == following:
+            return _appended(strip, begin, count, following)
+    for corner in range(3):
+        vertex = Count(faces[last, corner])
+        if corner_of(faces[following], vertex) < 0:
+            continue
+        left = fan_length(faces, face_neighbours, blocked, vertex, last, following, Count(0))
+        right = fan_length(faces, face_neighbours, blocked, vertex, last, following, Count(2))
+        if left < 0 and right < 0:
+            return strip, Count(-1)
+        side = Count(0) if right < 0 or 0 <= left < right else Count(2)
+        face = last
+        while face != following:
+            face = next_round(faces, face_neighbours, vertex, face, side)
+            strip, count = _appended(strip, begin, count, face)
+        return strip, count
+    return strip, Count(-1)
+
+
+@inner_kernel
+def _appended(strip: Int32Array, begin: int, count: int, face: int) -> tuple[Int32Array, int]:
+    """Append a face; into a face and straight back out of it is no step at all."""
+    if count - begin > 1 and strip[count - 2] == face:
+        return strip, count - 1
+    if count + 1 > len(strip):
+        strip = _grown(strip)
+    strip[count] = face
+    return strip, count + 1
+
+
+@inner_kernel
+def next_round(faces: Int32Array, face_neighbours: Int32Array, vertex: int, face: int, side: int) -> int:
+    """Next face round a vertex over its outgoing (0) or incoming (2) edge; -1 at a border."""
+    return Count(face_neighbours[face, (corner_of(faces[face], vertex) + side) % 3])  # type: ignore[no-any-return]
+
+
+@inner_kernel
+def fan_length(
+    faces: Int32Array,
+    face_neighbours: Int32Array,
+    blocked: BoolArray,
+    vertex: int,
+    face: int,
+    following: int,
+    side: int,
+) -> int:
+    """Steps round a vertex from a face to the following one; -1 if a border or a blocked face lies between.
+
+    Also if the faces touch in the vertex only, then the turn comes back to where it began.
+    """
+    steps, begin = Count(0), face
+    while face != following:
+        face = next_round(faces, face_neighbours, vertex, face, side)
+        steps += 1
+        if face < 0 or face == begin or (face != following and _is_blocked(faces[face], blocked)):
+            return Count(-1)  # type: ignore[no-any-return]
+    return steps  # type: ignore[no-any-return]
+
+
+@kernel
+def straighten(
+    vertices: Float64Array,
+    faces: Int32Array,
+    face_neighbours: Int32Array,
+    blocked: BoolArray,
+    strip: Int32Array,
+    start: Vector,
+    goal: Vector,
+    turn: bool,
+) -> tuple[Float64Array, Int32Array]:
+    """Pull a path taut through a strip and turn the strip round the vertices where that makes the path shorter.
+
+    Parameters
+    ----------
+    vertices, faces, face_neighbours, blocked
+        The mesh, as in ``link_faces``.
+    strip : (s,) int32
+        Faces, each sharing an edge with the next.
+    start, goal : (float, float, float)
+        Points in the first and the last face [m].
+    turn : bool
+        Whether the strip may be turned; without it the path is that of ``pull_taut``.
+
+    Returns
+    -------
+    points : (n + 1, 3) float64
+        Start, one point on each crossed edge, goal.
+    strip : (n,) int32
+        The faces the path goes through.
+    """
+    points = pull_taut(vertices, faces, strip, start, goal)
+    length = path_length(points)
+    index, tries, is_changed = Count(0), _MAX_TURNS_A_FACE * len(strip) if turn else Count(0), False
+    while tries > 0 and len(strip) > 1:
+        if index >= len(strip) - 1:
+            if not is_changed:
+                break
+            index, is_changed = Count(0), False  # a turn may have made the path bend before it
+        vertex = _bend_at(vertices, faces, strip, points, index)
+        if vertex < 0:
+            index += 1
+            continue
+        first, last = index, index + 1
+        while first > 0 and corner_of(faces[strip[first - 1]], vertex) >= 0:
+            first -= 1
+        while last < len(strip) - 1 and corner_of(faces[strip[last + 1]], vertex) >= 0:
+            last += 1
+        side = _free_side(vertices, faces, face_neighbours, blocked, strip, points, vertex, first, last)
+        turned = strip if side < 0 else turned_strip(faces, face_neighbours, strip, vertex, first, last, side)
+        index = last
+        if side < 0:
+            continue
+        tries -= 1
+        shorter = pull_taut(vertices, faces, turned, start, goal)
+        new_length = path_length(shorter)
+        if new_length < length:
+            points, strip, length, is_changed = shorter, turned, new_length, True
+            index = max(first - 1, 0)
+    return points, strip
+
+
+@inner_kernel
+def path_length(points: Float64Array) -> float:
+    """Length [m] of a polyline (n, 3)."""
+    total = 0.0
+    for index in range(len(points) - 1):
+        total += norm(difference(row(points, index + 1), row(points, index)))
+    return total
+
+
+@inner_kernel
+def _bend_at(vertices: Float64Array, faces: Int32Array, strip: Int32Array, points: Float64Array, portal: int) -> int:
+    """Vertex at an end of a portal through which the path goes, else -1."""
+    following, crossing = faces[strip[portal + 1]], row(points, Count(portal + 1))
+    for corner in range(3):
+        vertex = Count(faces[strip[portal], corner])
+        if corner_of(following, vertex) >= 0 and norm(difference(row(vertices, vertex), crossing)) < _AT_VERTEX:
+            return vertex  # type: ignore[no-any-return]
+    return Count(-1)  # type: ignore[no-any-return]
+
+
+@inner_kernel
+def _angle(at: Vector, first: Vector, second: Vector) -> float:
+    a, b = difference(first, at), difference(second, at)
+    return math.acos(min(max(dot(a, b) / max(norm(a) * norm(b), 1e-300), -1.0), 1.0))
+
+
+@inner_kernel
+def _free_side(
+    vertices: Float64Array,
+    faces: Int32Array,
+    face_neighbours: Int32Array,
+    blocked: BoolArray,
+    strip: Int32Array,
+    points: Float64Array,
+    vertex: int,
+    first: int,
+    last: int,
+) -> int:
+    """Which way round a vertex (0, 2) leads from face ``first`` of a strip to ``last`` by the other side; -1 for none.
+
+    None if it is not free, or if the path leaves an angle of half a turn or more there.
+    """
+    inner = Count(strip[first + 1])
+    side = Count(2) if next_round(faces, face_neighbours, vertex, Count(strip[first]), Count(0)) == inner else Count(0)
+    begin, end = Count(strip[first]), Count(strip[last])
+    if begin == end or fan_length(faces, face_neighbours, blocked, vertex, begin, end, side) < 0:
+        return Count(-1)  # type: ignore[no-any-return]
+    # The path comes to the vertex from the point before face ``first`` and leaves it to the one behind ``last``.
+    at = row(vertices, vertex)
+    corner = corner_of(faces[begin], vertex)
+    # Over the outgoing edge the face is left between the vertex and the next corner, else and the one before.
+    edge = row(vertices, Count(faces[begin, (corner + 1) % 3 if side == 0 else (corner + 2) % 3]))
+    total = _angle(at, row(points, first), edge)
+    face = next_round(faces, face_neighbours, vertex, begin, side)
+    while face != end and total < _LESS_THAN_HALF_A_TURN:
+        corner = corner_of(faces[face], vertex)
+        total += _angle(
+            at, row(vertices, Count(faces[face, (corner + 1) % 3])), row(vertices, Count(faces[face, (corner + 2) % 3]))
+        )
+        face = next_round(faces, face_neighbours, vertex, face, side)
+    corner = corner_of(faces[end], vertex)
+    edge = row(vertices, Count(faces[end, (corner + 2) % 3 if side == 0 else (corner + 1) % 3]))
+    total += _angle(at, edge, row(points, Count(last + 1)))
+    return side if total < _LESS_THAN_HALF_A_TURN else Count(-1)  # type: ignore[no-any-return]
+
+
+@inner_kernel
+def turned_strip(
+    faces: Int32Array, face_neighbours: Int32Array, strip: Int32Array, vertex: int, first: int, last: int, side: int
+) -> Int32Array:
+    """The strip led round the other side of a vertex between two of its faces."""
+    between, face, end = Count(0), next_round(faces, face_neighbours, vertex, Count(strip[first]), side), strip[last]
+    while face != end:
+        face = next_round(faces, face_neighbours, vertex, face, side)
+        between += 1
+    turned = np.empty(first + 1 + between + len(strip) - last, dtype=np.int32)
+    for index in range(first + 1):
+        turned[index] = strip[index]
+    face = Count(strip[first])
+    for index in range(between):
+        face = next_round(faces, face_neighbours, vertex, face, side)
+        turned[first + 1 + index] = face
+    for index in range(last, len(strip)):
+        turned[first + 1 + between + index - last] = strip[index]
+    return turned

@@ -1,0 +1,312 @@
+"""Exact descent of a distance field: the path is traced from edge to edge, never stepped and searched for.
+
+At a point of a face the wave's own rule is applied once more (``cvp.propagate_wave``): two corners that one front has
+passed tell where its centre lies, a virtual source; the way leads straight there, if that line crosses the side between
+the two, else to the corner over which it is shortest. A field taken as linear within a face would be wrong by a tenth
+some edges away from the source, where the fronts are round. A virtual source of two fronts is a fiction and may lead
+in circles: no face is passed through twice, and from corner to corner the distance falls. Thus the trace ends, and
+every reached point gets a path.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.mesh.corners import slot_of
+from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, between, cross, difference, dot, norm, row, set_row
+from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.wave.fronts import NO_BEND, SLACK
+
+_ON_VERTEX = 1e-6  # a crossing this near (as a share of the edge) to a vertex is the vertex
+_NO_SIDE = -1
+
+
+@kernel
+def trace_descent(
+    vertices: Float64Array,
+    faces: Int32Array,
+    face_neighbours: Int32Array,
+    vertex_face_offsets: Int32Array,
+    vertex_faces: Int32Array,
+    neighbour_offsets: Int32Array,
+    neighbours: Int32Array,
+    edge_weights: Float32Array,
+    distances: Float32Array,
+    predecessors: Int32Array,
+    bends: Int32Array,
+    start_face: int,
+    start: Vector,
+    goal_face: int,
+    goal: Vector,
+    along_edges: bool,
+) -> tuple[Float64Array, Int32Array]:
+    """Trace the way down from ``start`` to the source of the field at ``goal``.
+
+    Parameters
+    ----------
+    vertices, faces, face_neighbours, vertex_face_offsets, vertex_faces, neighbour_offsets, neighbours
+        The mesh; (V, 3) float64 [m], (F, 3), (F, 3), (V+1,), (3F,), (V+1,), (2E,) int32.
+    edge_weights : (2E,) float32
+        Of the wave [m], aligned with ``neighbours``.
+    distances, predecessors, bends : (V,) float32 [m], (V,) int32, (V,) int32
+        The wave's result; at least one corner of ``start_face`` is reached.
+    start_face, goal_face : int
+        Different faces.
+    start, goal : (float, float, float)
+        Points in them [m].
+    along_edges : bool
+        Follow the predecessors only: a longer way, but surely the one along which the wave came.
+
+    Returns
+    -------
+    points : (n, 3) float64
+        From start to goal, one point per crossed edge or visited vertex [m].
+    point_faces : (n,) int32
+        The face the way to each point lies in (or on an edge of); the start's own face first.
+    """
+    capacity = Count(256)
+    points = np.empty((capacity, 3), dtype=np.float64)
+    point_faces = np.empty(capacity, dtype=np.int32)
+    graph = (neighbour_offsets, neighbours, edge_weights)
+    passed = np.zeros(len(faces), dtype=np.bool_)
+    face, vertex = Count(start_face), Count(-1)
+    place = _barycentric(vertices, faces[face], start)
+    set_row(points, Count(0), start)
+    point_faces[0] = face
+    count = Count(1)
+    while True:
+        # 1. In the goal's face, or at one of its corners, the rest is a straight line.
+        if (vertex < 0 and face == goal_face) or (vertex >= 0 and _has_corner(faces[goal_face], vertex)):
+            set_row(points, count, goal)
+            point_faces[count] = goal_face
+            return points[: count + 1].copy(), point_faces[: count + 1].copy()
+        if count + 2 > capacity:
+            capacity *= 2
+            points, point_faces = _grown(points, point_faces, capacity)
+        # 2. Which way on is the shortest: through one of the sides to a face not passed yet, or over a corner?
+        if vertex >= 0:
+            face, side, share, vertex = _way_from_vertex(
+                vertices, faces, face_neighbours, vertex_face_offsets, vertex_faces, graph, distances, predecessors,
+                bends, goal_face, passed, vertex, along_edges,
+            )  # fmt: skip
+        else:
+            _, side, share, vertex = _way_through(
+                vertices, faces, face_neighbours, graph, distances, bends, goal_face, passed, face, place, along_edges
+            )
+        # 3. Note where it leads, and go on there.
+        if vertex < 0:
+            left, right = Count(faces[face, side]), Count(faces[face, (side + 1) % 3])
+            passed[face] = True
+            if share < _ON_VERTEX or share > 1.0 - _ON_VERTEX:
+                vertex = left if share < 0.5 else right
+        point_faces[count] = face
+        if vertex >= 0:
+            set_row(points, count, row(vertices, vertex))
+        else:
+            set_row(points, count, between(row(vertices, left), row(vertices, right), share))
+            face = Count(face_neighbours[face, side])
+            place = _on_side(_side_of(faces[face], right), 1.0 - share)
+        count += 1
+
+
+@inner_kernel
+def _grown(points: Float64Array, point_faces: Int32Array, capacity: int) -> tuple[Float64Array, Int32Array]:
+    more_points, more_faces = np.empty((capacity, 3), dtype=np.float64), np.empty(capacity, dtype=np.int32)
+    for i in range(len(points)):
+        set_row(more_points, i, row(points, i))
+        more_faces[i] = point_faces[i]
+    return more_points, more_faces
+
+
+@inner_kernel
+def _has_corner(corners: Int32Array, vertex: int) -> bool:
+    return bool(corners[0] == vertex or corners[1] == vertex or corners[2] == vertex)
+
+
+@inner_kernel
+def _side_of(corners: Int32Array, vertex: int) -> int:
+    """Number of the side that begins at a corner."""
+    side = 0 if corners[0] == vertex else (1 if corners[1] == vertex else 2)
+    return Count(side)  # type: ignore[no-any-return]
+
+
+@inner_kernel
+def _on_side(side: int, share: float) -> Vector:
+    """Barycentric coordinates of a point on a side, at a share of it from its first corner."""
+    first = 1.0 - share
+    if side == 0:
+        return first, share, 0.0
+    return (0.0, first, share) if side == 1 else (share, 0.0, first)
+
+
+@inner_kernel
+def _barycentric(vertices: Float64Array, corners: Int32Array, point: Vector) -> Vector:
+    """Barycentric coordinates of a point in the plane of a face."""
+    a, b, c = row(vertices, Count(corners[0])), row(vertices, Count(corners[1])), row(vertices, Count(corners[2]))
+    normal = cross(difference(b, a), difference(c, a))
+    squared = max(dot(normal, normal), 1e-300)
+    second = dot(cross(difference(point, a), difference(c, a)), normal) / squared
+    third = dot(cross(difference(b, a), difference(point, a)), normal) / squared
+    return 1.0 - second - third, second, third
+
+
+@inner_kernel
+def _side_weights(
+    vertices: Float64Array, corners: Int32Array, graph: tuple[Int32Array, Int32Array, Float32Array]
+) -> Vector:
+    """Weights [m] of the sides of a face, that from corner k to the next at k; the length at a blocked corner."""
+    return (
+        _weight(vertices, Count(corners[0]), Count(corners[1]), graph),
+        _weight(vertices, Count(corners[1]), Count(corners[2]), graph),
+        _weight(vertices, Count(corners[2]), Count(corners[0]), graph),
+    )
+
+
+@inner_kernel
+def _weight(vertices: Float64Array, a: int, b: int, graph: tuple[Int32Array, Int32Array, Float32Array]) -> float:
+    offsets, neighbours, weights = graph
+    weight = float(weights[slot_of(offsets, neighbours, a, b)])
+    return weight if weight < np.inf else norm(difference(row(vertices, a), row(vertices, b)))
+
+
+@inner_kernel
+def _weighted_length(sides: Vector, step: Vector) -> float:
+    """Length [m] of a step, a difference of barycentric coordinates, in the plane of a triangle of weighted sides."""
+    squared = (
+        step[0] * step[1] * sides[0] * sides[0]
+        + step[1] * step[2] * sides[1] * sides[1]
+        + step[2] * step[0] * sides[2] * sides[2]
+    )
+    return math.sqrt(max(-squared, 0.0))
+
+
+@inner_kernel
+def _way_through(
+    vertices: Float64Array,
+    faces: Int32Array,
+    face_neighbours: Int32Array,
+    graph: tuple[Int32Array, Int32Array, Float32Array],
+    distances: Float32Array,
+    bends: Int32Array,
+    goal_face: int,
+    passed: BoolArray,
+    face: int,
+    place: Vector,
+    over_corner: bool,
+) -> tuple[float, int, float, int]:
+    """Find the shortest way on from a point of a face: its length, the side, the share of it, or the corner (else -1).
+
+    It goes to no face that has been ``passed`` (F,), or to a corner in any case (``over_corner``). Where one is not
+    reached, only the others count.
+    """
+    corners = faces[face]
+    sides = _side_weights(vertices, corners, graph)
+    best, best_side, best_share, best_vertex = np.inf, Count(_NO_SIDE), 0.0, Count(-1)
+    lengths = (
+        _weighted_length(sides, (place[0] - 1.0, place[1], place[2])),
+        _weighted_length(sides, (place[0], place[1] - 1.0, place[2])),
+        _weighted_length(sides, (place[0], place[1], place[2] - 1.0)),
+    )
+    for corner in range(3):
+        total = distances[corners[corner]] + lengths[corner]
+        if total < best:
+            best, best_vertex = total, Count(corners[corner])
+    for side in range(0 if over_corner else 3):
+        if not _leads_on(faces, face_neighbours[face, side], distances, goal_face, passed):
+            continue
+        left, right = Count(corners[side]), Count(corners[(side + 1) % 3])
+        total, share = _over_side(distances, bends, left, right, sides[side], lengths[side], lengths[(side + 1) % 3])
+        if total < best:
+            best, best_side, best_share, best_vertex = total, Count(side), share, Count(-1)
+    return best, best_side, best_share, best_vertex
+
+
+@inner_kernel
+def _is_reached(corners: Int32Array, distances: Float32Array) -> bool:
+    return bool(distances[corners[0]] < np.inf and distances[corners[1]] < np.inf and distances[corners[2]] < np.inf)
+
+
+@inner_kernel
+def _leads_on(faces: Int32Array, following: int, distances: Float32Array, goal_face: int, passed: BoolArray) -> bool:
+    """Whether the trace may enter a face: the goal's, or one that is reached and has not been passed (F,)."""
+    if following < 0 or passed[following]:
+        return False
+    return bool(following == goal_face or _is_reached(faces[following], distances))
+
+
+@inner_kernel
+def _over_side(
+    distances: Float32Array, bends: Int32Array, left: int, right: int, c: float, b: float, a: float
+) -> tuple[float, float]:
+    """Length of the straight way through a side to the centre of the front, and where it crosses the side.
+
+    ``c``, ``b``, ``a`` are the side and the lengths from the point to its left and right end. The length is inf where
+    the way would not cross the side; the crossing is a share of the side from its left end.
+    """
+    bend = bends[left]
+    to_bend = float(distances[bend]) if bend == bends[right] and bend != NO_BEND else 0.0
+    u1, u2 = float(distances[left]) - to_bend, float(distances[right]) - to_bend
+    # The left end is the origin, the x axis runs to the right one; the point lies above, the virtual source below.
+    source_x = (c * c + (u1 - u2) * (u1 + u2)) / (2.0 * c)
+    point_x = (c * c + (b - a) * (b + a)) / (2.0 * c)
+    if not abs(source_x) <= SLACK * u1:
+        return np.inf, 0.0
+    depth = math.sqrt(max((u1 - source_x) * (u1 + source_x), 0.0))
+    height = math.sqrt(max((b - point_x) * (b + point_x), 0.0))
+    across, along = height + depth, point_x - source_x
+    crossing = source_x * height + point_x * depth  # times ``across``
+    if not 0.0 < crossing < c * across:
+        return np.inf, 0.0
+    return to_bend + math.sqrt(across * across + along * along), crossing / (across * c)
+
+
+@inner_kernel
+def _way_from_vertex(
+    vertices: Float64Array,
+    faces: Int32Array,
+    face_neighbours: Int32Array,
+    vertex_face_offsets: Int32Array,
+    vertex_faces: Int32Array,
+    graph: tuple[Int32Array, Int32Array, Float32Array],
+    distances: Float32Array,
+    predecessors: Int32Array,
+    bends: Int32Array,
+    goal_face: int,
+    passed: BoolArray,
+    vertex: int,
+    to_predecessor: bool,
+) -> tuple[int, int, float, int]:
+    """Choose the way on from a vertex: (face, side, share, -1) through a face, or (face, -1, 0, next vertex)."""
+    best, best_face, best_side, best_share = np.inf, Count(-1), Count(_NO_SIDE), 0.0
+    best_vertex = Count(predecessors[vertex])
+    for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
+        face = Count(vertex_faces[record])
+        corners = faces[face]
+        # A side of a free face is told of as that, it may have a blocked face on the other side.
+        if _has_corner(corners, best_vertex) and (best_face < 0 or _is_reached(corners, distances)):
+            best_face = face
+    if to_predecessor:
+        return best_face, best_side, best_share, best_vertex
+    for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
+        face = Count(vertex_faces[record])
+        corners = faces[face]
+        if not _is_reached(corners, distances):
+            continue
+        own = _side_of(corners, vertex)
+        sides = _side_weights(vertices, corners, graph)
+        for step in range(1, 3):
+            other = Count(corners[(own + step) % 3])
+            total = distances[other] + (sides[own] if step == 1 else sides[(own + 2) % 3])
+            if distances[other] < distances[vertex] and total < best:
+                best, best_face, best_side, best_share, best_vertex = total, face, Count(_NO_SIDE), 0.0, other
+        opposite = (own + 1) % 3
+        if passed[face] or not _leads_on(faces, face_neighbours[face, opposite], distances, goal_face, passed):
+            continue
+        left, right = Count(corners[opposite]), Count(corners[(opposite + 1) % 3])
+        total, share = _over_side(distances, bends, left, right, sides[opposite], sides[own], sides[(own + 2) % 3])
+        if total < best:
+            best, best_face, best_side, best_share, best_vertex = total, face, Count(opposite), share, Count(-1)
+    return best_face, best_side, best_share, best_vertex

@@ -1,0 +1,1 @@
+"""The mesh map that a server runs: layers in order, snapshots, queries."""

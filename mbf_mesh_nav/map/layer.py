@@ -1,0 +1,148 @@
+"""The interface of a mesh layer: one cost and one lethal flag per vertex, recomputed when its inputs change.
+
+A new layer derives ``MeshLayer``, declares ``Parameters`` and writes ``compute``. Layers that can do better than
+starting over after a local change override ``update_from_inputs``; layers fed by a sensor override ``insert_scan``,
+``expire``, ``clear`` and ``is_current``. A layer never calls another layer: the layer graph hands changes on.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_mesh_nav.mesh.locate import SurfaceLocator
+from mbf_mesh_nav.mesh.topology import MeshTopology
+
+CostArray = NDArray[np.float32]
+LethalArray = NDArray[np.bool_]
+IntArray = NDArray[np.int32]
+FloatArray = NDArray[np.float64]
+
+NOTHING_CHANGED: IntArray = np.zeros(0, dtype=np.int32)
+
+
+class LayerParameters(ParameterModel):
+    """Parameters every layer has."""
+
+    combination_weight: float = parameter(1.0, "Weight of this layer in a weighted sum or mean.", ge=0.0, le=10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class LayerContext:
+    """What a layer is constructed with.
+
+    Attributes
+    ----------
+    name : str
+        Name of the instance in the configuration.
+    topology, locator
+        The mesh and its surface queries.
+    parameters : LayerParameters
+        Validated instance of the layer class's ``Parameters``.
+    inputs : tuple of MeshLayer
+        The layers it reads, in the configured order.
+    """
+
+    name: str
+    topology: MeshTopology
+    locator: SurfaceLocator
+    parameters: LayerParameters
+    inputs: tuple[MeshLayer, ...] = ()
+
+
+class MeshLayer(ABC):
+    """One attribute of the surface: cost (V,) float32 and lethal (V,) bool.
+
+    Attributes
+    ----------
+    costs, lethal
+        Read-only views of the current values; a missing value is +inf (lethal) rather than NaN.
+    """
+
+    Parameters: ClassVar[type[LayerParameters]] = LayerParameters
+    inputs_allowed: ClassVar[tuple[int, int]] = (0, 0)
+    """Least and greatest number of inputs."""
+    cacheable: ClassVar[bool] = False
+    """Whether the values depend on mesh and parameters alone and are worth keeping in a file."""
+    contract_check: ClassVar[str] = "mbf_mesh_nav.testing:check_layer"
+
+    parameters: Any
+
+    def __init__(self, context: LayerContext) -> None:
+        self.name = context.name
+        self.topology = context.topology
+        self.locator = context.locator
+        self.parameters = context.parameters
+        self.inputs = context.inputs
+        self._costs: CostArray = np.zeros(context.topology.vertex_count, dtype=np.float32)
+        self._lethal: LethalArray = np.zeros(context.topology.vertex_count, dtype=np.bool_)
+
+    @property
+    def costs(self) -> CostArray:
+        """Costs (V,) float32 in internal numbering, a read-only view."""
+        return _read_only(self._costs)
+
+    @property
+    def lethal(self) -> LethalArray:
+        """Lethal mask (V,) bool in internal numbering, a read-only view."""
+        return _read_only(self._lethal)
+
+    @abstractmethod
+    def compute(self) -> tuple[CostArray, LethalArray]:
+        """Compute all values anew from mesh, parameters and inputs."""
+
+    def recompute(self) -> IntArray:
+        """Compute everything anew and return the vertices whose cost or flag changed, ascending."""
+        costs, lethal = self.compute()
+        return self.replace(costs, lethal)
+
+    def replace(self, costs: CostArray, lethal: LethalArray) -> IntArray:
+        """Take over new values and return the vertices that changed, ascending.
+
+        Raises
+        ------
+        ValueError
+            There is not one value for each vertex.
+        """
+        expected = (self.topology.vertex_count,)
+        for what, values in (("costs", costs), ("lethal flags", lethal)):
+            if np.shape(values) != expected:
+                raise ValueError(f"layer '{self.name}' gives {what} of shape {np.shape(values)}, expected {expected}")
+        changed = np.flatnonzero((costs != self._costs) | (lethal != self._lethal)).astype(np.int32)
+        self._costs, self._lethal = costs, lethal
+        return changed
+
+    def update_from_inputs(self, changed: IntArray) -> IntArray:
+        """React to changed vertices of the inputs; return the own vertices that changed."""
+        return self.recompute() if len(changed) else NOTHING_CHANGED
+
+    def insert_scan(self, scan: RangeScan) -> IntArray:
+        """Take in what a sensor saw, in the map's frame, all of it finite; return the vertices that changed.
+
+        ``scan.source`` names the sensor: one layer may be fed by several.
+        """
+        return NOTHING_CHANGED
+
+    def expire(self, now: float) -> IntArray:
+        """Forget what is too old at ``now`` [s]."""
+        return NOTHING_CHANGED
+
+    def clear(self) -> IntArray:
+        """Forget everything sensed."""
+        return NOTHING_CHANGED
+
+    def is_current(self, now: float) -> bool:
+        """Whether the sensor data is fresh enough at ``now`` [s]."""
+        return True
+
+
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+    view = array.view()
+    view.flags.writeable = False
+    return view

@@ -1,0 +1,178 @@
+"""The layers of a mesh map in the order of their dependencies, and one pass through them per event.
+
+An event (a point cloud, an expiry, a changed parameter) changes some vertices of one or more layers. The graph then
+visits every layer once, inputs first, and hands it the union of what its inputs changed; a layer below a diamond is
+therefore computed once, not once per path.
+
+A layer that raises ends the pass. What had changed by then is not lost: the next pass hands it on, and begins by
+computing every layer anew that raised since the last one that came through. Until then ``problem`` says that the layers
+are not up to date.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from mbf_abstract.event_values import error_text
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerParameters, MeshLayer
+
+
+class LayerGraphError(ValueError):
+    """The layers cannot be ordered: an unknown input, a duplicate name or a cycle. The text names them all."""
+
+
+def dependency_order(inputs: Mapping[str, Sequence[str]]) -> list[str]:
+    """Order layer names so that inputs come first, keeping the configured order where it is free.
+
+    Parameters
+    ----------
+    inputs : mapping
+        For every layer the names of the layers it reads.
+
+    Raises
+    ------
+    LayerGraphError
+        An input is not the name of a layer, or layers wait for each other; every finding is named.
+    """
+    findings = [
+        f"{name} reads unknown layer '{read}'" for name in inputs for read in inputs[name] if read not in inputs
+    ]
+    if findings:
+        findings.append(f"the layers are: {', '.join(inputs)}")
+    known = {name: [read for read in reads if read in inputs] for name, reads in inputs.items()}
+    order: list[str] = []
+    waiting = list(inputs)
+    while waiting:
+        ready = [name for name in waiting if all(read in order for read in known[name])]
+        if not ready:
+            findings.append(f"layers read each other in a circle: {' -> '.join(_cycle(known, waiting[0]))}")
+            break
+        order += ready
+        waiting = [name for name in waiting if name not in ready]
+    if findings:
+        raise LayerGraphError("; ".join(findings))
+    return order
+
+
+def _cycle(inputs: Mapping[str, Sequence[str]], start: str) -> list[str]:
+    """Follow inputs that are part of or lead to a cycle until a name repeats."""
+    ordered: set[str] = set()
+    while grown := {name for name in inputs if name not in ordered and ordered.issuperset(inputs[name])}:
+        ordered |= grown
+    trail = [start]
+    while True:
+        following = next(read for read in inputs[trail[-1]] if read not in ordered)
+        if following in trail:
+            return [*trail[trail.index(following) :], following]
+        trail.append(following)
+
+
+class LayerGraph(Mapping[str, MeshLayer]):
+    """The layers by name, ``graph["inflation"].costs``; see the module's text for how changes travel.
+
+    Parameters
+    ----------
+    layers : sequence of MeshLayer
+        Inputs before the layers that read them, computed or not.
+
+    Attributes
+    ----------
+    problem : str
+        Which layer raised what in the last pass, "" if none did.
+    """
+
+    def __init__(self, layers: Sequence[MeshLayer] = ()) -> None:
+        self._layers = {layer.name: layer for layer in layers}
+        self.problem = ""
+        self._interrupted: set[str] = set()  # names of the layers that raised in passes that did not come through
+        self._owed: dict[str, IntArray] = {}  # what passes changed that did not come through
+
+    def __getitem__(self, name: str) -> MeshLayer:
+        return self._layers[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._layers)
+
+    def __len__(self) -> int:
+        return len(self._layers)
+
+    def apply(self, event: Callable[[MeshLayer], IntArray]) -> dict[str, IntArray]:
+        """Give an event to every layer, then let the changes run down once.
+
+        Parameters
+        ----------
+        event : callable
+            Called once with every layer, inputs first; returns the vertices it changed by itself.
+
+        Returns
+        -------
+        dict
+            Changed vertices, ascending int32, for every layer that changed.
+
+        Raises
+        ------
+        Exception
+            Whatever a layer raises; see the module's text.
+        """
+        changed = dict(self._owed)
+        for name, layer in self._layers.items():
+            from_inputs = union_of([changed[read.name] for read in layer.inputs if read.name in changed])
+            try:
+                own = union_of([changed.get(name, NOTHING_CHANGED), self._follow(layer, from_inputs), event(layer)])
+            except BaseException as error:  # sys.exit() in a layer must not pass for an update
+                self.problem = f"layer '{name}' raised {type(error).__name__}: {error_text(error)}"
+                self._interrupted.add(name)
+                self._owed = changed
+                raise
+            if len(own):
+                changed[name] = own
+        self.problem, self._interrupted, self._owed = "", set(), {}
+        return changed
+
+    def _follow(self, layer: MeshLayer, from_inputs: IntArray) -> IntArray:
+        """Let a layer react to what its inputs changed; one that raised starts over."""
+        if layer.name in self._interrupted:
+            layer.recompute()
+            return np.arange(len(layer.costs), dtype=np.int32)
+        return layer.update_from_inputs(from_inputs) if len(from_inputs) else NOTHING_CHANGED
+
+    def set_parameters(self, name: str, parameters: LayerParameters) -> dict[str, IntArray]:
+        """Change a layer's parameters at run time and recompute what depends on them; returns what changed.
+
+        A combination reads the weights of its inputs, so a new ``combination_weight`` counts as a change of every
+        vertex of the layer.
+
+        Raises
+        ------
+        TypeError
+            The parameters are those of another type of layer.
+        Exception
+            Whatever the layer, or one that reads it, raises that cannot compute with them; it keeps the old ones.
+        """
+        layer = self._layers[name]
+        old = layer.parameters
+        if not isinstance(parameters, type(old)):
+            raise TypeError(f"layer '{name}' takes {type(old).__name__}, got {type(parameters).__name__}")
+        layer.parameters = parameters
+        try:
+            changed = layer.recompute()
+            if old.combination_weight != parameters.combination_weight:
+                changed = np.arange(len(layer.costs), dtype=np.int32)
+            return self.apply(lambda visited: changed if visited is layer else NOTHING_CHANGED)
+        except BaseException:
+            layer.parameters = old
+            # Not always what the new ones had changed: inputs may have changed in the same pass.
+            restored = layer.recompute()
+            if len(restored):
+                self._owed[name] = union_of([self._owed.get(name, NOTHING_CHANGED), restored])
+            raise
+
+
+def union_of(sets: Sequence[IntArray]) -> IntArray:
+    """Vertices that are in any of the sets, ascending."""
+    filled = [changed for changed in sets if len(changed)]
+    if not filled:
+        return NOTHING_CHANGED
+    return filled[0] if len(filled) == 1 else np.unique(np.concatenate(filled))

@@ -1,0 +1,313 @@
+"""From a configuration to a mesh map with its layers.
+
+The configuration is an ordered list of layers and a block of parameters for each::
+
+    mesh_map:
+      mesh_file: garage.ply
+      repair: [zero_area]
+      layers:
+        - {name: border, type: border}
+        - {name: slopes, type: steepness}
+        - {name: sum, type: weighted_sum, inputs: [border, slopes]}
+        - {name: inflation, type: inflation, inputs: [sum]}
+      default_layer: inflation
+      slopes: {threshold: 0.5}
+      inflation: {inscribed_radius: 0.3, inflation_radius: 0.8}
+
+Everything that is wrong with the layers is reported at once, before the mesh is read.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import ValidationError, field_validator
+
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_mesh_nav.files.mesh_io import MAX_FACES, SPLIT_CORNERS, read_mesh
+from mbf_mesh_nav.map.layer import LayerContext, LayerParameters, MeshLayer
+from mbf_mesh_nav.map.layer_cache import LayerCache
+from mbf_mesh_nav.map.layer_graph import LayerGraph, LayerGraphError, dependency_order
+from mbf_mesh_nav.map.map_findings import frame_findings, map_findings
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.densify import densify
+from mbf_mesh_nav.mesh.repair import REPAIRS, Finding, checked_mesh
+from mbf_mesh_nav.mesh.topology import build_topology
+
+LAYER_TYPES: dict[str, str] = {
+    "border": "mbf_mesh_nav.layers.border:BorderLayer",
+    "clearance": "mbf_mesh_nav.layers.clearance:ClearanceLayer",
+    "height_diff": "mbf_mesh_nav.layers.height_diff:HeightDiffLayer",
+    "inflation": "mbf_mesh_nav.layers.inflation:InflationLayer",
+    "keep_out": "mbf_mesh_nav.layers.keep_out:KeepOutLayer",
+    "label": "mbf_mesh_nav.layers.label:LabelLayer",
+    "max_combination": "mbf_mesh_nav.layers.max_combination:MaxCombinationLayer",
+    "mean": "mbf_mesh_nav.layers.mean:MeanLayer",
+    "obstacle": "mbf_mesh_nav.layers.obstacle:ObstacleLayer",
+    "ridge": "mbf_mesh_nav.layers.ridge:RidgeLayer",
+    "roughness": "mbf_mesh_nav.layers.roughness:RoughnessLayer",
+    "steepness": "mbf_mesh_nav.layers.steepness:SteepnessLayer",
+    "tilt": "mbf_mesh_nav.layers.tilt:TiltLayer",
+    "weighted_sum": "mbf_mesh_nav.layers.weighted_sum:WeightedSumLayer",
+}
+"""The layers that come with the package; further ones are found through the ``load_layer`` argument."""
+
+JOIN, KEEP_APART = "duplicate_vertices", "-duplicate_vertices"
+
+LayerLoader = Callable[[str], type[MeshLayer]]
+LayerBlocks = Mapping[str, Mapping[str, Any] | LayerParameters]
+
+
+class LayerEntry(ParameterModel):
+    """One line of the ``layers`` list."""
+
+    name: str = parameter(..., "Name of the layer; its parameters stand in the block of that name.")
+    type: str = parameter(..., "Type of the layer, or module:Class.")
+    inputs: tuple[str, ...] = parameter((), "Names of the layers it reads.")
+
+
+class MeshMapParameters(ParameterModel):
+    """Parameters of the ``mesh_map`` block, beside the blocks of the layers."""
+
+    mesh_file: str = parameter("", "File of the mesh; empty if the mesh is given as arrays.", dynamic=False)
+    mesh_part: str = parameter("", "Part of the file: path through the scene graph, or HDF5 group.", dynamic=False)
+    up_axis: Literal["", "x", "y", "z"] = parameter(
+        "",
+        "Axis of the file that points up; empty = what the file says (COLLADA) or its format (glTF: y, others: z).",
+        dynamic=False,
+    )
+    unit: float = parameter(
+        0.0,
+        "Length of the file's unit; 0 = what the file says (COLLADA), or 1.",
+        unit="m",
+        ge=0.0,
+        le=1e6,
+        dynamic=False,
+    )
+    max_faces: int = parameter(MAX_FACES, "Larger files are refused before they are read.", ge=1, dynamic=False)
+    repair: tuple[str, ...] = parameter(
+        (),
+        "Defects of the mesh that may be repaired (see Mesh files). Files of formats without shared corners (STL, OBJ, "
+        "DAE, glTF) get duplicate_vertices unasked; -duplicate_vertices keeps it off.",
+        dynamic=False,
+    )
+    join_distance: float = parameter(
+        0.0,
+        "How far apart vertices at the rims of parts may be for duplicate_vertices to join them; 0 = a millionth of "
+        "the mesh's extent.",
+        unit="m",
+        ge=0.0,
+        dynamic=False,
+    )
+    densify: float = parameter(0.0, "Split edges longer than this; 0 = off.", unit="m", ge=0.0, dynamic=False)
+    layers: tuple[LayerEntry, ...] = parameter((), "The layers, in any order.", dynamic=False)
+    default_layer: str = parameter("", "The layer planners and controllers see; empty = the last one.", dynamic=False)
+    edge_cost_factor: float = parameter(0.0, "How much a cost of 1 lengthens an edge, in lengths.", ge=0.0, le=100.0)
+    inscribed_radius: float = parameter(
+        0.0,
+        "Radius of the robot's inner circle; the mesh should be finer than half of it. 0 = unknown.",
+        unit="m",
+        ge=0.0,
+    )
+    cache_dir: str = parameter(
+        "", "Folder for computed layers, relative to the configuration; empty = no cache.", dynamic=False
+    )
+
+    @field_validator("repair")
+    @classmethod
+    def _repairs_are_known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        known = {*REPAIRS, KEEP_APART}
+        if unknown := [name for name in names if name not in known]:
+            raise ValueError(f"names of repairs ({', '.join(REPAIRS)}), not {', '.join(unknown)}")
+        if {JOIN, KEEP_APART} <= set(names):
+            raise ValueError(f"either {JOIN} or {KEEP_APART}")
+        return names
+
+    def repairs_for(self, file: str) -> tuple[str, ...]:
+        """Names of ``REPAIRS`` to apply to a mesh from ``file``, "" for arrays: the listed ones and the format's."""
+        listed = tuple(name for name in self.repair if name != KEEP_APART)
+        joins = Path(file).suffix.lower() in SPLIT_CORNERS and KEEP_APART not in self.repair
+        return (*listed, JOIN) if joins and JOIN not in listed else listed
+
+
+def load_builtin_layer(type_name: str) -> type[MeshLayer]:
+    """Class of a type in ``LAYER_TYPES`` or of ``module:Class``.
+
+    Raises
+    ------
+    LayerGraphError
+        No such type, it cannot be imported, or the class is no ``MeshLayer``.
+    """
+    target = LAYER_TYPES.get(type_name, type_name)
+    if ":" not in target:
+        raise LayerGraphError(f"unknown layer type '{type_name}', the types are: {', '.join(LAYER_TYPES)}")
+    module, _, name = target.partition(":")
+    try:
+        layer_class = getattr(importlib.import_module(module), name)
+    except Exception as error:  # whatever the import of a user's module raises
+        raise LayerGraphError(f"layer type '{type_name}' cannot be loaded: {type(error).__name__}: {error}") from error
+    if not (isinstance(layer_class, type) and issubclass(layer_class, MeshLayer)):
+        raise LayerGraphError(f"layer type '{type_name}' is no MeshLayer")
+    return layer_class
+
+
+def default_layers(inscribed_radius: float) -> tuple[MeshMapParameters, dict[str, dict[str, float]]]:
+    """Return parameters and layer blocks for a bare mesh and a robot of ``inscribed_radius`` [m].
+
+    Border, steepness, roughness and height steps are joined and inflated to twice the radius.
+    """
+    guards = ("border", "steepness", "roughness", "height_diff")
+    entries = [LayerEntry(name=guard, type=guard) for guard in guards]
+    entries.append(LayerEntry(name="lethal", type="max_combination", inputs=guards))
+    entries.append(LayerEntry(name="inflation", type="inflation", inputs=("lethal",)))
+    blocks = {
+        "steepness": {"threshold": 0.6},
+        "roughness": {"threshold": 0.8},
+        "height_diff": {"threshold": 0.2, "height_limit": 1.0},
+        "inflation": {
+            "inscribed_radius": inscribed_radius,
+            "inflation_radius": 2.0 * inscribed_radius,
+            "lethal_value": np.inf,
+            "inscribed_value": 1.0,
+            "cost_scaling_factor": 2.0,
+        },
+    }
+    parameters = MeshMapParameters(layers=tuple(entries), edge_cost_factor=1.0, inscribed_radius=inscribed_radius)
+    return parameters, blocks
+
+
+def build_mesh_map(
+    parameters: MeshMapParameters,
+    layer_blocks: LayerBlocks | None = None,
+    *,
+    vertices: ArrayLike | None = None,
+    faces: ArrayLike | None = None,
+    frame_id: str = "map",
+    load_layer: LayerLoader = load_builtin_layer,
+) -> MeshMap:
+    """Read or take a mesh, check it, build the map and compute its layers.
+
+    Parameters
+    ----------
+    parameters : MeshMapParameters
+    layer_blocks : mapping, optional
+        Layer name -> parameters, as read from the configuration or validated.
+    vertices, faces : (V, 3) float, (F, 3) int, optional
+        The mesh, instead of ``parameters.mesh_file``.
+    frame_id : str
+        Frame of the coordinates.
+    load_layer : callable
+        Layer type -> class; a server passes its registry's.
+
+    Raises
+    ------
+    LayerGraphError
+        Unknown or duplicate names, unknown types, wrong parameters, cycles: all findings in one text.
+    MeshError
+        The mesh cannot be read or has defects that may not be repaired.
+    """
+    plan = plan_layers(parameters, layer_blocks or {}, load_layer)
+    file = ""
+    if vertices is None or faces is None:
+        file = parameters.mesh_file
+        part, up_axis, unit = parameters.mesh_part, parameters.up_axis, parameters.unit
+        vertices, faces = read_mesh(file, part, parameters.max_faces, up_axis=up_axis, unit=unit)
+    repair = parameters.repairs_for(file)
+    mesh, report = checked_mesh(vertices, faces, repair, file or "arrays", parameters.join_distance)
+    if parameters.densify > 0.0:
+        mesh = densify(mesh, parameters.densify, file=file or "arrays")
+    topology = build_topology(mesh.vertices, mesh.faces, mesh.vertex_source, mesh.face_source, mesh.input_to_vertex)
+    mesh_map = MeshMap(topology, frame_id, report, parameters.inscribed_radius)
+    if plan:
+        graph = _compute_layers(mesh_map, plan, parameters.cache_dir)
+        default = parameters.default_layer or parameters.layers[-1].name
+        mesh_map.set_layers(graph, default, parameters.edge_cost_factor)
+    report.findings += [*frame_findings(file, parameters.up_axis, parameters.unit), *map_findings(mesh_map)]
+    return mesh_map
+
+
+PlannedLayer = tuple[LayerEntry, type[MeshLayer], LayerParameters]
+
+
+def plan_layers(
+    parameters: MeshMapParameters, layer_blocks: LayerBlocks, load_layer: LayerLoader = load_builtin_layer
+) -> list[PlannedLayer]:
+    """Check the layers of a configuration and order them, inputs first; ``LayerGraphError`` has all findings."""
+    names = [entry.name for entry in parameters.layers]
+    findings = [
+        f"layer name '{name}' is used twice" for name in sorted({name for name in names if names.count(name) > 1})
+    ]
+    findings += [f"there are parameters for '{name}', but no such layer" for name in layer_blocks if name not in names]
+    if parameters.default_layer and parameters.default_layer not in names:
+        findings.append(f"default_layer '{parameters.default_layer}' is no layer")
+    planned: dict[str, PlannedLayer] = {}
+    for entry in parameters.layers:
+        try:
+            layer_class = load_layer(entry.type)
+            planned[entry.name] = (entry, layer_class, _validated(layer_class, layer_blocks.get(entry.name, {})))
+            findings += _wrong_inputs(entry, layer_class)
+            findings += _narrower_than_robot(entry, planned[entry.name][2], parameters.inscribed_radius)
+        except ValidationError as error:
+            findings += [f"layer '{entry.name}': {_place(item['loc'])}{item['msg']}" for item in error.errors()]
+        except LayerGraphError as error:
+            findings.append(f"layer '{entry.name}': {error}")
+    order: Sequence[str] = ()
+    try:
+        order = dependency_order({entry.name: entry.inputs for entry in parameters.layers})
+    except LayerGraphError as error:
+        findings.append(str(error))
+    if findings:
+        raise LayerGraphError("; ".join(findings))
+    return [planned[name] for name in order]
+
+
+def _validated(layer_class: type[MeshLayer], block: Mapping[str, Any] | LayerParameters) -> LayerParameters:
+    if isinstance(block, layer_class.Parameters):
+        return block
+    return layer_class.Parameters.model_validate(dict(block))
+
+
+def _narrower_than_robot(entry: LayerEntry, layer: LayerParameters, robot_radius: float) -> list[str]:
+    radius = getattr(layer, "inflation_radius", robot_radius)
+    if radius >= robot_radius:
+        return []
+    least = f"inflation_radius of at least the robot's radius (mesh_map.inscribed_radius), {robot_radius:g} m"
+    return [f"layer '{entry.name}': {least}: else ground the robot's body touches would be free, got {radius:g} m"]
+
+
+def _wrong_inputs(entry: LayerEntry, layer_class: type[MeshLayer]) -> list[str]:
+    least, most = layer_class.inputs_allowed
+    if least <= len(entry.inputs) <= most:
+        return []
+    wanted = str(least) if least == most else f"at least {least}"
+    return [f"layer '{entry.name}' of type {entry.type} takes {wanted} inputs, got {len(entry.inputs)}"]
+
+
+def _place(location: tuple[int | str, ...]) -> str:
+    return ".".join(str(part) for part in location) + ": " if location else ""
+
+
+def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer], cache_dir: str) -> LayerGraph:
+    cache = LayerCache(cache_dir, mesh_map.topology.digest()) if cache_dir else None
+    complaint = ""
+    layers: dict[str, MeshLayer] = {}
+    for entry, layer_class, settings in plan:
+        inputs = tuple(layers[name] for name in entry.inputs)
+        layer = layer_class(LayerContext(entry.name, mesh_map.topology, mesh_map.locator, settings, inputs))
+        stored = cache.load(layer) if cache and layer.cacheable else None
+        if stored is not None:
+            layer.replace(*stored)
+        else:
+            layer.recompute()
+            if cache and layer.cacheable and not complaint:
+                complaint = cache.store(layer)
+        layers[entry.name] = layer
+    if complaint:
+        text = f"layers cannot be kept in {cache_dir}: {complaint}; they are computed at every start"
+        mesh_map.report.findings.append(Finding("cache", text, np.zeros(0, dtype=np.int64), harmless=True))
+    return LayerGraph(list(layers.values()))

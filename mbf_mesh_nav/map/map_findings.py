@@ -1,0 +1,103 @@
+"""What somebody should know of a map that can be used: turned files, coarse edges, ground all lethal, wider robots."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from mbf_mesh_nav.files.elevation_files import elevation_readers
+from mbf_mesh_nav.files.file_frames import FileFrame, file_frame
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.mesh_report import Finding
+
+LETHAL_SHARE = 0.95
+"""A map with a greater share of lethal vertices is hardly what anybody wanted."""
+AXES = ("x", "y", "z")
+NOWHERE = np.zeros(0, dtype=np.int64)
+
+
+def frame_findings(file: str, up_axis: str, unit: float) -> Iterator[Finding]:
+    """One finding if a mesh file was turned or scaled; the arguments as in ``file_frame``, "" for no file."""
+    if not file or Path(file).suffix.lower() in elevation_readers():
+        return
+    frame = file_frame(Path(file), up_axis, unit)
+    if frame != FileFrame():
+        text = f"the file has {frame}; it is turned and scaled to z up and metres (see up_axis and unit)"
+        yield Finding("file_frame", text, NOWHERE, harmless=True)
+
+
+def map_findings(mesh_map: MeshMap) -> Iterator[Finding]:
+    """Findings about a map whose layers are computed."""
+    yield from _coarse(mesh_map)
+    yield from _lethal(mesh_map)
+    yield from _narrow(mesh_map)
+
+
+def _narrow(mesh_map: MeshMap) -> Iterator[Finding]:
+    """Findings if the layers leave ground free which the robot's body would touch.
+
+    A tilt layer puts the whole robot onto the ground, so beside it an inflation need not keep the robot's radius.
+    """
+    radius, layers = mesh_map.inscribed_radius, mesh_map.layers
+    if not layers or any(hasattr(layer.parameters, "wheelbase") for layer in layers.values()):
+        return
+    inflations = {name: one.parameters for name, one in layers.items() if hasattr(one.parameters, "inflation_radius")}
+    if radius > 0.0 and not inflations:
+        text = (
+            f"no layer is an inflation or a tilt: the robot is planned as a point, its inscribed radius is {radius:g} m"
+        )
+        yield Finding("narrow", text, NOWHERE, harmless=True)
+    for name, parameters in inflations.items():
+        own = float(getattr(parameters, "inscribed_radius", radius))
+        if own < radius:
+            text = (
+                f"inscribed_radius {own:g} m of layer '{name}' is less than the robot's (mesh_map.inscribed_radius), "
+                f"{radius:g} m, and no tilt layer looks at the whole robot: ground its body touches may count as free"
+            )
+            yield Finding("narrow", text, NOWHERE, harmless=True)
+
+
+def _lethal(mesh_map: MeshMap) -> Iterator[Finding]:
+    """One finding if nearly every vertex of the default layer is lethal, with the layers that say so themselves."""
+    used = np.diff(mesh_map.neighbour_offsets) > 0
+    shares = {name: float(layer.lethal[used].mean()) for name, layer in mesh_map.layers.items()}
+    default = mesh_map.default_layer
+    if default is None or shares[default] < LETHAL_SHARE:
+        return
+    guilty = ", ".join(f"{name} {share:.0%}" for name, share in shares.items() if share >= LETHAL_SHARE)
+    text = f"nearly every vertex is lethal, so nothing can be planned (layers: {guilty})"
+    first, second, third = (mesh_map.vertices[mesh_map.faces[:, corner]] for corner in range(3))
+    seen_along = np.abs(np.cross(second - first, third - first)).sum(axis=0)  # doubled areas in the three plan views
+    if seen_along.argmax() != 2:
+        axis = AXES[int(seen_along.argmax())]
+        text += f"; most faces look along {axis}: if that is up in the file, set up_axis: {axis}"
+    indices = np.flatnonzero(mesh_map.layers[default].lethal & used)
+    yield Finding("lethal", text, indices, harmless=True)
+
+
+def _coarse(mesh_map: MeshMap) -> Iterator[Finding]:
+    """Findings if the mesh's edges are too long for the robot's wheels or radius, or for the reach of a layer.
+
+    A layer that stands the robot's wheels on the faces sees ledges between vertices up to a wheelbase apart; farther
+    apart the robot tilts more than the layer knows. Where none does, vertices are all that is known of the ground, and
+    there have to be several under a robot.
+    """
+    mean_edge = mesh_map.topology.mean_edge_length
+    blocks = {name: layer.parameters for name, layer in mesh_map.layers.items()}
+    limits = {f"the wheelbase of layer '{name}'": getattr(block, "wheelbase", 0.0) for name, block in blocks.items()}
+    if not any(limits.values()):
+        limits["half the inscribed radius"] = 0.5 * mesh_map.inscribed_radius
+        if mesh_map.inscribed_radius == 0.0:  # then that of an inflation is all that is known of the robot
+            for name, block in blocks.items():
+                limits[f"half the inscribed radius of layer '{name}'"] = 0.5 * getattr(block, "inscribed_radius", 0.0)
+    limits |= {f"the radius of layer '{name}'": getattr(block, "radius", 0.0) for name, block in blocks.items()}
+    for what, limit in limits.items():
+        if 0.0 < limit < mean_edge:
+            text = (
+                f"edges are {mean_edge:.3g} m long on average, more than {what} ({limit:.3g} m); "
+                "layers may miss obstacles and ledges; densify helps those that look around, a finer survey all"
+            )
+            everywhere = np.flatnonzero(np.diff(mesh_map.neighbour_offsets) > 0)
+            yield Finding("coarse", text, everywhere, harmless=True)

@@ -1,0 +1,311 @@
+"""The map of the mesh server: a surface, the layers on it, and frozen snapshots for planners and controllers.
+
+Everything a plugin needs is an attribute here, as flat read-only arrays (``topology.MeshTopology`` says what is in
+them), in internal numbering. The surface never changes; costs do. A plugin takes one ``snapshot()`` at the start of a
+call and works on that.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_mesh_nav.map.layer import IntArray, LayerParameters, MeshLayer
+from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
+from mbf_mesh_nav.map.snapshot import MeshSnapshot, SnapshotSeries
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
+from mbf_mesh_nav.mesh.repair import MeshReport, checked_mesh
+from mbf_mesh_nav.mesh.topology import MeshTopology, build_topology
+
+if TYPE_CHECKING:
+    import networkx
+
+REMEMBERED_CHANGES = 100
+"""Number of changes of the default layer a planner may have missed and still repair its last result."""
+
+
+class MeshMap:
+    """A triangle mesh with layers. Construct it with ``from_arrays``, ``from_heights`` or ``map_builder``.
+
+    Attributes
+    ----------
+    topology : MeshTopology
+        All arrays in one value; each of them is an attribute of the map, too.
+    locator : SurfaceLocator
+        Nearest-point and ray queries.
+    layers : LayerGraph
+        The layers by name: ``mesh_map.layers["inflation"].costs``.
+    report : MeshReport
+        What was found in, and done to, the mesh when it was loaded.
+    frame_id : str
+        Frame of all coordinates.
+    inscribed_radius : float
+        Radius [m] of the disc that stands for the robot when the server is asked where it fits.
+    """
+
+    def __init__(
+        self,
+        topology: MeshTopology,
+        frame_id: str = "map",
+        report: MeshReport | None = None,
+        inscribed_radius: float = 0.0,
+    ) -> None:
+        self.topology = topology
+        self.frame_id = frame_id
+        self.inscribed_radius = inscribed_radius
+        self.report = report if report is not None else MeshReport()
+        self.locator = SurfaceLocator(topology)
+        self.vertices = topology.vertices
+        self.faces = topology.faces
+        self.vertex_normals = topology.vertex_normals
+        self.face_normals = topology.face_normals
+        self.edges = topology.edges
+        self.neighbour_offsets = topology.neighbour_offsets
+        self.neighbours = topology.neighbours
+        self.neighbour_lengths = topology.neighbour_lengths
+        self.vertex_face_offsets = topology.vertex_face_offsets
+        self.vertex_faces = topology.vertex_faces
+        self.face_neighbours = topology.face_neighbours
+        self.components = topology.components
+        self.input_to_internal = topology.input_to_internal
+        self.internal_to_input = topology.internal_to_input
+        self._snapshots = SnapshotSeries(topology)
+        self._changes: dict[int, IntArray] = {}  # version -> vertices that differ from the version before
+        self._overridden: dict[str, tuple[LayerParameters, float]] = {}  # usual parameters, end of the override
+        self._lock = threading.RLock()
+        self.set_layers(LayerGraph(), None)
+
+    @classmethod
+    def from_arrays(
+        cls, vertices: ArrayLike, faces: ArrayLike, frame_id: str = "map", repair: Sequence[str] = ()
+    ) -> MeshMap:
+        """Check a mesh and build its map, without layers (all costs 0).
+
+        Parameters
+        ----------
+        vertices : (V, 3) float
+            Positions [m].
+        faces : (F, 3) int
+            Corners, counter-clockwise seen from above.
+        repair : sequence of str
+            Names of the repairs that may be applied, see ``repair.REPAIRS``.
+
+        Raises
+        ------
+        MeshError
+            The mesh has defects no listed repair removes; lists all of them.
+        """
+        mesh, report = checked_mesh(vertices, faces, repair)
+        topology = build_topology(mesh.vertices, mesh.faces, mesh.vertex_source, mesh.face_source, mesh.input_to_vertex)
+        return cls(topology, frame_id, report)
+
+    @classmethod
+    def from_heights(
+        cls,
+        heights: ArrayLike,
+        dx: float,
+        dy: float,
+        x0: float = 0.0,
+        y0: float = 0.0,
+        frame_id: str = "map",
+        repair: Sequence[str] = (),
+    ) -> MeshMap:
+        """Build the map of a heightfield; the surface equals that of Bullet's heightfield shape.
+
+        Parameters
+        ----------
+        heights : (ny, nx) float
+            z [m] at ``(x0 + ix * dx, y0 + iy * dy)``; NaN leaves a hole. Sample [iy, ix] is the caller's vertex
+            ``iy * nx + ix``, with -1 in ``input_to_internal`` for holes.
+        dx, dy : float
+            Spacing [m].
+        x0, y0 : float
+            Position of ``heights[0, 0]`` [m].
+        repair : sequence of str
+            As in ``from_arrays``; ``point_contacts`` parts regions that touch in a sample only.
+
+        Raises
+        ------
+        ValueError
+            Fewer than 2 x 2 samples, or a spacing that is not positive.
+        MeshError
+            No three samples that make a face, see ``from_arrays``.
+        """
+        return cls.from_arrays(*heightfield_mesh(heights, dx, dy, x0, y0, keep_grid=True), frame_id, repair)
+
+    # ------------------------------------------------------------------------------------------------- queries
+    def locate(self, points: ArrayLike, max_distance: float = np.inf) -> Location:
+        """Nearest surface points of many points, see ``SurfaceLocator.locate``."""
+        return self.locator.locate(points, max_distance)
+
+    def locate_one(self, point: ArrayLike, max_distance: float = np.inf, hint_face: int = -1) -> SurfacePoint | None:
+        """Nearest surface point of one point or None, see ``SurfaceLocator.locate_one``."""
+        return self.locator.locate_one(point, max_distance, hint_face)
+
+    def snapshot(self) -> MeshSnapshot:
+        """Return the current state; cheap, call it once per plan or control cycle."""
+        return self._snapshot
+
+    def changes_between(self, old_version: int, new_version: int) -> IntArray | None:
+        """Vertices whose cost or flag may differ between two snapshots; None if that is not remembered.
+
+        Nor is it if the first is the newer one. The last ``REMEMBERED_CHANGES`` changes of the layers are; new layers
+        or a new edge cost factor begin anew.
+        """
+        if old_version > new_version:
+            return None
+        with self._lock:
+            steps = [self._changes.get(version) for version in range(old_version + 1, new_version + 1)]
+        known = [changed for changed in steps if changed is not None]
+        return union_of(known) if len(known) == len(steps) else None
+
+    def to_input_order(self, values: NDArray[Any], missing: float = np.nan) -> NDArray[Any]:
+        """Bring per-vertex values (V, ...) into the caller's numbering; dropped vertices get ``missing``."""
+        result = np.full((len(self.input_to_internal), *values.shape[1:]), missing, dtype=np.float64)
+        kept = self.input_to_internal >= 0
+        result[kept] = values[self.input_to_internal[kept]]
+        return result
+
+    def vertex_graph(self) -> networkx.Graph[int]:
+        """Build the vertex graph for algorithms of your own, see ``vertex_graph.build_vertex_graph``."""
+        from mbf_mesh_nav.mesh.vertex_graph import build_vertex_graph  # networkx takes 0.3 s to import
+
+        return build_vertex_graph(self.topology, self._snapshot.costs, self._snapshot.edge_weights)
+
+    # -------------------------------------------------------------------------------------------------- layers
+    def set_layers(self, layers: LayerGraph, default_layer: str | None, edge_cost_factor: float = 0.0) -> None:
+        """Put computed layers on the map.
+
+        Parameters
+        ----------
+        default_layer : str or None
+            The layer whose costs and flags planners see; None = free everywhere.
+        edge_cost_factor : float
+            How much a cost of 1 lengthens an edge, in lengths.
+
+        Raises
+        ------
+        KeyError
+            There is no such layer.
+        """
+        count = self.topology.vertex_count
+        with self._lock:
+            shown = None if default_layer is None else layers[default_layer]
+            self.layers = layers
+            self.default_layer = default_layer
+            self.edge_cost_factor = edge_cost_factor
+            costs = np.zeros(count, np.float32) if shown is None else shown.costs
+            lethal = np.zeros(count, np.bool_) if shown is None else shown.lethal
+            costs.flags.writeable = lethal.flags.writeable = False  # as those of a layer: kernels know one type
+            self._changes.clear()
+            self._snapshot = self._snapshots.begin(costs, lethal, edge_cost_factor)
+
+    def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
+        """Change how much costs lengthen edges, at run time.
+
+        Raises
+        ------
+        ValueError
+            It is negative or not finite.
+        """
+        if not (np.isfinite(edge_cost_factor) and edge_cost_factor >= 0.0):
+            raise ValueError(f"edge_cost_factor must be a finite number of at least 0, got {edge_cost_factor}")
+        self.set_layers(self.layers, self.default_layer, edge_cost_factor)
+
+    def set_layer_parameters(self, name: str, parameters: LayerParameters, until: float = np.inf) -> None:
+        """Change the parameters of one layer at run time; everything that depends on them follows.
+
+        With a time ``until`` [s] the change is an override: ``update`` restores the usual parameters once it is over.
+        Raises as ``LayerGraph.set_parameters``; nothing has changed then.
+        """
+        with self._lock:
+            usual = self.usual_parameters(name)
+            self._publish(self.layers.set_parameters(name, parameters))
+            self._overridden.pop(name, None)
+            if until < np.inf:
+                self._overridden[name] = usual, until
+
+    def usual_parameters(self, name: str) -> LayerParameters:
+        """Parameters of a layer apart from a timed override."""
+        with self._lock:
+            usual: LayerParameters = self.layers[name].parameters
+            return self._overridden[name][0] if name in self._overridden else usual
+
+    def insert_points(self, points: ArrayLike, sensor_origin: ArrayLike, stamp: float, source: str = "") -> None:
+        """Feed a point cloud to the obstacle layers, as a scan in which every ray hit something.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            Hits [m] in the map's frame.
+        sensor_origin : (3,) float
+            Where the sensor was [m], for range limits and clearing.
+        stamp : float
+            Time of the measurement [s].
+        source : str
+            Name of the sensor.
+
+        Raises
+        ------
+        ValueError
+            As ``insert_scan``.
+        """
+        cloud = np.array(points, dtype=np.float64).reshape(-1, 3)
+        origin = np.array(sensor_origin, dtype=np.float64).reshape(3)
+        self.insert_scan(RangeScan(source, self.frame_id, origin, cloud, np.ones(len(cloud), dtype=np.bool_), stamp))
+
+    def insert_scan(self, scan: RangeScan) -> None:
+        """Feed a scan in the map's frame to the obstacle layers.
+
+        Rays with an end that is not finite are left out; a scan that has no others says nothing and is passed over.
+
+        Raises
+        ------
+        ValueError
+            The scan is in another frame, or its origin or stamp is not finite.
+        """
+        if scan.frame_id != self.frame_id:
+            raise ValueError(f"the scan is in the frame '{scan.frame_id}', the map in '{self.frame_id}'")
+        if not (np.isfinite(scan.origin).all() and np.isfinite(scan.stamp)):
+            raise ValueError(f"origin and stamp of a scan must be finite, got {scan.origin.tolist()} and {scan.stamp}")
+        known = np.asarray(np.isfinite(scan.ends).all(axis=1))
+        if len(known) and not known.any():
+            return
+        seen = scan if known.all() else replace(scan, ends=scan.ends[known], hits=scan.hits[known])
+        self.apply(lambda layer: layer.insert_scan(seen))
+
+    def update(self, now: float) -> None:
+        """Forget obstacles that are too old at ``now`` [s], end overrides of parameters that are over."""
+        with self._lock:
+            for name in [name for name, (_, until) in self._overridden.items() if until <= now]:
+                self.set_layer_parameters(name, self.usual_parameters(name))
+        self.apply(lambda layer: layer.expire(now))
+
+    def clear(self) -> None:
+        """Forget all sensed obstacles."""
+        self.apply(lambda layer: layer.clear())
+
+    def is_current(self, now: float) -> bool:
+        """Whether all layers are up to date and those of obstacles got data in time, at ``now`` [s]."""
+        return not self.layers.problem and all(layer.is_current(now) for layer in self.layers.values())
+
+    def apply(self, event: Callable[[MeshLayer], IntArray]) -> None:
+        """Give an event to every layer, see ``LayerGraph.apply``, and show plugins the map that follows."""
+        with self._lock:
+            self._publish(self.layers.apply(event))
+
+    def _publish(self, changed: dict[str, IntArray]) -> None:
+        """Make the snapshot that follows a change of the default layer; only edges at changed vertices are touched."""
+        if self.default_layer not in changed:
+            return
+        layer, vertices = self.layers[self.default_layer], changed[self.default_layer]
+        self._snapshot = self._snapshots.follow(layer.costs, layer.lethal, vertices)
+        self._changes[self._snapshot.version] = vertices
+        self._changes.pop(self._snapshot.version - REMEMBERED_CHANGES, None)

@@ -1,0 +1,120 @@
+"""The state of a mesh map at one version, and how the next one is made at the price of what changed.
+
+A snapshot never changes, so the next one needs arrays of its own. On a large map copying them costs more than a local
+change does; so the arrays of the snapshot before the last one are brought up to date instead, if nobody holds them any
+more.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbf_mesh_nav.kernels.layers.edge_weights import show_changes
+from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS
+from mbf_mesh_nav.map.layer import CostArray, IntArray, LethalArray
+from mbf_mesh_nav.mesh.topology import MeshTopology
+
+
+@dataclass(frozen=True, eq=False)
+class MeshSnapshot:
+    """The state of the map at one version, never changed afterwards.
+
+    Attributes
+    ----------
+    version : int
+        Grows by one with every change of a cost, a flag or a weight.
+    costs : (V,) float32
+        Costs of the default layer; may be +inf.
+    lethal : (V,) bool
+        Vertices no plan may touch.
+    edge_weights : (2E,) float32
+        Aligned with ``MeshMap.neighbours``: length plus collected cost, +inf at lethal vertices.
+    edge_cost_factor : float
+        How much a cost of 1 lengthens an edge, in lengths.
+    """
+
+    version: int
+    costs: CostArray
+    lethal: LethalArray
+    edge_weights: CostArray
+    edge_cost_factor: float
+
+    def __post_init__(self) -> None:
+        for array in (self.costs, self.lethal, self.edge_weights):
+            array.flags.writeable = False
+
+    def blocked(self, cost_limit: float) -> LethalArray:
+        """Vertices (V,) a plan with this limit does not touch: lethal, or of a cost that reaches it or is NaN."""
+        blocked = self.costs < cost_limit
+        np.logical_not(blocked, out=blocked)
+        return np.logical_or(blocked, self.lethal, out=blocked)
+
+    def hardness(self, cost_limit: float, vertices: IntArray | None = None) -> CostArray:
+        """How forbidden vertices are, all or the given (k,): 0 where free, 1 to 2 by cost, LETHAL_HARDNESS if lethal.
+
+        What is free is as in ``blocked``; infinite cost is lethal. See ``kernels.forbidden_ground`` for its use.
+        """
+        costs, lethal = (self.costs, self.lethal) if vertices is None else (self.costs[vertices], self.lethal[vertices])
+        beyond = np.nan_to_num(costs - np.float32(min(cost_limit, 1e6)), nan=0.0, posinf=1.0)
+        by_cost = np.where(costs < cost_limit, 0.0, 1.0 + np.clip(beyond, 0.0, 1.0))
+        return np.where(lethal | np.isposinf(costs), LETHAL_HARDNESS, by_cost).astype(np.float32)
+
+
+@dataclass(eq=False)
+class _Arrays:
+    """What a snapshot shows read-only views of."""
+
+    costs: CostArray
+    lethal: LethalArray
+    edge_weights: CostArray
+
+    def copy(self) -> _Arrays:
+        return _Arrays(self.costs.copy(), self.lethal.copy(), self.edge_weights.copy())
+
+    def references(self) -> int:
+        """How often the most wanted of the arrays is referred to; every view of an array refers to it."""
+        return max(sys.getrefcount(array) for array in (self.costs, self.lethal, self.edge_weights))
+
+
+UNHELD = _Arrays(np.zeros(1, np.float32), np.zeros(1, np.bool_), np.zeros(1, np.float32)).references()
+"""References to arrays no snapshot and no view shows; what the interpreter itself holds while it counts."""
+
+
+class SnapshotSeries:
+    """Makes one snapshot of a mesh after the other; the caller takes care that only one thread does."""
+
+    def __init__(self, topology: MeshTopology) -> None:
+        self._topology = topology
+        self._version = -1
+        self._current: _Arrays
+        self._spare: _Arrays | None = None
+        self._missed: IntArray  # vertices that changed since the spare arrays were current
+
+    def begin(self, costs: CostArray, lethal: LethalArray, edge_cost_factor: float) -> MeshSnapshot:
+        """Make a snapshot that has nothing to do with the one before; costs (V,), lethal (V,), see ``MeshSnapshot``."""
+        self._edge_cost_factor = edge_cost_factor
+        weights = np.zeros(len(self._topology.neighbours), np.float32)
+        self._current, self._spare = _Arrays(costs.copy(), lethal.copy(), weights), None
+        return self._published(costs, lethal, np.arange(len(costs), dtype=np.int32))
+
+    def follow(self, costs: CostArray, lethal: LethalArray, changed: IntArray) -> MeshSnapshot:
+        """Make the snapshot that differs from the last one at the ``changed`` vertices (k,) only."""
+        last, arrays = self._current, self._spare
+        if arrays is None or arrays.references() > UNHELD:
+            arrays, outdated = last.copy(), changed
+        else:
+            outdated = np.concatenate([self._missed, changed])
+        self._current, self._spare, self._missed = arrays, last, changed
+        return self._published(costs, lethal, outdated)
+
+    def _published(self, costs: CostArray, lethal: LethalArray, outdated: IntArray) -> MeshSnapshot:
+        """Bring the current arrays up to date at the ``outdated`` vertices and show them."""
+        mesh, now = self._topology, self._current
+        graph = (mesh.neighbour_offsets, mesh.neighbours, mesh.neighbour_lengths)
+        factor = float(self._edge_cost_factor)
+        show_changes(*graph, costs, lethal, factor, outdated, now.costs, now.lethal, now.edge_weights)
+        self._version += 1
+        return MeshSnapshot(self._version, now.costs.view(), now.lethal.view(), now.edge_weights.view(), factor)

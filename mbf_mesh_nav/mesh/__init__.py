@@ -1,0 +1,1 @@
+"""A triangle mesh as a surface: checks, repairs, topology, and exact location queries."""

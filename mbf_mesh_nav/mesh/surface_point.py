@@ -1,0 +1,126 @@
+"""Small questions about points on the surface: their corners, how far those are, whether the spot is blocked."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.snapshot import MeshSnapshot
+from mbf_mesh_nav.mesh.locate import Location, SurfacePoint
+
+BORDER_SLACK = 0.05
+"""A position may be so far [m] past a border of the surface and count as on it: rounding, and the width of a wheel."""
+ON_EDGE = 1e-9
+INFINITELY_FAR = np.float32(np.inf)
+
+
+def nearest_corner(mesh_map: MeshMap, point: SurfacePoint) -> int:
+    """Return the corner of the point's face with the largest barycentric coordinate."""
+    return int(mesh_map.faces[point.face, np.argmax(point.barycentric)])
+
+
+def passes_blocked_corner(start: SurfacePoint, end: SurfacePoint, blocked: NDArray[np.bool_]) -> bool:
+    """Whether the line between two points of one face comes nearer to a blocked corner (3,) than to the free ones.
+
+    Neither point does itself. How much nearer is the lesser of two linear functions, so greatest where they are equal.
+    """
+    begin, change = start.barycentric, end.barycentric - start.barycentric
+    for corner in np.flatnonzero(blocked).tolist():
+        left, right = (corner + 1) % 3, (corner + 2) % 3
+        rate = change[left] - change[right]
+        share = min(max(float((begin[right] - begin[left]) / rate), 0.0), 1.0) if rate != 0.0 else 0.5
+        there = begin + share * change
+        if there[corner] > max(there[left], there[right]):
+            return True
+    return False
+
+
+def surface_point_at_vertex(mesh_map: MeshMap, vertex: int) -> SurfacePoint:
+    """Return the surface point at a vertex, in one of its faces."""
+    face = int(mesh_map.vertex_faces[mesh_map.vertex_face_offsets[vertex]])
+    barycentric = (mesh_map.faces[face] == vertex).astype(np.float64)
+    return SurfacePoint(face, barycentric, mesh_map.vertices[vertex].copy(), 0.0)
+
+
+def beyond_border(
+    mesh_map: MeshMap, places: NDArray[np.float64], location: Location, slack: float = BORDER_SLACK
+) -> NDArray[np.bool_]:
+    """Whether positions (n, 3) lie past a border of the surface, by more than ``slack`` [m] sideways.
+
+    The surface point nearest to such a position lies on a border edge, and not below or above it. ``location`` is that
+    of the places; those without a face are not beyond a border.
+    """
+    on_surface = np.maximum(location.faces, 0)
+    offsets = np.where(location.faces[:, None] >= 0, places - location.points, 0.0)
+    normals = mesh_map.face_normals[on_surface]
+    sideways = offsets - (offsets * normals).sum(axis=1, keepdims=True) * normals
+    # Side i of a face runs from corner i to the next, so it is opposite to the corner after that. In a vertex the face
+    # may be any of those around it.
+    near = np.nan_to_num(location.barycentric, nan=1.0) > ON_EDGE
+    on_border = (~np.roll(near, -2, axis=1) & (mesh_map.face_neighbours[on_surface] < 0)).any(axis=1)
+    in_vertex = near.sum(axis=1) == 1
+    on_border |= in_vertex & (near & mesh_map.topology.border_vertices[mesh_map.faces[on_surface]]).any(axis=1)
+    return np.asarray(on_border & (norm(sideways) > slack))
+
+
+def on_surface(
+    mesh_map: MeshMap, position: NDArray[np.float64] | tuple[float, ...], reach: float
+) -> SurfacePoint | None:
+    """Return the surface point of a position at most ``reach`` [m] above or below it, None also past a border."""
+    point = mesh_map.locate_one(position, reach)
+    if point is None or point.distance <= BORDER_SLACK or min(point.barycentric.tolist()) > ON_EDGE:
+        return point  # too near, or inside a face: not past a border
+    place = np.asarray(position, dtype=np.float64)[None]
+    location = Location(
+        np.array([point.face], dtype=np.int32), point.barycentric[None], point.point[None], np.array([point.distance])
+    )
+    return None if beyond_border(mesh_map, place, location)[0] else point
+
+
+def corner_distances(
+    mesh_map: MeshMap, blocked: NDArray[np.bool_], point: SurfacePoint, snapshot: MeshSnapshot | None = None
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Free corners of the point's face (k,) int32 and how far the point is from them (k,) float32 [m].
+
+    With a ``snapshot`` the straight lines are weighted like its edges, by the mean of the costs at both ends; corners
+    of infinite cost do not count for the point's own. At a vertex that makes a line the edge.
+    """
+    face = mesh_map.faces[point.face].tolist()
+    corners = [corner for corner in face if not blocked[corner]]
+    place = point.point.tolist()
+    lengths = [math.dist(mesh_map.vertices[corner].tolist(), place) for corner in corners]
+    if snapshot is not None and snapshot.edge_cost_factor > 0.0:
+        costs, factor = snapshot.costs, snapshot.edge_cost_factor
+        at_point = _cost_at(point, [float(costs[corner]) for corner in face])
+        lengths = [
+            length * (1.0 + factor * 0.5 * (at_point + float(costs[corner])))
+            for length, corner in zip(lengths, corners, strict=True)
+        ]
+    # A hair longer than the line, so that rounding cannot make it shorter than a straight-line bound.
+    return np.array(corners, dtype=np.int32), np.nextafter(np.array(lengths, dtype=np.float32), INFINITELY_FAR)
+
+
+def _cost_at(point: SurfacePoint, corner_costs: list[float]) -> float:
+    """Interpolate the cost at a point between the corners of its face that have a finite one."""
+    mixed = known = 0.0
+    for share, cost in zip(point.barycentric.tolist(), corner_costs, strict=True):
+        if math.isfinite(cost):
+            mixed += share * cost
+            known += share
+    return mixed / max(known, ON_EDGE)
+
+
+def describe_blockage(mesh_map: MeshMap, snapshot: MeshSnapshot, vertex: int, cost_limit: float) -> str:
+    """Say why a vertex is blocked: its cost, the limit, and the layers that call it lethal."""
+    names = [name for name, layer in mesh_map.layers.items() if layer.lethal[vertex]]
+    layers = f" (lethal in layer {', '.join(names)})" if names else ""
+    return f"cost {snapshot.costs[vertex]:.3g}, limit {cost_limit:g}{layers}"
+
+
+def position_text(position: NDArray[np.float64] | tuple[float, float, float]) -> str:
+    """Write a position for a message, in metres."""
+    return f"({position[0]:.2f}, {position[1]:.2f}, {position[2]:.2f})"

@@ -1,0 +1,162 @@
+"""The geometry of a mesh map as flat arrays: who touches whom, how long the edges are, where up is.
+
+Vertices and faces are renumbered along a Morton curve first: neighbours on the surface then lie close in memory,
+which makes every wave over the mesh three to four times faster on files with a random order. Callers see their own
+numbering through ``input_to_internal`` and ``internal_to_input``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from mbf_mesh_nav.kernels.mesh import topology as kernels
+
+IntArray = NDArray[np.int32]
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MeshTopology:
+    """Read-only arrays of one triangle mesh, V vertices, F faces, E edges, in internal numbering.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float64
+        Positions [m].
+    faces : (F, 3) int32
+        Corners, counter-clockwise seen from above or outside.
+    vertex_normals, face_normals : (V, 3), (F, 3) float64
+        Unit normals; a vertex has the unweighted mean of its faces'.
+    edges : (E, 2) int32
+        Undirected edges, smaller vertex first.
+    neighbour_offsets, neighbours, neighbour_lengths
+        CSR graph: entries ``neighbour_offsets[v]`` to ``neighbour_offsets[v+1]`` hold the vertices next to ``v``
+        (int32, ascending) and the edge lengths [m] (float32).
+    vertex_face_offsets, vertex_faces : (V+1,), (3F,) int32
+        CSR of the faces around every vertex.
+    face_neighbours : (F, 3) int32
+        ``[f, k]`` is the face across the edge from corner k to corner (k+1) % 3, -1 at a border.
+    components : (V,) int32
+        Number of the connected component.
+    input_to_internal : (V_input,) int32
+        Internal vertex of every vertex the caller gave, -1 if a repair dropped it.
+    internal_to_input, internal_to_input_faces : (V,), (F,) int32
+        The caller's number of every vertex and face, -1 if densifying or a repair made it.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    vertex_normals: FloatArray
+    face_normals: FloatArray
+    edges: IntArray
+    neighbour_offsets: IntArray
+    neighbours: IntArray
+    neighbour_lengths: NDArray[np.float32]
+    vertex_face_offsets: IntArray
+    vertex_faces: IntArray
+    face_neighbours: IntArray
+    components: IntArray
+    input_to_internal: IntArray
+    internal_to_input: IntArray
+    internal_to_input_faces: IntArray
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            getattr(self, field.name).flags.writeable = False
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices."""
+        return len(self.vertices)
+
+    @cached_property
+    def mean_edge_length(self) -> float:
+        """Mean length of the edges [m], the natural unit of steps over the mesh; 1 without edges."""
+        return float(np.mean(self.neighbour_lengths)) if len(self.neighbour_lengths) else 1.0
+
+    @cached_property
+    def border_vertices(self) -> NDArray[np.bool_]:
+        """Vertices (V,) at the rim of the mesh and of its holes."""
+        face, corner = np.nonzero(self.face_neighbours < 0)
+        border = np.zeros(len(self.vertices), dtype=np.bool_)
+        border[self.faces[face, corner]] = border[self.faces[face, (corner + 1) % 3]] = True
+        return border
+
+    def digest(self) -> str:
+        """Hexadecimal SHA-256 of vertices and faces: the identity of the mesh in caches."""
+        digest = hashlib.sha256(self.vertices.tobytes())
+        digest.update(self.faces.tobytes())
+        return digest.hexdigest()
+
+
+def build_topology(
+    vertices: FloatArray,
+    faces: IntArray,
+    vertex_source: IntArray | None = None,
+    face_source: IntArray | None = None,
+    input_to_given: IntArray | None = None,
+) -> MeshTopology:
+    """Sort a valid mesh along a Morton curve and build all neighbour arrays.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64
+    faces : (F, 3) int32
+        Checked by ``repair.check_mesh``: in range, no degenerate face, at most two faces an edge.
+    vertex_source, face_source : (V,), (F,) int32, optional
+        The caller's number of every given vertex and face, if repairs or densifying came between.
+    input_to_given : (V_input,) int32, optional
+        The other direction for vertices, -1 = dropped.
+    """
+    vertex_order, face_order = _locality_order(vertices, faces)
+    position = np.zeros(len(vertices), dtype=np.int32)
+    position[vertex_order] = np.arange(len(vertices), dtype=np.int32)
+    sorted_vertices = np.ascontiguousarray(vertices[vertex_order], dtype=np.float64)
+    sorted_faces = np.ascontiguousarray(position[faces[face_order]])
+
+    face_offsets, incident = kernels.faces_of_vertices(sorted_faces, len(sorted_vertices))
+    offsets, neighbours = kernels.neighbours_of_vertices(sorted_faces, face_offsets, incident)
+    edges, lengths = kernels.edges_of_neighbours(sorted_vertices, offsets, neighbours)
+    graph = csr_array(
+        (np.ones(len(neighbours), dtype=np.int8), neighbours, offsets), shape=(len(vertices), len(vertices))
+    )
+    face_normals = kernels.unit_face_normals(sorted_vertices, sorted_faces)
+    identity = np.arange(len(vertices), dtype=np.int32) if input_to_given is None else input_to_given
+    return MeshTopology(
+        vertices=sorted_vertices,
+        faces=sorted_faces,
+        vertex_normals=kernels.unit_vertex_normals(face_normals, face_offsets, incident),
+        face_normals=face_normals,
+        edges=edges,
+        neighbour_offsets=offsets,
+        neighbours=neighbours,
+        neighbour_lengths=lengths,
+        vertex_face_offsets=face_offsets,
+        vertex_faces=incident,
+        face_neighbours=kernels.faces_across_edges(sorted_faces, face_offsets, incident),
+        components=connected_components(graph, directed=False)[1],
+        input_to_internal=np.where(identity >= 0, position[identity], -1).astype(np.int32),
+        internal_to_input=_renumbered(vertex_source, vertex_order),
+        internal_to_input_faces=_renumbered(face_source, face_order),
+    )
+
+
+def _renumbered(source: IntArray | None, order: NDArray[np.int64]) -> IntArray:
+    return (order if source is None else source[order]).astype(np.int32)
+
+
+def _locality_order(vertices: FloatArray, faces: IntArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Orders of vertices and of faces (by centroid) along the Morton curve of the bounding cube."""
+    lower = vertices.min(axis=0)
+    cell = max(float((vertices.max(axis=0) - lower).max()), 1e-12) / (2**21 - 1)
+    centroids = (vertices[faces[:, 0]] + vertices[faces[:, 1]] + vertices[faces[:, 2]]) / 3.0
+    vertex_order = np.argsort(kernels.morton_codes(vertices, lower, cell), kind="stable")
+    face_order = np.argsort(kernels.morton_codes(centroids, lower, cell), kind="stable")
+    return vertex_order, face_order

@@ -1,0 +1,66 @@
+"""Finding vertices that stand for one point: at the same position, or nearly so at the rims of parts that meet.
+
+Parts of a scene are moved into place by matrices, and files hold four bytes a coordinate: two tiles laid edge to edge
+then miss each other by a rounding error. Only vertices at a rim are compared with a tolerance, so however fine the
+inside of a surface is, it stays as it is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from mbf_abstract.geometry.arithmetic import norm
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+ROUNDING_SHARE = 1e-6
+"""Default distance for joining, in diagonals of the mesh: some twenty times what four-byte numbers lose."""
+
+
+def same_position(vertices: FloatArray) -> IntArray:
+    """First vertex at the same position, for every vertex (V,)."""
+    order = np.lexsort(vertices.T)
+    in_order = vertices[order]
+    is_first = np.ones(len(order), dtype=np.bool_)
+    is_first[1:] = (in_order[1:] != in_order[:-1]).any(axis=1)
+    # The sort is stable, so the first of a run has the smallest number.
+    target = np.zeros(len(order), dtype=np.int32)
+    target[order] = order[is_first][np.cumsum(is_first) - 1]
+    return target
+
+
+def close_rims(vertices: FloatArray, face_neighbours: IntArray, faces: IntArray, distance: float) -> IntArray:
+    """Vertex that stands for each vertex (V,) when the ones at rims within ``distance`` [m] are joined.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64
+    face_neighbours, faces : (F, 3) int32
+        -1 = no face across the edge from corner k to corner k+1.
+    distance : float
+        [m]; chains of vertices that are each as close to the next become one.
+    """
+    target = np.arange(len(vertices), dtype=np.int32)
+    face, corner = np.nonzero(face_neighbours < 0)
+    rim = np.unique(np.concatenate([faces[face, corner], faces[face, (corner + 1) % 3]]))
+    pairs = cKDTree(vertices[rim]).query_pairs(distance, output_type="ndarray") if len(rim) else np.zeros((0, 2))
+    if not len(pairs):
+        return target
+    graph = coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(len(rim), len(rim)))
+    _, first, group = np.unique(connected_components(graph, directed=False)[1], return_index=True, return_inverse=True)
+    target[rim] = rim[first[group]]
+    # Corners of one face that are this close are a fine detail and no seam: leave all of them where they are.
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    detail = target[start[(target[start] == target[end]) & (start != end)]]
+    return np.where(np.isin(target, detail), np.arange(len(target), dtype=np.int32), target)
+
+
+def rounding_distance(vertices: FloatArray) -> float:
+    """Distance [m] within which rims are taken for one unless the user says otherwise."""
+    extent = np.ptp(vertices, axis=0) if len(vertices) else np.zeros(3)
+    return ROUNDING_SHARE * float(norm(extent))

@@ -1,0 +1,110 @@
+"""What controllers on meshes share about arriving: heading errors in the tangent plane and the goal test."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.arithmetic import rotated_back
+from mbf_mesh_nav.map.mesh_map import MeshMap
+
+_SAME_STOREY = 0.5  # [m]
+
+
+def in_robot_frame(pose: Pose, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coordinates (3,) of a global point in the robot's frame: x ahead, y left, both in its tangent plane."""
+    return rotated_back(pose.rotation, point - np.asarray(pose.position))
+
+
+def arc_to(pose: Pose, point: NDArray[np.float64]) -> tuple[float, float]:
+    """Bearing [rad] of a point, and curvature [1/m] of the arc tangent to the robot's heading through it (left > 0)."""
+    x, y, _ = in_robot_frame(pose, point)
+    return math.atan2(y, x), 2.0 * float(y) / max(float(x * x + y * y), 1e-6)
+
+
+def heading_error(pose: Pose, other: Pose) -> float:
+    """Angle [rad] in (-pi, pi] the robot has to turn left, about its own z axis, to look where ``other`` looks."""
+    ahead = rotated_back(pose.rotation, other.rotation[:, 0])
+    return math.atan2(ahead[1], ahead[0])
+
+
+def ground_distance(pose: Pose, goal: Pose) -> float:
+    """Distance [m] to the goal in the robot's tangent plane.
+
+    A goal given a little above or below the ground, and a robot frame above it, do not count; a goal more than
+    ``_SAME_STOREY`` off the plane is on other ground, then the distance is the straight one.
+    """
+    x, y, z = in_robot_frame(pose, np.asarray(goal.position))
+    return math.hypot(x, y) if abs(z) <= _SAME_STOREY else math.hypot(x, y, z)
+
+
+def is_at_goal(pose: Pose, goal: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
+    """Whether ``pose`` is within ``dist_tolerance`` [m] and its heading within ``angle_tolerance`` [rad] of the goal.
+
+    Distances and headings are those in the robot's tangent plane, so a goal given without the height and slope of
+    the ground can be reached.
+    """
+    return ground_distance(pose, goal) <= dist_tolerance and abs(heading_error(pose, goal)) <= angle_tolerance
+
+
+def tracker_on_surface(mesh_map: MeshMap, path: Path, reach: float) -> PathTracker:
+    """Track a path whose last pose is put onto the surface, at most ``reach`` [m] away: no robot drives up to it."""
+    end = mesh_map.locate_one(path.positions[-1], reach)
+    if end is None:
+        return PathTracker(path)
+    return PathTracker(replace(path, positions=np.concatenate([path.positions[:-1], end.point[None]])))
+
+
+class GoalApproach:
+    """How a robot comes to the end of its path: along the path, then to the position, then to the heading.
+
+    Parameters
+    ----------
+    goal : Pose
+        Last pose of the path as it was asked for.
+    reach : float
+        Distance [m] at which the position counts as reached, unless the goal's tolerance is less.
+    straying : float
+        So many times its deviation from the path a robot may be short of the path's end; for controllers that do not
+        keep to the path.
+    """
+
+    def __init__(self, goal: Pose, reach: float, straying: float = 0.0) -> None:
+        self.goal = goal
+        self._reach = reach
+        self._straying = straying
+        self._only_turning = False
+
+    def is_reached(self, pose: Pose, tracker: PathTracker, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """Whether the robot has driven to the end of the path and stands there within the tolerances [m, rad]."""
+        self._reach = min(self._reach, dist_tolerance)
+        tracker.update(pose.position)
+        driven = self._has_driven(tracker, dist_tolerance)
+        return driven and is_at_goal(pose, self.goal, dist_tolerance, angle_tolerance)
+
+    def is_only_turning(self, pose: Pose, tracker: PathTracker) -> bool:
+        """Whether only the heading is left, with the pose of this cycle.
+
+        Once there, the robot may drift twice as far before it has to drive again, so turning does not flicker.
+        """
+        reach = self._reach * (2.0 if self._only_turning else 1.0)
+        self._only_turning = self._has_driven(tracker, reach) and ground_distance(pose, self.goal) <= reach
+        return self._only_turning
+
+    def _has_driven(self, tracker: PathTracker, reach: float) -> bool:
+        return tracker.has_arrived(reach + self._straying * tracker.deviation)
+
+
+def clamp(value: float, limit: float) -> float:
+    """Limit a value symmetrically to [-limit, limit]."""
+    return max(-limit, min(limit, value))
+
+
+def braking_speed(distance: float, deceleration: float) -> float:
+    """Speed [m/s] from which a constant ``deceleration`` [m/s^2] stops the robot after ``distance`` [m]."""
+    return math.sqrt(2.0 * deceleration * max(distance, 0.0))

@@ -1,0 +1,1 @@
+"""What the planners on a mesh share: segments, waves, corridors of faces, path costs."""

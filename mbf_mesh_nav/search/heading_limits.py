@@ -1,0 +1,122 @@
+"""What the tilt allows a robot with a heading: to stand at a point, to drive straight within a face, along an edge.
+
+Two sources: the footprint of a ``tilt`` layer, settled anywhere, or normals of the surface where a map has no such
+layer. Both tell a *use*, the greatest share of a limit: at most 1 is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, Ground, greatest_use, scratch_for
+from mbf_mesh_nav.kernels.mesh.slopes import slopes_of_edges, tilt_of_normals
+from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN, HEADING_STEP, HEADINGS
+from mbf_mesh_nav.layers.tilt import TiltLayer
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.locate import SurfacePoint
+
+FloatArray = NDArray[np.float64]
+NO_CHASSIS = Chassis(1.0, 1.0, False, 1.0, 1.0, 1.0, math.inf)
+
+
+class HeadingLimits(Protocol):
+    """What a planner with headings asks.
+
+    Attributes
+    ----------
+    allowed, roll : (V, 16) bool, (V, 16) float32 [rad]
+        Where the robot may stand with which heading, and how it rolls there.
+    edges : (2E,) uint8
+        What is known of each directed edge, see ``kernels.heading_astar``.
+    chassis : Chassis
+        For edges of which nothing is known.
+    """
+
+    allowed: NDArray[np.bool_]
+    roll: NDArray[np.float32]
+    edges: NDArray[np.uint8]
+    chassis: Chassis
+
+    def standing(self, place: SurfacePoint, yaw: float) -> float:
+        """Use at a point with a heading [rad]."""
+
+    def driving(self, face: int, start: FloatArray, end: FloatArray, ends: list[FloatArray]) -> float:
+        """Greatest use on the straight way between two points of a face; ``ends`` are the normals at both."""
+
+
+class FootprintLimits:
+    """Limits of a tilt layer, as they were when this was made."""
+
+    def __init__(self, mesh_map: MeshMap, layer: TiltLayer) -> None:
+        self.allowed, self.roll = layer.allowed, layer.roll
+        self.edges = np.zeros(len(mesh_map.neighbours), dtype=np.uint8)
+        settings = layer.parameters
+        roll, up, down = (math.tan(limit) for limit in layer.limits())
+        measures = settings.wheelbase, settings.track, settings.rigid
+        self.chassis = Chassis(*measures, roll, up, down, settings.ground_clearance)
+        self._ground = ground_of(mesh_map)
+        self._vertex_count = len(mesh_map.vertices)
+
+    def standing(self, place: SurfacePoint, yaw: float) -> float:
+        """See ``HeadingLimits``."""
+        return self._use(place.face, place.point, place.point, math.cos(yaw), math.sin(yaw))
+
+    def driving(self, face: int, start: FloatArray, end: FloatArray, ends: list[FloatArray]) -> float:
+        """See ``HeadingLimits``; the normals do not matter."""
+        x, y = (end - start).tolist()[:2]
+        length = math.sqrt(x * x + y * y)
+        return self._use(face, start, end, x / length, y / length) if length > 0.0 else math.inf
+
+    def _use(self, face: int, start: FloatArray, end: FloatArray, cosine: float, sine: float) -> float:
+        points = tuple(start.tolist()), tuple(end.tolist())
+        scratch = scratch_for(self._vertex_count)
+        return float(greatest_use(self._ground, self.chassis, scratch, int(face), *points, cosine, sine))
+
+
+class NormalLimits:
+    """Limits [rad] of roll and pitch on the surface's tangent planes."""
+
+    chassis = NO_CHASSIS
+
+    def __init__(self, mesh_map: MeshMap, max_roll: float, max_pitch: float) -> None:
+        self._mesh_map = mesh_map
+        self.angles = max_roll, max_pitch
+        headings = np.asarray(np.arange(HEADINGS) * HEADING_STEP, dtype=np.float64)
+        self.allowed, self.roll = tilt_of_normals(mesh_map.vertex_normals, headings, max_roll, max_pitch)
+        graph = mesh_map.vertices, mesh_map.neighbour_offsets, mesh_map.neighbours
+        along = slopes_of_edges(*graph, mesh_map.vertex_normals, max_roll, max_pitch)
+        self.edges = np.where(along, np.uint8(DRIVABLE), np.uint8(FORBIDDEN))
+
+    def standing(self, place: SurfacePoint, yaw: float) -> float:
+        """See ``HeadingLimits``."""
+        return self._use(self._mesh_map.face_normals[place.face], math.cos(yaw), math.sin(yaw))
+
+    def driving(self, face: int, start: FloatArray, end: FloatArray, ends: list[FloatArray]) -> float:
+        """See ``HeadingLimits``; in between the normal goes from one end's to the other's in proportion."""
+        x, y = (end - start).tolist()[:2]
+        return max(self._use(normal, x, y) for normal in ends)
+
+    def _use(self, normal: FloatArray, ahead_x: float, ahead_y: float) -> float:
+        x, y, up = normal.tolist()
+        up *= math.sqrt(ahead_x * ahead_x + ahead_y * ahead_y)
+        roll, pitch = math.atan2(y * ahead_x - x * ahead_y, up), math.atan2(x * ahead_x + y * ahead_y, up)
+        return max(abs(roll) / self.angles[0], abs(pitch) / self.angles[1])
+
+
+def ground_of(mesh_map: MeshMap) -> Ground:
+    """The arrays of a map that footprints stand on."""
+    mesh = mesh_map.topology
+    return Ground(
+        mesh.vertices,
+        mesh.faces,
+        mesh.face_normals,
+        mesh.face_neighbours,
+        mesh.vertex_face_offsets,
+        mesh.vertex_faces,
+        mesh.neighbour_offsets,
+        mesh.neighbours,
+    )

@@ -1,0 +1,32 @@
+"""What a way over the surface costs: its length plus what the map's costs collect along it.
+
+Along edges that is the sum of their weights; a way through faces has the costs of their corners interpolated in
+between, so both agree where a way follows an edge.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.kernels.motion.path_costs import way_cost
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.snapshot import MeshSnapshot
+
+
+def cost_along(
+    mesh_map: MeshMap, snapshot: MeshSnapshot, positions: NDArray[np.float64], point_faces: NDArray[np.int32]
+) -> float:
+    """Length plus collected cost [m] of a path.
+
+    Parameters
+    ----------
+    positions : (n, 3) float64
+        Points on the surface [m].
+    point_faces : (n,) int32
+        The face in which the way to each point lies. Corners of infinite cost, which only the faces of a start or a
+        goal have, do not count.
+    """
+    return way_cost(
+        mesh_map.vertices, mesh_map.faces, snapshot.costs, snapshot.edge_cost_factor, positions, point_faces
+    )

@@ -1,0 +1,213 @@
+"""What every planner on a mesh has in common: the questions around the search.
+
+``SurfacePlanner.make_plan`` reads as numbered steps: locate start, via points and goal on the surface, refuse what is
+off the map or blocked, refuse what lies in another component, plan leg by leg, fall back to a nearby goal within the
+tolerance, assemble the path. A planner derives it and implements ``find_leg`` only.
+
+A point counts as blocked when the vertex nearest to it in its face is lethal or its cost reaches ``cost_limit``.
+"""
+
+from __future__ import annotations
+
+import itertools
+from abc import abstractmethod
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import PlanRequest, PlanResult
+from mbf_mesh_nav.kernels.motion.path_poses import poses_along
+from mbf_mesh_nav.map.snapshot import MeshSnapshot
+from mbf_mesh_nav.mesh.ground import ground_heights
+from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.mesh.surface_point import (
+    describe_blockage,
+    nearest_corner,
+    on_surface,
+    position_text,
+    surface_point_at_vertex,
+)
+from mbf_mesh_nav.plugins import MeshContext, MeshPlanner
+from mbf_mesh_nav.search.blocked_vertices import BlockedVertices
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery, spread_from
+
+SAME_POINT = 1e-6
+"""Points of a path so near [m] to each other are one."""
+
+
+class SurfacePlannerParameters(PluginParameters):
+    """Parameters every planner on a mesh has."""
+
+    cost_limit: float = parameter(1.0, "Vertices whose cost reaches this are impassable.", gt=0.0, allow_inf=True)
+    max_surface_distance: float = parameter(
+        0.4,
+        "A start, via point or goal farther than this above or below the surface, or past a border, is out of the map.",
+        unit="m",
+        gt=0.0,
+    )
+
+
+class SurfacePlanner(MeshPlanner):
+    """Template of the planners on meshes; see the module's text."""
+
+    Parameters = SurfacePlannerParameters
+    parameters: SurfacePlannerParameters
+
+    def __init__(self, context: MeshContext) -> None:
+        super().__init__(context)
+        self._blocked_vertices = BlockedVertices(context.mesh_map)
+
+    @abstractmethod
+    def find_leg(self, query: LegQuery) -> Leg | None:
+        """Return the best leg, None if there is none (or the search was cancelled)."""
+
+    def reach(self, query: LegQuery) -> NDArray[np.float32] | None:
+        """Distances (V,) [m] from the query's start to all this planner finds a way to, inf elsewhere; None: cancelled.
+
+        Here: along the edges of free vertices.
+        """
+        distances, _, finished = spread_from(
+            self.mesh_map, query.snapshot, query.blocked, query.start, query.cancel_flag
+        )
+        return distances if finished else None
+
+    def make_plan(self, request: PlanRequest) -> PlanResult:
+        """Plan from start over the via points to the goal; see ``AbstractPlanner``."""
+        # 1. Which vertices are free?
+        snapshot = self.mesh_map.snapshot()
+        blocked = self._blocked_vertices.at(snapshot, self.parameters.cost_limit)
+
+        # 2. Where on the surface is everything? Only a problem of the goal can be mended by a tolerance.
+        stops, problem = self._locate_stops(request, snapshot, blocked)
+        if problem is not None and (len(stops) <= len(request.via) or request.dist_tolerance <= 0.0):
+            return problem
+
+        # 3. Plan leg by leg; the last one may end near the goal instead of at it.
+        legs: list[Leg] = []
+        poses = (request.start, *request.via, request.goal)
+        for index, (start, goal) in enumerate(itertools.pairwise(stops)):
+            ends = poses[index], poses[index + 1]
+            tolerance = request.angle_tolerance if index == len(request.via) else 0.0
+            leg = self.find_leg(LegQuery(start, goal, snapshot, blocked, request.cancel_token.flag, *ends, tolerance))
+            if leg is None:
+                problem = self._no_path(start, goal, blocked)
+                break
+            legs.append(leg)
+        near_goal = problem is not None and len(legs) == len(request.via) and request.dist_tolerance > 0.0
+        if near_goal and not request.cancel_token.cancelled:
+            leg = self._leg_near_goal(stops[len(legs)], request, snapshot, blocked)
+            legs, problem = ([*legs, leg], None) if leg is not None else (legs, problem)
+
+        # 4. One path of all legs, ending with the requested pose.
+        if request.cancel_token.cancelled:
+            return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
+        if problem is not None:
+            return problem
+        path = self._assemble(legs, request.goal, not near_goal)
+        notes = [leg.note for leg in legs if leg.note]
+        if near_goal:
+            notes.append(f"ends {path[-1].distance_to(request.goal):.2f} m from the goal")
+        return PlanResult(GetPathOutcome.SUCCESS, "; ".join(notes), path, sum(leg.cost for leg in legs))
+
+    def _locate_stops(
+        self, request: PlanRequest, snapshot: MeshSnapshot, blocked: NDArray[np.bool_]
+    ) -> tuple[list[SurfacePoint], PlanResult | None]:
+        """Start, via points and goal on the surface, in order, up to the first that has a problem; the problem."""
+        stops: list[SurfacePoint] = []
+        for name, pose in _named_poses(request):
+            point = self._locate(name, pose, snapshot, blocked)
+            if isinstance(point, PlanResult):
+                return stops, point
+            problem = self._different_components(stops[0], point) if stops else None
+            if problem is not None:
+                return stops, problem
+            stops.append(point)
+        return stops, None
+
+    def _locate(
+        self, name: str, pose: Pose, snapshot: MeshSnapshot, blocked: NDArray[np.bool_]
+    ) -> SurfacePoint | PlanResult:
+        """Put a pose on the surface, or say why that fails."""
+        reach = self.parameters.max_surface_distance
+        point = on_surface(self.mesh_map, pose.position, reach)
+        if point is None:
+            distance = self.mesh_map.locate([pose.position]).distances[0]
+            where = f"the {name} {position_text(pose.position)} is {distance:.2f} m from the surface"
+            if distance <= reach:
+                return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{where}, past its border")
+            hint = self._heights_text(pose)
+            return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{where}, allowed are {reach:g} m; {hint}")
+        vertex = nearest_corner(self.mesh_map, point)
+        if blocked[vertex]:
+            outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
+            reason = describe_blockage(self.mesh_map, snapshot, vertex, self.parameters.cost_limit)
+            return PlanResult(outcome, f"the {name} {position_text(pose.position)} is blocked: {reason}")
+        return point
+
+    def _heights_text(self, pose: Pose) -> str:
+        """Say where the ground is at a pose that is not on it."""
+        heights = sorted(ground_heights(self.mesh_map, pose.x, pose.y))
+        if not heights:
+            return "there is no surface above or below it"
+        return f"the surface there is at z = {', '.join(f'{height:.2f}' for height in heights)} m"
+
+    def _different_components(self, start: SurfacePoint, stop: SurfacePoint) -> PlanResult | None:
+        """NO_PATH_FOUND if two points lie on surfaces that do not touch; known without a search."""
+        components = self.mesh_map.components
+        home, other = (components[self.mesh_map.faces[point.face, 0]] for point in (start, stop))
+        if home == other:
+            return None
+        sizes = [int(np.count_nonzero(components == label)) for label in (home, other)]
+        message = (
+            f"the start is on component {home} ({sizes[0]} vertices), {position_text(stop.point)} on component "
+            f"{other} ({sizes[1]} vertices); they do not touch"
+        )
+        return PlanResult(GetPathOutcome.NO_PATH_FOUND, message, permanent=True)
+
+    def _no_path(self, start: SurfacePoint, goal: SurfacePoint, blocked: NDArray[np.bool_]) -> PlanResult:
+        component = self.mesh_map.components == self.mesh_map.components[nearest_corner(self.mesh_map, start)]
+        share = float(np.mean(blocked[component]))
+        message = (
+            f"no free way from {position_text(start.point)} to {position_text(goal.point)}: {share:.1%} of "
+            f"the surface between them is lethal or has cost >= {self.parameters.cost_limit:g}"
+        )
+        return PlanResult(GetPathOutcome.NO_PATH_FOUND, message)
+
+    def _leg_near_goal(
+        self, start: SurfacePoint, request: PlanRequest, snapshot: MeshSnapshot, blocked: NDArray[np.bool_]
+    ) -> Leg | None:
+        """Leg to the reachable vertex nearest to the goal, if one lies within ``dist_tolerance``."""
+        mesh_map = self.mesh_map
+        last_pose = (request.start, *request.via)[-1]
+        ends = last_pose, request.goal, request.angle_tolerance
+        query = LegQuery(start, start, snapshot, blocked, request.cancel_token.flag, *ends)
+        distances = self.reach(query)
+        if distances is None:
+            return None
+        offsets = norm(mesh_map.vertices - np.asarray(request.goal.position))
+        offsets[~np.isfinite(distances)] = np.inf
+        vertex = int(np.argmin(offsets))
+        if offsets[vertex] > request.dist_tolerance:
+            return None
+        return self.find_leg(replace(query, goal=surface_point_at_vertex(mesh_map, vertex)))
+
+    def _assemble(self, legs: list[Leg], goal: Pose, goal_reached_exactly: bool) -> Path:
+        positions = np.concatenate([legs[0].positions[:1]] + [leg.positions[1:] for leg in legs])
+        normals = np.concatenate([legs[0].normals[:1]] + [leg.normals[1:] for leg in legs])
+        if goal_reached_exactly:
+            positions[-1] = goal.position
+        # Every pose looks to the next one and stands on the surface; the last one is as requested.
+        positions, orientations = poses_along(positions, normals, SAME_POINT)
+        orientations[-1] = goal.orientation
+        guidance = tuple(leg.guidance for leg in legs if leg.guidance is not None) or None
+        return Path(positions, orientations, self.mesh_map.frame_id, self.clock.now(), guidance)
+
+
+def _named_poses(request: PlanRequest) -> list[tuple[str, Pose]]:
+    via = [(f"via point {index}", pose) for index, pose in enumerate(request.via)]
+    return [("start", request.start), *via, ("goal", request.goal)]

@@ -1,0 +1,270 @@
+"""One continuous wave from a goal, and the exact way down its field: what planners over faces share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_mesh_nav.kernels.mesh.corners import build_corner_ends, write_corner_weights
+from mbf_mesh_nav.kernels.wave.cvp import ALONG_EDGE, propagate_wave
+from mbf_mesh_nav.kernels.wave.descent import trace_descent
+from mbf_mesh_nav.kernels.wave.directions import wave_directions
+from mbf_mesh_nav.kernels.wave.fronts import NO_BEND
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.map.snapshot import MeshSnapshot
+from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.motion.vector_field import VectorField
+from mbf_mesh_nav.search.corridor import FaceStrip, Piece
+from mbf_mesh_nav.search.leg_search import LegQuery, seeded_arrays
+from mbf_mesh_nav.search.other_courses import OtherCourses, is_worth_a_search, reversed_query
+
+NEVER = np.zeros(1, dtype=np.uint8)
+"""The flag of what is not cancelled."""
+STEP_SAMPLE = 64
+"""The typical weight of an edge is the mean of one in so many."""
+COURSE_LOST = 0.005
+"""A path so much costlier than its field, as a share, is looked for once more. Fields are right to 0.3 %."""
+
+AS_FORETOLD = 5e-4
+"""A path that differs by no more from what its field says, as a share, is the one that the wave meant."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wave:
+    """A wave that reached the start of its query.
+
+    Attributes
+    ----------
+    distances : (V,) float32
+        Weighted distance [m] to the goal, inf where the wave did not come.
+    predecessors, cut_records, bends : (V,) int32
+        See ``kernels.cvp.propagate_wave``.
+    along_edges : bool
+        Whether no way over free faces leads to the start, so that the wave also walked along edges.
+    """
+
+    distances: NDArray[np.float32]
+    predecessors: NDArray[np.int32]
+    cut_records: NDArray[np.int32]
+    bends: NDArray[np.int32]
+    along_edges: bool
+
+
+class _Weights(NamedTuple):
+    """Weights of corner records at one version of the map, and the typical weight [m] of an edge."""
+
+    version: int
+    of_corners: NDArray[np.float32]
+    step: float
+
+
+class WaveSearch:
+    """Waves over one mesh; keeps the corner records of the mesh and their weights. Several threads may use it."""
+
+    def __init__(self, mesh_map: MeshMap) -> None:
+        self._mesh_map = mesh_map
+        self._corner_ends = build_corner_ends(mesh_map.faces, mesh_map.vertex_face_offsets, mesh_map.vertex_faces)
+        self._weights: _Weights | None = self._gathered(mesh_map.snapshot(), NEVER)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the corner records and their weights."""
+        return self._corner_ends.nbytes + (self._weights.of_corners.nbytes if self._weights is not None else 0)
+
+    def spread(self, query: LegQuery, overshoot: float) -> Wave | None:
+        """Spread a wave from the goal until it is ``overshoot`` [m] past the start; None: not reached, or cancelled.
+
+        Where no way over free faces leads to the start, the wave also walks along single edges of free vertices.
+        """
+        corners = self._mesh_map.faces[query.start.face]
+        targets = np.ascontiguousarray(corners[~query.blocked[corners]])
+        at_least = max(overshoot, 2.0 * self._mesh_map.topology.mean_edge_length)
+        for along_edges in (False, True):
+            wave = self._propagated(query, targets, at_least, along_edges)
+            if wave is None or np.isfinite(wave.distances[corners]).any():
+                return wave
+        return None
+
+    def edges_text(
+        self, query: LegQuery, wave: Wave, positions: NDArray[np.float64], point_faces: NDArray[np.int32]
+    ) -> str:
+        """Say that a path follows edges where no whole face is free, and how far; empty if it need not."""
+        if not wave.along_edges:
+            return ""
+        between_ends = (point_faces[1:] != query.start.face) & (point_faces[1:] != query.goal.face)
+        blocked = query.blocked[self._mesh_map.faces[point_faces[1:]]].any(axis=1) & between_ends
+        length = math.fsum(math.dist(positions[index], positions[index + 1]) for index in np.flatnonzero(blocked))
+        return f"no way over whole free faces: {length:.2f} m lead along edges between blocked faces"
+
+    def path(self, query: LegQuery, wave: Wave, taut_over_costs: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Positions (n, 3) from start to goal, and the face (n,) the way to each of them lies in.
+
+        The way down the field, shortened to a geodesic. Where that is longer than the field says, it has lost its
+        course between two fronts: then the way along which the wave came is shortened, too, and the shorter one taken.
+        Where it leads through few large faces, other courses are looked for.
+        Over costs the cheapest path is no geodesic: there the way down the field stays, or is pulled taut as far as
+        that costs no more (``taut_over_costs``).
+        """
+        start, goal = query.start, query.goal
+        if start.face == goal.face:
+            return np.array([start.point, goal.point]), np.array([start.face, goal.face], dtype=np.int32)
+        strip = FaceStrip(self._mesh_map, query.snapshot, query.blocked)
+        traced = self._trace(query, wave, along_edges=False)
+        if strip.has_costs(traced[1]):
+            return strip.shorten(*traced) if taut_over_costs else traced
+        best = strip.shorten(*traced)
+        foretold = min(
+            float(wave.distances[corner]) + math.dist(self._mesh_map.vertices[corner], start.point)
+            for corner in self._mesh_map.faces[start.face].tolist()
+        )
+        if strip.cost(*best) > (1.0 + COURSE_LOST) * foretold:
+            other = strip.shorten(*self._trace(query, wave, along_edges=True))
+            best = min(best, other, key=lambda path: strip.cost(*path))
+        if wave.along_edges or abs(strip.cost(*best) - foretold) <= AS_FORETOLD * foretold:
+            return best
+        return self._other_course(query, wave, strip, best)
+
+    def _other_course(self, query: LegQuery, wave: Wave, strip: FaceStrip, best: Piece) -> Piece:
+        """A shorter way than the best so far through few large faces, see ``other_courses``; else that one."""
+        if not is_worth_a_search(query, best, strip):
+            return best
+        back = reversed_query(query)
+        wave_back = self.spread(back, overshoot=0.0)
+        if wave_back is None or wave_back.along_edges:
+            return best
+        to_goal, to_start = partial(self._trace_from, query, wave), partial(self._trace_from, back, wave_back)
+        courses = OtherCourses(self._mesh_map, query, strip, to_goal, to_start)
+        return courses.best(best, wave.distances, wave_back.distances)
+
+    def _trace_from(self, query: LegQuery, wave: Wave, place: SurfacePoint) -> Piece:
+        """Way down the field from any place the wave came to."""
+        if place.face == query.goal.face:
+            return np.array([place.point, query.goal.point]), np.array([place.face] * 2, dtype=np.int32)
+        return self._trace(replace(query, start=place), wave, along_edges=False)
+
+    def _trace(self, query: LegQuery, wave: Wave, along_edges: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Way down the field, see ``kernels.descent``."""
+        mesh_map, start, goal = self._mesh_map, query.start, query.goal
+        return trace_descent(
+            mesh_map.vertices,
+            mesh_map.faces,
+            mesh_map.face_neighbours,
+            mesh_map.vertex_face_offsets,
+            mesh_map.vertex_faces,
+            mesh_map.neighbour_offsets,
+            mesh_map.neighbours,
+            query.snapshot.edge_weights,
+            wave.distances,
+            wave.predecessors,
+            wave.bends,
+            start.face,
+            tuple(start.point.tolist()),
+            goal.face,
+            tuple(goal.point.tolist()),
+            along_edges,
+        )
+
+    def field(self, query: LegQuery, wave: Wave) -> VectorField | None:
+        """Directions towards the goal wherever the wave came; None if cancelled."""
+        mesh_map, goal = self._mesh_map, query.goal
+        weights = self._take_weights(query)
+        if weights is None:
+            return None
+        directions = wave_directions(
+            mesh_map.vertices,
+            mesh_map.faces,
+            mesh_map.vertex_faces,
+            self._corner_ends,
+            weights.of_corners,
+            wave.distances,
+            wave.predecessors,
+            wave.cut_records,
+            wave.bends,
+        )
+        self._weights = weights
+        corners = mesh_map.faces[goal.face]
+        towards_goal = goal.point - mesh_map.vertices[corners]
+        directions[corners] = towards_goal / np.maximum(norm(towards_goal)[..., None], 1e-9)
+        return VectorField(
+            directions, wave.distances, goal.face, goal.point.copy(), query.snapshot.version, mesh_map.topology
+        )
+
+    def _propagated(
+        self, query: LegQuery, targets: NDArray[np.int32], overshoot: float, along_edges: bool
+    ) -> Wave | None:
+        """Run the kernel from the goal of a query; None if cancelled."""
+        mesh_map = self._mesh_map
+        weights = self._take_weights(query)
+        if weights is None:
+            return None
+        distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.goal, query.snapshot)
+        cut_records = np.full(len(distances), ALONG_EDGE, dtype=np.int32)
+        bends = np.full(len(distances), NO_BEND, dtype=np.int32)
+        settled = propagate_wave(
+            mesh_map.vertex_face_offsets,
+            self._corner_ends,
+            weights.of_corners,
+            query.blocked,
+            distances,
+            predecessors,
+            cut_records,
+            bends,
+            seeds,
+            targets,
+            overshoot,
+            weights.step,
+            query.cancel_flag,
+            along_edges,
+        )
+        self._weights = weights
+        return None if settled < 0 else Wave(distances, predecessors, cut_records, bends, along_edges)
+
+    def _take_weights(self, query: LegQuery) -> _Weights | None:
+        """Take the weights, brought up to date for a query; give them back after use. None if cancelled meanwhile.
+
+        Another thread that comes in between finds none and gathers its own.
+        """
+        weights, self._weights = self._weights, None
+        if weights is None:
+            return self._gathered(query.snapshot, query.cancel_flag)
+        if weights.version == query.snapshot.version:
+            return weights
+        changed = self._mesh_map.changes_between(weights.version, query.snapshot.version)
+        if changed is None:
+            return self._gathered(query.snapshot, query.cancel_flag)
+        return self._written(query.snapshot, changed, weights.of_corners, query.cancel_flag)
+
+    def _gathered(self, snapshot: MeshSnapshot, cancel_flag: NDArray[np.uint8]) -> _Weights | None:
+        of_corners = np.empty((len(self._corner_ends), 3), dtype=np.float32)
+        everything = np.arange(len(snapshot.costs), dtype=np.int32)
+        return self._written(snapshot, everything, of_corners, cancel_flag)
+
+    def _written(
+        self,
+        snapshot: MeshSnapshot,
+        changed: NDArray[np.int32],
+        of_corners: NDArray[np.float32],
+        cancel_flag: NDArray[np.uint8],
+    ) -> _Weights | None:
+        """Bring weights (3F, 3) up to date at the changed vertices."""
+        mesh_map = self._mesh_map
+        finished = write_corner_weights(
+            mesh_map.vertex_face_offsets,
+            self._corner_ends,
+            mesh_map.neighbour_offsets,
+            mesh_map.neighbours,
+            snapshot.edge_weights,
+            changed,
+            of_corners,
+            cancel_flag,
+        )
+        sample = snapshot.edge_weights[::STEP_SAMPLE]
+        sample = sample[np.isfinite(sample)]
+        step = float(sample.mean()) if len(sample) else mesh_map.topology.mean_edge_length
+        return _Weights(snapshot.version, of_corners, step) if finished else None

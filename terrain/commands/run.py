@@ -1,0 +1,172 @@
+"""The commands ``mbf run``, ``scenarios``, ``replay`` and ``compare``, which need the simulator and the viewer."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from mbf_abstract.commands.reporting import FAILURE, readable_errors
+from mbf_abstract.commands.waiting import waiting
+
+if TYPE_CHECKING:
+    from terrain.session.runner import RunResult
+
+RUNS = Path("runs")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the application ``mbf``."""
+    app.command("run")(run)
+    app.command("scenarios")(scenarios)
+    app.command("replay")(replay)
+    app.command("compare")(compare)
+
+
+def run(
+    scenario: str = typer.Argument(..., help="Name of a shipped scenario (see mbf scenarios), or a YAML file."),
+    backend: str = typer.Option("", "--backend", help="Map backend: mesh or costmap; the scenario's own if not given."),
+    seed: int = typer.Option(
+        -1, "--seed", min=-1, help="Seed of sensors and plugins; the scenario's own if not given."
+    ),
+    out: Path | None = typer.Option(None, "--out", help="Folder for the results; runs/<time> if not given."),
+    map_file: Path | None = typer.Option(None, "--map", help="Drive in the building of this map_server yaml instead."),
+    wall_clock: bool = typer.Option(False, "--wall-clock", help="Real time instead of as fast as possible."),
+    executive: str = typer.Option(
+        "move_base", "--executive", help="Who decides: move_base, classic, or a tree (see mbf tree list)."
+    ),
+    view: bool = typer.Option(False, "--view", help="Serve a page to watch and steer the run, until Ctrl-C."),
+    view_port: int = typer.Option(8080, "--view-port", min=1, max=65535, help="Port of the page; the next free one."),
+    view_host: str = typer.Option(
+        "127.0.0.1", "--view-host", help="Interface of the page; others than loopback are not encrypted."
+    ),
+    view_token: bool = typer.Option(
+        True, "--view-token/--no-view-token", help="A token in the page's address, so that only who has it gets in."
+    ),
+    view_read_only: bool = typer.Option(False, "--view-read-only", help="Let nobody steer, only watch."),
+    view_speed: float = typer.Option(
+        1.0, "--view-speed", min=0.0, help="With --view: at most so many times real time; 0 = no limit."
+    ),
+    stay: bool = typer.Option(True, "--stay/--no-stay", help="With --view: wait for goals from the page at the end."),
+    quiet: bool = typer.Option(False, "--quiet", help="Print only the outcome."),
+    as_json: bool = typer.Option(False, "--json", help="Print one JSON object with outcome and metrics."),
+) -> None:
+    """Drive a scenario in the simulator; exit code 0 only if it arrived within all limits and touched nothing."""
+    with readable_errors():
+        from terrain.commands.live_line import LiveLine
+        from terrain.scenarios.on_map import on_map
+        from terrain.scenarios.scenario import load_scenario
+        from terrain.session.runner import RunOptions, run_scenario
+        from terrain.viewer.live.options import ViewOptions
+
+        loaded = load_scenario(scenario)
+        if map_file is not None:
+            loaded = on_map(loaded, map_file)
+        folder = out or new_run_folder(RUNS, datetime.now())
+        with LiveLine(show=not (quiet or as_json)) as live:
+            options = RunOptions(
+                folder=folder,
+                backend=backend or None,
+                seed=seed if seed >= 0 else None,
+                wall_clock=wall_clock,
+                on_progress=live.progress,
+                on_step=live.step,
+                on_note=live.note,
+                executive=executive,
+                on_page=lambda address: live.note(f"live view at {address}"),
+                view=ViewOptions(view_host, view_port, view_speed, stay, view_token, view_read_only) if view else None,
+            )
+            result = run_scenario(loaded, options)
+    _tell(result, as_json)
+    if not result.success:
+        raise typer.Exit(FAILURE)
+
+
+def scenarios() -> None:
+    """List the scenarios that come with the package, and what each of them proves."""
+    with readable_errors():
+        from terrain.scenarios.scenario import load_scenario, shipped_scenarios
+
+        for name in shipped_scenarios():
+            loaded = load_scenario(name)
+            typer.echo(f"{name:16} {loaded.proves}  [{', '.join(loaded.navigation)}]")
+
+
+def replay(
+    folder: Path = typer.Argument(..., help="Folder of a run, e.g. runs/2030-01-02_03-04-05."),
+    show: bool = typer.Option(True, "--open/--no-open", help="Open the page in the browser."),
+    rrd: bool = typer.Option(False, "--rrd", help="Write run.rrd for Rerun too; needs the extra rerun."),
+    gif: bool = typer.Option(False, "--gif", help="Write animation.gif too, for where no script may run."),
+) -> None:
+    """Write picture, report, replay and MCAP log of a run, also of one that was killed, and open the replay."""
+    with readable_errors():
+        from terrain.commands.live_line import LiveLine
+        from terrain.recording.run_folder import read_run
+        from terrain.viewer.logs.rerun_log import write_rrd
+        from terrain.viewer.pictures.animation import write_animation
+        from terrain.viewer.results import write_results
+
+        recording, metrics = read_run(folder)
+        with LiveLine() as live:
+            problems = write_results(folder, recording, metrics, live.step)
+            if problems:
+                raise RuntimeError("; ".join(problems))
+            if rrd:
+                live.step("writing the recording for Rerun")
+                write_rrd(folder / "run.rrd", recording)
+            if gif:
+                live.step("writing the animation")
+                write_animation(folder / "animation.gif", recording)
+    page = (folder / "replay.html").resolve()
+    typer.echo(page)
+    if show:
+        typer.launch(page.as_uri())
+
+
+def compare(
+    left: Path = typer.Argument(..., help="Folder of a run."),
+    right: Path = typer.Argument(..., help="Folder of another run."),
+    out: Path = typer.Option(Path("compare.html"), "--out", help="The page to write."),
+) -> None:
+    """Lay two runs side by side: a table of their metrics here, and one page with everything."""
+    with readable_errors():
+        from rich.console import Console
+        from rich.markup import escape
+        from rich.table import Table
+
+        from terrain.recording.run_folder import read_run
+        from terrain.viewer.reports.comparison import compare_digests, compare_metrics, write_comparison
+
+        runs = read_run(left), read_run(right)
+        names = (left.name, right.name) if left.name != right.name else (str(left), str(right))
+        table = Table("metric", *map(escape, names), "difference")
+        for row in compare_metrics(runs[0][1], runs[1][1]):
+            table.add_row(*map(escape, row))
+        Console().print(table)
+        typer.echo(compare_digests(runs[0][1], runs[1][1]))
+        with waiting("writing the page"):
+            write_comparison(out, names, *runs)
+    typer.echo(out.resolve())
+
+
+def new_run_folder(parent: Path, now: datetime) -> Path:
+    """Return a folder name made of the time that does not exist yet."""
+    stamp = now.strftime("%Y-%m-%d_%H-%M-%S")
+    names = [stamp, *(f"{stamp}_{number}" for number in range(2, 1000))]
+    return next(parent / name for name in names if not (parent / name).exists())
+
+
+def _tell(result: RunResult, as_json: bool) -> None:
+    metrics = result.metrics
+    if as_json:
+        typer.echo(json.dumps({**result.verdict.to_json(), "folder": str(result.folder), "metrics": metrics}))
+        return
+    typer.echo(result.verdict)
+    typer.echo(
+        f"{metrics['path_length_m']:.1f} m in {metrics['time_s']:.1f} s simulated, "
+        f"{metrics['wall_time_s']:.1f} s of wall time: {metrics['real_time_factor']:.1f} x real time"
+    )
+    typer.echo(f"results in {result.folder}: replay.html, report.html, picture.png, run.mcap, metrics.json")

@@ -1,0 +1,1 @@
+"""Experiments that compare executives; no part of the library."""

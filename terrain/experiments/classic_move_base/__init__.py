@@ -1,0 +1,1 @@
+"""The fixed state machine of ``move_base``, for comparisons."""

@@ -1,0 +1,129 @@
+"""All runs of the experiment: which there are, in worker processes, each done once and kept.
+
+Finished runs stand in ``runs.jsonl`` of the campaign's folder under a key that holds the hash of all parameters, so an
+interrupted campaign goes on where it was, and a change of any parameter makes all runs anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from mbf_abstract.config.yaml_source import load_yaml
+from terrain.experiments.table1 import counting, plugin_wrappers, repetition
+from terrain.experiments.table1.conditions import ARMS, outdoors, without_traffic
+from terrain.experiments.table1.counting import Leg, Tally
+from terrain.experiments.table1.environments import traffic
+from terrain.experiments.table1.environments import warehouse_environment as stage
+from terrain.experiments.table1.environments.outdoor_environment import OUTDOOR
+from terrain.experiments.table1.environments.world import load_world
+from terrain.experiments.table1.repetition import run_repetition
+from terrain.sweeps.log import SweepLog
+from terrain.sweeps.worker_pool import run_in_workers
+
+LOG = "runs.jsonl"
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: an arm, a seed, a world file; ``empty`` = without traffic, ``again`` = for the second time."""
+
+    arm: str
+    seed: int
+    world: Path
+    empty: bool = False
+    again: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name within one set of parameters."""
+        return f"{self.arm}{'/empty' if self.empty else ''}{'/again' if self.again else ''}/{self.seed}"
+
+
+def do(job: Job) -> dict[str, Any]:
+    """Run a job and return its row."""
+    arm = outdoors(ARMS[job.arm]) if job.world == OUTDOOR else ARMS[job.arm]
+    row = run_repetition(without_traffic(arm) if job.empty else arm, job.world, job.seed).to_row()
+    return {"arm": job.arm, "seed": job.seed, "empty": job.empty, **row}
+
+
+def parameters_of(world_file: Path) -> dict[str, Any]:
+    """Everything a result depends on beside the code: arms, navigation, world, constants."""
+    if world_file == OUTDOOR:
+        navigation = load_yaml(OUTDOOR.with_name("outdoor_navigation.yaml")).data
+        arms = {name: asdict(outdoors(arm)) for name, arm in ARMS.items()}
+        return {**_parameters_of_arms(), "arms": arms, "world": load_yaml(OUTDOOR).data, "navigation": navigation}
+    world = load_world(world_file)
+    grid = world.grid()
+    return {
+        **_parameters_of_arms(),
+        "navigation": load_yaml(stage.NAVIGATION).data,
+        "world": json.loads(world.model_dump_json(exclude={"floor_plan", "map"})),
+        "floor": hashlib.sha256(grid.occupied.tobytes() + grid.free.tobytes()).hexdigest(),
+        "traffic": [
+            traffic.STOP_DISTANCE,
+            traffic.SIDE_MARGIN,
+            traffic.DWELL,
+            traffic.SPEED_RANGE,
+            traffic.PHASE_RANGE,
+        ],
+        "lidar": [stage.LIDAR_RATE, stage.LIDAR_RANGE, stage.LIDAR_RAYS, stage.LIDAR_NOISE],
+    }
+
+
+def _parameters_of_arms() -> dict[str, Any]:
+    return {
+        "arms": {name: asdict(arm) for name, arm in ARMS.items()},
+        "leg_time_limit": repetition.LEG_TIME_LIMIT,
+        "useless_within": counting.USELESS_WITHIN,
+        "latency": [plugin_wrappers.QUERY_CELL, plugin_wrappers.LATENCY_SPREAD],
+    }
+
+
+def hash_of_parameters(world_file: Path) -> str:
+    """Return a short hash of ``parameters_of``."""
+    text = json.dumps(parameters_of(world_file), sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+class Campaign:
+    """The runs of one world, kept in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+    world : Path
+    workers : int
+    """
+
+    def __init__(self, folder: Path, world: Path, workers: int = 1) -> None:
+        self.world = world
+        self.workers = workers
+        self.parameters_hash = hash_of_parameters(world)
+        self._file = folder / LOG
+
+    def rows(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, dict[str, Any]]]:
+        """Yield every job with its row: first those that are known, then the others as they finish."""
+        with SweepLog(self._file) as log:
+            known = {job: log.rows.get(self._key(job)) for job in jobs}
+            yield from ((job, row) for job, row in known.items() if row is not None)
+            for job, row in run_in_workers(do, [job for job, row in known.items() if row is None], self.workers):
+                log.append(self._key(job), row)
+                yield job, row
+
+    def job(self, arm: str, seed: int, empty: bool = False, again: bool = False) -> Job:
+        """Make a job in this campaign's world."""
+        return Job(arm, seed, self.world, empty, again)
+
+    def _key(self, job: Job) -> str:
+        return f"{self.parameters_hash}/{job.name}"
+
+
+def tally_of(row: Mapping[str, Any]) -> Tally:
+    """Read back the tally of a row."""
+    values = dict(row["tally"])
+    return Tally(**{**values, "legs": [Leg(**leg) for leg in values["legs"]]})

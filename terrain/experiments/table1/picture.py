@@ -1,0 +1,59 @@
+"""A picture of the world: its racks, the routes of the others, the waypoints, and where our robot drove in each arm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+from terrain.experiments.table1.environments.world import Table1World
+
+TITLES = {"S1": "move_base (S1)", "B": "tree (B)"}
+DOTS_PER_INCH = 90
+
+
+def draw_tracks(
+    file: Path, world: Table1World | None, tracks: Mapping[str, Sequence[Sequence[Sequence[float]]]], robots: int = 5
+) -> None:
+    """Write a PNG with one map for each arm.
+
+    Parameters
+    ----------
+    world : Table1World or None
+        Nothing but the tracks is drawn without it.
+    tracks : mapping of str to list of (n, 2) lists
+        Tracks [m] of every repetition of each arm.
+    robots : int
+        How many of the routes were driven.
+    """
+    figure, axes = plt.subplots(1, len(tracks), figsize=(6.2 * len(tracks), 6.4), squeeze=False)
+    for axis, (name, of_arm) in zip(axes[0], tracks.items(), strict=True):
+        if world is not None:
+            _draw_world(axis, world, robots)
+        axis.set_aspect("equal")
+        axis.set_xlabel("x [m]")
+        axis.set_ylabel("y [m]")
+        for track in of_arm:
+            axis.plot(*np.transpose(track), color="tab:blue", linewidth=0.6, alpha=0.6)
+        axis.set_title(f"{TITLES.get(name, name)}: {len(of_arm)} repetitions", parse_math=False)
+    figure.tight_layout()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(file, dpi=DOTS_PER_INCH)
+    plt.close(figure)
+
+
+def _draw_world(axis: Any, world: Table1World, robots: int) -> None:
+    grid = world.grid()
+    axis.imshow(~grid.occupied, origin="lower", extent=grid.bounds, cmap="gray", vmin=-1.0, vmax=1.0)
+    for route in world.routes[:robots]:
+        corners = np.array([*route, route[0]])
+        axis.plot(*corners.T, color="tab:orange", linewidth=3.0, alpha=0.25)
+    for number, (x, y, _) in enumerate(world.waypoints, start=1):
+        axis.plot(x, y, "o", color="tab:red", markersize=9)
+        axis.annotate(str(number), (x, y), color="white", ha="center", va="center", fontsize=7)

@@ -1,0 +1,1 @@
+"""What moves in a world: PyBullet, wheeled and kinematic robots, actors, incidents."""

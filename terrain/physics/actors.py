@@ -1,0 +1,252 @@
+"""Things that move by themselves: people and other robots on routes, doors that close. Only sensors see them.
+
+Their positions are functions of the world's time and of what they were made with; only who gives way looks at the
+robot too. Seeds go into the routes. They are as heavy as walls: a robot in the way of one that does not look is pushed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.arithmetic import norm
+from terrain.physics.incidents import Thing
+from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.robot_models import RobotSpec
+from terrain.physics.world import BulletWorld
+from terrain.recording.recording import RobotShape
+from terrain.worlds.occupancy import OccupancyGrid
+from terrain.worlds.solids import box_triangles, cylinder_triangles, joined
+
+FloatArray = NDArray[np.float64]
+
+AnyWorld = BulletWorld | KinematicWorld
+Triangles = tuple[FloatArray, NDArray[np.int32]]
+
+PERSON_RADIUS: float = 0.25  # m
+PERSON_HEIGHT: float = 1.7  # m
+PERSON_SIZE = (PERSON_RADIUS, PERSON_HEIGHT)
+MAX_ROUTE_DRAWS = 10_000
+COURTESY = 0.3  # m; who gives way stops this far from the robot
+
+
+class Actor(Protocol):
+    """What ``Recorder`` needs to know of a thing that moves.
+
+    Attributes
+    ----------
+    thing : Thing
+    looks : (V, 3) float64, (F, 3) int32
+        Triangles in the actor's own frame [m].
+    """
+
+    thing: Thing
+    looks: Triangles
+
+    def pose(self) -> Pose:
+        """Pose of the actor's frame now."""
+
+
+class VisibleRobot(Protocol):
+    """What somebody who walks sees of a robot."""
+
+    @property
+    def spec(self) -> RobotSpec:
+        """Its model."""
+
+    def pose(self) -> Pose:
+        """Where it is."""
+
+
+class RouteWalker:
+    """Somebody or something that follows a closed route of straight lines at constant speed.
+
+    Parameters
+    ----------
+    world : AnyWorld
+    route : (n, 2) or (n, 3) float
+        Corners [m]; after the last it goes back to the first. With three columns the third is the ground's height.
+    speed : float
+        [m/s]
+    start : float
+        How far along the route [m] it is at time 0.
+    size : (2,) or (3,) float
+        Radius and height of an upright cylinder, or length, width and height of a box [m].
+    thing : Thing
+    looks : triangles, optional
+        In the frame of its middle; those of the cylinder or box where absent.
+    gives_way : bool
+        Wait as long as the robot it has met is just ahead, instead of pushing it.
+    """
+
+    def __init__(
+        self,
+        world: AnyWorld,
+        route: FloatArray,
+        speed: float,
+        start: float = 0.0,
+        size: Sequence[float] = PERSON_SIZE,
+        thing: Thing = Thing.PERSON,
+        looks: Triangles | None = None,
+        gives_way: bool = False,
+    ) -> None:
+        corners = np.asarray(route, dtype=float)
+        if corners.shape[1] == 2:
+            corners = np.column_stack([corners, np.zeros(len(corners))])
+        self._corners = np.vstack([corners, corners[:1]])
+        self._travelled = np.concatenate([[0.0], np.cumsum(norm(np.diff(self._corners, axis=0)))])
+        self._world = world
+        self._speed = speed
+        self._start = start
+        self._lift = 0.5 * size[-1]
+        self._reach = size[0] if len(size) == 2 else 0.5 * math.hypot(size[0], size[1])
+        self._waited = 0.0
+        self._gives_way = gives_way
+        self._robot: VisibleRobot | None = None
+        self.thing = thing
+        if len(size) == 2:
+            radius, height = size
+            self.body = world.add_cylinder(self.pose(), radius, height, moving=True)
+            self.looks = looks or cylinder_triangles(radius, height)
+        else:
+            self.body = world.add_box(self.pose(), size, moving=True)
+            self.looks = looks or box_triangles(size)
+        world.things[self.body] = thing
+        world.before_step(self._move)
+
+    def pose(self) -> Pose:
+        """Pose of its middle now."""
+        length = float(self._travelled[-1])
+        along = (self._start + self._speed * (self._world.time - self._waited)) % length if length > 0.0 else 0.0
+        x, y, z = (float(np.interp(along, self._travelled, self._corners[:, k])) for k in range(3))
+        leg = min(int(np.searchsorted(self._travelled, along, side="right")), len(self._corners) - 1)
+        ahead = self._corners[leg] - self._corners[leg - 1]
+        return Pose.planar(x, y, math.atan2(ahead[1], ahead[0]), z + self._lift)
+
+    def meet(self, robot: VisibleRobot) -> None:
+        """Know from now on which robot to give way to."""
+        self._robot = robot if self._gives_way else None
+
+    def _move(self) -> None:
+        if self._robot is not None and self._is_ahead(self._robot):
+            self._waited += self._world.time_step
+        self._world.place_body(self.body, self.pose())
+
+    def _is_ahead(self, robot: VisibleRobot) -> bool:
+        """Whether the robot is near, and on the side this one walks to."""
+        here, there = self.pose(), robot.pose()
+        dx, dy = there.x - here.x, there.y - here.y
+        near = math.hypot(dx, dy) < self._reach + robot.spec.circumscribed_radius + COURTESY
+        return near and dx * math.cos(here.yaw) + dy * math.sin(here.yaw) > 0.0
+
+
+class SlidingDoor:
+    """A leaf that slides from its open into its closed place at a given time.
+
+    Parameters
+    ----------
+    opened, closed : Pose
+        Middle of the leaf in both places.
+    size : (3,) float
+        Of the leaf [m].
+    closes_at, duration : float
+        When it starts to close and how long that takes [s].
+    """
+
+    def __init__(
+        self,
+        world: AnyWorld,
+        opened: Pose,
+        closed: Pose,
+        size: Sequence[float],
+        closes_at: float,
+        duration: float = 2.0,
+    ) -> None:
+        self._world = world
+        self._opened, self._closed = np.array(opened.position), np.array(closed.position)
+        self._orientation = closed.orientation
+        self._closes_at = closes_at
+        self._duration = duration
+        self.thing, self.looks = Thing.DOOR, box_triangles(size)
+        self.body = world.add_box(opened, size, moving=True)
+        world.things[self.body] = self.thing
+        world.before_step(self._move)
+
+    def pose(self) -> Pose:
+        """Pose of the leaf's middle now."""
+        share = min(1.0, max(0.0, (self._world.time - self._closes_at) / self._duration))
+        x, y, z = (self._opened + share * (self._closed - self._opened)).tolist()
+        return Pose((x, y, z), self._orientation)
+
+    def _move(self) -> None:
+        self._world.place_body(self.body, self.pose())
+
+
+def other_robot(
+    world: AnyWorld, spec: RobotSpec, route: FloatArray, speed: float, start: float = 0.0, gives_way: bool = False
+) -> RouteWalker:
+    """Put in another robot that follows a route: a box as large as the model, with its body and wheels to look at."""
+    length, width = np.ptp(spec.footprint_array(), axis=0).tolist()
+    size = (length, width, spec.height)
+    return RouteWalker(world, route, speed, start, size, Thing.ROBOT, _robot_looks(spec, size), gives_way)
+
+
+def _robot_looks(spec: RobotSpec, size: tuple[float, float, float]) -> Triangles:
+    """A narrower body above the axles, and the wheels, in the frame of the middle of the box of ``size``."""
+    length, width, height = size
+    radius = spec.wheel_radius
+    body, body_faces = box_triangles((length, 0.7 * width, height - radius))
+    drum, drum_faces = cylinder_triangles(radius, 0.64 * radius)
+    drum = drum[:, [0, 2, 1]] * (1.0, -1.0, 1.0)  # a quarter turn about x lays its axis along y
+    middle = 0.5 * (spec.footprint_array().min(axis=0) + spec.footprint_array().max(axis=0))  # base_link may be off it
+    wheels = RobotShape.of(spec).wheels - np.array([*middle, 0.5 * height])
+    raised = body + np.array([0.0, 0.0, 0.5 * radius])
+    return joined([(raised, body_faces), *((drum + wheel, drum_faces) for wheel in wheels)])
+
+
+def random_route(
+    grid: OccupancyGrid, rng: np.random.Generator, corners: int = 4, clearance: float = 0.4, longest_leg: float = 12.0
+) -> FloatArray:
+    """Draw a closed route (corners, 2) [m] through free cells, each leg straight and clear of walls.
+
+    Parameters
+    ----------
+    clearance : float
+        Distance kept to walls [m].
+    longest_leg : float
+        [m]; short legs are found sooner.
+
+    Raises
+    ------
+    ValueError
+        No such route was found: the map is too narrow for the clearance.
+    """
+    open_cells = grid.free & (ndimage.distance_transform_edt(~grid.occupied) * grid.resolution > clearance)
+    cells = np.argwhere(open_cells)
+    route: list[NDArray[np.intp]] = []
+    for _ in range(MAX_ROUTE_DRAWS if len(cells) else 0):
+        cell = cells[rng.integers(len(cells))]
+        ends = [*route[-1:], cell]
+        if len(route) == corners - 1:
+            ends.append(route[0])
+        if all(_leg_is_open(open_cells, a, b, longest_leg / grid.resolution) for a, b in pairwise(ends)):
+            route.append(cell)
+        if len(route) == corners:
+            centres = (np.array(route, dtype=float)[:, ::-1] + 0.5) * grid.resolution
+            return np.asarray(centres + np.array([grid.origin_x, grid.origin_y]))
+    raise ValueError(f"found no route of {corners} corners with {clearance} m to the walls")
+
+
+def _leg_is_open(open_cells: NDArray[np.bool_], a: NDArray[np.intp], b: NDArray[np.intp], longest: float) -> bool:
+    length = float(norm(b - a))
+    if length > longest:
+        return False
+    points = np.rint(a + np.linspace(0.0, 1.0, 2 * math.ceil(length) + 2)[:, None] * (b - a)).astype(np.intp)
+    return bool(open_cells[points[:, 0], points[:, 1]].all())

@@ -1,0 +1,178 @@
+"""Ground, walls, obstacles and actors without physics: what ``terrain.physics.kinematic_robot`` drives in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from mbf_abstract.geometry import Pose
+from terrain.physics.contact_depth import depth_in_cells, placed
+from terrain.physics.incidents import Thing
+from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.occupancy import OccupancyGrid, wall_triangles
+from terrain.worlds.solids import joined
+from terrain.worlds.upright_solids import UprightSolid
+
+FloatArray = NDArray[np.float64]
+
+TIME_STEP = 1.0 / 60.0
+NOTHING: frozenset[Thing] = frozenset()
+FLOOR = 1000.0  # m; half the size of the floor that sensors see in a world without a map
+
+
+class MovingRobot(Protocol):
+    """What the world asks of a robot."""
+
+    def advance(self, seconds: float) -> None:
+        """Move on by one small time step."""
+
+
+class KinematicWorld:
+    """Ground and walls without physics; has the clock and the interface that ``Simulation`` steps.
+
+    Parameters
+    ----------
+    terrain : Heightfield, optional
+        Ground; level at z = 0 without it.
+    building : OccupancyGrid, optional
+        Its occupied cells are walls.
+    """
+
+    time_step = TIME_STEP
+
+    def __init__(self, terrain: Heightfield | None = None, building: OccupancyGrid | None = None) -> None:
+        self.terrain = terrain
+        self.building = building
+        self.robots: list[MovingRobot] = []
+        self.solids: list[UprightSolid] = []
+        self.things: dict[int, Thing] = {}
+        self.step_count = 0
+        self._before_step: list[Callable[[], None]] = []
+        self._clearance: FloatArray | None = None
+        if building is not None:
+            distance = ndimage.distance_transform_edt(~building.occupied)
+            self._clearance = np.asarray(distance, dtype=float) * building.resolution
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.step_count * TIME_STEP
+
+    def step(self) -> None:
+        """Advance by one time step."""
+        for callback in self._before_step:
+            callback()
+        self.step_count += 1
+        for robot in self.robots:
+            robot.advance(TIME_STEP)
+
+    def before_step(self, callback: Callable[[], None]) -> None:
+        """Call ``callback`` before each step: moving actors, faults."""
+        self._before_step.append(callback)
+
+    def close(self) -> None:
+        """Do nothing; there is nothing to free."""
+
+    def __enter__(self) -> KinematicWorld:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def add_box(self, pose: Pose, size: Sequence[float], moving: bool = False) -> int:
+        """Stand a box of ``size`` (3,) [m] with its middle at ``pose``; ``moving`` if it will be put elsewhere."""
+        self.solids.append(UprightSolid(pose, size, moving))
+        return len(self.solids) - 1
+
+    def add_cylinder(self, pose: Pose, radius: float, height: float, moving: bool = False) -> int:
+        """Stand a cylinder; as ``add_box``."""
+        return self.add_box(pose, (radius, height), moving)
+
+    def place_body(self, body: int, pose: Pose) -> None:
+        """Put a box or cylinder at ``pose`` at once."""
+        self.solids[body].pose = pose
+
+    @property
+    def has_moving_bodies(self) -> bool:
+        """Whether anything may move besides the robots."""
+        return any(solid.moving for solid in self.solids)
+
+    def contains(self, x: float, y: float, margin: float = 0.0) -> bool:
+        """Whether there is ground at (x, y) [m], and at all places within ``margin`` [m] along x and y."""
+        terrain = self.terrain
+        return terrain is None or (
+            terrain.x0 <= x - margin
+            and x + margin <= terrain.x_max
+            and terrain.y0 <= y - margin
+            and y + margin <= terrain.y_max
+        )
+
+    def contact(
+        self, outline: FloatArray, x: float, y: float, yaw: float, reach: float, gap: float = 0.0
+    ) -> tuple[float, frozenset[Thing]]:
+        """How deep [m] a robot lies in walls, obstacles and actors, and which of them it touches.
+
+        Parameters
+        ----------
+        outline : (n, 2) float
+            Convex, counter-clockwise, in base_link [m].
+        x, y, yaw : float
+            Where base_link is.
+        reach : float
+            Distance [m] from there to the farthest corner.
+        gap : float
+            What is nearer than this [m] counts as touched, less than a cell of the building.
+
+        Returns
+        -------
+        depth : float
+            Below 0 where it touches nothing.
+        touched : frozenset of Thing
+        """
+        if not self.solids and self.building is None:
+            return -math.inf, NOTHING
+        near = [(body, solid) for body, solid in enumerate(self.solids) if solid.distance(x, y) < reach + gap]
+        grid = self.building
+        if grid is not None and self._wall_clearance(x, y) > reach + 2.0 * grid.resolution:
+            grid = None
+        if grid is None and not near:
+            return -math.inf, NOTHING
+        corners = placed(outline, x, y, yaw)
+        depths = [(solid.depth(corners), self.things.get(body, Thing.WALL)) for body, solid in near]
+        if grid is not None:
+            origin = np.array([grid.origin_x, grid.origin_y])
+            depths.append((depth_in_cells(corners, grid.occupied, grid.resolution, origin), Thing.WALL))
+        return max(depth for depth, _ in depths), frozenset(thing for depth, thing in depths if depth > -gap)
+
+    def _wall_clearance(self, x: float, y: float) -> float:
+        """Distance [m] between the cell at (x, y) and the nearest occupied one, from middle to middle."""
+        if self.building is None or self._clearance is None:
+            return math.inf
+        ix = math.floor((x - self.building.origin_x) / self.building.resolution)
+        iy = math.floor((y - self.building.origin_y) / self.building.resolution)
+        ny, nx = self._clearance.shape
+        return float(self._clearance[iy, ix]) if 0 <= ix < nx and 0 <= iy < ny else math.inf
+
+    def pose_at(self, x: float, y: float, yaw: float) -> Pose:
+        """Pose on the ground; on a heightfield tilted with it. Raises ValueError off the terrain."""
+        return Pose.planar(x, y, yaw) if self.terrain is None else self.terrain.pose_at(x, y, yaw)
+
+    def static_triangles(self) -> tuple[FloatArray, NDArray[np.int32]]:
+        """All that sensors can see as one mesh: vertices (n, 3) float64 [m], faces (m, 3) int32."""
+        return joined([self._ground_triangles(), *(solid.triangles() for solid in self.solids if not solid.moving)])
+
+    def _ground_triangles(self) -> tuple[FloatArray, NDArray[np.int32]]:
+        """The ground with the walls of the building."""
+        if self.terrain is not None:
+            return self.terrain.triangles()
+        floor = FLOOR * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)
+        floor_faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+        if self.building is None:
+            return floor, floor_faces
+        vertices, faces = wall_triangles(self.building)
+        return np.concatenate([floor, vertices]), np.concatenate([floor_faces, faces + np.int32(4)])

@@ -1,0 +1,131 @@
+"""One simulated world with its robot and sensors, moved on in lockstep by whoever owns the clock.
+
+``advance_to`` is a pure function of what the simulation was made of, its seeds and the commands sent: no thread, no
+clock, no global state. In a run, a thread of ``SimClock`` calls it at a steady period; in a test, call it directly.
+
+Example
+-------
+>>> simulation = Simulation(world, robot, {"scan": lidar})
+>>> robot.send_command(Twist.planar(0.5))
+>>> simulation.advance_to(0.2)
+>>> simulation.latest["scan"].points
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from mbf_abstract.geometry import Command, Pose
+from terrain.physics.incidents import Mishap, MishapMonitor, MotionSample
+from terrain.sensors.lidar import SensedRobot, Sensor
+
+MONITOR_RATE = 20.0  # Hz
+TIME_TOLERANCE = 1e-9  # s; a target this close behind a step is reached by it
+
+Listener = Callable[[str, Any], None]
+
+
+class SteppedWorld(Protocol):
+    """A world that moves in fixed steps: ``BulletWorld`` or ``KinematicWorld``."""
+
+    @property
+    def time_step(self) -> float:
+        """Length of a step [s]."""
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+
+    def step(self) -> None:
+        """Advance by one time step."""
+
+
+class SimulatedRobot(SensedRobot, Protocol):
+    """A robot in such a world: ``WheeledRobot`` or ``KinematicRobot``."""
+
+    def send_command(self, command: Command) -> None:
+        """Hold a command until the next one or the time-out."""
+
+    def motion_sample(self) -> MotionSample:
+        """Collect what ``MishapMonitor`` looks at."""
+
+
+class Simulation:
+    """World, robot and sensors on one time line.
+
+    Parameters
+    ----------
+    world : SteppedWorld
+        With its clock at the instant the run shall start, that is after ``robot.settle()``.
+    robot : SimulatedRobot
+    sensors : mapping of str to Sensor
+        By topic; each measures at its own rate, the first time at once.
+    monitor : MishapMonitor, optional
+        Counts what goes wrong.
+
+    Attributes
+    ----------
+    latest : dict of str to measurement
+        Newest measurement of each sensor that has given one.
+    mishaps : list of Mishap
+        All so far.
+    track : list of Pose
+        Ground truth of the robot at 20 Hz.
+    """
+
+    def __init__(
+        self,
+        world: SteppedWorld,
+        robot: SimulatedRobot,
+        sensors: Mapping[str, Sensor[Any]] | None = None,
+        monitor: MishapMonitor | None = None,
+    ) -> None:
+        self.world = world
+        self.robot = robot
+        self.sensors = dict(sensors or {})
+        self.monitor = monitor or MishapMonitor()
+        self.latest: dict[str, Any] = {}
+        self.mishaps: list[Mishap] = []
+        self.track: list[Pose] = []
+        self._listeners: list[Listener] = []
+        self._monitor_period = self._steps_per(MONITOR_RATE)
+        self._schedule = [(name, sensor, self._steps_per(sensor.rate)) for name, sensor in self.sensors.items()]
+        self._steps = 0
+        self._observe()
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.world.time
+
+    def on_measurement(self, listener: Listener) -> None:
+        """Call ``listener(name, measurement)`` for every measurement from now on, in the order of the sensors."""
+        self._listeners.append(listener)
+
+    def advance_to(self, time: float) -> None:
+        """Step until the world's time is at least ``time`` [s]; does nothing if it is already."""
+        while self.world.time < time - TIME_TOLERANCE:
+            self.world.step()
+            self._steps += 1
+            self._observe()
+
+    def _observe(self) -> None:
+        """Let everything that is due at this step look at the world."""
+        if self._steps % self._monitor_period == 0:
+            sample = self.robot.motion_sample()
+            self.track.append(sample.pose)
+            self.mishaps += self.monitor.update(sample)
+        for name, sensor, period in self._schedule:
+            if self._steps % period == 0:
+                measurement = sensor.measure(self.world.time)
+                if measurement is not None:
+                    self._deliver(name, measurement)
+
+    def _steps_per(self, rate: float) -> int:
+        return max(1, round(1.0 / (rate * self.world.time_step)))
+
+    def _deliver(self, name: str, measurement: Any) -> None:
+        self.latest[name] = measurement
+        for listener in self._listeners:
+            listener(name, measurement)

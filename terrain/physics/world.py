@@ -1,0 +1,283 @@
+"""A PyBullet world without a window: ground, walls and things put in, and fixed steps of 1/240 s.
+
+Use it where contact matters: slopes, bumps, wheels that slip, doors that push. For sweeps on ground that does not
+matter take ``terrain.physics.kinematic_robot`` instead, which is some thirty times faster.
+
+Two ways to put ground in. ``add_heightfield`` is Bullet's own heightfield; the planner's mesh from
+``Heightfield.triangles`` is the same surface to a fraction of a millimetre. ``add_mesh`` is a concave triangle mesh:
+overhangs are possible, rays are faster. Bullet's heightfield has two traps that are guarded here: more than 2**21
+samples are cut off silently, and slanted rays miss it where raw heights are positive, so heights are shifted to <= 0
+(Bullet 3.25, ``btHeightfieldTerrainShape`` skips chunks by the wrong component). Long lidar rays should still be cast
+at the triangles (``terrain.sensors.rays``).
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.arithmetic import rotated
+from terrain.physics.bullet import load_pybullet, quiet_native_output
+from terrain.physics.incidents import Thing
+from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.solids import box_triangles, cylinder_triangles
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+TIME_STEP = 1.0 / 240.0
+GRAVITY = 9.81
+MAX_HEIGHTFIELD_SAMPLES = 2**21  # Bullet's upload buffer: 8 MiB of float32, the rest is cut without an error
+MAX_RAYS_PER_CALL = 16_000  # Bullet answers at most 16,383 rays and drops the next one silently
+RAY_MARGIN = 1.0  # metres above and below the world where vertical rays start and end
+
+# Collision groups. Fixed bodies do not collide with each other: Bullet would test every post against the ground under
+# it in each step. A ray is of Bullet's group 1 and hits the groups in its mask.
+RAY, STATIC, ROBOT, MOVING = 1, 2, 4, 8
+EVERY_GROUP = RAY | STATIC | ROBOT | MOVING
+
+
+@dataclass(frozen=True)
+class RayHits:
+    """What rays hit: ``hit`` (n,) bool, ``points`` (n, 3) float64 [m] (end of the ray if nothing), ``bodies`` (n,)."""
+
+    hit: NDArray[np.bool_]
+    points: FloatArray
+    bodies: IntArray
+
+
+class BulletWorld:
+    """A world of its own: several can live in one process. Use as a context manager or call ``close``.
+
+    Parameters
+    ----------
+    time_step : float
+        Of one step [s]. Climbing and turning change by under 3 % between 1/60 and 1/1000 s; longer is faster.
+
+    Attributes
+    ----------
+    client : int
+        PyBullet's number of this world, the ``physicsClientId`` of every call.
+    step_count : int
+        Steps since the clock was started (see ``restart_clock``); ``time`` is derived from it and thus exact.
+    ground_bodies : set of int
+        Bodies that are there to be driven on; touching any other counts as a collision.
+    things : dict of int to Thing
+        What bodies are that are not simply fixed, to tell collisions apart.
+    """
+
+    def __init__(self, time_step: float = TIME_STEP) -> None:
+        self.time_step = time_step
+        self.bullet = load_pybullet()
+        with quiet_native_output():
+            self.client: int = self.bullet.connect(self.bullet.DIRECT)
+        self.step_count = 0
+        self.ground_bodies: set[int] = set()
+        self.things: dict[int, Thing] = {}
+        self.has_moving_bodies = False
+        self._static: list[tuple[FloatArray, IntArray]] = []
+        self._folder = tempfile.TemporaryDirectory(prefix="mbf_world_")
+        self._before_step: list[Callable[[], None]] = []
+        self._closed = False
+        self.bullet.setGravity(0, 0, -GRAVITY, physicsClientId=self.client)
+        self.bullet.setPhysicsEngineParameter(
+            fixedTimeStep=time_step,
+            numSolverIterations=50,
+            deterministicOverlappingPairs=1,
+            enableConeFriction=0,  # with the cone on, a skid-steered robot turns at a fifth of the commanded rate
+            enableFileCaching=0,  # meshes are cached by file name otherwise, even if the file has changed
+            physicsClientId=self.client,
+        )
+
+    def __enter__(self) -> BulletWorld:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the world; idempotent."""
+        if not self._closed:
+            self._closed = True
+            self.bullet.disconnect(physicsClientId=self.client)
+            self._folder.cleanup()
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s] since the clock was started."""
+        return self.step_count * self.time_step
+
+    def restart_clock(self) -> None:
+        """Let this instant be time 0; called once the robots have settled."""
+        self.step_count = 0
+
+    def before_step(self, callback: Callable[[], None]) -> None:
+        """Call ``callback`` before each step: moving actors, motor watchdogs."""
+        self._before_step.append(callback)
+
+    def step(self) -> None:
+        """Advance by one time step."""
+        for callback in self._before_step:
+            callback()
+        self.bullet.stepSimulation(physicsClientId=self.client)
+        self.step_count += 1
+
+    def add_heightfield(self, terrain: Heightfield, friction: float = 1.0) -> int:
+        """Put a terrain in as Bullet's own heightfield.
+
+        Returns
+        -------
+        body : int
+
+        Raises
+        ------
+        ValueError
+            More than 2**21 samples, which Bullet would cut off silently.
+        """
+        if terrain.heights.size > MAX_HEIGHTFIELD_SAMPLES:
+            raise ValueError(
+                f"a Bullet heightfield holds at most {MAX_HEIGHTFIELD_SAMPLES} samples, this one has {terrain.ny} x "
+                f"{terrain.nx}; crop or resample it, or use add_mesh"
+            )
+        shift = float(terrain.heights.max())
+        raw = terrain.heights - np.float32(shift)
+        shape = self.bullet.createCollisionShape(
+            self.bullet.GEOM_HEIGHTFIELD,
+            meshScale=[terrain.dx, terrain.dy, 1.0],
+            heightfieldData=raw.ravel(),
+            numHeightfieldRows=terrain.nx,  # Bullet's "rows" is the number of samples along x
+            numHeightfieldColumns=terrain.ny,
+            physicsClientId=self.client,
+        )
+        middle = 0.5 * (float(raw.min()) + float(raw.max()))  # Bullet centres z on the middle of the range
+        centre = [terrain.x0 + terrain.size[0] / 2, terrain.y0 + terrain.size[1] / 2, middle + shift]
+        self._static.append(terrain.triangles())
+        return self._add_static_body(shape, centre, friction, ground=True)
+
+    def add_mesh(self, vertices: ArrayLike, faces: ArrayLike, friction: float = 1.0, ground: bool = True) -> int:
+        """Put a fixed, maybe concave triangle mesh in and return its body.
+
+        Parameters
+        ----------
+        vertices : (n, 3) float
+            Corners [m].
+        faces : (m, 3) int
+            Counter-clockwise seen from outside.
+        ground : bool
+            False for walls: touching them is a collision.
+        """
+        vertices = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+        faces = np.array(faces, dtype=np.int32).reshape(-1, 3)
+        file = Path(self._folder.name) / f"mesh_{len(self._static)}.obj"
+        np.savetxt(file, vertices, fmt="v %.9g %.9g %.9g")
+        with file.open("a", encoding="ascii") as out:
+            np.savetxt(out, faces + 1, fmt="f %d %d %d")
+        with quiet_native_output():
+            shape = self.bullet.createCollisionShape(
+                self.bullet.GEOM_MESH,
+                fileName=str(file),
+                flags=self.bullet.GEOM_FORCE_CONCAVE_TRIMESH,
+                physicsClientId=self.client,
+            )
+        self._static.append((vertices, faces))
+        return self._add_static_body(shape, [0.0, 0.0, 0.0], friction, ground)
+
+    def add_ground_plane(self, x_min: float, x_max: float, y_min: float, y_max: float, friction: float = 1.0) -> int:
+        """Put a level floor in at z = 0; it is endless for wheels and as large as given [m] for lidar rays."""
+        corners = np.array([[x_min, y_min, 0], [x_max, y_min, 0], [x_max, y_max, 0], [x_min, y_max, 0]], dtype=float)
+        self._static.append((corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)))
+        shape = self.bullet.createCollisionShape(
+            self.bullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=self.client
+        )
+        return self._add_static_body(shape, [0.0, 0.0, 0.0], friction, ground=True)
+
+    def add_box(self, pose: Pose, size: Sequence[float], mass: float = 0.0, moving: bool = False) -> int:
+        """Put a box of ``size`` (3,) [m] in, centred at ``pose``.
+
+        Parameters
+        ----------
+        mass : float
+            0 fixes the box; above [kg], wheels can push it.
+        moving : bool
+            True for a fixed-mass box that an actor sets to new poses: ``MovingRays`` see it, ``StaticRays`` do not.
+        """
+        half = [0.5 * length for length in size]
+        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
+        return self._add_solid(shape, pose, mass, moving, *box_triangles(size))
+
+    def add_cylinder(self, pose: Pose, radius: float, height: float, mass: float = 0.0, moving: bool = False) -> int:
+        """Put an upright cylinder in, centred at ``pose``; parameters as for ``add_box``."""
+        shape = self.bullet.createCollisionShape(
+            self.bullet.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self.client
+        )
+        return self._add_solid(shape, pose, mass, moving, *cylinder_triangles(radius, height))
+
+    def _add_solid(
+        self, shape: int, pose: Pose, mass: float, moving: bool, vertices: FloatArray, faces: IntArray
+    ) -> int:
+        group = MOVING if moving or mass > 0.0 else STATIC
+        self.has_moving_bodies |= group == MOVING
+        if group == STATIC:
+            self._static.append((rotated(pose.rotation, vertices) + pose.position, faces))
+        body: int = self.bullet.createMultiBody(
+            mass, shape, basePosition=pose.position, baseOrientation=pose.orientation, physicsClientId=self.client
+        )
+        self.set_group(body, group)
+        self.bullet.changeDynamics(body, -1, lateralFriction=1.0, physicsClientId=self.client)
+        return body
+
+    def _add_static_body(self, shape: int, position: Sequence[float], friction: float, ground: bool) -> int:
+        body: int = self.bullet.createMultiBody(0, shape, basePosition=position, physicsClientId=self.client)
+        # Bullet multiplies the frictions of the two bodies, and its own default is 0.5
+        self.bullet.changeDynamics(body, -1, lateralFriction=friction, physicsClientId=self.client)
+        self.set_group(body, STATIC)
+        if ground:
+            self.ground_bodies.add(body)
+        return body
+
+    def place_body(self, body: int, pose: Pose) -> None:
+        """Put a body at ``pose`` at once."""
+        self.bullet.resetBasePositionAndOrientation(body, pose.position, pose.orientation, physicsClientId=self.client)
+
+    def set_group(self, body: int, group: int) -> None:
+        """Put all links of a body into a collision group; it collides with every group, fixed with fixed excepted."""
+        collides_with = EVERY_GROUP & ~STATIC if group == STATIC else EVERY_GROUP
+        for link in range(-1, self.bullet.getNumJoints(body, physicsClientId=self.client)):
+            self.bullet.setCollisionFilterGroupMask(body, link, group, collides_with, physicsClientId=self.client)
+
+    def static_triangles(self) -> tuple[FloatArray, IntArray]:
+        """All that is fixed as one mesh: vertices (n, 3) float64 [m], faces (m, 3) int32."""
+        if not self._static:
+            return np.zeros((0, 3)), np.zeros((0, 3), np.int32)
+        starts = np.cumsum([0] + [len(vertices) for vertices, _ in self._static[:-1]]).astype(np.int32)
+        faces = [part + start for (_, part), start in zip(self._static, starts, strict=True)]
+        return np.concatenate([vertices for vertices, _ in self._static]), np.concatenate(faces)
+
+    def cast_rays(self, starts: ArrayLike, ends: ArrayLike, groups: int = STATIC | MOVING) -> RayHits:
+        """Cast rays from ``starts`` to ``ends``, each (n, 3) [m], at the bodies of ``groups``."""
+        starts, ends = np.asarray(starts, dtype=float).reshape(-1, 3), np.asarray(ends, dtype=float).reshape(-1, 3)
+        results: list[tuple[int, int, float, tuple[float, float, float], tuple[float, float, float]]] = []
+        for first in range(0, len(starts), MAX_RAYS_PER_CALL):
+            part = slice(first, first + MAX_RAYS_PER_CALL)
+            results += self.bullet.rayTestBatch(
+                starts[part], ends[part], numThreads=1, collisionFilterMask=groups, physicsClientId=self.client
+            )
+        bodies = np.array([result[0] for result in results], dtype=np.int32)
+        fractions = np.array([result[2] for result in results], dtype=np.float64).reshape(-1, 1)
+        return RayHits(bodies >= 0, starts + fractions * (ends - starts), bodies)
+
+    def vertical_rays(self, xy: ArrayLike) -> FloatArray:
+        """Height [m] of the highest fixed thing at each position ``xy`` (n, 2); nan where there is none."""
+        xy = np.asarray(xy, dtype=float).reshape(-1, 2)
+        vertices, _ = self.static_triangles()
+        top = float(vertices[:, 2].max(initial=0.0)) + RAY_MARGIN
+        bottom = float(vertices[:, 2].min(initial=0.0)) - RAY_MARGIN
+        starts = np.column_stack([xy, np.full(len(xy), top)])
+        hits = self.cast_rays(starts, np.column_stack([xy, np.full(len(xy), bottom)]), STATIC)
+        return np.where(hits.hit, hits.points[:, 2], np.nan)

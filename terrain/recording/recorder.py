@@ -1,0 +1,155 @@
+"""Collects a run while it happens and turns it into a ``Recording``.
+
+Use one per run, on one thread: the runner's, which steps the simulator. Give it samples at a steady rate of 10 to
+20 Hz; more makes files larger and pictures no better.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbf_abstract.event_values import well_formed
+from mbf_abstract.events import Event
+from mbf_abstract.geometry import Command, Pose, Twist
+from mbf_abstract.maps.view import GridView, MapView, MeshView
+from terrain.physics.actors import Actor
+from terrain.recording.actor_track import ActorTrack
+from terrain.recording.recorded_grid import RecordedGrid
+from terrain.recording.recorded_mesh import RecordedMesh, add_if_changed
+from terrain.recording.recording import Recording, RobotShape, StampedPoints, Surface
+from terrain.recording.verdict import UNFINISHED, Verdict
+
+MAP_PERIOD = 5.0  # s at least between two looks at the map
+MAX_GRID_CELLS = 4_000_000  # larger maps are not recorded
+MAX_MESH_VERTICES = 1_000_000  # nor are these
+MAX_MAP_COSTS = 200_000_000  # of all maps of a run together, a byte or two each; later ones are not recorded
+
+
+@dataclass(frozen=True)
+class Taken:
+    """How much of each kind has been taken from a recorder."""
+
+    samples: int = 0
+    paths: int = 0
+    scans: int = 0
+    grids: int = 0
+    meshes: int = 0
+
+
+@dataclass(eq=False)
+class Recorder:
+    """Collects a run while it happens; everything given is copied.
+
+    Parameters
+    ----------
+    scenario, backend : str
+        Names, for titles.
+    start : Pose
+    goals : sequence of Pose
+        More may be added to ``goals`` during the run.
+    actors : sequence of Actor
+        What moves by itself; looked at with every sample.
+    map_budget : int
+        How many costs of maps may still be recorded.
+    """
+
+    scenario: str
+    backend: str
+    robot: RobotShape
+    start: Pose
+    goals: list[Pose]
+    ground: Surface | None = None
+    walls: Surface | None = None
+    obstacles: Surface | None = None
+    paths: list[StampedPoints] = field(default_factory=list)
+    scans: list[StampedPoints] = field(default_factory=list)
+    grids: list[RecordedGrid] = field(default_factory=list)
+    meshes: list[RecordedMesh] = field(default_factory=list)
+    actors: Sequence[Actor] = ()
+    map_budget: int = MAX_MAP_COSTS
+    _actor_poses: list[list[list[float]]] = field(default_factory=list)
+    _next_map: float = -math.inf
+    _samples: list[list[float]] = field(default_factory=list)
+    _taken: Taken = field(default_factory=Taken)
+
+    def sample(self, time: float, pose: Pose, velocity: Twist, command: Command) -> None:
+        """Add one sample; call at a steady rate (10 to 20 Hz). Commands of a car are its speed and zero turning."""
+        asked = [command.vx, command.vy, command.wz] if isinstance(command, Twist) else [command.speed, 0.0, 0.0]
+        row = [time, *pose.position, *pose.orientation, velocity.vx, velocity.vy, velocity.wz, *asked]
+        self._samples.append(row)
+        self._actor_poses.append([[*p.position, *p.orientation] for p in (actor.pose() for actor in self.actors)])
+
+    def path(self, time: float, points: ArrayLike) -> None:
+        """Add a plan (m, 3) [m] that the robot follows from now on."""
+        self.paths.append((time, np.array(points, dtype=np.float64).reshape(-1, 3)))
+
+    def scan(self, time: float, points: ArrayLike) -> None:
+        """Add the points (k, 3) [m] of a range sensor, in the map."""
+        self.scans.append((time, np.array(points, dtype=np.float64).reshape(-1, 3)))
+
+    def map(self, time: float, look: Callable[[], MapView | None]) -> None:
+        """Add what the map looks like now, unless it is too large or was looked at some seconds ago."""
+        if time < self._next_map or self.map_budget <= 0:
+            return
+        self._next_map = time + MAP_PERIOD
+        view = look()
+        self.map_budget -= 0 if view is None else view.costs.size
+        if isinstance(view, GridView) and view.costs.size <= MAX_GRID_CELLS:
+            self.grids.append(RecordedGrid.of(time, view))
+        elif isinstance(view, MeshView) and view.costs.size <= MAX_MESH_VERTICES:
+            add_if_changed(self.meshes, time, view)
+
+    def finish(self, verdict: Verdict = UNFINISHED, events: Sequence[Event] = (), began: float = 0.0) -> Recording:
+        """Return what was recorded; ``began`` [s] is the events' time at which the samples' time was 0."""
+        return self._recording(Taken(), verdict, events, began)
+
+    def take(self, events: Sequence[Event] = (), began: float = 0.0) -> Recording:
+        """Return what has come since this was called last, with these events; surfaces the first time only."""
+        before = self._taken
+        self._taken = Taken(
+            len(self._samples), len(self.paths), len(self.scans), len(self.grids), len(self.meshes)
+        )  # fmt: skip
+        return self._recording(before, UNFINISHED, events, began)
+
+    def _recording(self, before: Taken, verdict: Verdict, events: Sequence[Event], began: float) -> Recording:
+        """Return all but what has been taken before."""
+        rows = np.array(self._samples[before.samples :], dtype=np.float64).reshape(-1, 14)
+        meshes = self.meshes[before.meshes :]
+        if before.meshes:  # the surface has been taken
+            meshes = [replace(mesh, vertices=np.zeros((0, 3)), faces=np.zeros((0, 3), np.int32)) for mesh in meshes]
+        surfaces = (self.ground, self.walls, self.obstacles) if before == Taken() else (None, None, None)
+        return Recording(
+            scenario=well_formed(self.scenario),
+            backend=well_formed(self.backend),
+            robot=self.robot,
+            ground=surfaces[0],
+            walls=surfaces[1],
+            obstacles=surfaces[2],
+            start=self.start,
+            goals=tuple(self.goals),
+            times=rows[:, 0].copy(),
+            poses=rows[:, 1:8].copy(),
+            twists=rows[:, 8:11].copy(),
+            commands=rows[:, 11:14].copy(),
+            paths=self.paths[before.paths :],
+            scans=self.scans[before.scans :],
+            events=tuple(replace(event, time=max(0.0, round(event.time - began, 9))) for event in events),
+            verdict=verdict,
+            grids=self.grids[before.grids :],
+            meshes=meshes,
+            actors=self._actor_tracks(before.samples),
+        )
+
+    def actor_tracks(self) -> list[ActorTrack]:
+        """Return what moves by itself, and where it was at each sample so far."""
+        return self._actor_tracks(0)
+
+    def _actor_tracks(self, first: int) -> list[ActorTrack]:
+        rows = self._actor_poses[first:]
+        poses = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.actors), 7)
+        return [ActorTrack(a.thing.value, *a.looks, poses[:, number]) for number, a in enumerate(self.actors)]

@@ -1,0 +1,252 @@
+"""What a run left behind, as arrays: the one source of the picture, the metrics, the replay and the report.
+
+A runner fills a ``terrain.recording.recorder.Recorder`` while the robot drives and ends with ``finish``. A ``Recording`` knows
+no simulator and no viewer and can be saved and read again (``recording.npz``), so a picture can be made on another day
+or machine.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.config.bounded_files import read_arrays
+from mbf_abstract.events import Event
+from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.arithmetic import arccos
+from terrain.physics.robot_models import Drive, RobotSpec
+from terrain.recording.actor_track import ActorTrack, track_arrays, tracks_from
+from terrain.recording.recorded_grid import RecordedGrid, grid_arrays, grids_from
+from terrain.recording.recorded_mesh import RecordedMesh, mesh_arrays, meshes_from
+from terrain.recording.verdict import Verdict
+from terrain.recording.whole_files import replacing
+
+FloatArray = NDArray[np.float64]
+StampedPoints = tuple[float, FloatArray]
+
+MAX_BYTES = 4 * 2**30
+"""How large a recording's arrays may be in memory unless a caller allows more."""
+
+
+class RecordingError(Exception):
+    """A recording file cannot be read; the text names the file and the reason."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A triangle mesh to look at.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float64
+        [m]
+    faces : (F, 3) int32
+    colours : (V, 3) uint8, optional
+        sRGB colour of each vertex; the viewer chooses its own where None.
+    """
+
+    vertices: FloatArray
+    faces: NDArray[np.int32]
+    colours: NDArray[np.uint8] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RobotShape:
+    """What a robot looks like, roughly: a body and wheels in base_link.
+
+    Attributes
+    ----------
+    name : str
+    footprint : (n, 2) float64
+        Outline [m], counter-clockwise.
+    height, wheel_radius : float
+        [m]
+    wheels : (k, 3) float64
+        Centres of the wheels [m].
+    """
+
+    name: str
+    footprint: FloatArray
+    height: float
+    wheels: FloatArray
+    wheel_radius: float
+
+    @classmethod
+    def of(cls, spec: RobotSpec) -> RobotShape:
+        """Shape of one of the simulated robots."""
+        return cls(spec.name, spec.footprint_array(), spec.height, _wheel_positions(spec), spec.wheel_radius)
+
+
+def _wheel_positions(spec: RobotSpec) -> FloatArray:
+    """Centres (k, 3) of the wheels in base_link, which lies under the rear axle of a car and amidships else."""
+    axles = {
+        Drive.ACKERMANN: (0.0, spec.wheelbase),
+        Drive.SKID_STEER: (-0.5 * spec.wheelbase, 0.5 * spec.wheelbase),
+        Drive.DIFFERENTIAL: (0.0,),
+    }[spec.drive]
+    return np.array([(x, side * spec.track / 2, spec.wheel_radius) for x in axles for side in (1.0, -1.0)])
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A finished run of n samples.
+
+    Attributes
+    ----------
+    times : (n,) float64
+        Simulated time of each sample [s], increasing.
+    poses : (n, 7) float64
+        True pose of base_link in the map: x y z qx qy qz qw.
+    twists, commands : (n, 3) float64
+        Measured and commanded vx [m/s], vy [m/s], wz [rad/s] in the base frame.
+    paths : list of (time, (m, 3) float64)
+        Every plan the robot followed, from the time it came.
+    scans : list of (time, (k, 3) float64)
+        Points a range sensor hit, in the map.
+    ground, walls, obstacles : Surface or None
+        Obstacles are things that are in no map.
+    goals : tuple of Pose
+        In the order they were given.
+    events : tuple of Event
+    verdict : Verdict
+        How it ended.
+    grids : list of RecordedGrid
+        The map the plans were made on, where it is a grid; seldom enough that the file stays small.
+    meshes : list of RecordedMesh
+        The same where it is a mesh.
+    actors : list of ActorTrack
+        What moved by itself.
+    """
+
+    scenario: str
+    backend: str
+    robot: RobotShape
+    ground: Surface | None
+    walls: Surface | None
+    obstacles: Surface | None
+    start: Pose
+    goals: tuple[Pose, ...]
+    times: FloatArray
+    poses: FloatArray
+    twists: FloatArray
+    commands: FloatArray
+    paths: list[StampedPoints]
+    scans: list[StampedPoints]
+    events: tuple[Event, ...]
+    verdict: Verdict
+    grids: list[RecordedGrid] = field(default_factory=list)
+    meshes: list[RecordedMesh] = field(default_factory=list)
+    actors: list[ActorTrack] = field(default_factory=list)
+
+    @cached_property
+    def tilt(self) -> FloatArray:
+        """(n,) angle [rad] between the robot's z axis and the vertical."""
+        x, y = self.poses[:, 3], self.poses[:, 4]
+        return np.asarray(arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
+
+    @property
+    def duration(self) -> float:
+        """Simulated length of the run [s]."""
+        return float(self.times[-1] - self.times[0]) if len(self.times) else 0.0
+
+    def save(self, file: str | Path, compress: bool = True) -> None:
+        """Write everything into one npz file, which is there whole or not at all."""
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in ("times", "poses", "twists", "commands")}
+        arrays |= {"footprint": self.robot.footprint, "wheels": self.robot.wheels}
+        arrays["start"], arrays["goals"] = _pose_row(self.start), np.array([_pose_row(goal) for goal in self.goals])
+        for name in ("ground", "walls", "obstacles"):
+            arrays |= _surface_arrays(name, getattr(self, name))
+        for name in ("paths", "scans"):
+            arrays |= _stamped_arrays(name, getattr(self, name))
+        arrays |= grid_arrays(self.grids) | mesh_arrays(self.meshes) | track_arrays(self.actors)
+        words: dict[str, Any] = {
+            "scenario": self.scenario,
+            "backend": self.backend,
+            "verdict": asdict(self.verdict),
+            "robot": self.robot.name,
+            "height": self.robot.height,
+            "wheel_radius": self.robot.wheel_radius,
+            "frame_id": self.start.frame_id,
+            "events": [event.to_json() for event in self.events],
+        }
+        arrays["words"] = np.array(json.dumps(words))
+        with replacing(file) as part, part.open("wb") as out:
+            (np.savez_compressed if compress else np.savez)(out, **arrays)
+
+    @classmethod
+    def load(cls, file: str | Path, max_bytes: int = MAX_BYTES) -> Recording:
+        """Read a file written by ``save``, of at most ``max_bytes`` in memory; raises RecordingError."""
+        try:
+            return _recording_from(read_arrays(Path(file), max_bytes))
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise RecordingError(f"{file}: is no readable recording: {type(error).__name__}: {error}") from error
+
+
+def _pose_row(pose: Pose) -> list[float]:
+    return [*pose.position, *pose.orientation]
+
+
+def _pose(row: FloatArray, frame_id: str) -> Pose:
+    x, y, z, qx, qy, qz, qw = row.tolist()
+    return Pose((x, y, z), (qx, qy, qz, qw), frame_id)
+
+
+def _surface_arrays(name: str, surface: Surface | None) -> dict[str, Any]:
+    if surface is None:
+        return {}
+    arrays: dict[str, Any] = {f"{name}_vertices": surface.vertices, f"{name}_faces": surface.faces}
+    return arrays if surface.colours is None else {**arrays, f"{name}_colours": surface.colours}
+
+
+def _surface(name: str, arrays: dict[str, Any]) -> Surface | None:
+    if f"{name}_vertices" not in arrays:
+        return None
+    return Surface(arrays[f"{name}_vertices"], arrays[f"{name}_faces"], arrays.get(f"{name}_colours"))
+
+
+def _stamped_arrays(name: str, items: list[StampedPoints]) -> dict[str, Any]:
+    """A list of point sets as one array of points, the number in each set, and the stamps."""
+    points = np.concatenate([np.zeros((0, 3)), *(points for _, points in items)])
+    stamps = np.array([stamp for stamp, _ in items], dtype=np.float64)
+    return {name: points, f"{name}_counts": np.array([len(p) for _, p in items], np.int64), f"{name}_stamps": stamps}
+
+
+def _stamped(name: str, arrays: dict[str, Any]) -> list[StampedPoints]:
+    ends = np.cumsum(arrays[f"{name}_counts"])[:-1]
+    parts = np.split(arrays[name], ends) if len(arrays[f"{name}_counts"]) else []
+    return [(float(stamp), part) for stamp, part in zip(arrays[f"{name}_stamps"], parts, strict=True)]
+
+
+def _recording_from(arrays: dict[str, Any]) -> Recording:
+    words = json.loads(str(arrays["words"]))
+    ending = words["verdict"]
+    shape = RobotShape(
+        words["robot"], arrays["footprint"], words["height"], arrays["wheels"], words["wheel_radius"]
+    )  # fmt: skip
+    return Recording(
+        scenario=words["scenario"],
+        backend=words["backend"],
+        robot=shape,
+        ground=_surface("ground", arrays),
+        walls=_surface("walls", arrays),
+        obstacles=_surface("obstacles", arrays),
+        start=_pose(arrays["start"], words["frame_id"]),
+        goals=tuple(_pose(row, words["frame_id"]) for row in arrays["goals"]),
+        times=arrays["times"],
+        poses=arrays["poses"],
+        twists=arrays["twists"],
+        commands=arrays["commands"],
+        paths=_stamped("paths", arrays),
+        scans=_stamped("scans", arrays),
+        events=tuple(Event.from_json(line) for line in words["events"]),
+        verdict=Verdict(ending["outcome"], ending["message"], tuple(ending["failures"])),
+        grids=grids_from(arrays),
+        meshes=meshes_from(arrays),
+        actors=tracks_from(arrays),
+    )

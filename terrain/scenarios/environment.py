@@ -1,0 +1,53 @@
+"""Everything that the robot of a scenario meets: the world, what stands in it and what moves in it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from terrain.recording.recording import Surface
+from terrain.scenarios.actors import add_actors
+from terrain.scenarios.obstacles import add_obstacles
+from terrain.scenarios.places import coordinates
+from terrain.scenarios.scenario import Scenario
+from terrain.scenarios.world import ScenarioWorld, build_world
+from terrain.worlds.map_files import MapFiles
+
+WORLD_STREAM, FOREST_STREAM, ACTOR_STREAM, MAP_STREAM = 1, 2, 3, 4  # each part draws from its own generator
+
+
+def set_stage(scenario: Scenario, folder: Path, seed: int) -> tuple[ScenarioWorld, Surface | None]:
+    """Build the world of a scenario, write its map files into ``folder``, then add obstacles and actors.
+
+    Returns
+    -------
+    world : ScenarioWorld
+    obstacles : Surface or None
+        What stands in the world and is on no map, to look at.
+    """
+    keep_clear = coordinates((scenario.start, *scenario.goals))
+    rng, is_kinematic = np.random.default_rng([seed, WORLD_STREAM]), scenario.physics == "kinematic"
+    files = MapFiles(folder, scenario.map, np.random.default_rng([seed, MAP_STREAM]))
+    world = build_world(scenario.world, files, rng, keep_clear, 1.0 / scenario.physics_rate, is_kinematic)
+    try:
+        rng = np.random.default_rng([seed, FOREST_STREAM])
+        posts = [post for forest in scenario.forests for post in forest.posts(rng, keep_clear)]
+        obstacles = add_obstacles(world.physics, [*scenario.obstacles, *posts], world.height_at)
+        add_actors(world, scenario.actors, np.random.default_rng([seed, ACTOR_STREAM]))
+    except BaseException:
+        world.physics.close()
+        raise
+    return world, obstacles
+
+
+def with_noise(scenario: Scenario) -> Scenario:
+    """Return the scenario with the noise of its ``perturb`` block in its sensors and its localisation."""
+    perturb = scenario.perturb
+    sensors = tuple(
+        sensor.model_copy(update={"noise": math.hypot(sensor.noise, perturb.range_noise)})
+        for sensor in scenario.sensors
+    )
+    localization = scenario.localization.widened(perturb.pose_position, perturb.pose_angle)
+    return scenario.model_copy(update={"sensors": sensors, "localization": localization})

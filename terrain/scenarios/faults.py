@@ -1,0 +1,116 @@
+"""What goes wrong with sensors and localisation in a scenario, from one time to another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.arithmetic import rotated, rotated_back
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.parameters import ParameterModel, parameter
+from terrain.physics.actors import AnyWorld
+from terrain.sensors.lidar import Sensor
+from terrain.sensors.proprioception import Localization
+
+LOCALIZATION, ODOMETRY, IMU = "localization", "odometry", "imu"
+"""Names among the sensors of a fault, of those that look at the robot itself."""
+
+
+class TimedFault(ParameterModel):
+    """A fault that holds from ``start`` until just before ``end``."""
+
+    start: float = parameter(..., "When it begins.", unit="s", ge=0.0)
+    end: float = parameter(math.inf, "When it ends; absent = never.", unit="s", gt=0.0, allow_inf=True)
+
+    def holds_at(self, time: float) -> bool:
+        """Whether it holds at ``time`` [s]."""
+        return self.start <= time < self.end
+
+
+class SensorFault(TimedFault):
+    """A sensor says nothing, its last measurement again and again, or something untrue."""
+
+    type: Literal["silent", "stale", "wrong"]
+    sensor: str = parameter(..., "Name of the sensor, or localization, odometry or imu.")
+
+
+class LocalizationJump(TimedFault):
+    """The localisation is off by a fixed amount; scans end up in the wrong place with it."""
+
+    type: Literal["jump"]
+    dx: float = parameter(0.0, "Error along x.", unit="m")
+    dy: float = parameter(0.0, "Error along y.", unit="m")
+    dyaw: float = parameter(0.0, "Error of the heading.", unit="rad")
+
+
+Fault = Annotated[SensorFault | LocalizationJump, Field(discriminator="type")]
+
+
+class FaultSchedule:
+    """Switches the faults of a scenario on and off as the world's time goes on.
+
+    Parameters
+    ----------
+    world : AnyWorld
+    sensors : mapping of str to Sensor
+    localization : Localization
+    faults : sequence of Fault
+    """
+
+    def __init__(
+        self,
+        world: AnyWorld,
+        sensors: Mapping[str, Sensor[Any]],
+        localization: Localization,
+        faults: Sequence[SensorFault | LocalizationJump],
+    ) -> None:
+        self._world = world
+        self._localization = localization
+        self._sensors = {**sensors, LOCALIZATION: localization}
+        self._sensor_faults: list[SensorFault] = []
+        self._jumps: list[LocalizationJump] = []
+        for fault in faults:
+            self.add(fault)
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of what a sensor fault can befall."""
+        return tuple(self._sensors)
+
+    def add(self, fault: SensorFault | LocalizationJump) -> None:
+        """Let one more fault happen; raises ValueError for a sensor that does not exist."""
+        if isinstance(fault, SensorFault) and fault.sensor not in self._sensors:
+            raise ValueError(f"expected one of {', '.join(self._sensors)}, got {fault.sensor!r}")
+        if not (self._sensor_faults or self._jumps):
+            self._world.before_step(self._apply)
+        if isinstance(fault, SensorFault):
+            self._sensor_faults.append(fault)
+        else:
+            self._jumps.append(fault)
+
+    def _apply(self) -> None:
+        now = self._world.time
+        for fault in self._sensor_faults:
+            sensor = self._sensors[fault.sensor]
+            same = [other for other in self._sensor_faults if (other.sensor, other.type) == (fault.sensor, fault.type)]
+            setattr(sensor, fault.type, any(other.holds_at(now) for other in same))
+        holding = [jump for jump in self._jumps if jump.holds_at(now)]
+        dx, dy, dyaw = (sum(getattr(jump, name) for jump in holding) for name in ("dx", "dy", "dyaw"))
+        self._localization.offset = (dx, dy, dyaw)
+
+
+def seen_from(scan: RangeScan, true_pose: Pose, believed_pose: Pose) -> RangeScan:
+    """Return a scan as a robot puts it into the map that believes to be at ``believed_pose``."""
+
+    def believed(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        in_base = rotated_back(true_pose.rotation, points - true_pose.position)
+        return rotated(believed_pose.rotation, in_base) + believed_pose.position
+
+    return replace(scan, origin=believed(scan.origin), ends=believed(scan.ends))

@@ -1,0 +1,100 @@
+"""Features that a scenario puts on generated ground, in the order they are listed."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from mbf_abstract.geometry import FloatArray
+from mbf_abstract.parameters import ParameterModel, parameter
+from terrain.worlds.generate import add_boulders, add_crater, add_ridge, add_road, add_ruts, add_steps
+from terrain.worlds.heightfield import Heightfield
+
+PlanarLine = tuple[tuple[float, float], ...]
+
+
+class Ridge(ParameterModel):
+    """A ridge of Gaussian section along a line."""
+
+    type: Literal["ridge"]
+    points: PlanarLine = parameter(..., "Corners of its crest.", unit="m")
+    height: float = parameter(..., "Of the crest above the ground; below 0 it is a trench.", unit="m")
+    width: float = parameter(..., "From foot to foot.", unit="m", gt=0.0)
+
+    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
+        """Return the terrain with the ridge."""
+        return add_ridge(terrain, np.array(self.points), self.height, self.width)
+
+
+class Crater(ParameterModel):
+    """A bowl with a raised rim."""
+
+    type: Literal["crater"]
+    x: float = parameter(..., "Position of its middle.", unit="m")
+    y: float = parameter(..., "Position of its middle.", unit="m")
+    radius: float = parameter(..., "From the middle to the crest of the rim.", unit="m", gt=0.0)
+    depth: float = parameter(..., "Of the bowl below the ground.", unit="m", gt=0.0)
+    rim: float | None = parameter(None, "Of the crest above the ground; absent = a fifth of the depth.", unit="m")
+
+    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
+        """Return the terrain with the crater."""
+        return add_crater(terrain, self.x, self.y, self.radius, self.depth, self.rim)
+
+
+class Ruts(ParameterModel):
+    """Two wheel ruts along a line."""
+
+    type: Literal["ruts"]
+    points: PlanarLine = parameter(..., "Corners of the line in their middle.", unit="m")
+    track: float = parameter(1.5, "Distance of the ruts.", unit="m", gt=0.0)
+    width: float = parameter(0.4, "Of one rut.", unit="m", gt=0.0)
+    depth: float = parameter(0.15, "Of the ruts.", unit="m", gt=0.0)
+
+    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
+        """Return the terrain with the ruts."""
+        return add_ruts(terrain, np.array(self.points), self.track, self.width, self.depth)
+
+
+class Road(ParameterModel):
+    """A road that is level across; hairpins make a switchback."""
+
+    type: Literal["road"]
+    points: tuple[tuple[float, float, float], ...] = parameter(..., "Corners of its middle with heights.", unit="m")
+    width: float = parameter(3.0, "Of the level part.", unit="m", gt=0.0)
+    shoulder: float = parameter(1.0, "Over which it fades into the ground on each side.", unit="m", gt=0.0)
+
+    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
+        """Return the terrain with the road."""
+        return add_road(terrain, np.array(self.points), self.width, self.shoulder)
+
+
+class Boulders(ParameterModel):
+    """Half-buried round boulders at places drawn from the seed; start and goals stay clear."""
+
+    type: Literal["boulders"]
+    density: float = parameter(5.0, "Boulders on 100 square metres.", ge=0.0, le=200.0)
+    radius_min: float = parameter(0.1, "Smallest radius.", unit="m", gt=0.0)
+    radius_max: float = parameter(0.8, "Largest radius.", unit="m", gt=0.0)
+
+    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
+        """Return the terrain with boulders."""
+        return add_boulders(terrain, rng, self.density, self.radius_min, self.radius_max, keep_clear)
+
+
+class Steps(ParameterModel):
+    """Stairs that rise along +x over the whole width of the world."""
+
+    type: Literal["steps"]
+    x: float = parameter(..., "Where the first step rises.", unit="m")
+    height: float = parameter(0.15, "Of a step.", unit="m", gt=0.0)
+    length: float = parameter(1.0, "Of a step.", unit="m", gt=0.0)
+    count: int = parameter(1, "Number of steps.", ge=1, le=1000)
+
+    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
+        """Return the terrain with the steps."""
+        return add_steps(terrain, self.height, self.length, self.x, self.count)
+
+
+Feature = Annotated[Ridge | Crater | Ruts | Road | Boulders | Steps, Field(discriminator="type")]

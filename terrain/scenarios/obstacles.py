@@ -1,0 +1,70 @@
+"""Things that stand in a scenario's world and are on no map: single ones, and forests of posts drawn from the seed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Literal
+
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.geometry.arithmetic import rotated
+from mbf_abstract.parameters import ParameterModel, parameter
+from terrain.physics.actors import AnyWorld
+from terrain.recording.recording import Surface
+from terrain.worlds.solids import box_triangles, cylinder_triangles, joined
+
+DRAWS_PER_POST = 100
+
+
+class Obstacle(ParameterModel):
+    """Something that stands in the world but on no map."""
+
+    shape: Literal["box", "cylinder"] = parameter("box", "Its form.")
+    x: float = parameter(..., "Position of its middle.", unit="m")
+    y: float = parameter(..., "Position of its middle.", unit="m")
+    yaw: float = parameter(0.0, "Heading.", unit="rad")
+    size: tuple[float, float, float] = parameter((0.5, 0.5, 1.0), "Length, width, height; a cylinder's diameter.")
+
+
+class Forest(ParameterModel):
+    """Posts at places drawn from the seed, each with room around it to drive through."""
+
+    x_range: tuple[float, float] = parameter(..., "Where it begins and ends along x.", unit="m")
+    y_range: tuple[float, float] = parameter(..., "Where it begins and ends along y.", unit="m")
+    count: int = parameter(30, "Number of posts; fewer if there is no room.", ge=0, le=10_000)
+    gap: float = parameter(2.0, "Least distance between the middles of two posts.", unit="m", gt=0.0)
+    diameter: float = parameter(0.3, "Of a post.", unit="m", gt=0.0)
+    height: float = parameter(1.5, "Of a post.", unit="m", gt=0.0)
+
+    def posts(self, rng: np.random.Generator, keep_clear: FloatArray) -> list[Obstacle]:
+        """Draw the posts, none nearer than the gap to the places ``keep_clear`` (n, 2) [m] or to another post."""
+        taken = [tuple(place) for place in keep_clear.tolist()]
+        posts: list[Obstacle] = []
+        for _ in range(DRAWS_PER_POST * self.count):
+            x, y = float(rng.uniform(*self.x_range)), float(rng.uniform(*self.y_range))
+            if len(posts) == self.count:
+                break
+            if all(math.hypot(x - a, y - b) >= self.gap for a, b in taken):
+                taken.append((x, y))
+                posts.append(Obstacle(shape="cylinder", x=x, y=y, size=(self.diameter, self.diameter, self.height)))
+        return posts
+
+
+def add_obstacles(
+    world: AnyWorld, obstacles: Iterable[Obstacle], height_at: Callable[[float, float], float]
+) -> Surface | None:
+    """Stand the obstacles on the ground; return them as one surface to look at."""
+    parts = []
+    for obstacle in obstacles:
+        length, _, height = obstacle.size
+        pose = Pose.planar(obstacle.x, obstacle.y, obstacle.yaw, height_at(obstacle.x, obstacle.y) + 0.5 * height)
+        if obstacle.shape == "box":
+            world.add_box(pose, obstacle.size)
+            corners, triangles = box_triangles(obstacle.size)
+        else:
+            world.add_cylinder(pose, 0.5 * length, height)
+            corners, triangles = cylinder_triangles(0.5 * length, height)
+        parts.append((rotated(pose.rotation, corners) + pose.position, triangles))
+    return Surface(*joined(parts)) if parts else None

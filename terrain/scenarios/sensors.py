@@ -1,0 +1,76 @@
+"""The sensors of a scenario: lidars and cameras that see the world, and those that look at the robot itself."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from typing import Any
+
+import numpy as np
+
+from terrain.physics.kinematic_robot import KinematicRobot
+from terrain.physics.robots import WheeledRobot
+from terrain.physics.world import BulletWorld
+from terrain.scenarios import scenario as model
+from terrain.scenarios.faults import IMU, LOCALIZATION, ODOMETRY
+from terrain.scenarios.noise import LocalizationNoise
+from terrain.scenarios.world import ScenarioWorld
+from terrain.sensors.lidar import Lidar, Sensor, camera_directions, planar_directions, ring_directions
+from terrain.sensors.proprioception import Imu, Localization, WheelOdometry
+from terrain.sensors.rays import MovingRays, RayCaster, StaticRays
+from terrain.worlds.upright_solids import SolidRays
+
+AnyRobot = WheeledRobot | KinematicRobot
+
+
+def make_sensors(
+    sensors: tuple[model.Sensor, ...], robot: AnyRobot, world: ScenarioWorld, seed: int
+) -> dict[str, Lidar]:
+    """Make the lidars of a scenario, by name; each draws its noise from a generator of its own."""
+    physics = world.physics
+    casters: list[RayCaster] = [StaticRays(*physics.static_triangles())]
+    if physics.has_moving_bodies:
+        casters.append(MovingRays(physics) if isinstance(physics, BulletWorld) else SolidRays(physics.solids))
+    return {sensor.name: _lidar(sensor, robot, casters, seed) for sensor in sensors}
+
+
+def make_ego_sensors(scenario: model.Scenario, robot: AnyRobot, seed: int) -> dict[str, Sensor[Any]]:
+    """Make the sensors of a scenario that look at the robot itself, by name."""
+    makers = {ODOMETRY: WheelOdometry, IMU: Imu}
+    return {name: makers[name](robot, _generator(seed, name)) for name in model.ego_sensors(scenario)}
+
+
+def make_localization(noise: LocalizationNoise, robot: AnyRobot, seed: int) -> Localization:
+    """Make the localisation of a robot, which is as noisy as the scenario says."""
+    return Localization(
+        robot,
+        _generator(seed, LOCALIZATION),
+        position_noise=noise.position_noise,
+        yaw_noise=math.radians(noise.yaw_noise),
+        height_noise=noise.height_noise,
+        tilt_noise=math.radians(noise.tilt_noise),
+    )
+
+
+def _generator(seed: int, name: str) -> np.random.Generator:
+    """A generator of a sensor's own, so that sensors do not shift each other's noise."""
+    return np.random.default_rng([seed, zlib.crc32(name.encode())])
+
+
+def _lidar(sensor: model.Sensor, robot: AnyRobot, casters: list[RayCaster], seed: int) -> Lidar:
+    if sensor.type == "depth":
+        directions = camera_directions(sensor.rays, 3 * sensor.rays // 4)
+    else:
+        directions = planar_directions(sensor.rays) if sensor.type == "planar" else ring_directions(rays=sensor.rays)
+    return Lidar(
+        robot,
+        sensor.name,
+        casters,
+        robot.spec.lidar_position,
+        directions,
+        sensor.rate,
+        _generator(seed, sensor.name),
+        max_range=sensor.max_range,
+        noise=sensor.noise,
+        drop_out=sensor.drop_out,
+    )

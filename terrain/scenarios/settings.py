@@ -1,0 +1,81 @@
+"""Settings that a run or a sweep makes on top of a scenario, such as ``planner=cvp`` or ``world.median_slope=12``.
+
+``planner`` and ``controller`` choose the default plugin by its name in the navigation configuration or by its type;
+``world.`` and a key change the scenario's world; any other key is a dotted path of the configuration, e.g.
+``mesh_map.edge_cost_factor``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from mbf_abstract.config.findings import ConfigError, Finding
+from terrain.scenarios.scenario import Scenario
+
+WORLD = "world."
+PLUGIN_LISTS = {"planner": "planners", "controller": "controllers"}
+
+
+def apply_world_settings(scenario: Scenario, settings: Mapping[str, str]) -> tuple[Scenario, dict[str, str]]:
+    """Return the scenario with the settings of its world made, and the other settings.
+
+    Raises
+    ------
+    ConfigError
+        The world has no such key, or refuses a value; all findings.
+    """
+    of_world = {key: yaml.safe_load(value) for key, value in settings.items() if key.startswith(WORLD)}
+    if not of_world:
+        return scenario, dict(settings)
+    kept = scenario.world.model_dump(exclude_unset=True)
+    changed = kept | {key.removeprefix(WORLD): value for key, value in of_world.items()}
+    try:
+        world = type(scenario.world).model_validate(changed)
+    except ValidationError as error:
+        wrong = [(".".join(map(str, detail["loc"])), detail["msg"]) for detail in error.errors()]
+        raise ConfigError(
+            [Finding("settings", 1, f"{WORLD}{key}", text, repr(changed.get(key))) for key, text in wrong]
+        ) from error
+    rest = {key: value for key, value in settings.items() if key not in of_world}
+    return scenario.model_copy(update={"world": world}), rest
+
+
+def apply_settings(text: str, settings: Mapping[str, str]) -> str:
+    """Return a configuration's YAML text with the settings made.
+
+    Raises
+    ------
+    ConfigError
+        A dotted path leads through something that is no block of keys.
+    """
+    if not settings:
+        return text
+    config: dict[str, Any] = yaml.safe_load(text)
+    for key, value in settings.items():
+        if key in PLUGIN_LISTS:
+            config[PLUGIN_LISTS[key]] = _with_default(config.get(PLUGIN_LISTS[key]) or [], value)
+        else:
+            _set(config, key, yaml.safe_load(value))
+    return yaml.safe_dump(config, sort_keys=False)
+
+
+def _with_default(plugins: list[dict[str, Any]], wanted: str) -> list[dict[str, Any]]:
+    """Put the plugin with this name, or else of this type, first; a new one if there is neither."""
+    named = [plugin for plugin in plugins if plugin["name"] == wanted]
+    typed = [plugin for plugin in plugins if plugin["type"] == wanted]
+    chosen = next(iter(named + typed), {"name": wanted.replace(":", "_").replace(".", "_"), "type": wanted})
+    return [chosen, *(plugin for plugin in plugins if plugin is not chosen)]
+
+
+def _set(config: dict[str, Any], key: str, value: Any) -> None:
+    *blocks, last = key.split(".")
+    block = config
+    for name in blocks:
+        block = block.setdefault(name, {})
+        if not isinstance(block, dict):
+            raise ConfigError([Finding(f"setting {key}", 1, name, "a block of keys", repr(block))])
+    block[last] = value

@@ -1,0 +1,165 @@
+"""From a scenario's world to physics, and to the map files a navigation configuration may ask for.
+
+Every server gets the map it can read from ``terrain.worlds.map_files``, and a configuration never sees the simulator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.geometry import FloatArray, Pose
+from terrain.physics.actors import Actor, AnyWorld, RouteWalker, VisibleRobot
+from terrain.physics.indoor import add_building
+from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.world import TIME_STEP, BulletWorld
+from terrain.recording.recording import Surface
+from terrain.scenarios.places import Place
+from terrain.scenarios.world_types import BuildingWorld, LevelsWorld, TerrainWorld
+from terrain.worlds.geodesics import free_floor
+from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.map_files import MapFiles
+from terrain.worlds.occupancy import OccupancyGrid, wall_triangles
+from terrain.worlds.slope_map import slope_grid
+
+Physics = TypeVar("Physics", BulletWorld, AnyWorld)
+HeightAt = Callable[[float, float], float]
+
+
+@dataclass(frozen=True)
+class ScenarioWorld:
+    """A scenario's world, built.
+
+    Attributes
+    ----------
+    physics : BulletWorld or KinematicWorld
+        What steps it.
+    files : dict of str to Path
+        Placeholder of a navigation configuration -> the file that stands for it.
+    height_at : callable
+        Height of the highest ground [m] at (x, y).
+    grid : OccupancyGrid or None
+        2D map of it, where there is one.
+    places : mapping of str to Pose
+        Places with a name.
+    actors : list of Actor
+        What moves by itself; a scenario adds them.
+    """
+
+    physics: AnyWorld
+    files: dict[str, Path]
+    height_at: HeightAt
+    ground: Surface
+    walls: Surface | None = None
+    grid: OccupancyGrid | None = None
+    places: Mapping[str, Pose] = field(default_factory=dict)
+    actors: list[Actor] = field(default_factory=list)
+
+    def introduce(self, robot: VisibleRobot) -> None:
+        """Let those who walk know the robot, for they may give way to it."""
+        for actor in self.actors:
+            if isinstance(actor, RouteWalker):
+                actor.meet(robot)
+
+    def open_surface(self) -> Surface:
+        """Return what a robot may drive on: the ground, in a building only its free cells."""
+        return self.ground if self.grid is None or self.walls is None else free_floor(self.grid)
+
+    def pose_of(self, place: Place) -> Pose:
+        """Return the pose on the ground that a place means, upright; raises ConfigError for an unknown name."""
+        if isinstance(place, str):
+            if place not in self.places:
+                known = ", ".join(self.places) or "none"
+                raise ConfigError([Finding("scenario", 1, "start or goals", f"a place of the world ({known})", place)])
+            return self.places[place]
+        z = self.height_at(place.x, place.y) if place.z is None else place.z
+        return Pose.planar(place.x, place.y, place.yaw, z)
+
+
+def build_world(
+    world: TerrainWorld | BuildingWorld | LevelsWorld,
+    files: MapFiles,
+    rng: np.random.Generator,
+    keep_clear: FloatArray,
+    time_step: float = TIME_STEP,
+    kinematic: bool = False,
+) -> ScenarioWorld:
+    """Put a world into Bullet, or into its stand-in without physics, and write its map files.
+
+    Parameters
+    ----------
+    files : MapFiles
+        Writes the maps.
+    keep_clear : (n, 2) float
+        Places [m] on which nothing that is drawn may stand.
+    time_step : float
+        Of the physics [s].
+    kinematic : bool
+        Whether robots follow commands exactly; impossible on several levels.
+    """
+
+    def physics(terrain: Heightfield | None = None, building: OccupancyGrid | None = None) -> AnyWorld:
+        return KinematicWorld(terrain, building) if kinematic else BulletWorld(time_step)
+
+    if isinstance(world, TerrainWorld):
+        terrain = world.heightfield(rng, keep_clear)
+        return _built(physics(terrain), partial(_build_terrain, terrain, world.lethal_slope, files))
+    if isinstance(world, BuildingWorld):
+        grid = world.grid()
+        return _built(physics(building=grid), partial(_build_building, world, grid, files))
+    if kinematic:
+        raise ValueError("a robot without physics needs a world with one level")
+    return _built(BulletWorld(time_step), partial(_build_levels, world, files))
+
+
+def _built(physics: Physics, build: Callable[[Physics], ScenarioWorld]) -> ScenarioWorld:
+    """Build into ``physics``, which is closed if that fails."""
+    try:
+        return build(physics)
+    except BaseException:
+        physics.close()
+        raise
+
+
+def _build_terrain(terrain: Heightfield, lethal_slope: float, files: MapFiles, physics: AnyWorld) -> ScenarioWorld:
+    if isinstance(physics, BulletWorld):
+        physics.add_heightfield(terrain)
+    ground, resolution = Surface(*terrain.triangles()), min(terrain.dx, terrain.dy)
+    written = files.of_terrain(terrain, lethal_slope)
+    grid = slope_grid(terrain, resolution, lethal_slope)
+    return ScenarioWorld(physics, written, lambda x, y: float(terrain.height_at(x, y)), ground, None, grid)
+
+
+def _build_building(world: BuildingWorld, grid: OccupancyGrid, files: MapFiles, physics: AnyWorld) -> ScenarioWorld:
+    if isinstance(physics, BulletWorld):
+        add_building(physics, grid)
+    walls = Surface(*wall_triangles(grid)) if grid.occupied.any() else None
+    return ScenarioWorld(
+        physics, files.of_building(grid), lambda x, y: 0.0, _floor_surface(grid), walls, grid, world.places()
+    )
+
+
+def _build_levels(world: LevelsWorld, files: MapFiles, physics: BulletWorld) -> ScenarioWorld:
+    levels = world.levels()
+    physics.add_mesh(levels.ground.vertices, levels.ground.faces)
+    ground, walls = Surface(levels.ground.vertices, levels.ground.faces), None
+    if len(levels.walls.faces):
+        physics.add_mesh(levels.walls.vertices, levels.walls.faces, ground=False)
+        walls = Surface(levels.walls.vertices, levels.walls.faces)
+
+    def height_at(x: float, y: float) -> float:
+        return float(physics.vertical_rays([(x, y)])[0])
+
+    return ScenarioWorld(physics, files.of_levels(ground), height_at, ground, walls, places=levels.places)
+
+
+def _floor_surface(grid: OccupancyGrid) -> Surface:
+    x_min, x_max, y_min, y_max = grid.bounds
+    corners = np.array([[x_min, y_min, 0.0], [x_max, y_min, 0.0], [x_max, y_max, 0.0], [x_min, y_max, 0.0]])
+    return Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32))

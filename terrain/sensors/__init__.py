@@ -1,0 +1,1 @@
+"""Simulated sensors: lidar, proprioception and the rays that they cast."""

@@ -1,0 +1,202 @@
+"""The frame of every simulated sensor, and the lidars.
+
+A sensor measures when it is asked, at a stamp; ``Simulation`` asks at the sensor's rate. All noise comes from the
+sensor's own generator, so that one sensor's faults do not shift another's noise. Three switches make it fail, for
+scenarios: ``silent`` (nothing comes), ``stale`` (the last measurement comes again, with its old stamp) and ``wrong``
+(new measurements that are not true).
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Pose, Twist, Vector3
+from mbf_abstract.geometry.arithmetic import norm, rotated
+from mbf_abstract.maps.sensing import RangeScan
+from terrain.sensors.rays import RayCaster
+
+FloatArray = NDArray[np.float64]
+
+Measurement = TypeVar("Measurement")
+
+WRONG_RANGE_FACTOR = 0.5  # a lidar gone wrong sees everything at half its distance
+
+
+class SensedRobot(Protocol):
+    """What sensors ask of a robot: ground truth, and what its wheels do."""
+
+    def pose(self) -> Pose:
+        """Ground truth of base_link in map."""
+
+    def velocity(self) -> Twist:
+        """Ground truth of the velocity, in base_link."""
+
+    def rolling_velocity(self) -> Twist:
+        """Motion of the base if the wheels did not slip."""
+
+
+class Sensor(ABC, Generic[Measurement]):
+    """Base of all sensors.
+
+    Parameters
+    ----------
+    robot : SensedRobot
+        Carries the sensor.
+    rate : float
+        Measurements per second of simulated time.
+    rng : numpy Generator
+        Draws the noise; belongs to this sensor alone.
+
+    Attributes
+    ----------
+    silent, stale, wrong : bool
+        Fault switches, see the module's text.
+    """
+
+    def __init__(self, robot: SensedRobot, rate: float, rng: np.random.Generator) -> None:
+        self.robot = robot
+        self.rate = rate
+        self.rng = rng
+        self.silent = False
+        self.stale = False
+        self.wrong = False
+        self._last: Measurement | None = None
+
+    def measure(self, stamp: float) -> Measurement | None:
+        """Measure at ``stamp`` [s]; None where the sensor gives nothing."""
+        if self.silent:
+            return None
+        if self.stale:
+            return self._last
+        measurement = self._sense(stamp)
+        self._last = self._falsify(measurement) if self.wrong else measurement
+        return self._last
+
+    @abstractmethod
+    def _sense(self, stamp: float) -> Measurement:
+        """Take an honest measurement, noise included."""
+
+    @abstractmethod
+    def _falsify(self, measurement: Measurement) -> Measurement:
+        """Return what a defective sensor would say instead."""
+
+
+class Lidar(Sensor[RangeScan]):
+    """A scanner with a fixed fan of rays; all rays of a turn are cast at once.
+
+    Its scans are in map. Rays without a hit end at maximum range, which was seen to be free; rays that dropped out or
+    hit something nearer than the minimum are not in the scan at all.
+
+    Parameters
+    ----------
+    source : str
+        Name of this sensor in its scans, as layers of a server's configuration call it.
+    casters : sequence of RayCaster
+        What it can see.
+    position : (3,) float
+        In base_link [m].
+    directions : (n, 3) float64
+        Unit rays in base_link.
+    min_range, max_range : float
+        Nearer hits are dropped, farther ones are no hits [m].
+    noise : float
+        Standard deviation of ranges [m].
+    drop_out : float
+        Share of rays without any answer, 0..1.
+    """
+
+    def __init__(
+        self,
+        robot: SensedRobot,
+        source: str,
+        casters: Sequence[RayCaster],
+        position: Vector3,
+        directions: FloatArray,
+        rate: float,
+        rng: np.random.Generator,
+        min_range: float = 0.1,
+        max_range: float = 20.0,
+        noise: float = 0.01,
+        drop_out: float = 0.0,
+    ) -> None:
+        super().__init__(robot, rate, rng)
+        self.source = source
+        self.casters = list(casters)
+        self.position = np.asarray(position, dtype=float)
+        self.directions = directions
+        self.min_range = min_range
+        self.max_range = max_range
+        self.noise = noise
+        self.drop_out = drop_out
+
+    def _sense(self, stamp: float) -> RangeScan:
+        pose = self.robot.pose()
+        R_map_base = pose.rotation
+        origin = np.array(pose.position) + rotated(R_map_base, self.position)
+        directions = rotated(R_map_base, self.directions)
+        origins = np.broadcast_to(origin, directions.shape)
+        ranges = np.full(len(directions), np.inf)
+        for caster in self.casters:
+            ranges = np.minimum(ranges, caster.distances(origins, directions, self.max_range))
+        # every turn draws the same amount of noise, whatever it sees: seeds stay comparable between scenarios
+        noise = self.noise * self.rng.normal(size=len(ranges))
+        kept = self.rng.uniform(size=len(ranges)) >= self.drop_out
+        hit = np.isfinite(ranges)
+        kept &= ~hit | (ranges >= self.min_range)
+        ranges = np.where(hit, np.clip(ranges + noise, self.min_range, self.max_range), self.max_range)
+        ends = origin + ranges[:, None] * directions
+        return RangeScan(self.source, pose.frame_id, origin, ends[kept], hit[kept], stamp)
+
+    def _falsify(self, measurement: RangeScan) -> RangeScan:
+        ends = measurement.origin + WRONG_RANGE_FACTOR * (measurement.ends - measurement.origin)
+        return replace(measurement, ends=ends, hits=np.ones_like(measurement.hits))
+
+
+def ray_fan(azimuths: FloatArray, elevations: FloatArray) -> FloatArray:
+    """Unit rays (len(elevations) * len(azimuths), 3) of every azimuth at every elevation [rad]."""
+    elevation, azimuth = np.meshgrid(elevations, azimuths, indexing="ij")
+    rays = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+    return np.stack(rays, axis=-1).reshape(-1, 3)
+
+
+def planar_directions(rays: int = 360, field_of_view: float = 2.0 * np.pi) -> FloatArray:
+    """Rays (rays, 3) of a planar lidar, evenly over ``field_of_view`` [rad] about straight ahead."""
+    azimuths = (np.arange(rays) + 0.5) / rays * field_of_view - 0.5 * field_of_view
+    return ray_fan(azimuths, np.zeros(1))
+
+
+def ring_directions(rings: int = 16, rays: int = 360, elevation: float = np.radians(15.0)) -> FloatArray:
+    """Rays (rings * rays, 3) of a turning multi-beam lidar, rings from -``elevation`` to +``elevation`` [rad]."""
+    azimuths = (np.arange(rays) + 0.5) / rays * 2.0 * np.pi - np.pi
+    return ray_fan(azimuths, np.linspace(-elevation, elevation, rings))
+
+
+def camera_directions(width: int = 160, height: int = 120, field_of_view: float = np.radians(70.0)) -> FloatArray:
+    """Rays (height * width, 3) of a depth camera that looks ahead, row by row from the top left pixel.
+
+    A depth camera is a ``Lidar`` with these rays; its ranges are along the rays, not along the optical axis.
+
+    Parameters
+    ----------
+    field_of_view : float
+        Horizontal [rad]; pixels are square.
+    """
+    pixel = 2.0 * math.tan(0.5 * field_of_view) / width
+    left = 0.5 * (width - 1) - np.arange(width)
+    up = 0.5 * (height - 1) - np.arange(height)
+    rays = np.stack(
+        [
+            np.ones((height, width)),
+            np.broadcast_to(pixel * left, (height, width)),
+            np.broadcast_to(pixel * up[:, None], (height, width)),
+        ],
+        axis=-1,
+    ).reshape(-1, 3)
+    return np.asarray(rays / norm(rays)[..., None])

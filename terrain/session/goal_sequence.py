@@ -1,0 +1,130 @@
+"""Which goals a run visits, one after the other: those of the scenario, then those that somebody asks for.
+
+The tour runs on the thread that calls ``visit_goals``. ``go_to``, ``cancel`` and ``end`` come from the simulator's
+thread (``DriveLoop.on_tick``), between two steps, so that a goal which comes from outside comes at a definite time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import MoveBaseResult
+from mbf_abstract.outcomes import MoveBaseOutcome
+from terrain.session.arrival import Arrival
+from terrain.session.bench import Bench
+from terrain.session.executives import GoalDriver
+
+NO_GOALS = MoveBaseResult(MoveBaseOutcome.FAILURE, "the scenario has no goals")
+
+
+@dataclass(frozen=True)
+class AskedGoal:
+    """Where to go, and with which plugins; without a name the first ones loaded."""
+
+    pose: Pose
+    planner: str = ""
+    controller: str = ""
+
+
+class GoalTour:
+    """Visits goals with a driver; the first failure ends the scenario's part.
+
+    Parameters
+    ----------
+    bench : Bench
+        Running.
+    driver : GoalDriver
+    stay : bool
+        Wait for further goals after those of the scenario, until ``end`` is called.
+
+    Attributes
+    ----------
+    on_goal : list of callables
+        Told each goal that somebody has asked for, before it is sent.
+    is_waiting : bool
+        Whether there is no goal to go to at the moment.
+    target : Pose or None
+        The present goal.
+    last_result : MoveBaseResult or None
+        How the last goal has ended.
+    arrivals : list of Arrival
+        Where the robot was in truth when navigation said that a goal was reached, goal by goal.
+    """
+
+    def __init__(self, bench: Bench, driver: GoalDriver, stay: bool = False) -> None:
+        self.on_goal: list[Callable[[Pose], None]] = []
+        self.is_waiting = False
+        self.target: Pose | None = None
+        self.last_result: MoveBaseResult | None = None
+        self._bench = bench
+        self._driver = driver
+        self._stay = stay
+        self.arrivals: list[Arrival] = []
+        self._condition = bench.clock.condition()
+        self._next: AskedGoal | None = None
+        self._ended = False
+        self._deadline = float("inf")
+        bench.loop.on_tick.append(self._watch_time)
+        bench.loop.on_failure.append(lambda: self.end("the simulation has failed"))
+
+    def visit_goals(self) -> MoveBaseResult:
+        """Visit the goals of the scenario, and others if they come; returns the result of the last one."""
+        self._deadline = limit = self._bench.scenario.time_limit
+        result = NO_GOALS
+        for goal in self._bench.goals:
+            result = self._visit(AskedGoal(goal))
+            if not result.success or self._next is not None or self._ended:
+                break
+        while (asked := self._await_goal()) is not None:
+            self._bench.recorder.goals.append(asked.pose)
+            for listener in self.on_goal:
+                listener(asked.pose)
+            self._deadline = self._bench.simulation.time + limit
+            result = self._visit(asked)
+        return result
+
+    # ------------------------------------------------------------------------------ from other threads
+    def go_to(self, goal: AskedGoal) -> None:
+        """Go there instead of to the present goal and what is left of the scenario."""
+        with self._condition:
+            self._next = goal
+            self._condition.notify_all()
+        self.cancel("a new goal was asked for")
+
+    def cancel(self, reason: str) -> None:
+        """Cancel the present goal; the rest of the scenario goes with it."""
+        self._driver.cancel(reason)
+
+    def end(self, reason: str) -> None:
+        """Cancel the present goal and take no more."""
+        with self._condition:
+            self._ended = True
+            self._condition.notify_all()
+        self.cancel(reason)
+
+    # -------------------------------------------------------------------------------------------------
+    def _visit(self, goal: AskedGoal) -> MoveBaseResult:
+        self.target = goal.pose
+        self.last_result = result = self._driver.drive(goal.pose, goal.planner, goal.controller)
+        self.target = None
+        if result.success and self._driver.arrives:
+            self.arrivals.append(Arrival.at(goal.pose, self._bench.loop.true_pose, result))
+        return result
+
+    def _await_goal(self) -> AskedGoal | None:
+        """Wait for the next goal if there may be one; None when the tour is over."""
+        self._deadline = float("inf")
+        with self._condition:
+            self.is_waiting = True
+            while self._stay and self._next is None and not self._ended:
+                self._condition.wait()
+            self.is_waiting = False
+            asked, self._next = self._next, None
+            return None if self._ended else asked
+
+    def _watch_time(self, time: float) -> None:
+        if time >= self._deadline:
+            self._deadline = float("inf")
+            self.cancel(f"the time limit of {self._bench.scenario.time_limit:g} s")

@@ -1,0 +1,1 @@
+"""Many runs of one scenario, in worker processes or on a cluster."""

@@ -1,0 +1,58 @@
+"""Runs of a sweep on a Dask cluster: many machines instead of many processes of one.
+
+Use it where one machine takes too long; needs the extra ``cluster`` here, and this package and the same scenario files
+on every worker. Start workers with one thread each (``dask worker ADDRESS --nthreads 1``): PyBullet allows no second
+thread. A worker that dies costs nothing but time, Dask gives its runs to another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from terrain.sweeps.sweep import Job, run_once
+
+CONNECTION_TIMEOUT = 20.0  # s
+
+
+class ClusterError(Exception):
+    """The cluster cannot be used; the text says what to do."""
+
+
+def run_on_cluster(jobs: Sequence[Job], address: str) -> Iterator[tuple[Job, dict[str, Any]]]:
+    """Do all jobs on the workers of a scheduler and yield each with its metrics as it finishes.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+    address : str
+        Of the scheduler, such as ``tcp://10.0.0.1:8786``.
+
+    Raises
+    ------
+    ClusterError
+        Dask is not installed, nobody answers at the address, or a worker has several threads.
+    distributed.KilledWorker
+        A run took several workers down with it.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError as error:
+        raise ClusterError("a cluster needs Dask: pip install 'mbf-flex[cluster]'") from error
+    try:
+        client = Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ClusterError(f"no scheduler answers at {address}: {error}") from error
+    with client:
+        _refuse_threads(client)
+        running = {client.submit(run_once, *job, pure=False): job for job in jobs}
+        for finished in as_completed(running, loop=client.loop):
+            yield running.pop(finished), finished.result()
+
+
+def _refuse_threads(client: Any) -> None:
+    """A second run in a process would share its simulator; workers that come later are not looked at."""
+    workers = client.scheduler_info(n_workers=-1)["workers"]
+    shared = [name for name, worker in workers.items() if worker["nthreads"] > 1]
+    if shared:
+        raise ClusterError(f"workers must have one thread (--nthreads 1), these have more: {', '.join(shared)}")

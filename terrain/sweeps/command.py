@@ -1,0 +1,90 @@
+"""The command ``mbf sweep``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from mbf_abstract.commands.reporting import readable_errors
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the application ``mbf``."""
+    app.command("sweep")(sweep)
+
+
+def sweep(
+    scenario: str = typer.Argument(..., help="Name of a shipped scenario (see mbf scenarios), or a YAML file."),
+    seeds: str = typer.Option("0:10", "--seeds", help="First and one past the last seed, 0:20, or a list, 1,5,9."),
+    settings: list[str] = typer.Option(
+        [], "--set", help="KEY=VALUE,VALUE: planner, controller, backend, world.KEY, or a path of the configuration."
+    ),
+    workers: int = typer.Option(1, "--workers", min=1, help="Worker processes."),
+    scheduler: str | None = typer.Option(
+        None, "--scheduler", help="Address of a Dask scheduler, whose workers are used instead of own processes."
+    ),
+    out: Path = typer.Option(..., "--out", help="Folder for the results; runs that it holds are not run again."),
+) -> None:
+    """Run a scenario with many seeds and variants and put all results into one table."""
+    with readable_errors():
+        from rich.console import Console
+        from rich.markup import escape
+        from rich.progress import track
+        from rich.table import Table
+
+        from mbf_abstract.event_values import well_formed
+        from terrain.scenarios.scenario import load_scenario
+        from terrain.sweeps.cluster import run_on_cluster
+        from terrain.sweeps.log import SweepLog
+        from terrain.sweeps.report import summarise, write_tables
+        from terrain.sweeps.sweep import hash_of, plan_sweep, run_all
+
+        loaded = load_scenario(scenario)
+        planned = plan_sweep(parse_seeds(seeds), parse_settings(settings))
+        hashed, console = hash_of(loaded), Console()
+        with SweepLog(out / "runs.jsonl") as log:
+            left = [run for run in planned if run.key(hashed) not in log.rows]
+            console.print(f"{len(planned)} runs, {len(planned) - len(left)} of them done before")
+            jobs = [(loaded, run) for run in left]
+            finished = run_all(jobs, workers) if scheduler is None else run_on_cluster(jobs, scheduler)
+            for (_, run), metrics in track(
+                finished, escape(well_formed(loaded.name)), len(left), console=console, disable=not console.is_terminal
+            ):
+                log.append(run.key(hashed), {**metrics, "seed": run.seed, "variant": run.variant})
+                told = well_formed(f"seed {run.seed} {run.variant}: {metrics['verdict']}")
+                console.print(told, markup=False, highlight=False, soft_wrap=True)
+            rows = [log.rows[run.key(hashed)] for run in planned]
+        files = write_tables(f"{loaded.name}: {loaded.proves}", rows, out)
+        summary = summarise(rows)
+        table = Table(*summary[0])
+        for line in summary:
+            table.add_row(*(escape(well_formed(str(value))) for value in line.values()))
+        console.print(table)
+        console.print("results in " + ", ".join(map(str, files)), soft_wrap=True, markup=False)
+
+
+def parse_seeds(text: str) -> list[int]:
+    """Return the seeds of ``0:20`` or ``1,5,9``."""
+    try:
+        if ":" in text:
+            first, end = text.split(":")
+            seeds = list(range(int(first), int(end)))
+        else:
+            seeds = [int(part) for part in text.split(",")]
+    except ValueError:
+        seeds = []
+    if not seeds or min(seeds) < 0 or len(set(seeds)) < len(seeds):
+        raise typer.BadParameter(f"expected 0:20 or 1,5,9, each seed once and none below 0, got {text!r}")
+    return seeds
+
+
+def parse_settings(texts: list[str]) -> dict[str, list[str]]:
+    """Return the values of each key of ``KEY=VALUE,VALUE``."""
+    settings: dict[str, list[str]] = {}
+    for text in texts:
+        key, _, values = text.partition("=")
+        if not key or not all(values.split(",")):
+            raise typer.BadParameter(f"expected KEY=VALUE,VALUE, got {text!r}")
+        settings[key] = values.split(",")
+    return settings

@@ -1,0 +1,112 @@
+"""Many runs of one scenario: every seed with every variant, in worker processes, each run exactly once.
+
+Finished runs stand in ``runs.jsonl`` of the sweep's folder, so a sweep that was killed goes on where it was. Workers
+run on this machine; each run is as deterministic as ``mbf run`` with the same seed and settings.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mbf_abstract.config.yaml_source import load_yaml
+from terrain.scenarios.scenario import Scenario
+from terrain.sweeps.worker_pool import run_in_workers
+
+MAX_NAME = 200  # bytes; a longer text is no file's name
+
+
+@dataclass(frozen=True)
+class SweepRun:
+    """One run of a sweep: a seed and the settings of a variant (``backend`` is one of them)."""
+
+    seed: int
+    settings: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def variant(self) -> str:
+        """The settings as a text, such as ``backend=mesh planner=cvp``."""
+        return " ".join(f"{key}={value}" for key, value in sorted(self.settings.items()))
+
+    def key(self, scenario_hash: str) -> str:
+        """Return what tells this run from all others; a file that a setting names counts with what it says."""
+        files = [_hash_of_file(file).hex()[:16] for file in _named_files(list(self.settings.values()), Path())]
+        return "/".join([scenario_hash, str(self.seed), self.variant, *files])
+
+
+Job = tuple[Scenario, SweepRun]
+
+
+def hash_of(scenario: Scenario) -> str:
+    """Return a short hash of everything a scenario's files say: maps, meshes and images too, and what those name."""
+    digest = hashlib.sha256(scenario.model_dump_json(exclude={"navigation"}).encode())
+    for backend, file in sorted(scenario.navigation.items()):
+        digest.update(backend.encode() + _hash_of_file(file))
+    world_file: Path | None = getattr(scenario.world, "file", None)
+    if world_file is not None:
+        digest.update(_hash_of_file(world_file))
+    return digest.hexdigest()[:16]
+
+
+def _hash_of_file(file: Path, above: tuple[Path, ...] = ()) -> bytes:
+    """Hash a file; a YAML file with the files that its texts name, but for those it is named by itself."""
+    digest = hashlib.sha256(file.read_bytes())
+    if file.suffix in (".yaml", ".yml"):
+        above = (*above, file.resolve())
+        for named in _named_files(load_yaml(file).data, file.parent):
+            if named.resolve() not in above:
+                digest.update(_hash_of_file(named, above))
+    return digest.digest()
+
+
+def _named_files(value: Any, folder: Path) -> Iterator[Path]:
+    if isinstance(value, Mapping):
+        value = list(value.values())
+    if isinstance(value, list):
+        for item in value:
+            yield from _named_files(item, folder)
+    elif isinstance(value, str) and 0 < len(value.encode()) < MAX_NAME and "\0" not in value:
+        if (folder / value).is_file():
+            yield folder / value
+
+
+def plan_sweep(seeds: Sequence[int], settings: Mapping[str, Sequence[str]]) -> list[SweepRun]:
+    """Return every seed with every combination of the settings' values."""
+    variants = [dict(zip(settings, values, strict=True)) for values in itertools.product(*settings.values())]
+    return [SweepRun(seed, variant) for seed in seeds for variant in variants]
+
+
+def run_once(scenario: Scenario, run: SweepRun) -> dict[str, Any]:
+    """Run a scenario and return its metrics; a run that cannot even begin has the outcome of its error."""
+    from terrain.session.runner import RunOptions, run_scenario
+
+    settings = dict(run.settings)
+    backend = settings.pop("backend", None)
+    with tempfile.TemporaryDirectory(prefix="mbf_sweep_") as folder:
+        options = RunOptions(Path(folder), backend, run.seed, draw=False, settings=settings, geodesic=True)
+        try:
+            result = run_scenario(scenario, options)
+        except Exception as error:  # one impossible variant must not end the sweep
+            name, message = type(error).__name__, str(error)
+            return {"success": False, "verdict": f"{name}: {message}", "outcome": name, "message": message}
+    return result.metrics
+
+
+def run_all(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, dict[str, Any]]]:
+    """Do all jobs in ``workers`` processes and yield each with its metrics as it finishes.
+
+    Raises
+    ------
+    BrokenProcessPool
+        Workers died again and again.
+    """
+    return run_in_workers(_run_job, jobs, workers)
+
+
+def _run_job(job: Job) -> dict[str, Any]:
+    return run_once(*job)

@@ -1,0 +1,1 @@
+"""Runs as logs for Foxglove (MCAP) and Rerun."""

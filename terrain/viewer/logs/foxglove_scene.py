@@ -1,0 +1,127 @@
+"""What stands in the world of a run and what the robot looks like, as Foxglove scene entities."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from foxglove_schemas_protobuf.CylinderPrimitive_pb2 import CylinderPrimitive
+from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
+from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.SpherePrimitive_pb2 import SpherePrimitive
+from foxglove_schemas_protobuf.TextPrimitive_pb2 import TextPrimitive
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Pose
+from terrain.recording.actor_track import ActorTrack
+from terrain.recording.recording import Recording, RobotShape, Surface
+from terrain.viewer.logs.foxglove_messages import colour, points, pose, timestamp, triangles
+from terrain.viewer.pictures.colours import ACTORS, BODY, DRIVEN, GOAL, OBSTACLE, START, WALL, WHEEL, Colour
+from terrain.viewer.pictures.shading import vertex_colours
+from terrain.viewer.pictures.shapes import cut_walls, prism
+
+FloatArray = NDArray[np.float64]
+
+UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
+ALONG_Y = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])  # a quarter turn about x: a cylinder's axis along y
+BALL = 0.4  # m
+TEXT = 18.0  # pixels
+TRACK_WIDTH = 4.0  # pixels
+
+
+def world(recording: Recording) -> SceneUpdate:
+    """Ground, walls, obstacles, start and goals; they stay for the whole run."""
+    frame = recording.start.frame_id
+    entities = []
+    for name, surface, paint in (("walls", recording.walls, WALL), ("obstacles", recording.obstacles, OBSTACLE)):
+        if surface is not None:
+            shown = cut_walls(surface) if name == "walls" else surface
+            entities.append(_solid(frame, name, shown, paint))
+    if recording.ground is not None:
+        entities.append(_solid(frame, "ground", recording.ground, vertex_colours(recording.ground)))
+    entities.append(_mark("start", recording.start, START))
+    for number, goal in enumerate(recording.goals, start=1):
+        entities.append(_mark(f"goal {number}" if len(recording.goals) > 1 else "goal", goal, GOAL))
+    return SceneUpdate(entities=entities)
+
+
+def robot(shape: RobotShape) -> SceneUpdate:
+    """The body in ``base_link`` and each wheel in a frame of its own, so that it can turn."""
+    body = prism(shape.footprint * np.array([0.98, 0.78]), 0.6 * shape.wheel_radius, shape.height)
+    entities = [_solid("base_link", "body", body, BODY)]
+    for index in range(len(shape.wheels)):
+        diameter, width = 2.0 * shape.wheel_radius, 0.64 * shape.wheel_radius
+        drum = CylinderPrimitive(
+            pose=pose(np.zeros(3), ALONG_Y),
+            size=Vector3(x=diameter, y=diameter, z=width),
+            bottom_scale=1.0,
+            top_scale=1.0,
+            color=colour(WHEEL),
+        )
+        entity = _entity(wheel_frame(index), f"wheel {index}")
+        entity.cylinders.append(drum)
+        entities.append(entity)
+    return SceneUpdate(entities=entities)
+
+
+def actors(tracks: Sequence[ActorTrack]) -> SceneUpdate:
+    """People, doors and other robots, each in a frame of its own."""
+    return SceneUpdate(
+        entities=[
+            _solid(
+                actor_frame(index), f"{track.thing} {index}", Surface(track.vertices, track.faces), ACTORS[track.thing]
+            )
+            for index, track in enumerate(tracks)
+        ]
+    )
+
+
+def actor_frame(index: int) -> str:
+    """Name of an actor's frame."""
+    return f"actor_{index}"
+
+
+def wheel_frame(index: int) -> str:
+    """Name of a wheel's frame."""
+    return f"wheel_{index}"
+
+
+def track_piece(frame: str, number: int, time: float, line: FloatArray) -> SceneUpdate:
+    """A piece (m, 3) [m] of the driven track."""
+    entity = _entity(frame, f"track {number}")
+    entity.timestamp.CopyFrom(timestamp(time))
+    entity.lines.append(
+        LinePrimitive(
+            type=LinePrimitive.LINE_STRIP,
+            pose=pose(np.zeros(3), UPRIGHT),
+            thickness=TRACK_WIDTH,
+            scale_invariant=True,
+            points=points(line),
+            color=colour(DRIVEN),
+        )
+    )
+    return SceneUpdate(entities=[entity])
+
+
+def _entity(frame: str, name: str) -> SceneEntity:
+    return SceneEntity(frame_id=frame, id=name, frame_locked=True, timestamp=timestamp(0.0))
+
+
+def _solid(frame: str, name: str, surface: Surface, colours: NDArray[np.uint8] | Colour) -> SceneEntity:
+    entity = _entity(frame, name)
+    entity.triangles.append(triangles(surface.vertices, surface.faces, colours))
+    return entity
+
+
+def _mark(name: str, at: Pose, paint: Colour) -> SceneEntity:
+    entity = _entity(at.frame_id, name)
+    size = Vector3(x=BALL, y=BALL, z=BALL)
+    entity.spheres.append(SpherePrimitive(pose=pose(np.array(at.position), UPRIGHT), size=size, color=colour(paint)))
+    above = pose(np.array(at.position) + np.array([0.0, 0.0, 2.0 * BALL]), UPRIGHT)
+    label = TextPrimitive(
+        pose=above, billboard=True, font_size=TEXT, scale_invariant=True, color=colour(paint), text=name
+    )
+    entity.texts.append(label)
+    return entity

@@ -1,0 +1,1 @@
+"""Pictures by matplotlib and Pillow, and the colours that all views share."""

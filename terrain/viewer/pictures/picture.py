@@ -1,0 +1,177 @@
+"""A run from above: shaded ground, walls, what moved, plan, driven track, start and goals, as a PNG by matplotlib.
+
+Use it for reports and READMEs; one look tells what happened. It takes about a second per hundred thousand
+triangles. For motion see ``terrain.viewer.replay``.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Pose
+from terrain.recording.recording import Recording, StampedPoints
+from terrain.recording.whole_files import write_whole
+from terrain.viewer.pictures.colours import ACTORS, DRIVEN, GOAL, OBSTACLE, PLANNED, START, WALL, slope_legend
+from terrain.viewer.pictures.shading import shaded_triangles
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+
+LONG_SIDE = 9.0  # inches
+DOTS_PER_INCH = 130
+MAX_NAME = 60  # characters of a name in the title; the picture is as wide as its title
+HALO = 1.6  # points of white around lines, so that they show on any ground
+
+
+class ViewerMissing(Exception):
+    """A package that draws is not installed; the text says how to get it."""
+
+
+def write_picture(file: str | Path, recording: Recording) -> None:
+    """Draw a recording and write it as PNG; raises ViewerMissing without matplotlib."""
+    write_whole(file, picture_png(recording))
+
+
+def picture_png(recording: Recording) -> bytes:
+    """Draw a recording as the bytes of a PNG file; raises ViewerMissing without matplotlib."""
+    figure, axes = new_figure(_extent(recording))
+    _draw_world(axes, recording)
+    _draw_actors(axes, recording)
+    draw_paths(axes, recording.paths)
+    _draw_track(axes, recording)
+    draw_marks(axes, recording.start, recording.goals)
+    _label(axes, recording)
+    return png_bytes(figure)
+
+
+def new_figure(extent: tuple[float, float, float, float]) -> tuple[Figure, Axes]:
+    """Make a figure of the extent's proportions, without a window and without matplotlib's global state."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise ViewerMissing(f"pictures need matplotlib: pip install 'mbf-flex[sim]' ({error})") from error
+    x_min, x_max, y_min, y_max = extent
+    width, height = x_max - x_min, y_max - y_min
+    scale = LONG_SIDE / max(width, height)
+    figure = Figure(figsize=(max(width * scale, 4.0) + 1.0, max(height * scale, 3.0) + 1.6), dpi=DOTS_PER_INCH)
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal", xlabel="x [m]", ylabel="y [m]")
+    axes.set_facecolor("#e8e8e8")
+    return figure, axes
+
+
+def png_bytes(figure: Figure) -> bytes:
+    """Return the figure as a PNG file, cut to its contents."""
+    buffer = io.BytesIO()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)  # drawn as a box, which says enough
+        figure.savefig(buffer, format="png", bbox_inches="tight", facecolor="white")
+    return buffer.getvalue()
+
+
+def _extent(recording: Recording) -> tuple[float, float, float, float]:
+    """What must be in the picture: the world, or the track and the goals where there is none; with a margin."""
+    surfaces = [surface.vertices[:, :2] for surface in (recording.ground, recording.walls) if surface is not None]
+    poses = [recording.start, *recording.goals]
+    points = np.concatenate([*surfaces, recording.poses[:, :2], [pose.position[:2] for pose in poses]])
+    (x_min, y_min), (x_max, y_max) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    margin = 1.0 if not surfaces else 0.0
+    return x_min - margin, x_max + margin, y_min - margin, y_max + margin
+
+
+def _draw_world(axes: Axes, recording: Recording) -> None:
+    if recording.ground is not None:
+        draw_triangles(axes, *shaded_triangles(recording.ground))
+    for surface, colour, label in ((recording.walls, WALL, None), (recording.obstacles, OBSTACLE, "in no map")):
+        if surface is not None:
+            corners = surface.vertices[surface.faces][:, :, :2]
+            draw_triangles(axes, corners, np.tile(np.array(colour) / 255.0, (len(corners), 1)))
+            axes.plot([], [], "s", color=np.array(colour) / 255.0, markersize=9, label=label)
+    if recording.ground is not None and np.ptp(recording.ground.vertices[:, 2]) > 0.5:
+        _draw_slope_legend(axes)
+
+
+def draw_triangles(axes: Axes, corners: FloatArray, colours: FloatArray) -> None:
+    """Paint triangles (n, 3, 2) in the given order, one colour (n, 3) each."""
+    from matplotlib.collections import PolyCollection
+
+    collection = PolyCollection(list(corners), facecolors=colours, edgecolors="none", antialiaseds=False, zorder=1)
+    collection.set_rasterized(True)
+    axes.add_collection(collection, autolim=False)
+
+
+def _draw_slope_legend(axes: Axes) -> None:
+    from matplotlib.patches import Patch
+
+    handles = [Patch(color=np.array(colour) / 255.0, label=label) for label, colour in slope_legend()]
+    place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.005, 1.0)}
+    legend = axes.legend(handles=handles, title="slope", frameon=False, fontsize=8, title_fontsize=8, **place)
+    axes.add_artist(legend)  # keeps it when the second legend is made, but clips it to the axes
+    legend.set_clip_on(False)
+
+
+def _line(axes: Axes, points: FloatArray, colour: tuple[int, int, int], width: float, **style: Any) -> None:
+    from matplotlib.patheffects import Normal, Stroke
+
+    effects = [Stroke(linewidth=width + HALO, foreground="white", alpha=0.7), Normal()]
+    (line,) = axes.plot(points[:, 0], points[:, 1], color=np.array(colour) / 255.0, linewidth=width, **style)
+    line.set_path_effects(effects)
+
+
+def draw_paths(axes: Axes, paths: list[StampedPoints]) -> None:
+    """Draw the last plan strong and those before it faint; wide, so that it shows beside the track upon it."""
+    for _, points in paths[:-1]:
+        axes.plot(points[:, 0], points[:, 1], color=np.array(PLANNED) / 255.0, linewidth=1.0, alpha=0.35, zorder=4)
+    for _, points in paths[-1:]:
+        _line(axes, points, PLANNED, 3.6, zorder=5, label="plan")
+
+
+def _draw_actors(axes: Axes, recording: Recording) -> None:
+    """Where people, doors and other robots have been, dotted, and where they were at the end."""
+    labelled: set[str] = set()
+    for track in recording.actors:
+        if not len(track.poses):
+            continue
+        label = None if track.thing in labelled else track.thing
+        labelled.add(track.thing)
+        style: dict[str, Any] = {"color": np.array(ACTORS[track.thing]) / 255.0, "linestyle": ":", "zorder": 3}
+        axes.plot(track.poses[:, 0], track.poses[:, 1], linewidth=1.5, **style)
+        axes.plot(*track.poses[-1, :2], marker="o", markersize=6, label=label, **style)
+
+
+def _draw_track(axes: Axes, recording: Recording) -> None:
+    if len(recording.poses):
+        _line(axes, recording.poses[:, :2], DRIVEN, 1.5, zorder=6, label="driven track")
+        heading = Pose((0, 0, 0), tuple(recording.poses[-1, 3:].tolist()))
+        outline = recording.robot.footprint @ heading.rotation[:2, :2].T + recording.poses[-1, :2]
+        axes.fill(*outline.T, facecolor=np.array(DRIVEN) / 255.0, edgecolor="white", linewidth=0.8, zorder=8)
+
+
+def draw_marks(axes: Axes, start: Pose, goals: tuple[Pose, ...]) -> None:
+    """Mark the start by a disc and the goals by stars."""
+    mark: dict[str, Any] = {"linestyle": "none", "markeredgecolor": "white", "markeredgewidth": 1.2, "zorder": 9}
+    axes.plot(start.x, start.y, marker="o", markersize=10, color=np.array(START) / 255.0, label="start", **mark)
+    for index, goal in enumerate(goals):
+        label = "goal" if index == 0 else None
+        axes.plot(goal.x, goal.y, marker="*", markersize=18, color=np.array(GOAL) / 255.0, label=label, **mark)
+
+
+def _label(axes: Axes, recording: Recording) -> None:
+    length = float(np.linalg.norm(np.diff(recording.poses[:, :3], axis=0), axis=1).sum())
+    title = f"{recording.scenario[:MAX_NAME]} · {recording.backend[:MAX_NAME]} · {recording.verdict.title}"
+    tilt = np.degrees(recording.tilt).max(initial=0.0)
+    facts = f"{length:.1f} m driven in {recording.duration:.1f} s, tilt up to {tilt:.0f}°"
+    axes.set_title(f"{title}\n", loc="left", fontsize=12, fontweight="bold", parse_math=False)
+    axes.text(0.0, 1.015, facts, transform=axes.transAxes, fontsize=9, color="#444444")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=6, frameon=False, fontsize=9)

@@ -1,0 +1,67 @@
+"""Hill shading: how bright each triangle of a ground is in the light of an afternoon sun from the north-west.
+
+Cartographers' shading (Horn, "Hill shading and the reflectance map", 1981, Lambert's law): brightness is the cosine
+between the normal and the direction of the light.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrain.recording.recording import Surface
+from terrain.viewer.pictures.colours import FLOOR, slope_colours
+
+FloatArray = NDArray[np.float64]
+
+LIGHT = np.array([-1.0, 1.0, 1.4]) / np.linalg.norm([-1.0, 1.0, 1.4])
+AMBIENT = 0.45
+FLAT_GROUND = 0.02  # m of relief; less is a floor
+
+
+def face_normals(surface: Surface) -> FloatArray:
+    """Return unit normals (F, 3) of the faces, turned upwards; (0, 0, 1) for faces without area."""
+    a, b, c = (surface.vertices[surface.faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(lengths > 1e-12, normals / np.maximum(lengths, 1e-12), [[0.0, 0.0, 1.0]])
+    return np.asarray(normals * np.where(normals[:, 2:] < 0.0, -1.0, 1.0))
+
+
+def shaded_triangles(surface: Surface) -> tuple[FloatArray, FloatArray]:
+    """Triangles of a ground seen from above, lowest first, with their colours.
+
+    Returns
+    -------
+    corners : (F, 3, 2) float64
+        x and y [m], to be painted in this order so that bridges cover what is under them.
+    colours : (F, 3) float64
+        0..1, by slope and light.
+    """
+    normals = face_normals(surface)
+    order = np.argsort(surface.vertices[surface.faces, 2].mean(axis=1), kind="stable")
+    colours = face_colours(surface, normals) / 255.0
+    brightness = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ LIGHT, 0.0, 1.0) / LIGHT[2]
+    shaded = np.clip(colours * brightness[:, None], 0.0, 1.0)
+    return surface.vertices[surface.faces][order][:, :, :2], shaded[order]
+
+
+def face_colours(surface: Surface, normals: FloatArray) -> FloatArray:
+    """Colours (F, 3) 0..255 without light: the surface's own, a floor's grey, or by slope."""
+    if surface.colours is not None:
+        return np.asarray(surface.colours[surface.faces].mean(axis=1), dtype=np.float64)
+    if np.ptp(surface.vertices[:, 2]) < FLAT_GROUND:
+        return np.tile(np.array(FLOOR, dtype=np.float64), (len(surface.faces), 1))
+    return slope_colours(np.degrees(np.arccos(np.clip(normals[:, 2], -1.0, 1.0))))
+
+
+def vertex_colours(surface: Surface) -> NDArray[np.uint8]:
+    """Colours (V, 3) uint8 sRGB of the vertices, the mean of their faces."""
+    if surface.colours is not None:
+        return surface.colours
+    of_faces = face_colours(surface, face_normals(surface))
+    sums, counts = np.zeros((len(surface.vertices), 3)), np.zeros(len(surface.vertices))
+    for corner in range(3):
+        np.add.at(sums, surface.faces[:, corner], of_faces)
+        np.add.at(counts, surface.faces[:, corner], 1.0)
+    return np.asarray(np.round(sums / np.maximum(counts, 1.0)[:, None]), dtype=np.uint8)

@@ -1,0 +1,46 @@
+"""The events that a page shows while it goes through a run: one line each, with a colour for good and bad."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mbf_abstract.events import Event, EventKind
+from mbf_abstract.outcomes import is_success, outcome_name
+from terrain.viewer.reports.event_text import NOTABLE, words
+
+TOLD = NOTABLE | {EventKind.GOAL_FINISHED, EventKind.GOAL_PAUSED, EventKind.GOAL_RESUMED, EventKind.CUSTOM}
+REPLACED = "preempted by a new plan"  # how exe_path ends a goal while the robot drives on along a newer path
+GOOD, BAD, NEITHER = "#1a7f37", "#cf222e", "#6b7280"
+
+
+@dataclass(frozen=True)
+class Line:
+    """One thing that happened: time [s], who tells it, what, and whether that is good (None = neither)."""
+
+    time: float
+    source: str
+    text: str
+    good: bool | None = None
+
+    @property
+    def colour(self) -> str:
+        """Green, red or grey, for CSS."""
+        return NEITHER if self.good is None else (GOOD if self.good else BAD)
+
+
+def is_told(event: Event) -> bool:
+    """Whether a reader wants to know of it; not each time a path is swapped for a newer one."""
+    return event.kind in TOLD and event.data.get("message") != REPLACED
+
+
+def line_of(event: Event) -> Line:
+    """Put an event into words."""
+    if event.kind is EventKind.GOAL_FINISHED:
+        outcome = event.data.get("outcome")
+        code = outcome if isinstance(outcome, int) else 0
+        name = outcome_name(code)
+        good = None if name == "CANCELED" else is_success(code)
+        return Line(event.time, event.source, f"{name}: {event.data.get('message', '')}", good)
+    what = "" if event.kind is EventKind.CUSTOM else event.kind.value.replace("_", " ")
+    text = " ".join(part for part in (what, words(event)) if part)
+    return Line(event.time, event.source, text, False if event.kind is EventKind.FAULT else None)

@@ -1,0 +1,134 @@
+"""The report of a run: one HTML file with outcome, picture, plots over time, a timeline, events, and metrics.
+
+Made for reading on any machine and for attaching to an issue: no script, no network, nothing beside the file. For
+motion see ``terrain.viewer.replay``.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Iterable, Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.events import EventKind
+from mbf_abstract.outcomes import is_success, outcome_name
+from terrain.recording.metrics import cross_track_errors
+from terrain.recording.recording import Recording
+from terrain.recording.whole_files import write_whole
+from terrain.viewer.pictures.picture import ViewerMissing, picture_png
+from terrain.viewer.reports.event_text import NOTABLE, words
+from terrain.viewer.reports.page import page, table
+from terrain.viewer.reports.timeline import timeline_svg
+
+FloatArray = NDArray[np.float64]
+
+
+def write_report(file: str | Path, recording: Recording, metrics: Mapping[str, Any]) -> None:
+    """Write the report; raises ViewerMissing without matplotlib."""
+    write_whole(file, report_html(recording, metrics))
+
+
+def report_html(recording: Recording, metrics: Mapping[str, Any]) -> str:
+    """Return the page's text; raises ViewerMissing without matplotlib."""
+    parts = [
+        summary(recording),
+        picture(recording),
+        "<h2>Over time</h2>" + plots_svg(recording) if len(recording.times) else "",
+        f"<h2>Actions and plugins</h2>{timeline_svg(recording.events)}",
+        "<h2>Metrics</h2>" + table(("name", "value"), metrics.items()),
+        "<h2>Results of the goals, in order</h2>" + goals_table(recording),
+        "<h2>Faults, stops and recoveries</h2>" + notable_table(recording),
+    ]
+    return page(title_of(recording), parts)
+
+
+def title_of(recording: Recording) -> str:
+    """What was run, in a few words."""
+    return f"{recording.scenario} on {recording.backend}"
+
+
+def summary(recording: Recording) -> str:
+    """Title, outcome, and what was asked."""
+    quality = "good" if recording.verdict.success else "bad"
+    return (
+        f"<h1>{escape(title_of(recording))}</h1>"
+        f'<p class="outcome {quality}">{escape(str(recording.verdict))}</p>'
+        f"<p>{escape(_asked(recording))}</p>"
+    )
+
+
+def picture(recording: Recording) -> str:
+    """The run from above."""
+    data = base64.b64encode(picture_png(recording)).decode("ascii")
+    return f'<img alt="map, plan and driven track from above" src="data:image/png;base64,{data}">'
+
+
+def goals_table(recording: Recording) -> str:
+    """How every goal ended, in order."""
+    return table(("time", "action", "outcome", "text"), _goals(recording))
+
+
+def notable_table(recording: Recording) -> str:
+    """Faults, gate events and recoveries."""
+    return table(("time", "what", "who", "text"), _notable(recording))
+
+
+def plots_svg(recording: Recording) -> str:
+    """Speed, yaw rate, tilt and cross-track error over time, as an inline SVG."""
+    try:
+        from matplotlib.backends.backend_svg import FigureCanvasSVG
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise ViewerMissing(f"reports need matplotlib: pip install 'mbf-flex[sim]' ({error})") from error
+    figure = Figure(figsize=(10.0, 7.5), layout="constrained")
+    FigureCanvasSVG(figure)
+    axes = figure.subplots(4, 1, sharex=True)
+    times = recording.times
+    curves: list[tuple[str, list[tuple[str, FloatArray]]]] = [
+        ("speed [m/s]", [("commanded", recording.commands[:, 0]), ("measured", recording.twists[:, 0])]),
+        ("yaw rate [rad/s]", [("commanded", recording.commands[:, 2]), ("measured", recording.twists[:, 2])]),
+        ("tilt [°]", [("tilt", np.degrees(recording.tilt))]),
+        ("off the plan [m]", [("cross-track error", cross_track_errors(recording))]),
+    ]
+    for panel, (label, lines) in zip(axes, curves, strict=True):
+        for name, values in lines:
+            colour, width = ("#9db8e8", 3.0) if name == "commanded" else ("#e1550a", 1.2)
+            panel.plot(times, values, label=name, color=colour, linewidth=width)
+        panel.set_ylabel(label)
+        panel.grid(alpha=0.3)
+        panel.spines[["top", "right"]].set_visible(False)
+        if len(lines) > 1:
+            panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, fontsize=8, frameon=False)
+    axes[-1].set_xlabel("time [s]")
+    figure.align_ylabels(axes)
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]
+
+
+def _asked(recording: Recording) -> str:
+    goals = ", then ".join(f"({goal.x:.1f}, {goal.y:.1f})" for goal in recording.goals) or "nowhere"
+    start = recording.start
+    return f"Asked: robot {recording.robot.name} from ({start.x:.1f}, {start.y:.1f}) to {goals}."
+
+
+def _goals(recording: Recording) -> Iterable[tuple[str, ...]]:
+    for event in recording.events:
+        if event.kind is EventKind.GOAL_FINISHED:
+            code = event.data.get("outcome")
+            name = outcome_name(code) if isinstance(code, int) else str(code)
+            mark = "" if name == "CANCELED" or (isinstance(code, int) and is_success(code)) else " ✗"
+            yield f"{event.time:.2f} s", event.source, name + mark, str(event.data.get("message", ""))
+
+
+def _notable(recording: Recording) -> Iterable[tuple[str, ...]]:
+    for event in recording.events:
+        if event.kind in NOTABLE:
+            yield f"{event.time:.2f} s", event.kind.value, event.source, words(event)

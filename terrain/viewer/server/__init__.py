@@ -1,0 +1,1 @@
+"""The server behind a live page, and who may use it."""

@@ -1,0 +1,1 @@
+"""Worlds: generated and measured terrain, floor plans, buildings of several levels."""

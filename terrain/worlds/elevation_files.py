@@ -1,0 +1,242 @@
+"""Read elevation models: the Jacksboro fault that comes with matplotlib, and files of four common formats.
+
+All readers turn the raster so that y grows northwards (row 0 of every one of these formats is the northern edge),
+put sample [0, 0] at the origin, and give degrees their length in metres at the raster's latitude. For a world to drive
+in, ``read_dem`` fills voids from the nearest valid sample: physics must not meet a hole where the survey had none. For
+a map, ``read_elevation`` leaves them: the mesh server takes it by the entry point ``mbf.elevation_readers``.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from mbf_abstract.config.bounded_files import read_arrays
+from terrain.worlds.generate import add_roughness
+from terrain.worlds.heightfield import Heightfield
+
+METRES_PER_DEGREE = 111_320.0  # along a meridian, and along the equator; good to half a percent everywhere
+MAX_SAMPLES = 20_000_000
+"""How many heights are read unless a caller asks for more; absurd headers are refused before memory is asked for."""
+MAX_VOID_SHARE = 0.5
+
+ASCII_VOID = -9999.0
+"""What an ESRI ASCII grid without a NODATA_value has for voids, by the format's definition."""
+MAX_ASCII_BYTES_PER_SAMPLE = 64
+HGT_VOID = -32768
+TIFF_PIXEL_SCALE, TIFF_TIE_POINT, TIFF_NO_DATA, TIFF_GEO_KEYS = 33550, 33922, 42113, 34735
+GEO_KEY_MODEL_TYPE, MODEL_TYPE_GEOGRAPHIC = 1024, 2
+
+
+class TerrainFileError(Exception):
+    """A terrain file cannot be used; the text names the file and the reason."""
+
+    def __init__(self, path: str | Path, reason: str) -> None:
+        super().__init__(f"{path}: {reason}")
+
+
+class Elevation(NamedTuple):
+    """Heights (ny, nx) [m], the southern row first and NaN at voids, and the distances [m] between samples."""
+
+    heights: NDArray[np.float64]
+    dx: float
+    dy: float
+
+
+def degree_lengths(latitude: float) -> tuple[float, float]:
+    """Length [m] of one degree of longitude and of latitude at ``latitude`` [degrees]."""
+    return METRES_PER_DEGREE * math.cos(math.radians(latitude)), METRES_PER_DEGREE
+
+
+def jacksboro(
+    size_m: float = 100.0,
+    spacing: float | None = None,
+    roughness: float = 0.0,
+    rng: np.random.Generator | None = None,
+) -> Heightfield:
+    """Real terrain: the Jacksboro fault (Tennessee), shrunk in all three directions to ``size_m`` [m] along x.
+
+    The file ships with matplotlib (sample data, from the US national survey): 30 x 32 km with slopes up to 36
+    degrees. Shrinking isotropically keeps those slopes and makes the hills the size of a robot's world.
+
+    Parameters
+    ----------
+    size_m : float
+        Length [m] of the shrunk terrain along x; along y it is 6 % longer. 100 gives samples 0.25 x 0.31 m apart.
+    spacing : float, optional
+        Sample again (bicubic) at this distance [m]; without it the survey's own samples are kept.
+    roughness : float
+        Root mean square height [m] of small fractal bumps to add, so that wheels meet rough ground; needs ``rng``.
+    rng : numpy Generator, optional
+        Draws the bumps.
+    """
+    from matplotlib import cbook
+
+    with np.load(cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False), allow_pickle=False) as data:
+        elevation, degrees = np.asarray(data["elevation"]), float(data["dx"])
+        latitude = 0.5 * (float(data["ymin"]) + float(data["ymax"]))
+    dx, dy = (degrees * length for length in degree_lengths(latitude))
+    terrain = _filled(_northern_row_first(elevation, dx, dy))
+    terrain = terrain.scaled(size_m / terrain.size[0])
+    terrain = terrain.with_heights(terrain.heights - terrain.heights.min())
+    if spacing is not None:
+        terrain = terrain.resample(spacing)
+    if roughness > 0.0:
+        if rng is None:
+            raise ValueError("roughness is random: give a generator `rng`")
+        terrain = add_roughness(terrain, rng, roughness)
+    return terrain
+
+
+def read_dem(path: str | Path, max_samples: int = MAX_SAMPLES) -> Heightfield:
+    """Read an elevation model and fill its voids; parameters and errors as in ``read_elevation``.
+
+    Raises
+    ------
+    TerrainFileError
+        Also where more than half of the raster is void.
+    """
+    try:
+        return _filled(read_elevation(path, max_samples))
+    except ValueError as error:
+        raise TerrainFileError(path, f"cannot be read: {error}") from error
+
+
+def read_elevation(path: str | Path, max_samples: int = MAX_SAMPLES) -> Elevation:
+    """Read an elevation model by its file name's ending; voids are NaN.
+
+    Parameters
+    ----------
+    path : path
+        ``.asc`` (ESRI ASCII grid), ``.hgt`` (SRTM tile), ``.tif``/``.tiff`` (GeoTIFF) or ``.npz`` with ``z`` and
+        ``dx``, ``dy`` [m], row 0 in the north.
+    max_samples : int
+        Larger rasters are refused before their heights are read.
+
+    Raises
+    ------
+    TerrainFileError
+        Missing file, unknown ending, too many samples, or contents that are not what the ending says.
+    """
+    path = Path(path)
+    readers = {".asc": _read_esri_ascii, ".hgt": _read_hgt, ".tif": _read_geotiff, ".tiff": _read_geotiff}
+    reader = (readers | {".npz": _read_npz}).get(path.suffix.lower())
+    if reader is None:
+        raise TerrainFileError(path, f"unknown ending '{path.suffix}', expected .asc, .hgt, .tif or .npz")
+    if not path.is_file():
+        raise TerrainFileError(path, "no such file")
+    try:
+        return reader(path, max_samples)
+    except TerrainFileError:
+        raise
+    except (OSError, ValueError, KeyError, IndexError, OverflowError) as error:
+        raise TerrainFileError(path, f"cannot be read: {error}") from error
+
+
+def _northern_row_first(raster: NDArray[Any], dx: float, dy: float, void: float | None = None) -> Elevation:
+    """Flip to y up and mark voids by NaN."""
+    heights = raster.astype(np.float64)[::-1]
+    bad = ~np.isfinite(heights)
+    if void is not None:
+        bad |= heights == void
+    return Elevation(np.where(bad, np.nan, heights), dx, dy)
+
+
+def _filled(elevation: Elevation) -> Heightfield:
+    """Fill voids from the nearest valid sample; raises ValueError where more than half of the raster is void."""
+    heights, bad = elevation.heights, np.isnan(elevation.heights)
+    if bad.mean() > MAX_VOID_SHARE:
+        raise ValueError(f"{bad.mean():.0%} of the samples are void")
+    if bad.any():
+        _, (rows, columns) = ndimage.distance_transform_edt(bad, return_indices=True)
+        heights = heights[rows, columns]
+    return Heightfield(heights.astype(np.float32), elevation.dx, elevation.dy)
+
+
+def _refuse_size(path: Path, rows: int, columns: int, max_samples: int) -> None:
+    if min(rows, columns) < 2:
+        raise TerrainFileError(path, f"unusable size of {rows} rows x {columns} columns")
+    if rows * columns > max_samples:
+        raise TerrainFileError(path, f"{rows} rows x {columns} columns of heights, the limit is {max_samples} in all")
+
+
+def _read_esri_ascii(path: Path, max_samples: int) -> Elevation:
+    header: dict[str, float] = {}
+    with path.open(encoding="ascii") as file:
+        for line in file:
+            words = line.split()
+            if len(words) != 2 or not re.match(r"[A-Za-z_]+$", words[0]):
+                break
+            header[words[0].lower()] = float(words[1])
+    missing = [key for key in ("ncols", "nrows", "cellsize") if key not in header]
+    if missing:
+        raise TerrainFileError(path, f"header without {', '.join(missing)}")
+    shape = int(header["nrows"]), int(header["ncols"])
+    _refuse_size(path, *shape, max_samples)
+    if path.stat().st_size > MAX_ASCII_BYTES_PER_SAMPLE * (shape[0] * shape[1] + len(header)):
+        raise TerrainFileError(path, f"{path.stat().st_size} bytes are too many for {shape[0]} x {shape[1]} heights")
+    values = np.array(path.read_text(encoding="ascii").split()[2 * len(header) :], dtype=np.float64)
+    if values.size != shape[0] * shape[1]:
+        raise TerrainFileError(path, f"{values.size} heights, the header promises {shape[0]} x {shape[1]}")
+    void = header.get("nodata_value", ASCII_VOID)
+    return _northern_row_first(values.reshape(shape), header["cellsize"], header["cellsize"], void)
+
+
+def _read_hgt(path: Path, max_samples: int) -> Elevation:
+    """SRTM: one degree square of big-endian int16; the name holds the south-west corner, e.g. ``N44W072``."""
+    name = re.match(r"([NS])(\d{2})[EW]\d{3}", path.stem, re.IGNORECASE)
+    if name is None:
+        raise TerrainFileError(path, "the name of an SRTM tile must start with its corner, such as N44W072")
+    size = path.stat().st_size
+    side = math.isqrt(size // 2)
+    if side < 2 or 2 * side * side != size:
+        raise TerrainFileError(path, f"{size} bytes are not a square of 16-bit heights")
+    _refuse_size(path, side, side, max_samples)
+    values = np.fromfile(path, dtype=">i2")
+    latitude = (1.0 if name[1].upper() == "N" else -1.0) * float(name[2]) + 0.5
+    dx, dy = (length / (side - 1) for length in degree_lengths(latitude))
+    return _northern_row_first(values.reshape(side, side), dx, dy, HGT_VOID)
+
+
+def _read_geotiff(path: Path, max_samples: int) -> Elevation:
+    from PIL import Image
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", Image.DecompressionBombWarning)
+        try:
+            with Image.open(path, formats=("TIFF",)) as image:
+                tags = dict(image.tag_v2)  # type: ignore[attr-defined]
+                _refuse_size(path, image.height, image.width, max_samples)
+                raster = np.asarray(image)
+        except (Image.DecompressionBombError, Image.DecompressionBombWarning, SyntaxError) as error:
+            raise TerrainFileError(path, f"cannot be read: {error}") from error
+    if raster.ndim != 2:
+        raise TerrainFileError(path, f"has {raster.shape[-1]} bands, expected one band of heights")
+    if TIFF_PIXEL_SCALE not in tags:
+        raise TerrainFileError(path, "has no pixel scale (tag 33550), so it is not a GeoTIFF with square axes")
+    dx, dy = float(tags[TIFF_PIXEL_SCALE][0]), float(tags[TIFF_PIXEL_SCALE][1])
+    keys = tags.get(TIFF_GEO_KEYS, ())
+    model_types = [keys[i + 3] for i in range(4, len(keys) - 3, 4) if keys[i] == GEO_KEY_MODEL_TYPE]
+    if MODEL_TYPE_GEOGRAPHIC in model_types:
+        latitude = float(tags[TIFF_TIE_POINT][4]) - 0.5 * dy * raster.shape[0]
+        dx, dy = (degrees * length for degrees, length in zip((dx, dy), degree_lengths(latitude), strict=True))
+    no_data = tags.get(TIFF_NO_DATA)
+    return _northern_row_first(raster, dx, dy, None if no_data is None else float(str(no_data).strip("\0 ")))
+
+
+def _read_npz(path: Path, max_samples: int) -> Elevation:
+    keys = ("z", "dx", "dy")
+    data = read_arrays(path, 8 * (max_samples + 2), keys)
+    if missing := [key for key in keys if key not in data]:
+        raise TerrainFileError(path, f"lacks {', '.join(missing)}")
+    if data["z"].ndim != 2:
+        raise TerrainFileError(path, f"z has the shape {data['z'].shape}, expected rows and columns")
+    _refuse_size(path, len(data["z"]), data["z"].shape[1], max_samples)
+    return _northern_row_first(data["z"], float(data["dx"]), float(data["dy"]))

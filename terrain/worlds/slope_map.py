@@ -1,0 +1,75 @@
+"""A terrain as a 2D map, so that a costmap server can be run outdoors and compared with a mesh server.
+
+What a flat map can know of hills: how steep each cell is, seen over the length of the robot. It cannot know which way
+the robot will stand on it; that is the comparison's point. Use ``slope_grid`` for a map of free and occupied cells,
+``write_slope_map`` for one with every shade between.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from mbf_abstract.geometry.arithmetic import arctan
+from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.occupancy import OccupancyGrid, all_digits
+from terrain.worlds.smoothing import smoothed
+
+FloatArray = NDArray[np.float64]
+
+LETHAL_SLOPE = 30.0  # degrees; where a skid-steered robot of the kind of a Husky begins to slide sideways
+FREE_SLOPE = 5.0  # degrees; gentler ground costs nothing
+ROBOT_LENGTH = 0.5  # m; bumps shorter than this are driven over, they are not slopes
+BORDER = 0.5  # m at the edge of the terrain that count as occupied
+OCCUPIED = 100
+
+
+def cell_slopes(terrain: Heightfield, resolution: float, robot_length: float = ROBOT_LENGTH) -> FloatArray:
+    """Slope [degrees] of square cells of ``resolution`` [m], as (ny, nx) float64.
+
+    Cell [0, 0] has its lower left corner at the terrain's; heights are smoothed first by a Gaussian whose width (four
+    sigma) is ``robot_length`` [m].
+    """
+    nx, ny = (int(length / resolution) for length in terrain.size)
+    x = terrain.x0 + (np.arange(nx) + 0.5) * resolution
+    y = terrain.y0 + (np.arange(ny) + 0.5) * resolution
+    heights = terrain.height_at(*np.meshgrid(x, y))
+    sigma = 0.25 * robot_length / resolution
+    smooth = smoothed(heights, (sigma, sigma))
+    rise_y, rise_x = np.gradient(smooth, resolution)
+    return np.asarray(np.degrees(arctan(np.hypot(rise_x, rise_y))))
+
+
+def slope_occupancy(terrain: Heightfield, resolution: float, lethal_slope: float = LETHAL_SLOPE) -> NDArray[np.uint8]:
+    """Occupancies (ny, nx) uint8: 0 up to 5 degrees, rising evenly to 100 at ``lethal_slope`` and at the border."""
+    share = (cell_slopes(terrain, resolution) - FREE_SLOPE) / (lethal_slope - FREE_SLOPE)
+    occupancy = np.rint(OCCUPIED * np.clip(share, 0.0, 1.0)).astype(np.uint8)
+    edge = max(1, round(BORDER / resolution))
+    for strip in (occupancy[:edge], occupancy[-edge:], occupancy[:, :edge], occupancy[:, -edge:]):
+        strip[...] = OCCUPIED
+    return occupancy
+
+
+def slope_grid(terrain: Heightfield, resolution: float, lethal_slope: float = LETHAL_SLOPE) -> OccupancyGrid:
+    """Map of a terrain where ground steeper than ``lethal_slope`` [degrees] and the border are occupied."""
+    occupied = slope_occupancy(terrain, resolution, lethal_slope) == OCCUPIED
+    return OccupancyGrid(occupied, ~occupied, resolution, terrain.x0, terrain.y0)
+
+
+def write_slope_map(
+    terrain: Heightfield, folder: str | Path, name: str, resolution: float, lethal_slope: float = LETHAL_SLOPE
+) -> Path:
+    """Write map_server files of mode ``raw``: pixels are occupancies, so the shades survive. Return the yaml's path."""
+    folder = Path(folder)
+    Image.fromarray(slope_occupancy(terrain, resolution, lethal_slope)[::-1]).save(folder / f"{name}.png")
+    yaml_path = folder / f"{name}.yaml"
+    yaml_path.write_text(
+        f"image: {name}.png\nmode: raw\nresolution: {all_digits(resolution)}\n"
+        f"origin: [{all_digits(terrain.x0)}, {all_digits(terrain.y0)}, 0.0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+        encoding="utf-8",
+    )
+    return yaml_path
