@@ -10,8 +10,8 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from reachability import is_reachable
 
-from benchmarks.reachability import is_reachable
 from terrain.physics.robot_models import HUSKY
 from terrain.scenarios.environment import WORLD_STREAM
 from terrain.scenarios.places import coordinates

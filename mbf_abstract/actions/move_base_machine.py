@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from mbf_abstract.actions.action import PREEMPTED, GoalJob
+from mbf_abstract.actions.action import PREEMPTED
+from mbf_abstract.actions.move_base_states import End, Job, MachineOwner, MoveBaseState, SubGoalAction, Trigger
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.oscillation import OscillationDetector
@@ -17,8 +17,6 @@ from mbf_abstract.goals.goal_types import (
     ExePathGoal,
     GetPathGoal,
     GetPathResult,
-    MoveBaseGoal,
-    MoveBaseResult,
     RecoveryGoal,
 )
 from mbf_abstract.goals.handle import AnyGoalHandle
@@ -26,42 +24,16 @@ from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.time.clock import Stopwatch
 
-if TYPE_CHECKING:
-    from mbf_abstract.actions.move_base import MoveBaseAction
-
-Job = GoalJob[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
 SUB_GOAL_SLOT = 255  # so that a client's goal in slot 0 does not preempt a part of move_base
 NO_REPLAN_WITHIN = 0.1  # m from the goal
 LEAST_SHARE_LEFT = 0.25  # of the tolerance, for stopping at the end of a path that does not reach the target
 FATAL = range(ExePathOutcome.INVALID_PATH, ExePathOutcome.INTERNAL_ERROR + 1)
 
 
-class MoveBaseState(Enum):
-    """What the machine waits for."""
-
-    GET_PATH = "get_path"
-    EXE_PATH = "exe_path"
-    STOPPING = "stopping"
-    RECOVERY = "recovery"
-    CANCELING = "canceling"
-
-
-class Trigger(Enum):
-    """What made the last recovery necessary."""
-
-    NONE = "none"
-    PLAN = "plan"
-    CONTROL = "control"
-    OSCILLATION = "oscillation"
-
-
-End = tuple[int, str]
-
-
 class MoveBaseMachine:
     """One run of move_base, for one goal or several that take over from each other."""
 
-    def __init__(self, action: MoveBaseAction, job: Job, target: Pose) -> None:
+    def __init__(self, action: MachineOwner, job: Job, target: Pose) -> None:
         self._action = action
         self._runtime = action.runtime
         self._job = job
@@ -377,8 +349,8 @@ class MoveBaseMachine:
         for handle in self._sub_goals():
             handle.pause() if paused else handle.resume()
 
-    def _send(self, action: Any, goal: object) -> AnyGoalHandle:
-        handle: AnyGoalHandle = action.send(goal)
+    def _send(self, action: SubGoalAction, goal: object) -> AnyGoalHandle:
+        handle = action.send(goal)
         if self._job.handle.paused:
             handle.pause()
         handle.on_wake(self._wake)

@@ -53,7 +53,7 @@ def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
         _tell_that_nothing_is_kept()
         return njit(nogil=True, **options)(function)
     cache = dispatcher._cache
-    stamp = _sources(Path(inspect.getfile(function)).parent)
+    stamp = _sources(_folder_of_kernels(Path(inspect.getfile(function))))
     # numba has no option for this; its own constructor makes the same object with the stamp of one file.
     cache._cache_file = IndexDataCacheFile(cache.cache_path, cache._impl.filename_base, stamp)
     return dispatcher
@@ -68,12 +68,17 @@ def _tell_that_nothing_is_kept() -> None:
     warnings.warn(text, stacklevel=3)
 
 
+def _folder_of_kernels(file: Path) -> Path:
+    """Return the folder named ``kernels`` that a file is in, at any depth, else the file's own folder."""
+    return next((folder for folder in file.parents if folder.name == "kernels"), file.parent)
+
+
 @lru_cache
 def _sources(folder: Path) -> bytes:
-    """Digest of all Python files of a folder."""
+    """Digest of all Python files of a folder and those below it."""
     digest = hashlib.sha256()
-    for file in sorted(folder.glob("*.py")):
-        digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    for file in sorted(folder.rglob("*.py")):
+        digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.digest()
 
 

@@ -1,8 +1,8 @@
 """For plugins written the nav_core way: three interfaces, and how they answer as MBF plugins.
 
 Move Base Flex runs plugins of the older ``move_base`` by wrapping them; so do we. Here are the interfaces, which know
-no map, and what is common to the wrappers; a server of a map binds them to it (``mbf_costmap_nav.planning.nav_core``) and offers
-its binding to the registry, which asks it about a class that is no MBF plugin.
+no map, and what is common to the wrappers; a server of a map binds them to it (``mbf_costmap_nav.planning.nav_core``)
+and offers its binding to the registry, which asks it about a class that is no MBF plugin.
 
 Use this to bring an old planner over. Write new plugins for ``mbf_abstract.plugins``: only they get tolerances, cancel,
 the robot's velocity and outcome codes of their own.

@@ -1,1 +1,1 @@
-"""Planners on a costmap, one a file; the shared parts are in ``mbf_costmap_nav.planning.grid_planning`` and ``search_grid``."""
+"""Planners on a costmap, one a file; what they share is in ``mbf_costmap_nav.planning``."""

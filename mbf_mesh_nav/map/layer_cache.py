@@ -77,8 +77,8 @@ class LayerCache:
 @lru_cache
 def _digest_of_code(layer_class: type[MeshLayer]) -> str:
     """Digest of the files a layer class is written in, of the kernels and of the normals they work on."""
-    package = Path(__file__).parent
-    files = {*package.glob("kernels/*.py"), package / "topology.py"}
+    package = Path(__file__).parents[1]
+    files = {*package.glob("kernels/**/*.py"), package / "mesh" / "topology.py"}
     files |= {Path(inspect.getfile(one)) for one in layer_class.__mro__ if issubclass(one, MeshLayer)}
     digest = hashlib.sha256()
     for file in sorted(files):

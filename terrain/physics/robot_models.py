@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry.arithmetic import norm
 
-URDF_FOLDER = Path(__file__).resolve().parent / "urdf"
+URDF_FOLDER = Path(__file__).resolve().parents[1] / "urdf"
 
 
 class Drive(Enum):

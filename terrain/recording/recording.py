@@ -1,8 +1,8 @@
 """What a run left behind, as arrays: the one source of the picture, the metrics, the replay and the report.
 
-A runner fills a ``terrain.recording.recorder.Recorder`` while the robot drives and ends with ``finish``. A ``Recording`` knows
-no simulator and no viewer and can be saved and read again (``recording.npz``), so a picture can be made on another day
-or machine.
+A runner fills a ``terrain.recording.recorder.Recorder`` while the robot drives and ends with ``finish``. A
+``Recording`` knows no simulator and no viewer and can be saved and read again (``recording.npz``), so a picture can be
+made on another day or machine.
 """
 
 from __future__ import annotations

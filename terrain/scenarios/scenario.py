@@ -26,7 +26,7 @@ from terrain.scenarios.world_types import LevelsWorld, MapWorld, TerrainWorld, W
 
 __all__ = ["MapWorld", "Obstacle", "PlanarPose", "Scenario", "Sensor", "load_scenario", "shipped_scenarios"]
 
-SHIPPED = Path(__file__).parent / "scenarios"
+SHIPPED = Path(__file__).parent / "library"
 
 
 class Sensor(ParameterModel):

@@ -3,8 +3,8 @@
 In the folder: ``events.jsonl``, ``metrics.json``, ``recording.npz``, ``picture.png``, ``report.html``, ``replay.html``,
 ``run.mcap``, ``navigation.yaml``, ``versions.json`` and the world's map files. On simulated time the same scenario and
 seed write the same ``events.jsonl``, byte for byte, and the same ``digest`` in ``metrics.json``, which covers poses and
-commands too (see ``terrain.recording.run_digest``), on every CPU with the versions that ``versions.json`` names; how long the run
-took on the wall stands in ``timing.json``.
+commands too (see ``terrain.recording.run_digest``), on every CPU with the versions that ``versions.json`` names; how
+long the run took on the wall stands in ``timing.json``.
 """
 
 from __future__ import annotations

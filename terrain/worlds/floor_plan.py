@@ -19,7 +19,7 @@ from terrain.worlds.occupancy import OccupancyGrid, all_digits
 
 BoolArray = NDArray[np.bool_]
 
-DATA_FOLDER = Path(__file__).resolve().parent / "data"
+DATA_FOLDER = Path(__file__).resolve().parents[1] / "data"
 OFFICE_PLAN = DATA_FOLDER / "office.plan.yaml"
 OFFICE_MAP = DATA_FOLDER / "office.yaml"
 RESOLUTION = 0.05

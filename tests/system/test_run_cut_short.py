@@ -29,7 +29,7 @@ SCENARIO = {
     "name": "corridor",
     "proves": "A run that is killed leaves what it has done.",
     "backend": "costmap",
-    "navigation": {"costmap": f"{terrain.__path__[0]}/scenarios/config/indoor_costmap.yaml"},
+    "navigation": {"costmap": f"{terrain.__path__[0]}/scenarios/library/config/indoor_costmap.yaml"},
     "world": {"type": "office"},
     "physics": "kinematic",
     "robot": "turtlebot",

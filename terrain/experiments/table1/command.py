@@ -10,8 +10,7 @@ from typing import Any
 import typer
 
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
-
-WAREHOUSE = Path(__file__).with_name("warehouse.yaml")
+from terrain.experiments.table1.environments.world import WAREHOUSE
 
 
 def register(app: typer.Typer) -> None:

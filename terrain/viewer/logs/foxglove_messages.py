@@ -1,7 +1,7 @@
 """Arrays as messages of Foxglove's schemas: pure functions, SI units, frames by name, times in seconds.
 
-The schemas are described at https://docs.foxglove.dev/docs/sdk/schemas. ``terrain.viewer.logs.mcap_log`` puts the messages
-in a file.
+The schemas are described at https://docs.foxglove.dev/docs/sdk/schemas. ``terrain.viewer.logs.mcap_log`` puts the
+messages in a file.
 """
 
 from __future__ import annotations

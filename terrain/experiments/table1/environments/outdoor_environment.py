@@ -1,6 +1,7 @@
 """The stage of the outdoor table: a Husky with physics on rough ground, navigated on a mesh, among rocks nobody mapped.
 
-It offers what ``stage.Stage`` offers to a repetition; the world is a scenario file, run by ``terrain.session.bench.Bench``.
+It offers what ``environment.Stage`` offers to a repetition; the world is a scenario file, run by
+``terrain.session.bench.Bench``.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from mbf_abstract.events import EventKind, read_events
 
 pytestmark = pytest.mark.timeout(300)
 
-CONFIG = f"{terrain.__path__[0]}/scenarios/config/outdoor_mesh.yaml"
+CONFIG = f"{terrain.__path__[0]}/scenarios/library/config/outdoor_mesh.yaml"
 SCENARIO = {
     "name": "meadow",
     "proves": "A page can be used.",
