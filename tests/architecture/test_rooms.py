@@ -20,6 +20,7 @@ SPAWNERS = (
     "mbf_abstract/execution/",
     "mbf_abstract/drive/",
     "mbf_abstract/goals/",
+    "mbf_abstract/server/process_end.py",
     "mbf_abstract/testing/",
     "terrain/",
 )

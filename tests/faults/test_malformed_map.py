@@ -176,7 +176,7 @@ def test_a_server_refuses_a_malformed_map_before_it_starts_and_starts_with_the_m
     with pytest.raises(MapError, match=r"map\.pgm"):
         Navigator.from_file(tmp_path / "robot.yaml", robot, clock, transforms)
     clock.sleep(0.1)
-    assert {who.name for who in clock._known} == {"main", "loopback robot"}, "no thread of the server is left"
+    assert set(clock.thread_names) == {"main", "loopback robot"}, "no thread of the server is left"
 
     Image.fromarray(np.full((40, 40), 255, np.uint8)).save(tmp_path / "map.pgm")
     with Navigator.from_file(tmp_path / "robot.yaml", robot, clock, transforms) as navigator:

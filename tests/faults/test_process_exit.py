@@ -227,4 +227,4 @@ def test_ctrl_c_in_the_middle_of_the_last_command_is_passed_on_and_zero_follows(
     bench.clock.sleep(1.0)
     assert bench.robot.command.is_stopped()
     bench.close()
-    assert {who.name for who in bench.clock._known} == {"main"}
+    assert set(bench.clock.thread_names) == {"main"}

@@ -148,7 +148,7 @@ def verify(seed, bench, handles):
     assert all(handle.done and handle.result.message for handle in handles), f"schedule {seed}: {handles}"
     assert sorted(bench.called) == sorted(handle.id for handle in handles), f"schedule {seed}: callbacks {bench.called}"
     assert bench.robot.command.is_stopped(), f"schedule {seed}: the robot still drives"
-    waiting = {who.name for who in bench.clock._known} - {"main"}
+    waiting = set(bench.clock.thread_names) - {"main"}
     assert not waiting, f"schedule {seed}: threads left: {waiting}"
     framework = [event for event in bench.events(EventKind.FAULT) if "where" not in event.data]
     assert not framework, f"schedule {seed}: {framework[0].data}"

@@ -167,7 +167,7 @@ def test_a_closed_gate_tries_a_few_times_to_stop_a_driver_that_raises_and_then_e
     scene.gate.close()
     scene.clock.sleep(10.0)
     assert len(scene.memory.of_kind(EventKind.FAULT)) == 4
-    assert [one.name for one in scene.clock._known] == ["main"]
+    assert scene.clock.thread_names == ["main"]
 
 
 # ------------------------------------------------------------------------------------------ what a command is

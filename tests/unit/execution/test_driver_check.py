@@ -99,7 +99,7 @@ def test_a_server_with_what_is_no_driver_is_not_made():
     with pytest.raises(DriverError, match="send_command is missing"):
         Bench(clock=clock, robot=object())
     clock.sleep(0.1)
-    assert {one.name for one in clock._known} == {"main", "loopback robot"}
+    assert set(clock.thread_names) == {"main", "loopback robot"}
 
 
 @pytest.mark.parametrize("answer", [None, Odometry(Twist(), 0.0), OSError("not connected yet")])

@@ -52,7 +52,7 @@ def test_jobs_run_in_order_on_one_thread_that_is_reused(clock, jobs):
         clock.sleep(1.0)
         assert not worker.busy
     assert len(jobs.log) == 6
-    names = [who.name for who in clock._known]
+    names = clock.thread_names
     assert names.count("slot 0") == 1
 
 
@@ -87,7 +87,7 @@ def test_an_abandoned_job_frees_the_slot_and_its_thread_ends_with_it(clock, jobs
     clock.sleep(2.0)
     assert jobs.log == ["a starts at 0", "b starts at 0.5", "b ends at 1.5"]
     clock.sleep(20.0)
-    assert [who.name for who in clock._known].count("slot 0") == 1
+    assert clock.thread_names.count("slot 0") == 1
     worker.abandon(hung)  # without effect: it is over
     worker.submit(jobs("c", 0.1))
     clock.sleep(1.0)
@@ -104,7 +104,7 @@ def test_a_closed_worker_gives_its_waiting_job_back_and_takes_no_more(clock, job
     assert worker.submit(late) is late
     clock.sleep(5.0)
     assert jobs.log == ["a starts at 0", "a ends at 1"]
-    assert "slot 0" not in {who.name for who in clock._known}
+    assert "slot 0" not in set(clock.thread_names)
 
 
 # --------------------------------------------------------------------------------------------- supervisor
@@ -152,14 +152,14 @@ def test_a_closed_supervisor_still_asks_what_is_watched_and_then_its_thread_ends
     stopped = supervisor.watch(lambda: asked.append("stopped"), 2.0)
     supervisor.close()
     clock.sleep(1.0)
-    assert "supervisor" in {who.name for who in clock._known}
+    assert "supervisor" in set(clock.thread_names)
     supervisor.stop(stopped)
     clock.sleep(0.0)
-    assert "supervisor" not in {who.name for who in clock._known}
+    assert "supervisor" not in set(clock.thread_names)
     supervisor.watch(lambda: asked.append("late"), 0.5)  # e.g. a done callback of a goal that has just ended
     clock.sleep(1.0)
     assert asked == ["early", "late"]
-    assert "supervisor" not in {who.name for who in clock._known}
+    assert "supervisor" not in set(clock.thread_names)
 
 
 @pytest.mark.parametrize("error", [RuntimeError("no more threads"), SystemExit(1)])
@@ -242,10 +242,10 @@ def test_with_too_many_blocked_callbacks_the_others_wait_until_one_comes_back(cl
         callbacks.submit(lambda i=i: log.append((i, clock.now())))
     clock.sleep(9.0)
     assert log == []
-    assert [who.name for who in clock._known].count("callbacks") == 3
+    assert clock.thread_names.count("callbacks") == 3
     clock.sleep(2.0)
     assert log == [(i, 10.0) for i in range(2000)]
-    assert [who.name for who in clock._known].count("callbacks") == 3
+    assert clock.thread_names.count("callbacks") == 3
 
 
 def test_of_what_one_taker_has_not_taken_only_the_newest_stays_and_keeps_its_place(clock, make_callbacks):
@@ -289,8 +289,8 @@ def test_closing_runs_what_is_queued_and_what_comes_later(clock, make_callbacks)
     callbacks.submit(lambda: log.append("queued"))
     callbacks.close()
     clock.sleep(0.1)
-    assert "callbacks" not in {who.name for who in clock._known}
+    assert "callbacks" not in set(clock.thread_names)
     callbacks.submit(lambda: log.append("later"))
     clock.sleep(0.1)
     assert log == ["queued", "later"]
-    assert "callbacks" not in {who.name for who in clock._known}
+    assert "callbacks" not in set(clock.thread_names)

@@ -1,0 +1,71 @@
+"""A thread as the lockstep scheduler knows it."""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import PurePath
+from typing import Protocol
+
+WAITING_MODULES = ("threading.py", "selectors.py", "queue.py")
+"""Files of Python's library in which a thread waits for another one."""
+
+
+class GuardedSection(Protocol):
+    """One guarded section, and who is called if its thread hangs."""
+
+    @property
+    def label(self) -> str:
+        """What runs in it, for messages."""
+
+    @property
+    def on_hang(self) -> Callable[[], None] | None:
+        """Called by the guard if the thread hangs."""
+
+
+class Participant:
+    """One known (or, while it waits, one foreign) thread."""
+
+    __slots__ = (
+        "baton", "deadlock", "detached", "foreign", "held_locks", "ident", "name", "notified", "outside_depth",
+        "priority", "resumed_at", "sections", "ticket", "waiting_among",
+    )  # fmt: skip
+
+    def __init__(self, name: str, priority: int, foreign: bool = False) -> None:
+        self.name = name
+        self.ident = threading.get_ident()  # of the thread that makes it; a SimThread sets its own when it starts
+        self.priority = priority
+        self.foreign = foreign
+        self.baton = threading.Lock()  # released by whoever passes it on, so it is no lock in the usual sense
+        self.baton.acquire()
+        self.ticket = 0  # grows with every wait: a timer entry of an older wait is stale
+        self.notified = False
+        self.detached = False
+        self.deadlock = False
+        self.held_locks = 0
+        self.outside_depth = 0  # coroutines of this thread that are outside the lockstep
+        self.sections: list[GuardedSection] = []  # the guarded ones it is in, the outermost first
+        self.resumed_at = 0.0  # wall clock
+        self.waiting_among: list[Participant] | None = None  # the waiters of the condition it waits on
+
+    def leave_waiters(self) -> None:
+        """Wait on no condition any more; the scheduler's mutex is held."""
+        if self.waiting_among is not None:
+            self.waiting_among.remove(self)
+            self.waiting_among = None
+
+    def is_blocked(self) -> bool:
+        """Whether it waits for another thread right now, by other means than the clock."""
+        frame = sys._current_frames().get(self.ident)
+        return frame is not None and PurePath(frame.f_code.co_filename).name in WAITING_MODULES
+
+    def start_counting(self) -> None:
+        """Let the hang guard's time begin anew."""
+        self.resumed_at = time.monotonic()
+
+    def stop_counting(self) -> None:
+        """Let the hang guard wait: the compiler is at work."""
+        self.resumed_at = math.inf
