@@ -9,13 +9,14 @@ Exit codes: 0 success, 1 the goal was not reached or no path was found, 2 bad ar
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, entry_points, version
 
 import typer
 
 from mbf_abstract.commands import check, doctor, new, plan, plugins
 
 COMMANDS_GROUP = "mbf.commands"
+DISTRIBUTION = "mbf-flex"
 
 
 def make_app() -> typer.Typer:
@@ -28,11 +29,26 @@ def make_app() -> typer.Typer:
         pretty_exceptions_enable=False,
         rich_markup_mode="markdown",  # "rich", the default, takes a unit such as [m] for markup and drops it
     )
+    app.callback()(_options)
     for command in (plan, check, plugins, new, doctor):
         command.register(app)
     for point in sorted(entry_points(group=COMMANDS_GROUP), key=lambda point: point.name):
         _add_commands(app, point)
     return app
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"{DISTRIBUTION} {version(DISTRIBUTION)}")
+        raise typer.Exit
+
+
+def _options(
+    show_version: bool = typer.Option(
+        False, "--version", help="Print the version and end.", is_eager=True, callback=_print_version
+    ),
+) -> None:
+    """Map-independent navigation for mobile robots, on 2D costmaps and 3D triangle meshes."""
 
 
 def _add_commands(app: typer.Typer, point: EntryPoint) -> None:
