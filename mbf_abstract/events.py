@@ -49,7 +49,6 @@ class EventKind(str, Enum):
     CONTROL_LOOP = "control_loop"  # goal_id, began, cycles, failed; source: plugin; a loop has ended
     PLAN = "plan"  # goal_id, plugin, cost, length, poses (count)
     RECOVERY = "recovery"  # goal_id, plugin, reason
-    FEEDBACK = "feedback"  # goal_id, action-specific sample
     COMMAND_CLAMPED = "command_clamped"  # requested, sent
     COMMAND_DROPPED = "command_dropped"  # command, reason
     GATE_CLOSED = "gate_closed"  # reason

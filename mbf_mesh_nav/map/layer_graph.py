@@ -12,6 +12,7 @@ are not up to date.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 
 import numpy as np
 
@@ -42,31 +43,26 @@ def dependency_order(inputs: Mapping[str, Sequence[str]]) -> list[str]:
     if findings:
         findings.append(f"the layers are: {', '.join(inputs)}")
     known = {name: [read for read in reads if read in inputs] for name, reads in inputs.items()}
-    order: list[str] = []
-    waiting = list(inputs)
-    while waiting:
-        ready = [name for name in waiting if all(read in order for read in known[name])]
-        if not ready:
-            findings.append(f"layers read each other in a circle: {' -> '.join(_cycle(known, waiting[0]))}")
-            break
-        order += ready
-        waiting = [name for name in waiting if name not in ready]
+    sorter, order = TopologicalSorter(known), list[str]()
+    try:
+        sorter.prepare()
+    except CycleError as error:
+        findings.append(f"layers read each other in a circle: {' -> '.join(_from_first(error.args[1], list(inputs)))}")
     if findings:
         raise LayerGraphError("; ".join(findings))
+    configured = list(inputs).index
+    while sorter.is_active():
+        ready = sorted(sorter.get_ready(), key=configured)
+        order += ready
+        sorter.done(*ready)
     return order
 
 
-def _cycle(inputs: Mapping[str, Sequence[str]], start: str) -> list[str]:
-    """Follow inputs that are part of or lead to a cycle until a name repeats."""
-    ordered: set[str] = set()
-    while grown := {name for name in inputs if name not in ordered and ordered.issuperset(inputs[name])}:
-        ordered |= grown
-    trail = [start]
-    while True:
-        following = next(read for read in inputs[trail[-1]] if read not in ordered)
-        if following in trail:
-            return [*trail[trail.index(following) :], following]
-        trail.append(following)
+def _from_first(circle: Sequence[str], configured: Sequence[str]) -> list[str]:
+    """Turn a circle of graphlib, which ends as it begins, so that each name reads the next, the first one first."""
+    names = list(reversed(circle))[1:]
+    start = min(range(len(names)), key=lambda place: configured.index(names[place]))
+    return [*names[start:], *names[:start], names[start]]
 
 
 class LayerGraph(Mapping[str, MeshLayer]):

@@ -42,7 +42,7 @@ from terrain.viewer.scene import wheel_angles
 
 TRACK_PIECE = 5.0  # s
 ERRORS = {EventKind.FAULT, EventKind.QUARANTINE, EventKind.SINK_FAILED}
-DETAILS = {EventKind.STATE_CHANGED, EventKind.PLUGIN_CALL_STARTED, EventKind.PLUGIN_CALL_ENDED, EventKind.FEEDBACK}
+DETAILS = {EventKind.STATE_CHANGED, EventKind.PLUGIN_CALL_STARTED, EventKind.PLUGIN_CALL_ENDED}
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 MOTION = ("speed", "commanded_speed", "yaw_rate", "commanded_yaw_rate", "tilt_deg", "cross_track_error")
 JSON_FIELDS: dict[str, dict[str, Any]] = {
@@ -78,7 +78,7 @@ def messages_of(recording: Recording) -> list[Stamped]:
         ((time, "/scan", message.point_cloud(time, frame, points)) for time, points in recording.scans),
         ((grid.time, "/map", message.grid(frame, grid, height)) for grid in recording.grids),
         ((mesh.time, "/mesh_map", update) for mesh, update in mesh_costs.updates(frame, recording.meshes)),
-        ((event.time, "/log", _log(event)) for event in recording.events if event.kind is not EventKind.FEEDBACK),
+        ((event.time, "/log", _log(event)) for event in recording.events),
         ((event.time, "/events", _event(event)) for event in recording.events),
         action_states(recording.events),
         _motion(recording),

@@ -134,7 +134,7 @@ def test_equal_runs_write_equal_bytes_and_read_back_as_equal_events(tmp_path):
         memory = MemorySink()
         bus = bus_with(memory, JsonLinesSink(tmp_path / run / "events.jsonl"))
         bus.emit(EventKind.PLAN, "planner", cost=0.1 + 0.2, length=np.float64(3), poses=4)
-        bus.emit(EventKind.FEEDBACK, "exe_path", b=1, a=[1.0, float("inf")])
+        bus.emit(EventKind.STATE_CHANGED, "exe_path", b=1, a=[1.0, float("inf")])
         bus.close()
         contents.append((tmp_path / run / "events.jsonl").read_bytes())
         assert tuple(read_events(tmp_path / run / "events.jsonl")) == memory.events
