@@ -201,7 +201,7 @@ class CostmapNavigationServer(AbstractNavigationServer):
 
     def map_problem(self) -> str:
         """Why the local costmap is not current, if it is not."""
-        return self.local_costmap.currency_problem(self.runtime.clock.now())
+        return self.local_costmap.stale_reason(self.runtime.clock.now())
 
     def close_map(self) -> None:
         """End the threads that update the maps."""

@@ -250,12 +250,8 @@ class MeshNavigationServer(AbstractNavigationServer):
         with_changes(cast(MeshMapParameters, self.config.sections["mesh_map"].parameters), changes)
 
     def map_problem(self) -> str:
-        """Name the layer that raised, or the obstacle layer whose sensor is silent, if there is one."""
-        if self.mesh_map.layers.problem:
-            return f"the mesh map is not up to date: {self.mesh_map.layers.problem}"
-        now = self.runtime.clock.now()
-        silent = [name for name, layer in self.mesh_map.layers.items() if not layer.is_current(now)]
-        return f"no recent sensor data for layer {', '.join(silent)}" if silent else ""
+        """Name the layer that raised, or the one whose sensor is silent, if there is one."""
+        return self.mesh_map.stale_reason(self.runtime.clock.now())
 
     def close_map(self) -> None:
         """End the map's own thread."""

@@ -109,7 +109,7 @@ class _LayerCheck:
         self._event("expire", lambda layer: layer.expire(2.0))
         self._event("clear", lambda layer: layer.clear())
         self._expect_same(unseen, "clear did not bring back the state without sensors")
-        self.report.expect(isinstance(self.layer.is_current(2.0), (bool, np.bool_)), "is_current returned no bool")
+        self.report.expect(isinstance(self.layer.stale_reason(2.0), str), "stale_reason returned no text")
 
     def _event(self, situation: str, event: Callable[[MeshLayer], IntArray]) -> None:
         """Apply an event to both instances and check what the first reports and holds."""

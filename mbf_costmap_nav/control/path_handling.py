@@ -109,7 +109,7 @@ class PathFollower(CostmapController):
             request, tracker, limit = self._on_costmap(request, self.tracker)
         except TransformError as error:
             return ControlResult(ExePathOutcome.TF_ERROR, str(error))
-        if self.costmap is not self.local_costmap and (problem := self.costmap.currency_problem(self.clock.now())):
+        if self.costmap is not self.local_costmap and (problem := self.costmap.stale_reason(self.clock.now())):
             return ControlResult(ExePathOutcome.MAP_ERROR, problem)  # the server looks at the local map only
         pose, costmap = request.pose, self.costmap.snapshot()
         if not costmap.contains(pose.x, pose.y):

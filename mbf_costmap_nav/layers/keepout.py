@@ -89,7 +89,7 @@ class KeepoutLayer(CostmapLayer):
         changed, self._changed = self._changed, EMPTY_BOX
         return box.union(changed)
 
-    def currency_problem(self, now: float) -> str:
+    def stale_reason(self, now: float) -> str:
         """Say that the frame of the areas is unknown."""
         return f"layer {self.name!r}: {self._placement.problem}" if self._placement.problem else ""
 

@@ -59,9 +59,9 @@ class ObstacleLayer(GridLayer, SensorLayer):
         """Take over the outline under which the map is free."""
         self._footprint = footprint
 
-    def currency_problem(self, now: float) -> str:
+    def stale_reason(self, now: float) -> str:
         """Name the source that is late at ``now`` [s]."""
-        problems = (buffer.watch.currency_problem(now) for buffer in self.buffers.values())
+        problems = (buffer.watch.stale_reason(now) for buffer in self.buffers.values())
         return next((f"layer {self.name!r}: {problem}" for problem in problems if problem), "")
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:

@@ -97,9 +97,9 @@ class RangeSensorLayer(SensorLayer):
         self.watches[source].heard(observation.stamp)
         self._waiting.append((source, observation))
 
-    def currency_problem(self, now: float) -> str:
+    def stale_reason(self, now: float) -> str:
         """Name the sensor that is late at ``now`` [s]."""
-        problems = (watch.currency_problem(now) for watch in self.watches.values())
+        problems = (watch.stale_reason(now) for watch in self.watches.values())
         return next((f"layer {self.name!r}: {problem}" for problem in problems if problem), "")
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:

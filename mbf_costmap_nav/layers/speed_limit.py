@@ -65,7 +65,7 @@ class SpeedLimitLayer(CostmapLayer):
         self._placement.refresh()
         return box
 
-    def currency_problem(self, now: float) -> str:
+    def stale_reason(self, now: float) -> str:
         """Say that the frame of the areas is unknown."""
         return f"layer {self.name!r}: {self._placement.problem}" if self._placement.problem else ""
 

@@ -109,7 +109,7 @@ class StaticLayer(GridLayer):
                 self._map, self.geometry, box, self.default_value, self._placement.T_data_costmap
             )
 
-    def currency_problem(self, now: float) -> str:
+    def stale_reason(self, now: float) -> str:
         """Say that the map's frame is unknown."""
         return f"layer {self.name!r}: {self._placement.problem}" if self._placement.problem else ""
 

@@ -133,7 +133,7 @@ class CostmapLayer(ABC):
     def clear_area(self, box: CellBox, inside: bool) -> None:  # noqa: B027 - an optional hook
         """Forget the cells in ``box``, or all cells out of it (``inside`` false)."""
 
-    def currency_problem(self, now: float) -> str:
+    def stale_reason(self, now: float) -> str:
         """Why the layer's data is too old at ``now`` [s]; empty while it is current."""
         return ""
 

@@ -153,9 +153,9 @@ class LayeredCostmap:
 
     def is_current(self, now: float) -> bool:
         """Whether a command may be computed on this map at ``now`` [s]."""
-        return not self.currency_problem(now)
+        return not self.stale_reason(now)
 
-    def currency_problem(self, now: float) -> str:
+    def stale_reason(self, now: float) -> str:
         """Why the map is not current at ``now`` [s]: the age of the map, or the silent sensor; empty if it is."""
         with self._lock:
             if self._last_update is None:
@@ -163,7 +163,7 @@ class LayeredCostmap:
             age = now - self._last_update
             if 0.0 < self.max_age < age:
                 return f"the last update of the costmap is {age:.2f} s old, allowed are {self.max_age:.2f} s"
-            problems = (layer.currency_problem(now) for layer in self._enabled_layers())
+            problems = (layer.stale_reason(now) for layer in self._enabled_layers())
             return next((problem for problem in problems if problem), "")
 
     def doubts(self) -> list[str]:

@@ -135,7 +135,7 @@ class SourceWatch:
         """Note that the map has forgotten the source: it must not be driven on before it sees again."""
         self._in_map = False
 
-    def currency_problem(self, now: float) -> str:
+    def stale_reason(self, now: float) -> str:
         """Say how late the source is at ``now`` [s]; empty while it is in time."""
         if self._limit == 0.0:
             return ""

@@ -135,15 +135,24 @@ class ObstacleLayer(MeshLayer):
         self._last_heard = dict.fromkeys(self._last_heard, -np.inf)
         return self._change(Hits.none())
 
-    def is_current(self, now: float) -> bool:
-        """Whether each sensor spoke within ``expected_update_rate``, and since the layer was cleared.
+    def stale_reason(self, now: float) -> str:
+        """Which sensor has not spoken within ``expected_update_rate``, or since the layer was cleared.
 
         A stamp from the future, but for the difference of two clocks, is no sign of life.
         """
         limit = self.parameters.expected_update_rate
         sources = self.parameters.sources or self._last_heard
-        ages = [now - self._last_heard.get(source, -np.inf) for source in sources]
-        return limit == 0.0 or (bool(ages) and -MAX_STAMP_LEAD <= min(ages) and max(ages) <= limit)
+        if limit == 0.0:
+            return ""
+        for source in sources:
+            age = now - self._last_heard.get(source, -np.inf)
+            if age == np.inf:
+                return f"nothing of observation source {source!r} is in the map yet"
+            if age > limit:
+                return f"observation source {source!r} is silent for {age:.2f} s, expected every {limit:.2f} s"
+            if age < -MAX_STAMP_LEAD:
+                return f"observation source {source!r} has a stamp {-age:.2f} s in the future, is its clock right?"
+        return "" if sources else "no observation source has sent anything yet"
 
     def _listens_to(self, source: str) -> bool:
         return not self.parameters.sources or source in self.parameters.sources

@@ -2,7 +2,7 @@
 
 A new layer derives ``MeshLayer``, declares ``Parameters`` and writes ``compute``. Layers that can do better than
 starting over after a local change override ``update_from_inputs``; layers fed by a sensor override ``insert_scan``,
-``expire``, ``clear`` and ``is_current``. A layer never calls another layer: the layer graph hands changes on.
+``expire``, ``clear`` and ``stale_reason``. A layer never calls another layer: the layer graph hands changes on.
 """
 
 from __future__ import annotations
@@ -137,9 +137,9 @@ class MeshLayer(ABC):
         """Forget everything sensed."""
         return NOTHING_CHANGED
 
-    def is_current(self, now: float) -> bool:
-        """Whether the sensor data is fresh enough at ``now`` [s]."""
-        return True
+    def stale_reason(self, now: float) -> str:
+        """Why the layer's sensor data are too old at ``now`` [s]; empty if they are fresh or there are none."""
+        return ""
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:

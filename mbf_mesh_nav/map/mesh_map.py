@@ -293,8 +293,15 @@ class MeshMap:
         self.apply(lambda layer: layer.clear())
 
     def is_current(self, now: float) -> bool:
-        """Whether all layers are up to date and those of obstacles got data in time, at ``now`` [s]."""
-        return not self.layers.problem and all(layer.is_current(now) for layer in self.layers.values())
+        """Whether a command may be computed on this map at ``now`` [s]."""
+        return not self.stale_reason(now)
+
+    def stale_reason(self, now: float) -> str:
+        """Why the map is not current at ``now`` [s]: a layer that raised, or a silent sensor; empty if it is."""
+        if self.layers.problem:
+            return f"the mesh map is not up to date: {self.layers.problem}"
+        reasons = ((name, layer.stale_reason(now)) for name, layer in self.layers.items())
+        return next((f"layer {name!r}: {reason}" for name, reason in reasons if reason), "")
 
     def apply(self, event: Callable[[MeshLayer], IntArray]) -> None:
         """Give an event to every layer, see ``LayerGraph.apply``, and show plugins the map that follows."""

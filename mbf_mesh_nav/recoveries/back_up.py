@@ -14,18 +14,18 @@ from numpy.typing import NDArray
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.guarded_motion import GuardedMotionParameters
 from mbf_abstract.outcomes import RecoveryOutcome
-from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.motion.goal_approach import arc_to, clamp, in_robot_frame
-from mbf_mesh_nav.motion.guarded_motion import free_distance, reports_lost_pose, run_guarded
-from mbf_mesh_nav.plugins import MeshRecovery
+from mbf_mesh_nav.motion.guarded_motion import GuardedRecovery, free_distance
 
 TRACK_GAP = 0.5
 """A track whose newest point is farther than this [m] from the robot is not the way it came."""
 
 
-class BackUpParameters(PluginParameters):
+class BackUpParameters(GuardedMotionParameters):
     """Parameters of ``mesh.back_up``."""
 
     distance: float = parameter(0.5, "How far to back up.", unit="m", gt=0.0, le=10.0)
@@ -35,23 +35,21 @@ class BackUpParameters(PluginParameters):
     lookahead: float = parameter(0.3, "Distance to the point of the track that is steered to.", unit="m", gt=0.0)
     clearance: float = parameter(0.3, "Free ground kept behind the robot's centre.", unit="m", ge=0.0)
     cost_limit: float = parameter(1.0, "Ground whose cost reaches this is not entered.", gt=0.0, allow_inf=True)
-    time_limit: float = parameter(15.0, "Longest run.", unit="s", gt=0.0)
 
 
-class BackUpRecovery(MeshRecovery):
+class BackUpRecovery(GuardedRecovery):
     """Backs up along the driven track."""
 
     Parameters = BackUpParameters
     parameters: BackUpParameters
 
-    @reports_lost_pose
-    def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
+    def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Back up until the distance is driven or the ground behind ends."""
         p = self.parameters
         begin = request.motion.pose()
         tracker = PathTracker(Path.from_points(self._way_back(begin), frame_id=self.mesh_map.frame_id))
 
-        def step(pose: Pose) -> Twist | RecoveryResult:
+        def velocity(pose: Pose) -> Twist | RecoveryResult:
             tracker.update(pose.position)
             driven = tracker.progress
             if driven >= p.distance:
@@ -68,7 +66,7 @@ class BackUpRecovery(MeshRecovery):
             outcome = RecoveryOutcome.SUCCESS if driven >= p.min_distance else RecoveryOutcome.IMPASSABLE
             return RecoveryResult(outcome, f"backed up {driven:.2f} m, then the ground behind is blocked")
 
-        return run_guarded(request, self.clock, p.time_limit, step)
+        return self.drive(request, velocity)
 
     def _way_back(self, pose: Pose) -> NDArray[np.float64]:
         """Points (n, 3) behind the robot: its track from the newest point on, then straight on for ``distance``."""

@@ -17,20 +17,20 @@ from numpy.typing import NDArray
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.maps.guarded_motion import GuardedMotionParameters
 from mbf_abstract.outcomes import RecoveryOutcome
-from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors, propagate_distances
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.surface_point import nearest_corner
 from mbf_mesh_nav.motion.goal_approach import arc_to, clamp, ground_distance
-from mbf_mesh_nav.motion.guarded_motion import reports_lost_pose, run_guarded
-from mbf_mesh_nav.plugins import MeshRecovery
+from mbf_mesh_nav.motion.guarded_motion import GuardedRecovery
 from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, seeded_arrays, threshold_step
 
 
-class EscapeParameters(PluginParameters):
+class EscapeParameters(GuardedMotionParameters):
     """Parameters of ``mesh.escape``."""
 
     cost_limit: float = parameter(0.9, "Ground is safe below this cost.", gt=0.0, allow_inf=True)
@@ -38,7 +38,7 @@ class EscapeParameters(PluginParameters):
     speed: float = parameter(0.2, "Driving speed.", unit="m/s", gt=0.0, le=1.0)
     yaw_rate: float = parameter(0.6, "Yaw rate limit.", unit="rad/s", gt=0.0, le=3.0)
     reach: float = parameter(0.1, "The free vertex is reached within this distance.", unit="m", gt=0.0)
-    time_limit: float = parameter(40.0, "Longest run.", unit="s", gt=0.0)
+    time_limit: float = parameter(40.0, "Give up after this time.", unit="s", gt=0.0, le=600.0)
 
 
 @dataclass(frozen=True)
@@ -62,14 +62,13 @@ class WayOut:
         return not (lethal[ahead].any() or blocked[self.vertices[-1]])
 
 
-class EscapeRecovery(MeshRecovery):
+class EscapeRecovery(GuardedRecovery):
     """Drives to the nearest safe ground."""
 
     Parameters = EscapeParameters
     parameters: EscapeParameters
 
-    @reports_lost_pose
-    def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
+    def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Find the nearest free vertex, drive there; a free start is a success at once."""
         p, mesh_map, flag = self.parameters, self.mesh_map, request.cancel_token.flag
         spot = mesh_map.locate_one(request.motion.pose().position, 1.0)
@@ -81,7 +80,7 @@ class EscapeRecovery(MeshRecovery):
         own_patch = self._patch_below(spot, snapshot, flag)
         way = self._way_to_safety(spot, own_patch, request)
 
-        def step(pose: Pose) -> Twist | RecoveryResult:
+        def velocity(pose: Pose) -> Twist | RecoveryResult:
             nonlocal way
             now = mesh_map.snapshot()
             if way is not None:
@@ -94,7 +93,7 @@ class EscapeRecovery(MeshRecovery):
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)
             return self._drive(pose, way.tracker)
 
-        return run_guarded(request, self.clock, p.time_limit, step)
+        return self.drive(request, velocity)
 
     def _drive(self, pose: Pose, tracker: PathTracker) -> Twist | RecoveryResult:
         """Pursue the way, or say that its end is reached."""

@@ -9,37 +9,36 @@ from __future__ import annotations
 import math
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.maps.guarded_motion import GuardedMotionParameters
 from mbf_abstract.outcomes import RecoveryOutcome
-from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.motion.goal_approach import heading_error
-from mbf_mesh_nav.motion.guarded_motion import reports_lost_pose, run_guarded
-from mbf_mesh_nav.plugins import MeshRecovery
+from mbf_mesh_nav.motion.guarded_motion import GuardedRecovery
 
 
-class RotateParameters(PluginParameters):
+class RotateParameters(GuardedMotionParameters):
     """Parameters of ``mesh.rotate``."""
 
     angle: float = parameter(2.0 * math.pi, "How far to turn; negative = clockwise.", unit="rad")
     yaw_rate: float = parameter(0.6, "Turning speed.", unit="rad/s", gt=0.0, le=3.0)
     max_slope: float = parameter(0.35, "Steeper ground is not turned on.", unit="rad", gt=0.0, le=1.5)
-    time_limit: float = parameter(30.0, "Longest run.", unit="s", gt=0.0)
+    time_limit: float = parameter(30.0, "Give up after this time.", unit="s", gt=0.0, le=600.0)
 
 
-class RotateRecovery(MeshRecovery):
+class RotateRecovery(GuardedRecovery):
     """Turns by an angle, measured on the poses."""
 
     Parameters = RotateParameters
     parameters: RotateParameters
 
-    @reports_lost_pose
-    def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
+    def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Turn until the angle is reached; checks the slope all the time."""
         p = self.parameters
         last = request.motion.pose()
         turned = 0.0
 
-        def step(pose: Pose) -> Twist | RecoveryResult:
+        def velocity(pose: Pose) -> Twist | RecoveryResult:
             nonlocal last, turned
             turned += heading_error(last, pose)
             last = pose
@@ -54,4 +53,4 @@ class RotateRecovery(MeshRecovery):
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)
             return Twist.planar(wz=math.copysign(p.yaw_rate, p.angle))
 
-        return run_guarded(request, self.clock, p.time_limit, step)
+        return self.drive(request, velocity)

@@ -159,21 +159,21 @@ def test_a_pose_in_another_frame_is_refused(build):
 # ---------------------------------------------------------------------------------------------------- currency
 def test_a_map_is_not_current_before_its_first_update_nor_long_after_the_last(build):
     costmap = build("static", max_age=2.0)
-    assert costmap.currency_problem(0.0) == "the costmap has not been updated yet"
+    assert costmap.stale_reason(0.0) == "the costmap has not been updated yet"
     costmap.update(None, 10.0)
     assert costmap.is_current(12.0)
-    assert "2.50 s old" in costmap.currency_problem(12.5)
+    assert "2.50 s old" in costmap.stale_reason(12.5)
 
 
 def test_a_silent_sensor_makes_the_map_not_current_by_default(build):
     costmap = build("obstacle", obstacle={"sources": {"laser": {}}})
     costmap.update(None, 0.0)
-    assert "'laser' has not sent anything" in costmap.currency_problem(0.0)
+    assert "'laser' has not sent anything" in costmap.stale_reason(0.0)
     costmap.insert_points("laser", [(1.0, 1.0, 0.0)], (0.0, 0.0, 0.0), 0.0)
     costmap.update(None, 1.0)
     assert costmap.is_current(1.0)
     costmap.update(None, 1.5)
-    assert "layer 'obstacle': observation source 'laser' is silent for 1.50 s" in costmap.currency_problem(1.5)
+    assert "layer 'obstacle': observation source 'laser' is silent for 1.50 s" in costmap.stale_reason(1.5)
 
 
 @pytest.mark.parametrize("layer", ["obstacle", "voxel", "range_sensor"])
@@ -189,11 +189,11 @@ def test_a_stamp_from_the_future_is_told_and_does_not_cover_silence(build, layer
     see(1e6, 10.1)
     for now in (10.1, 50.0, 1000.0):
         costmap.update(None, now)
-        assert "'laser' has a stamp" in costmap.currency_problem(now)
+        assert "'laser' has a stamp" in costmap.stale_reason(now)
     see(1000.0, 1000.0)
     assert costmap.is_current(1000.0), "the source is right again"
     costmap.update(None, 1002.0)
-    assert "'laser' is silent for 2.00 s" in costmap.currency_problem(1002.0)
+    assert "'laser' is silent for 2.00 s" in costmap.stale_reason(1002.0)
 
 
 @pytest.mark.parametrize("stamp", [math.nan, math.inf, -math.inf])
@@ -227,7 +227,7 @@ def test_a_cleared_map_is_not_current_before_it_sees_again(build, layer, clear):
     assert costmap.is_current(0.0)
     clear(costmap)
     costmap.update(HERE, 0.1)
-    assert "'laser' is in the map since it was cleared" in costmap.currency_problem(0.1)
+    assert "'laser' is in the map since it was cleared" in costmap.stale_reason(0.1)
     see(0.2)
     assert not costmap.is_current(0.2)
     costmap.update(HERE, 0.2)

@@ -92,7 +92,7 @@ def test_the_map_follows_its_frame():
 def test_while_the_frame_is_unknown_the_map_is_not_current_and_empty():
     costmap, transforms = place()
     costmap.update(None, 0.0)
-    assert "'walls'" in costmap.currency_problem(0.0) and "odom" in costmap.currency_problem(0.0)
+    assert "'walls'" in costmap.stale_reason(0.0) and "odom" in costmap.stale_reason(0.0)
     assert (costmap.snapshot().cells == UNKNOWN).all()
     transforms.set(odom_at(0.0, 0.0, 0.0))
     costmap.update(None, 0.1)
@@ -174,7 +174,7 @@ def test_a_speed_limit_holds_where_its_zone_lies(tmp_path):
 def test_filters_follow_their_frame_and_without_it_the_map_is_not_current(tmp_path):
     costmap, transforms = filters(tmp_path)
     costmap.update(None, 0.0)
-    assert "'keepout'" in costmap.currency_problem(0.0) and (costmap.snapshot().cells == UNKNOWN).all()
+    assert "'keepout'" in costmap.stale_reason(0.0) and (costmap.snapshot().cells == UNKNOWN).all()
     for stamp, x in ((1.0, 0.0), (2.0, 1.0)):
         odom = Transform((x, 0.5, 0.0), quaternion_from_yaw(0.6), "map", "odom", stamp)
         transforms.set(odom)

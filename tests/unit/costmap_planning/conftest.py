@@ -28,7 +28,7 @@ class FixedCostmap(LayeredCostmap):
     def snapshot(self) -> Costmap:
         return self.fixed
 
-    def currency_problem(self, now):
+    def stale_reason(self, now):
         return ""
 
     def clear(self, layer_names=None):

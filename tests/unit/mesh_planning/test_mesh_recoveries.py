@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.maps.recoveries.wait import WaitRecovery
 from mbf_abstract.maps.relaxation import NO_SLACK, Slack
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
@@ -20,7 +21,6 @@ from mbf_mesh_nav.recoveries.clear_layers import ClearLayersRecovery
 from mbf_mesh_nav.recoveries.escape import EscapeRecovery
 from mbf_mesh_nav.recoveries.relax import RelaxRecovery
 from mbf_mesh_nav.recoveries.rotate import RotateRecovery
-from mbf_mesh_nav.recoveries.wait import WaitRecovery
 
 
 class SimulatedMotion:
@@ -265,7 +265,7 @@ def test_cancel_a_closed_gate_and_an_end_signal_stop_the_robot(run, plain, recov
     token.cancel("enough")
     assert run(recovery_class, plain(), token=token)[0].outcome == RecoveryOutcome.CANCELED
     assert run(recovery_class, plain(), motion={"gate_open": False})[0].outcome == RecoveryOutcome.STOPPED
-    assert run(recovery_class, plain(), motion={"stop_after": 3})[0].outcome == RecoveryOutcome.STOPPED
+    assert run(recovery_class, plain(), motion={"stop_after": 1})[0].outcome == RecoveryOutcome.STOPPED
 
 
 def test_a_robot_that_does_not_move_runs_into_the_time_limit(make_plugin, plain):

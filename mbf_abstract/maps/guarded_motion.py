@@ -1,0 +1,112 @@
+"""Moving the robot inside a recovery, the same on every map: slowly, cancelable, stopped at the end.
+
+``GuardedRecovery`` is the base of the recoveries that move. A map says two things: why its data are too old to drive on
+(``stale_reason``), and what the robot would touch along a motion (``obstacle_ahead``). The loop does the rest:
+
+=================================  =====================================================================
+what happens                       how the behaviour ends
+=================================  =====================================================================
+finished                           SUCCESS
+no velocity but a result           with that
+canceled                           CANCELED, the reason
+time over                          PAT_EXCEEDED
+something ahead would be touched   IMPASSABLE, the place
+the gate refuses a command         STOPPED
+no fresh pose                      TF_ERROR
+the map is stale                   it stands, and goes on when the map is fresh again within its time
+=================================  =====================================================================
+
+Whatever happens, the last command is zero.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+
+from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import AbstractRecovery, RecoveryRequest, RecoveryResult
+from mbf_abstract.time.cancel import CancelToken
+
+GATE_REFUSED = "the velocity gate refused the command"
+
+
+class GuardedMotionParameters(PluginParameters):
+    """Parameters every moving recovery has."""
+
+    control_period: float = parameter(0.05, "Time between two commands.", unit="s", gt=0.0, le=1.0)
+    time_limit: float = parameter(15.0, "Give up after this time.", unit="s", gt=0.0, le=600.0)
+
+
+class GuardedRecovery(AbstractRecovery):
+    """Base of the recoveries that move the robot: write ``recover`` and use ``drive``."""
+
+    parameters: GuardedMotionParameters
+
+    @abstractmethod
+    def recover(self, request: RecoveryRequest) -> RecoveryResult:
+        """Do the behaviour's work; the robot is stopped afterwards in any case."""
+
+    @abstractmethod
+    def stale_reason(self) -> str:
+        """Why the map is too old to drive on; empty if it is fresh."""
+
+    def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
+        """What the robot would touch if it moved on with ``command``, and where; empty if the motion is free.
+
+        Empty for every command unless the map overrides it: then the steps of its recoveries look ahead themselves.
+        """
+        return ""
+
+    def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
+        """Run ``recover``, report a lost pose as TF_ERROR, and send zero velocity at the end, whatever it was."""
+        try:
+            return self.recover(request)
+        except (RobotStateError, TransformError) as error:
+            return RecoveryResult(RecoveryOutcome.TF_ERROR, str(error))
+        finally:
+            request.motion.send(Twist())
+
+    def drive(
+        self,
+        request: RecoveryRequest,
+        velocity: Callable[[Pose], Twist | RecoveryResult],
+        finished: Callable[[Pose], bool] = lambda _: False,
+    ) -> RecoveryResult:
+        """Send ``velocity(pose)`` each period until ``finished(pose)``, a result instead of a velocity, or another end.
+
+        While the map is stale the robot stands and ``velocity`` is not asked. A command that is refused because the
+        goal is paused is no end: the sleep lasts until it is resumed. Two refusals one after the other are.
+        """
+        motion, token, limit = request.motion, request.cancel_token, self.parameters.time_limit
+        deadline, refusals = self.clock.now() + limit, 0
+        while not token.cancelled:
+            pose = motion.pose()
+            if finished(pose):
+                return RecoveryResult(RecoveryOutcome.SUCCESS)
+            stale = self.stale_reason()
+            if self.clock.now() >= deadline:
+                text = f"not done after {limit:g} s{f': {stale}' if stale else ''}"
+                return RecoveryResult(RecoveryOutcome.PAT_EXCEEDED, text)
+            answer = Twist() if stale else velocity(pose)
+            if isinstance(answer, RecoveryResult):
+                return answer
+            if obstacle := self.obstacle_ahead(pose, answer):
+                return RecoveryResult(RecoveryOutcome.IMPASSABLE, obstacle)
+            refusals = 0 if motion.send(answer) else refusals + 1
+            if refusals > 1 and not token.cancelled:
+                return RecoveryResult(RecoveryOutcome.STOPPED, GATE_REFUSED)
+            if not motion.sleep(self.parameters.control_period):
+                break
+        return ended_by_others(token)
+
+
+def ended_by_others(token: CancelToken) -> RecoveryResult:
+    """Result of a behaviour that was asked to end: by a cancel, or because its time or its plugin is over."""
+    if token.cancelled:
+        return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
+    return RecoveryResult(RecoveryOutcome.STOPPED, "the behaviour was asked to end")

@@ -1,0 +1,1 @@
+"""Recovery behaviours that are the same on every map."""
