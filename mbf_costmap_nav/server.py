@@ -19,6 +19,7 @@ from mbf_abstract.config.configuration import Config, PluginDeclaration
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.config.registry import Adapter
 from mbf_abstract.maps.queries import MapQueries
+from mbf_abstract.maps.scan_intake import ScanIntake
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.view import FloorMap, GridView
 from mbf_abstract.parameters import ParameterModel, parameter
@@ -31,7 +32,6 @@ from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.map.queries import CostmapQueries
-from mbf_costmap_nav.map.scan_intake import ScanIntake
 from mbf_costmap_nav.map.served_costmap import ServedCostmap
 from mbf_costmap_nav.planning.nav_core import wrap_nav_core
 from mbf_costmap_nav.plugins import CostmapContext
@@ -90,9 +90,7 @@ class CostmapNavigationServer(AbstractNavigationServer):
         self._local = self._serve(config, "local_costmap")
         self.global_costmap, self.local_costmap = self._global.costmap, self._local.costmap
         both = (self._global, self._local)
-        self._scans = ScanIntake(
-            self.runtime, {one.name: (one.costmap, one.parameters.transform_tolerance) for one in both}
-        )
+        self._scans = ScanIntake(self.runtime, {one.name: one.scan_target for one in both})
         for one in both:
             one.tell_doubts()
 

@@ -19,6 +19,7 @@ from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Path as PlannedPath
 from mbf_abstract.maps.queries import MapQueries
+from mbf_abstract.maps.scan_intake import ScanIntake, ScanTarget
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.view import FieldView, MeshView
 from mbf_abstract.parameters import ParameterModel, with_changes
@@ -79,6 +80,13 @@ class MeshNavigationServer(AbstractNavigationServer):
     def load_map(self, config: Config) -> None:
         """Read the mesh and compute its layers."""
         self.mesh_map = self._build_map(config, mesh_file=None)
+        target = ScanTarget(  # the map of the moment, which may be swapped
+            config.parameters.global_frame,
+            lambda: self.mesh_map.source_names,
+            lambda source: self.mesh_map.listens_to(source),
+            lambda scan: self.mesh_map.insert_scan(scan),
+        )
+        self._scans = ScanIntake(self.runtime, {"mesh_map": target})
         self._tell_findings()
         clock, events = self.runtime.clock, self.runtime.events
         self._decay = Ticker(clock, events, lambda: self.mesh_map.update(clock.now()), DECAY_PERIOD, "mesh map decay")
@@ -180,16 +188,8 @@ class MeshNavigationServer(AbstractNavigationServer):
         return MeshQueries(self.mesh_map, self.runtime.robot, self.runtime.transforms)
 
     def take_scan(self, scan: RangeScan) -> None:
-        """Feed a scan to the obstacle layers, placed by the transform at its stamp.
-
-        Raises
-        ------
-        TransformError
-            There is none; see ``RangeScan.in_frame``.
-        ValueError
-            Origin or stamp are not finite.
-        """
-        self.mesh_map.insert_scan(scan.in_frame(self.mesh_map.frame_id, self.runtime.transforms))
+        """Feed a scan to every layer that listens to its source, as ``ScanIntake.take``, whose errors it raises."""
+        self._scans.take(scan)
 
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
         """Heights of all surfaces at a place, the lowest free one first; see ``ground.ground_heights``."""

@@ -11,6 +11,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.maps.scan_intake import ScanTarget
 from mbf_abstract.parameters import with_changes
 from mbf_abstract.time.ticker import Ticker
 from mbf_costmap_nav.map.costmap_config import CostmapParameters
@@ -46,6 +47,18 @@ class ServedCostmap:
         self._lifecycle_limits = self._lifecycle_parameters()
         self._lifecycle = MapLifecycle(runtime.clock, self._lifecycle_limits, self._update, _nothing, self._clear)
         self._ticker = Ticker(runtime.clock, runtime.events, self._tick, 1.0 / parameters.update_frequency, name)
+
+    @property
+    def scan_target(self) -> ScanTarget:
+        """The costmap as something that takes scans."""
+        costmap = self.costmap
+        return ScanTarget(
+            costmap.frame_id,
+            lambda: costmap.source_names,
+            lambda source: source in costmap.source_names,
+            lambda scan: costmap.insert_scan(scan.source, scan.origin, scan.ends, scan.hits, scan.stamp),
+            self.parameters.transform_tolerance,
+        )
 
     def in_use(self) -> AbstractContextManager[None]:
         """Keep the map updated for the time of a ``with`` block."""

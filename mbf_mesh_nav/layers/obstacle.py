@@ -106,7 +106,7 @@ class ObstacleLayer(MeshLayer):
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost inf and lethal at the corners of the marked faces; forget those of sensors not listened to any more."""
-        unheard = [number for number, name in enumerate(self._last_heard) if not self._listens_to(name)]
+        unheard = [number for number, name in enumerate(self._last_heard) if not self.listens_to(name)]
         self._hits = self._hits.where(~np.isin(self._hits.sources, unheard))
         lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)
         lethal[self.topology.faces[self._hits.faces]] = True
@@ -114,7 +114,7 @@ class ObstacleLayer(MeshLayer):
 
     def insert_scan(self, scan: RangeScan) -> IntArray:
         """Mark the faces below what was hit, forget what is too old or seen through."""
-        if not self._listens_to(scan.source):
+        if not self.listens_to(scan.source):
             return NOTHING_CHANGED
         self._last_heard[scan.source] = scan.stamp
         sensor = list(self._last_heard).index(scan.source)
@@ -154,7 +154,13 @@ class ObstacleLayer(MeshLayer):
                 return f"observation source {source!r} has a stamp {-age:.2f} s in the future, is its clock right?"
         return "" if sources else "no observation source has sent anything yet"
 
-    def _listens_to(self, source: str) -> bool:
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of the scan sources that the layer asks for; empty if it takes all."""
+        return tuple(self.parameters.sources)
+
+    def listens_to(self, source: str) -> bool:
+        """Whether the layer takes scans of a source."""
         return not self.parameters.sources or source in self.parameters.sources
 
     def _project(self, scan: RangeScan) -> tuple[IntArray, FloatArray]:

@@ -137,6 +137,15 @@ class MeshLayer(ABC):
         """Forget everything sensed."""
         return NOTHING_CHANGED
 
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of the scan sources that the layer asks for; empty if it takes all or none."""
+        return ()
+
+    def listens_to(self, source: str) -> bool:
+        """Whether the layer takes scans of a source; one that overrides ``insert_scan`` takes all unless it says so."""
+        return type(self).insert_scan is not MeshLayer.insert_scan
+
     def stale_reason(self, now: float) -> str:
         """Why the layer's sensor data are too old at ``now`` [s]; empty if they are fresh or there are none."""
         return ""

@@ -261,6 +261,15 @@ class MeshMap:
         origin = np.array(sensor_origin, dtype=np.float64).reshape(3)
         self.insert_scan(RangeScan(source, self.frame_id, origin, cloud, np.ones(len(cloud), dtype=np.bool_), stamp))
 
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of all scan sources that layers ask for, sorted."""
+        return tuple(sorted({name for layer in self.layers.values() for name in layer.source_names}))
+
+    def listens_to(self, source: str) -> bool:
+        """Whether any layer takes scans of a source."""
+        return any(layer.listens_to(source) for layer in self.layers.values())
+
     def insert_scan(self, scan: RangeScan) -> None:
         """Feed a scan in the map's frame to the obstacle layers.
 

@@ -1,0 +1,113 @@
+"""Scans on their way into the maps: to each map that listens, placed by the transform of the moment they were measured.
+
+A robot that turns at 1 rad/s turns by 6 degrees in the 0.1 s that a scan may be old when it arrives; placed by the
+newest transform, everything it saw would be marked beside its place. So a scan is placed by the transform at its own
+stamp, interpolated. A scan that is newer than the newest transform by at most ``transform_tolerance`` is placed by
+that one, as a driver that delivers scans before the odometry of the same moment would otherwise never be heard; nothing
+is extrapolated. A scan that is newer still, or older than the history (``tf_cache_time``), is not used.
+
+One map that cannot place a scan does not keep it from the others. What a user would otherwise look for in vain is
+reported once in the event log: a source that no layer listens to, and a map that cannot place what another one takes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from mbf_abstract.events import EventKind
+from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE, RangeScan
+
+MAX_REPORTED = 100
+"""Bound of what is remembered as reported, however many names a faulty driver invents."""
+
+
+@dataclass(frozen=True)
+class ScanTarget:
+    """A map that takes scans.
+
+    Attributes
+    ----------
+    frame_id : str
+        Frame in which it takes them.
+    source_names : callable
+        Names of the sources that its layers ask for.
+    listens_to : callable
+        Whether a layer takes scans of a source.
+    insert : callable
+        Takes a scan in the frame of the map.
+    transform_tolerance : float
+        How much newer [s] than the newest transform a scan may be.
+    """
+
+    frame_id: str
+    source_names: Callable[[], tuple[str, ...]]
+    listens_to: Callable[[str], bool]
+    insert: Callable[[RangeScan], object]
+    transform_tolerance: float = TRANSFORM_TOLERANCE
+
+
+class ScanIntake:
+    """Hands scans to maps.
+
+    Parameters
+    ----------
+    runtime : Runtime
+        Of the server.
+    maps : mapping of name to ScanTarget
+    """
+
+    def __init__(self, runtime: Runtime, maps: Mapping[str, ScanTarget]) -> None:
+        self._runtime = runtime
+        self._maps = maps
+        self._reported: set[tuple[str, str]] = set()
+
+    def take(self, scan: RangeScan) -> None:
+        """Insert a scan into every map that listens to its source and can place it.
+
+        Raises
+        ------
+        TransformError
+            None of the maps that listen can place it.
+        ValueError
+            Origin or stamp are not finite.
+        """
+        if not math.isfinite(scan.stamp):
+            raise ValueError(f"the stamp of a scan must be finite, got {scan.stamp} from source {scan.source!r}")
+        listening = [name for name, target in self._maps.items() if target.listens_to(scan.source)]
+        if not listening:
+            self._report_unknown(scan.source)
+            return
+        refused = {name: error for name in listening if (error := self._insert(name, scan)) is not None}
+        if len(refused) == len(listening):
+            raise refused[listening[0]]
+        for name in listening:
+            self._report_refused(name, scan.source, refused.get(name))
+
+    def _insert(self, name: str, scan: RangeScan) -> TransformError | None:
+        target = self._maps[name]
+        try:
+            placed = scan.in_frame(target.frame_id, self._runtime.transforms, target.transform_tolerance)
+        except TransformError as error:
+            return error
+        target.insert(placed)
+        return None
+
+    def _report_unknown(self, source: str) -> None:
+        known = sorted({name for target in self._maps.values() for name in target.source_names()})
+        if known:  # maps without any source are meant to see nothing
+            self._report("take_scan", source, f"no layer listens to the source {source!r}, known are {known}")
+
+    def _report_refused(self, name: str, source: str, error: TransformError | None) -> None:
+        if error is None:
+            self._reported.discard((name, source))
+        else:
+            self._report(name, source, f"the scans of {source!r} cannot be placed: {error}")
+
+    def _report(self, where: str, source: str, message: str) -> None:
+        if (where, source) not in self._reported and len(self._reported) < MAX_REPORTED:
+            self._reported.add((where, source))
+            self._runtime.events.emit(EventKind.FAULT, where, where="take_scan", message=message)
