@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.layers_in_sum import doubts_about, lasting_map
 from mbf_costmap_nav.map.layer import CostmapLayer, LayerParameters, shifted
+from mbf_costmap_nav.map.layers_in_sum import doubts_about, lasting_map
 from mbf_costmap_nav.map.sensor_data import Observation, SensorLayer
 
 

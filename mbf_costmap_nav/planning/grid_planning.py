@@ -22,8 +22,8 @@ from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.control.path_geometry import arc_lengths, resample
 from mbf_costmap_nav.grid.costmap import INSCRIBED, Costmap
-from mbf_costmap_nav.lasting_walls import stays_unreachable
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.planning.lasting_walls import stays_unreachable
 from mbf_costmap_nav.planning.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchRoom
 from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 
