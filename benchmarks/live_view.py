@@ -16,9 +16,9 @@ import time
 from contextlib import nullcontext
 
 from terrain.scenarios.scenario import PlanarPose, Scenario, load_scenario
-from terrain.session.bench import Bench
-from terrain.session.executives import make_goal_driver
-from terrain.session.goal_sequence import GoalTour
+from terrain.session.executives import make_executive
+from terrain.session.goal_sequence import GoalSequence
+from terrain.session.session import Session
 from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.session import LiveSession
 
@@ -28,17 +28,17 @@ PORT = 18600
 
 def drive(scenario: Scenario, executive: str, served: bool) -> tuple[float, float]:
     """CPU and wall seconds from the first step of the world to the goal."""
-    bench = Bench(scenario)
+    session = Session(scenario)
     try:
-        tour = GoalTour(bench, make_goal_driver(executive, bench.navigator))
-        page = LiveSession(bench, tour, ViewOptions(port=PORT, speed=0.0, stay=False)) if served else nullcontext()
+        tour = GoalSequence(session, make_executive(executive, session.navigator))
+        page = LiveSession(session, tour, ViewOptions(port=PORT, speed=0.0, stay=False)) if served else nullcontext()
         with page:
             cpu, wall = time.process_time(), time.perf_counter()
-            bench.run()
+            session.run()
             result = tour.visit_goals()
             cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
     finally:
-        bench.close()
+        session.close()
     assert result.success, result.message
     return cpu, wall
 

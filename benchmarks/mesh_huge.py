@@ -20,7 +20,7 @@ from terrain_meshes import Terrain, add_layer, fractal_terrain
 
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.astar import AStarPlanner
-from mbf_mesh_nav.search.leg_search import spread_from
+from mbf_mesh_nav.search.leg_search import propagate_from
 from mbf_mesh_nav.search.wave_search import WaveSearch
 
 
@@ -33,7 +33,7 @@ def small_map_compiles() -> None:
     terrain = fractal_terrain(20)
     mesh_map = MeshMap.from_arrays(terrain.vertices, terrain.faces)
     query = corner_query(mesh_map)
-    spread_from(mesh_map, query.snapshot, query.blocked, query.goal, NEVER)
+    propagate_from(mesh_map, query.snapshot, query.blocked, query.goal, NEVER)
     plugin(AStarPlanner, mesh_map).find_leg(query)
     WaveSearch(mesh_map).spread(query, overshoot=1e9)
 
@@ -57,7 +57,7 @@ def measure_ours(terrain: Terrain) -> tuple[dict[str, float], dict[str, float]]:
     figures["resident_gb"] = resident_gigabytes()
     query = corner_query(mesh_map)
     ours = {
-        "dijkstra": seconds_of(lambda: spread_from(mesh_map, query.snapshot, query.blocked, query.goal, NEVER)),
+        "dijkstra": seconds_of(lambda: propagate_from(mesh_map, query.snapshot, query.blocked, query.goal, NEVER)),
         "astar_corner_to_corner": seconds_of(lambda: plugin(AStarPlanner, mesh_map).find_leg(query)),
     }
     begin = time.thread_time()

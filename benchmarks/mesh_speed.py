@@ -31,7 +31,7 @@ from mbf_mesh_nav.mesh.surface_point import surface_point_at_vertex
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.repairing import RepairingPlanner
 from mbf_mesh_nav.plugins import MeshContext
-from mbf_mesh_nav.search.leg_search import LegQuery, spread_from
+from mbf_mesh_nav.search.leg_search import LegQuery, propagate_from
 from mbf_mesh_nav.search.wave_search import WaveSearch
 
 SIDES = {"10k": 100, "100k": 316, "1M": 1000}
@@ -111,7 +111,7 @@ def measure_fields(terrain: Terrain, mesh_map: MeshMap, peer: Callable[[], objec
     inflation = inflation_layer(terrain, mesh_map)
 
     def full_dijkstra() -> object:
-        return spread_from(mesh_map, query.snapshot, query.blocked, query.goal, NEVER)
+        return propagate_from(mesh_map, query.snapshot, query.blocked, query.goal, NEVER)
 
     return {
         "dijkstra": ratio_to(peer, full_dijkstra, rounds),

@@ -104,7 +104,7 @@ def failure_of(metrics: Row) -> str:
         return ""
     if "time_s" not in metrics:
         return "error"  # it could not even begin
-    if PHYSICS & set(metrics["mishaps"]):
+    if PHYSICS & set(metrics["incidents"]):
         return "physics"
     no_plan = metrics["plans"] == 0  # planner and controller share some codes, such as BLOCKED_GOAL
     return "planner" if no_plan or metrics["outcome"] in PLANNER_OUTCOMES else "controller"
@@ -129,8 +129,8 @@ def summarise(rows: list[Row], driven: set[tuple[str, int]]) -> Row:
         "success_percent": round(share * len(arrived), 1),
         "driven_by_anybody": len(driven_rows),
         "success_of_driven_percent": round(100.0 * float(np.mean([row["success"] for row in driven_rows] or [0.0])), 1),
-        "tip_over_percent": round(share * sum("tipped_over" in row.get("mishaps", ()) for row in routed), 1),
-        "slipping_percent": round(share * sum("slipping" in row.get("mishaps", ()) for row in routed), 1),
+        "tip_over_percent": round(share * sum("tipped_over" in row.get("incidents", ()) for row in routed), 1),
+        "slipping_percent": round(share * sum("slipping" in row.get("incidents", ()) for row in routed), 1),
         "slip_m_per_m": round(float(np.mean(slip)), 3) if slip else None,
         "energy_j_per_m": round(float(np.mean(energy)), 1) if energy else None,
         "failures": dict(Counter(row["failure"] for row in routed if not row["success"])),
@@ -161,7 +161,7 @@ def by_place(rows: list[Row]) -> list[Row]:
             here = [row for row in rows if (row["method"], row["terrain"]) == (method, place) and row["route"]]
             failures = Counter(row["failure"] for row in here)
             line = {"method": method, "terrain": place, "with_route": len(here), "arrived": failures.pop("", 0)}
-            line["tipped_over"] = sum("tipped_over" in row.get("mishaps", ()) for row in here)
+            line["tipped_over"] = sum("tipped_over" in row.get("incidents", ()) for row in here)
             table.append({**line, **{name: failures[name] for name in FAILURES}})
     return table
 

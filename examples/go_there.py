@@ -9,14 +9,14 @@ Run it twice and change nothing but the configuration::
 import sys
 
 from mbf_abstract.outcomes import ExePathOutcome
-from terrain.session.bench import Bench
+from terrain.session.session import Session
 
 RECOVERY_FOR = {ExePathOutcome.COLLISION: "back_up", ExePathOutcome.ROBOT_STUCK: "back_up"}
 
 
 def main(scenario: str, backend: str) -> bool:
-    with Bench(scenario, backend) as bench:
-        navigator, goal = bench.navigator, bench.goals[0]
+    with Session(scenario, backend) as session:
+        navigator, goal = session.navigator, session.goals[0]
         for attempt in range(5):
             plan = navigator.get_path(goal)
             print(f"{plan.outcome_name}: {plan.message}; cost {plan.cost:.1f}, path {plan.path}")

@@ -92,7 +92,7 @@ class CostmapNavigationServer(AbstractNavigationServer):
         both = (self._global, self._local)
         self._scans = ScanIntake(self.runtime, {one.name: one.scan_target for one in both})
         for one in both:
-            one.tell_doubts()
+            one.report_configuration_warnings()
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add both maps and the one this plugin is bound to."""

@@ -33,7 +33,7 @@ class FootprintCheck:
 
     def __init__(self, footprint: Footprint, resolution: float) -> None:
         self.footprint = footprint
-        self.samples = covering_points(footprint.vertices, resolution)
+        self.samples = footprint_samples(footprint.vertices, resolution)
 
     def cost(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
         """Largest cost under the footprint; -1 if it leaves the map."""
@@ -65,7 +65,7 @@ class FootprintCheck:
         )
 
 
-def covering_points(vertices: FloatArray, resolution: float) -> FloatArray:
+def footprint_samples(vertices: FloatArray, resolution: float) -> FloatArray:
     """Points (n, 2) on the outline of a polygon, half a cell apart, and inside it, a cell apart."""
     if len(vertices) < 3:
         return np.zeros((1, 2))

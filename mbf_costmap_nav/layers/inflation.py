@@ -80,7 +80,7 @@ class InflationLayer(CostmapLayer):
         """It is as lasting as what it inflates; unknown cells are not."""
         return not self.parameters.inflate_around_unknown
 
-    def doubt(self) -> str:
+    def configuration_warning(self) -> str:
         """Say that the radius is smaller than the robot and is not kept to."""
         radius = self.parameters.inflation_radius
         if radius >= self._inscribed_radius:

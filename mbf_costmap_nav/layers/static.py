@@ -69,7 +69,7 @@ class StaticLayer(GridLayer):
         """Whether its map is in the costmap's frame."""
         return self._placement.in_costmap_frame
 
-    def doubt(self) -> str:
+    def configuration_warning(self) -> str:
         """Say that nearly all of the map is occupied."""
         known = self._map.cells != UNKNOWN
         share = float(np.sum(self._map.cells == LETHAL)) / max(int(np.sum(known)), 1)

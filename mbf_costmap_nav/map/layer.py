@@ -142,7 +142,7 @@ class CostmapLayer(ABC):
         """Whether no sensor has a part in its cells, and no frame moves them: what it forbids stays forbidden."""
         return False
 
-    def doubt(self) -> str:
+    def configuration_warning(self) -> str:
         """What is legal but hardly meant in the layer's parameters, given the footprint; empty if nothing is."""
         return ""
 

@@ -22,7 +22,7 @@ from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.layer import CostmapLayer, LayerParameters, shifted
-from mbf_costmap_nav.map.layers_in_sum import doubts_about, lasting_map
+from mbf_costmap_nav.map.layers_in_sum import lasting_map, warnings_about
 from mbf_costmap_nav.map.sensor_data import Observation, SensorLayer
 
 
@@ -166,10 +166,10 @@ class LayeredCostmap:
             problems = (layer.stale_reason(now) for layer in self._enabled_layers())
             return next((problem for problem in problems if problem), "")
 
-    def doubts(self) -> list[str]:
+    def configuration_warnings(self) -> list[str]:
         """What is legal but hardly meant in the layers' parameters, e.g. an inflation narrower than the robot."""
         with self._lock:
-            return doubts_about(list(self._enabled_layers()), self.inscribed_radius)
+            return warnings_about(list(self._enabled_layers()), self.inscribed_radius)
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Lowest speed [m/s] the layers allow at the point (x, y) [m]; ``full_speed`` where there is no limit."""

@@ -95,12 +95,12 @@ class ServedCostmap:
 
     def _tell(self, what: str, changes: Mapping[str, Any]) -> None:
         self._runtime.events.emit(EventKind.PARAMETER_CHANGED, what, **changes)
-        self.tell_doubts()
+        self.report_configuration_warnings()
 
-    def tell_doubts(self) -> None:
+    def report_configuration_warnings(self) -> None:
         """Tell what is legal but hardly meant: in the event log, and to the user as a note of the server."""
-        for doubt in self.costmap.doubts():
-            self._runtime.events.emit(EventKind.MAP, self.name, message=f"{self.name}: {doubt}")
+        for warning in self.costmap.configuration_warnings():
+            self._runtime.events.emit(EventKind.MAP, self.name, message=f"{self.name}: {warning}")
 
     def close(self) -> None:
         """End the updates."""

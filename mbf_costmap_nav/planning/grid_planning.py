@@ -24,7 +24,7 @@ from mbf_costmap_nav.control.path_geometry import arc_lengths, resample
 from mbf_costmap_nav.grid.costmap import INSCRIBED, Costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 from mbf_costmap_nav.planning.lasting_walls import stays_unreachable
-from mbf_costmap_nav.planning.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchRoom
+from mbf_costmap_nav.planning.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchWorkspace
 from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 
 NEAR_END = 0.75
@@ -55,7 +55,7 @@ class GridPlanner(CostmapPlanner):
 
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)
-        self._room = SearchRoom()
+        self._room = SearchWorkspace()
 
     @property
     def pose_spacing(self) -> float:

@@ -38,7 +38,7 @@ class GridPlannerParameters(PluginParameters):
     allow_unknown: bool = parameter(True, "Plan through unknown cells, counted like cost 252.")
 
 
-class SearchRoom:
+class SearchWorkspace:
     """Memory of one planner's grid searches, kept from plan to plan.
 
     Fresh pages from the system take a tenth of a search, and twice as long as the search after others used them.
@@ -69,7 +69,7 @@ class SearchGrid:
         Traversal of each cost, 1 for free, inf for blocked.
     token : CancelToken
         Ends long answers early; what they say then means nothing.
-    room : SearchRoom
+    room : SearchWorkspace
         The planner's memory for ``grid_search.search``, of which the last one's result stands in it.
     """
 
@@ -78,7 +78,7 @@ class SearchGrid:
     stride: int
     table: NDArray[np.float32]
     token: CancelToken
-    room: SearchRoom
+    room: SearchWorkspace
 
     @classmethod
     def build(
@@ -86,12 +86,17 @@ class SearchGrid:
         costmap: Costmap,
         parameters: GridPlannerParameters,
         token: CancelToken,
-        room: SearchRoom | None = None,
+        room: SearchWorkspace | None = None,
     ) -> SearchGrid:
         """Prepare a snapshot by the costs a planner wants."""
         table = traversal_table(parameters.cost_factor, parameters.lethal_cost, parameters.allow_unknown)
         return cls(
-            costmap, pad_cells(costmap.cells, LETHAL, token.flag), costmap.width + 2, table, token, room or SearchRoom()
+            costmap,
+            pad_cells(costmap.cells, LETHAL, token.flag),
+            costmap.width + 2,
+            table,
+            token,
+            room or SearchWorkspace(),
         )
 
     def records(self) -> Records:

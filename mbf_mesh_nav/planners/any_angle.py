@@ -29,7 +29,7 @@ class AnyAnglePlanner(SurfacePlanner):
         wave = self._search.spread(query, overshoot=0.0)
         if wave is None:
             return None
-        positions, point_faces = self._search.path(query, wave, taut_over_costs=True)
+        positions, point_faces = self._search.path(query, wave, pull_over_costs=True)
         normals = self.mesh_map.face_normals[point_faces]
         cost = cost_along(self.mesh_map, query.snapshot, positions, point_faces)
         return Leg(positions, normals, cost, note=self._search.edges_text(query, wave, positions, point_faces))

@@ -42,7 +42,7 @@ class CVPPlanner(SurfacePlanner):
         wave = self._search.spread(query, self.parameters.goal_dist_offset)
         if wave is None:
             return None
-        positions, point_faces = self._search.path(query, wave, taut_over_costs=False)
+        positions, point_faces = self._search.path(query, wave, pull_over_costs=False)
         normals = self.mesh_map.face_normals[point_faces]
         cost = cost_along(self.mesh_map, query.snapshot, positions, point_faces)
         note = self._search.edges_text(query, wave, positions, point_faces)

@@ -8,7 +8,7 @@ Cost: about 60 ns a vertex that is nearer than the goal.
 
 from __future__ import annotations
 
-from mbf_mesh_nav.search.leg_search import Leg, LegQuery, spread_from, vertex_path_leg
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery, propagate_from, vertex_path_leg
 from mbf_mesh_nav.search.surface_planner import SurfacePlanner
 
 
@@ -17,7 +17,7 @@ class DijkstraPlanner(SurfacePlanner):
 
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Spread from the start until the goal is settled, then walk back."""
-        distances, predecessors, finished = spread_from(
+        distances, predecessors, finished = propagate_from(
             self.mesh_map, query.snapshot, query.blocked, query.start, query.cancel_flag, query.goal
         )
         return vertex_path_leg(self.mesh_map, query, distances, predecessors) if finished else None

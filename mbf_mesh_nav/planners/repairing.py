@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.search.dijkstra import propagate_distances
-from mbf_mesh_nav.kernels.search.repair_wave import forget_changed_ways
+from mbf_mesh_nav.kernels.search.repair_wave import invalidate_subtrees
 from mbf_mesh_nav.mesh.surface_point import corner_distances
 from mbf_mesh_nav.search.leg_search import (
     NO_OFFSETS,
@@ -96,7 +96,7 @@ class RepairingPlanner(SurfacePlanner):
 
     def _forget(self, changed: NDArray[np.int32], wave: RememberedWave, query: LegQuery) -> NDArray[np.int32]:
         """Forget what hung on changed vertices; return the seeds of the repair."""
-        return forget_changed_ways(
+        return invalidate_subtrees(
             self.mesh_map.neighbour_offsets,
             self.mesh_map.neighbours,
             query.blocked,

@@ -42,7 +42,7 @@ class EscapeParameters(GuardedMotionParameters):
 
 
 @dataclass(frozen=True)
-class WayOut:
+class EscapePath:
     """A way to safe ground.
 
     Attributes
@@ -78,7 +78,7 @@ class EscapeRecovery(GuardedRecovery):
         if not snapshot.blocked(p.cost_limit)[mesh_map.faces[spot.face]].any():
             return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on safe ground")
         own_patch = self._patch_below(spot, snapshot, flag)
-        way = self._way_to_safety(spot, own_patch, request)
+        way = self._escape_path(spot, own_patch, request)
 
         def velocity(pose: Pose) -> Twist | RecoveryResult:
             nonlocal way
@@ -87,7 +87,7 @@ class EscapeRecovery(GuardedRecovery):
                 way.tracker.update(pose.position)
                 if not way.is_open(_lethal(now) & ~own_patch, now.blocked(p.cost_limit)):
                     here = mesh_map.locate_one(pose.position, 1.0)
-                    way = None if here is None else self._way_to_safety(here, own_patch, request)
+                    way = None if here is None else self._escape_path(here, own_patch, request)
             if way is None:
                 message = f"no safe ground within {p.max_distance:g} m over the surface"
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)
@@ -113,9 +113,9 @@ class EscapeRecovery(GuardedRecovery):
             return np.zeros_like(lethal)
         return np.isfinite(self._spread(spot, ~lethal, flag)[0])
 
-    def _way_to_safety(
+    def _escape_path(
         self, spot: SurfacePoint, own_patch: NDArray[np.bool_], request: RecoveryRequest
-    ) -> WayOut | None:
+    ) -> EscapePath | None:
         """Way over the mesh to the nearest vertex around which no face is forbidden, on the map of now.
 
         It leads over costly ground, and of lethal vertices (V,) only over those of ``own_patch``.
@@ -132,7 +132,7 @@ class EscapeRecovery(GuardedRecovery):
             return None
         chain = follow_predecessors(predecessors, nearest)[::-1]
         points = np.concatenate([[spot.point], mesh_map.vertices[chain]])
-        return WayOut(chain, PathTracker(Path.from_points(points, frame_id=mesh_map.frame_id)))
+        return EscapePath(chain, PathTracker(Path.from_points(points, frame_id=mesh_map.frame_id)))
 
     def _spread(
         self, spot: SurfacePoint, closed: NDArray[np.bool_], flag: NDArray[np.uint8]

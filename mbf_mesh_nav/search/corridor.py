@@ -17,13 +17,13 @@ Piece = tuple[NDArray[np.float64], NDArray[np.int32]]
 """Points (n, 3) [m], and the face (n,) in which the way to each lies."""
 
 
-class FaceStrip:
+class Corridor:
     """Paths through faces, each sharing an edge with the next.
 
     Parameters
     ----------
     blocked : (V,) bool
-        Faces with a blocked corner never become part of a strip.
+        Faces with a blocked corner never become part of a corridor.
     """
 
     def __init__(self, mesh_map: MeshMap, snapshot: MeshSnapshot, blocked: NDArray[np.bool_]) -> None:
@@ -34,7 +34,7 @@ class FaceStrip:
     def shorten(self, positions: NDArray[np.float64], point_faces: NDArray[np.int32]) -> Piece:
         """Pull a traced path taut, piece by piece; a piece keeps its old course where the taut one costs more.
 
-        Where nothing on the way has a cost the strips are turned, too, and the path becomes a geodesic.
+        Where nothing on the way has a cost the corridors are turned, too, and the path becomes a geodesic.
 
         Parameters
         ----------
@@ -49,33 +49,33 @@ class FaceStrip:
             The shortened path in the same form.
         """
         mesh_map = self._mesh_map
-        strip, pieces = link_faces(mesh_map.faces, mesh_map.face_neighbours, self._blocked, point_faces)
+        corridor, pieces = link_faces(mesh_map.faces, mesh_map.face_neighbours, self._blocked, point_faces)
         points, faces, has_costs = [positions[:1]], [point_faces[:1]], self.has_costs(point_faces)
         for first, last, begin, end in pieces.tolist():
             old = positions[first : last + 1], point_faces[first : last + 1]
-            new = self._shorten_piece(*old, strip[begin:end], not has_costs) if end > begin else old
+            new = self._shorten_piece(*old, corridor[begin:end], not has_costs) if end > begin else old
             points.append(new[0][1:])
             faces.append(new[1][1:])
         return np.concatenate(points), np.concatenate(faces)
 
     def _shorten_piece(
-        self, positions: NDArray[np.float64], point_faces: NDArray[np.int32], strip: NDArray[np.int32], turn: bool
+        self, positions: NDArray[np.float64], point_faces: NDArray[np.int32], corridor: NDArray[np.int32], turn: bool
     ) -> Piece:
-        """Take the geodesic near the strip if it is not more expensive, else try its halves."""
+        """Take the geodesic near the corridor if it is not more expensive, else try its halves."""
         mesh_map = self._mesh_map
         ends = tuple(positions[0].tolist()), tuple(positions[-1].tolist())
         taut, faces = straighten(
-            mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, self._blocked, strip, *ends, turn
+            mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, self._blocked, corridor, *ends, turn
         )
-        taut_faces = np.concatenate([point_faces[:1], faces])
-        if self.cost(taut, taut_faces) <= self.cost(positions, point_faces):
-            return taut, taut_faces
+        pulled_faces = np.concatenate([point_faces[:1], faces])
+        if self.cost(taut, pulled_faces) <= self.cost(positions, point_faces):
+            return taut, pulled_faces
         middle = len(positions) // 2
-        cut = np.flatnonzero(strip == point_faces[middle])
+        cut = np.flatnonzero(corridor == point_faces[middle])
         if middle < _MIN_PIECE or len(cut) == 0:
             return positions, point_faces
-        head = self._shorten_piece(positions[: middle + 1], point_faces[: middle + 1], strip[: cut[0] + 1], turn)
-        tail = self._shorten_piece(positions[middle:], point_faces[middle:], strip[cut[0] :], turn)
+        head = self._shorten_piece(positions[: middle + 1], point_faces[: middle + 1], corridor[: cut[0] + 1], turn)
+        tail = self._shorten_piece(positions[middle:], point_faces[middle:], corridor[cut[0] :], turn)
         return np.concatenate([head[0], tail[0][1:]]), np.concatenate([head[1], tail[1][1:]])
 
     def pass_vertices(self, positions: NDArray[np.float64], point_faces: NDArray[np.int32]) -> Piece:
@@ -84,12 +84,12 @@ class FaceStrip:
         A path that leads along edges between blocked faces stays as it is.
         """
         mesh_map = self._mesh_map
-        strip, pieces = link_faces(mesh_map.faces, mesh_map.face_neighbours, self._blocked, point_faces)
-        if len(pieces) != 1 or len(strip) == 0:
+        corridor, pieces = link_faces(mesh_map.faces, mesh_map.face_neighbours, self._blocked, point_faces)
+        if len(pieces) != 1 or len(corridor) == 0:
             return positions, point_faces
         ends = tuple(positions[0].tolist()), tuple(positions[-1].tolist())
         mesh = mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, self._blocked
-        points, faces = pass_vertices(*mesh, strip, *ends)
+        points, faces = pass_vertices(*mesh, corridor, *ends)
         return points, np.concatenate([point_faces[:1], faces])
 
     def has_costs(self, faces: NDArray[np.int32]) -> bool:

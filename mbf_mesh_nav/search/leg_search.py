@@ -56,7 +56,7 @@ class Leg:
     note: str = ""
 
 
-def spread_from(
+def propagate_from(
     mesh_map: MeshMap,
     snapshot: MeshSnapshot,
     blocked: NDArray[np.bool_],

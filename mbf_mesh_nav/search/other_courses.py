@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.locate import SurfacePoint
-from mbf_mesh_nav.search.corridor import FaceStrip, Piece
+from mbf_mesh_nav.search.corridor import Corridor, Piece
 from mbf_mesh_nav.search.leg_search import LegQuery
 
 FEW_FACES = 150
@@ -33,17 +33,17 @@ Trace = Callable[[SurfacePoint], Piece]
 """The way down a field from a surface point."""
 
 
-def is_worth_a_search(query: LegQuery, course: Piece, strip: FaceStrip) -> bool:
+def is_worth_a_search(query: LegQuery, course: Piece, corridor: Corridor) -> bool:
     """Whether a course leads through few faces, and not straight to its goal anyway."""
     straight = math.dist(query.start.point, query.goal.point)
-    return len(course[1]) <= FEW_FACES and straight < _SHORTER * strip.cost(*course)
+    return len(course[1]) <= FEW_FACES and straight < _SHORTER * corridor.cost(*course)
 
 
 class OtherCourses:
     """Courses of one query; the traces lead down the fields of the waves from its goal and from its start."""
 
-    def __init__(self, mesh_map: MeshMap, query: LegQuery, strip: FaceStrip, to_goal: Trace, to_start: Trace) -> None:
-        self._mesh_map, self._query, self._strip = mesh_map, query, strip
+    def __init__(self, mesh_map: MeshMap, query: LegQuery, corridor: Corridor, to_goal: Trace, to_start: Trace) -> None:
+        self._mesh_map, self._query, self._strip = mesh_map, query, corridor
         self._to_goal, self._to_start = to_goal, to_start
 
     def best(self, course: Piece, from_goal: Distances, from_start: Distances) -> Piece:

@@ -34,7 +34,7 @@ from mbf_mesh_nav.mesh.surface_point import (
 )
 from mbf_mesh_nav.plugins import MeshContext, MeshPlanner
 from mbf_mesh_nav.search.blocked_vertices import BlockedVertices
-from mbf_mesh_nav.search.leg_search import Leg, LegQuery, spread_from
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery, propagate_from
 
 SAME_POINT = 1e-6
 """Points of a path so near [m] to each other are one."""
@@ -71,7 +71,7 @@ class SurfacePlanner(MeshPlanner):
 
         Here: along the edges of free vertices.
         """
-        distances, _, finished = spread_from(
+        distances, _, finished = propagate_from(
             self.mesh_map, query.snapshot, query.blocked, query.start, query.cancel_flag
         )
         return distances if finished else None

@@ -20,7 +20,7 @@ from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.motion.vector_field import VectorField
-from mbf_mesh_nav.search.corridor import FaceStrip, Piece
+from mbf_mesh_nav.search.corridor import Corridor, Piece
 from mbf_mesh_nav.search.leg_search import LegQuery, seeded_arrays
 from mbf_mesh_nav.search.other_courses import OtherCourses, is_worth_a_search, reversed_query
 
@@ -102,44 +102,44 @@ class WaveSearch:
         length = math.fsum(math.dist(positions[index], positions[index + 1]) for index in np.flatnonzero(blocked))
         return f"no way over whole free faces: {length:.2f} m lead along edges between blocked faces"
 
-    def path(self, query: LegQuery, wave: Wave, taut_over_costs: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    def path(self, query: LegQuery, wave: Wave, pull_over_costs: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Positions (n, 3) from start to goal, and the face (n,) the way to each of them lies in.
 
         The way down the field, shortened to a geodesic. Where that is longer than the field says, it has lost its
         course between two fronts: then the way along which the wave came is shortened, too, and the shorter one taken.
         Where it leads through few large faces, other courses are looked for.
         Over costs the cheapest path is no geodesic: there the way down the field stays, or is pulled taut as far as
-        that costs no more (``taut_over_costs``).
+        that costs no more (``pull_over_costs``).
         """
         start, goal = query.start, query.goal
         if start.face == goal.face:
             return np.array([start.point, goal.point]), np.array([start.face, goal.face], dtype=np.int32)
-        strip = FaceStrip(self._mesh_map, query.snapshot, query.blocked)
+        corridor = Corridor(self._mesh_map, query.snapshot, query.blocked)
         traced = self._trace(query, wave, along_edges=False)
-        if strip.has_costs(traced[1]):
-            return strip.shorten(*traced) if taut_over_costs else traced
-        best = strip.shorten(*traced)
+        if corridor.has_costs(traced[1]):
+            return corridor.shorten(*traced) if pull_over_costs else traced
+        best = corridor.shorten(*traced)
         foretold = min(
             float(wave.distances[corner]) + math.dist(self._mesh_map.vertices[corner], start.point)
             for corner in self._mesh_map.faces[start.face].tolist()
         )
-        if strip.cost(*best) > (1.0 + COURSE_LOST) * foretold:
-            other = strip.shorten(*self._trace(query, wave, along_edges=True))
-            best = min(best, other, key=lambda path: strip.cost(*path))
-        if wave.along_edges or abs(strip.cost(*best) - foretold) <= AS_FORETOLD * foretold:
+        if corridor.cost(*best) > (1.0 + COURSE_LOST) * foretold:
+            other = corridor.shorten(*self._trace(query, wave, along_edges=True))
+            best = min(best, other, key=lambda path: corridor.cost(*path))
+        if wave.along_edges or abs(corridor.cost(*best) - foretold) <= AS_FORETOLD * foretold:
             return best
-        return self._other_course(query, wave, strip, best)
+        return self._other_course(query, wave, corridor, best)
 
-    def _other_course(self, query: LegQuery, wave: Wave, strip: FaceStrip, best: Piece) -> Piece:
+    def _other_course(self, query: LegQuery, wave: Wave, corridor: Corridor, best: Piece) -> Piece:
         """A shorter way than the best so far through few large faces, see ``other_courses``; else that one."""
-        if not is_worth_a_search(query, best, strip):
+        if not is_worth_a_search(query, best, corridor):
             return best
         back = reversed_query(query)
         wave_back = self.spread(back, overshoot=0.0)
         if wave_back is None or wave_back.along_edges:
             return best
         to_goal, to_start = partial(self._trace_from, query, wave), partial(self._trace_from, back, wave_back)
-        courses = OtherCourses(self._mesh_map, query, strip, to_goal, to_start)
+        courses = OtherCourses(self._mesh_map, query, corridor, to_goal, to_start)
         return courses.best(best, wave.distances, wave_back.distances)
 
     def _trace_from(self, query: LegQuery, wave: Wave, place: SurfacePoint) -> Piece:

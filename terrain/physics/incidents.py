@@ -25,7 +25,7 @@ class Thing(Enum):
     ROBOT = "robot"
 
 
-class MishapKind(Enum):
+class IncidentKind(Enum):
     """What went wrong; a collision counts as such, by what was hit, and once more if the robot moved by itself."""
 
     TIPPED_OVER = "tipped_over"
@@ -40,7 +40,7 @@ class MishapKind(Enum):
     COLLISION_WITH_ROBOT = "collision_with_robot"
 
 
-COLLISIONS_WITH = {thing: MishapKind(f"collision_with_{thing.value}") for thing in Thing}
+COLLISIONS_WITH = {thing: IncidentKind(f"collision_with_{thing.value}") for thing in Thing}
 
 
 @dataclass(frozen=True)
@@ -73,17 +73,17 @@ class MotionSample:
 
 
 @dataclass(frozen=True)
-class Mishap:
+class Incident:
     """Something that went wrong, when [s] and where."""
 
-    kind: MishapKind
+    kind: IncidentKind
     stamp: float
     pose: Pose
 
 
 @dataclass(frozen=True)
-class MishapLimits:
-    """When a motion counts as a mishap.
+class IncidentLimits:
+    """When a motion counts as a incident.
 
     Attributes
     ----------
@@ -121,12 +121,12 @@ def roll_pitch(pose: Pose) -> tuple[float, float]:
 
 
 @dataclass
-class MishapMonitor:
-    """Counts mishaps and keeps the extremes of a run; call ``update`` at a steady rate (20 Hz is enough).
+class IncidentMonitor:
+    """Counts incidents and keeps the extremes of a run; call ``update`` at a steady rate (20 Hz is enough).
 
     Attributes
     ----------
-    counts : Counter of MishapKind
+    counts : Counter of IncidentKind
     max_roll, max_pitch : float
         Largest magnitudes so far [rad].
     slipped : float
@@ -137,35 +137,35 @@ class MishapMonitor:
         Work of the motors [J].
     """
 
-    limits: MishapLimits = field(default_factory=MishapLimits)
-    counts: Counter[MishapKind] = field(default_factory=Counter)
+    limits: IncidentLimits = field(default_factory=IncidentLimits)
+    counts: Counter[IncidentKind] = field(default_factory=Counter)
     max_roll: float = 0.0
     max_pitch: float = 0.0
     slipped: float = 0.0
     distance: float = 0.0
     energy: float = 0.0
-    _since: dict[MishapKind, float] = field(default_factory=dict)
-    _counted: set[MishapKind] = field(default_factory=set)
+    _since: dict[IncidentKind, float] = field(default_factory=dict)
+    _counted: set[IncidentKind] = field(default_factory=set)
     _last: MotionSample | None = None
     _anchor: Pose | None = None
     _moved_in_contact: bool = False
 
-    def update(self, sample: MotionSample) -> list[Mishap]:
-        """Take one sample, stamped by its pose; return the mishaps that count from this instant on."""
+    def update(self, sample: MotionSample) -> list[Incident]:
+        """Take one sample, stamped by its pose; return the incidents that count from this instant on."""
         self._watch_contact(sample)
         self._sum_up(sample)
         limits, standing = self.limits, self._standing_time(sample)
-        conditions: list[tuple[MishapKind, float, Callable[[MotionSample], bool]]] = [
-            (MishapKind.TIPPED_OVER, limits.tilt_hold, self._is_tipped),
-            (MishapKind.SLIPPING, limits.slip_hold, lambda s: slip_speed(s) > limits.slip_speed),
-            (MishapKind.HIGH_CENTRED, 0.0, lambda s: s.body_on_ground and standing >= limits.high_centred_hold),
-            (MishapKind.STUCK, 0.0, lambda s: standing >= limits.stuck_hold),
-            (MishapKind.COLLISION, 0.0, lambda s: bool(s.touched)),
-            (MishapKind.COLLISION_WHILE_MOVING, 0.0, lambda s: self._moved_in_contact),
+        conditions: list[tuple[IncidentKind, float, Callable[[MotionSample], bool]]] = [
+            (IncidentKind.TIPPED_OVER, limits.tilt_hold, self._is_tipped),
+            (IncidentKind.SLIPPING, limits.slip_hold, lambda s: slip_speed(s) > limits.slip_speed),
+            (IncidentKind.HIGH_CENTRED, 0.0, lambda s: s.body_on_ground and standing >= limits.high_centred_hold),
+            (IncidentKind.STUCK, 0.0, lambda s: standing >= limits.stuck_hold),
+            (IncidentKind.COLLISION, 0.0, lambda s: bool(s.touched)),
+            (IncidentKind.COLLISION_WHILE_MOVING, 0.0, lambda s: self._moved_in_contact),
             *((kind, 0.0, lambda s, t=thing: t in s.touched) for thing, kind in COLLISIONS_WITH.items()),
         ]
         return [
-            Mishap(kind, sample.pose.stamp, sample.pose)
+            Incident(kind, sample.pose.stamp, sample.pose)
             for kind, hold, condition in conditions
             if self._begins(kind, hold, condition(sample), sample.pose.stamp)
         ]
@@ -196,7 +196,7 @@ class MishapMonitor:
             motion.is_stopped(limits.standing_speed, limits.standing_yaw_rate) for motion in motions
         )
 
-    def _begins(self, kind: MishapKind, hold: float, holds: bool, now: float) -> bool:
+    def _begins(self, kind: IncidentKind, hold: float, holds: bool, now: float) -> bool:
         """Whether ``kind`` has held long enough and was not counted yet."""
         if not holds:
             self._since.pop(kind, None)

@@ -234,7 +234,7 @@ class WheeledRobot:
         return twist_from_wheels(self.spec, left, right, steering)
 
     def motion_sample(self) -> MotionSample:
-        """Collect what ``MishapMonitor`` looks at."""
+        """Collect what ``IncidentMonitor`` looks at."""
         pose, velocity = self._state()
         left, right, steering, power = self.wheel_state()
         rolling = twist_from_wheels(self.spec, left, right, steering)

@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from mbf_abstract.geometry import Command, Pose
-from terrain.physics.incidents import Mishap, MishapMonitor, MotionSample
+from terrain.physics.incidents import Incident, IncidentMonitor, MotionSample
 from terrain.sensors.lidar import SensedRobot, Sensor
 
 MONITOR_RATE = 20.0  # Hz
@@ -48,7 +48,7 @@ class SimulatedRobot(SensedRobot, Protocol):
         """Hold a command until the next one or the time-out."""
 
     def motion_sample(self) -> MotionSample:
-        """Collect what ``MishapMonitor`` looks at."""
+        """Collect what ``IncidentMonitor`` looks at."""
 
 
 class Simulation:
@@ -61,14 +61,14 @@ class Simulation:
     robot : SimulatedRobot
     sensors : mapping of str to Sensor
         By topic; each measures at its own rate, the first time at once.
-    monitor : MishapMonitor, optional
+    monitor : IncidentMonitor, optional
         Counts what goes wrong.
 
     Attributes
     ----------
     latest : dict of str to measurement
         Newest measurement of each sensor that has given one.
-    mishaps : list of Mishap
+    incidents : list of Incident
         All so far.
     track : list of Pose
         Ground truth of the robot at 20 Hz.
@@ -79,14 +79,14 @@ class Simulation:
         world: SteppedWorld,
         robot: SimulatedRobot,
         sensors: Mapping[str, Sensor[Any]] | None = None,
-        monitor: MishapMonitor | None = None,
+        monitor: IncidentMonitor | None = None,
     ) -> None:
         self.world = world
         self.robot = robot
         self.sensors = dict(sensors or {})
-        self.monitor = monitor or MishapMonitor()
+        self.monitor = monitor or IncidentMonitor()
         self.latest: dict[str, Any] = {}
-        self.mishaps: list[Mishap] = []
+        self.incidents: list[Incident] = []
         self.track: list[Pose] = []
         self._listeners: list[Listener] = []
         self._monitor_period = self._steps_per(MONITOR_RATE)
@@ -115,7 +115,7 @@ class Simulation:
         if self._steps % self._monitor_period == 0:
             sample = self.robot.motion_sample()
             self.track.append(sample.pose)
-            self.mishaps += self.monitor.update(sample)
+            self.incidents += self.monitor.update(sample)
         for name, sensor, period in self._schedule:
             if self._steps % period == 0:
                 measurement = sensor.measure(self.world.time)

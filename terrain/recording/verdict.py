@@ -88,5 +88,5 @@ def _contacts(metrics: Mapping[str, Any]) -> list[str]:
     count = metrics["collisions_while_moving"]
     if not count:
         return []
-    things = [mishap.removeprefix(TOUCHED) for mishap in metrics["mishaps"] if mishap.startswith(TOUCHED)]
+    things = [incident.removeprefix(TOUCHED) for incident in metrics["incidents"] if incident.startswith(TOUCHED)]
     return [f"contacts while the robot moved: {count} ({', '.join(things)})"]

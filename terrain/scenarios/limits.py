@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mbf_abstract.parameters import ParameterModel, parameter
-from terrain.physics.incidents import MishapKind
+from terrain.physics.incidents import IncidentKind
 
 
 class Limits(ParameterModel):
@@ -22,7 +22,7 @@ class Limits(ParameterModel):
         gt=0.0,
     )
     goal_angle: float | None = parameter(None, "Largest true angle to it; absent likewise.", unit="deg", gt=0.0)
-    forbidden: tuple[MishapKind, ...] = parameter((), "Mishaps that must not happen.")
+    forbidden: tuple[IncidentKind, ...] = parameter((), "Mishaps that must not happen.")
 
 
 def broken_limits(limits: Limits, metrics: Mapping[str, Any]) -> list[str]:
@@ -35,4 +35,4 @@ def broken_limits(limits: Limits, metrics: Mapping[str, Any]) -> list[str]:
         if limit is not None and metrics[name] > limit:
             broken.append(f"{name} {metrics[name]:.1f} is above {limit:g} {unit}")
     forbidden = {kind.value for kind in limits.forbidden}
-    return broken + [f"{mishap} happened" for mishap in metrics["mishaps"] if mishap in forbidden]
+    return broken + [f"{incident} happened" for incident in metrics["incidents"] if incident in forbidden]

@@ -128,7 +128,7 @@ def _find_contradictions(scenario: Scenario, document: YamlDocument) -> list[Fin
     if scenario.map.spacing is not None and not isinstance(scenario.world, TerrainWorld):
         expected = f"no spacing, which only maps of open ground have (a world of type {scenario.world.type} has none)"
         findings.append(document.finding(("map", "spacing"), expected, f"{scenario.map.spacing:g}"))
-    sensors = [*(sensor.name for sensor in scenario.sensors), *ego_sensors(scenario), LOCALIZATION]
+    sensors = [*(sensor.name for sensor in scenario.sensors), *proprioceptive_sensors(scenario), LOCALIZATION]
     for index, fault in enumerate(scenario.faults):
         if isinstance(fault, SensorFault) and fault.sensor not in sensors:
             expected = "one of " + ", ".join(sensors)
@@ -136,7 +136,7 @@ def _find_contradictions(scenario: Scenario, document: YamlDocument) -> list[Fin
     return findings
 
 
-def ego_sensors(scenario: Scenario) -> list[str]:
+def proprioceptive_sensors(scenario: Scenario) -> list[str]:
     """Names of the sensors that look at the robot itself."""
     return [ODOMETRY] * (scenario.odometry == "wheels") + [IMU] * scenario.imu
 

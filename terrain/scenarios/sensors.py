@@ -34,10 +34,10 @@ def make_sensors(
     return {sensor.name: _lidar(sensor, robot, casters, seed) for sensor in sensors}
 
 
-def make_ego_sensors(scenario: model.Scenario, robot: AnyRobot, seed: int) -> dict[str, Sensor[Any]]:
+def make_proprioceptive_sensors(scenario: model.Scenario, robot: AnyRobot, seed: int) -> dict[str, Sensor[Any]]:
     """Make the sensors of a scenario that look at the robot itself, by name."""
     makers = {ODOMETRY: WheelOdometry, IMU: Imu}
-    return {name: makers[name](robot, _generator(seed, name)) for name in model.ego_sensors(scenario)}
+    return {name: makers[name](robot, _generator(seed, name)) for name in model.proprioceptive_sensors(scenario)}
 
 
 def make_localization(noise: LocalizationNoise, robot: AnyRobot, seed: int) -> Localization:

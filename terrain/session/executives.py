@@ -1,7 +1,7 @@
 """Ways to get a robot to a goal in a run: the ``move_base`` action, a ready behaviour tree, the classic state machine.
 
 All of them block the thread that calls ``drive`` until the goal has ended and can be canceled from any other thread.
-``make_goal_driver`` finds one by the name that ``mbf run --executive`` takes.
+``make_executive`` finds one by the name that ``mbf run --executive`` takes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
 EXECUTIVES = ("move_base", "classic", *READY_TREES)
 
 
-class GoalDriver(ABC):
+class GoalExecutive(ABC):
     """Drives to one goal at a time.
 
     Attributes
@@ -49,18 +49,18 @@ class GoalDriver(ABC):
         """End the present goal soon, from any thread; never waits, does nothing where no goal runs."""
 
 
-def make_goal_driver(executive: str, navigator: Navigator) -> GoalDriver:
+def make_executive(executive: str, navigator: Navigator) -> GoalExecutive:
     """Make the driver of a name in ``EXECUTIVES``; raises ConfigError for another one."""
     if executive == "move_base":
-        return MoveBaseDriver(navigator)
+        return MoveBaseExecutive(navigator)
     if executive == "classic":
-        return ClassicDriver(navigator)
+        return ClassicExecutive(navigator)
     if executive in READY_TREES:
-        return TreeDriver(navigator, executive)
+        return ReferenceTreeExecutive(navigator, executive)
     raise ConfigError([Finding("--executive", 1, "", f"one of {', '.join(EXECUTIVES)}", repr(executive))])
 
 
-class MoveBaseDriver(GoalDriver):
+class MoveBaseExecutive(GoalExecutive):
     """The ``move_base`` action of the server."""
 
     def __init__(self, navigator: Navigator) -> None:
@@ -79,7 +79,7 @@ class MoveBaseDriver(GoalDriver):
             self._handle.cancel(reason)
 
 
-class ClassicDriver(GoalDriver):
+class ClassicExecutive(GoalExecutive):
     """The fixed state machine of ROS 1's move_base."""
 
     def __init__(self, navigator: Navigator) -> None:
@@ -97,7 +97,7 @@ class ClassicDriver(GoalDriver):
             self._machine.cancel(reason)
 
 
-class TreeDriver(GoalDriver):
+class ReferenceTreeExecutive(GoalExecutive):
     """A ready behaviour tree, with those of its recoveries that the server has loaded.
 
     The tree ``control`` follows a path it is given, so ``planning`` goes before it; ``planning`` alone only plans.

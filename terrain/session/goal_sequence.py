@@ -13,8 +13,8 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
 from terrain.session.arrival import Arrival
-from terrain.session.bench import Bench
-from terrain.session.executives import GoalDriver
+from terrain.session.executives import GoalExecutive
+from terrain.session.session import Session
 
 NO_GOALS = MoveBaseResult(MoveBaseOutcome.FAILURE, "the scenario has no goals")
 
@@ -28,14 +28,14 @@ class AskedGoal:
     controller: str = ""
 
 
-class GoalTour:
+class GoalSequence:
     """Visits goals with a driver; the first failure ends the scenario's part.
 
     Parameters
     ----------
-    bench : Bench
+    session : Session
         Running.
-    driver : GoalDriver
+    driver : GoalExecutive
     stay : bool
         Wait for further goals after those of the scenario, until ``end`` is called.
 
@@ -53,35 +53,35 @@ class GoalTour:
         Where the robot was in truth when navigation said that a goal was reached, goal by goal.
     """
 
-    def __init__(self, bench: Bench, driver: GoalDriver, stay: bool = False) -> None:
+    def __init__(self, session: Session, driver: GoalExecutive, stay: bool = False) -> None:
         self.on_goal: list[Callable[[Pose], None]] = []
         self.is_waiting = False
         self.target: Pose | None = None
         self.last_result: MoveBaseResult | None = None
-        self._bench = bench
+        self._session = session
         self._driver = driver
         self._stay = stay
         self.arrivals: list[Arrival] = []
-        self._condition = bench.clock.condition()
+        self._condition = session.clock.condition()
         self._next: AskedGoal | None = None
         self._ended = False
         self._deadline = float("inf")
-        bench.loop.on_tick.append(self._watch_time)
-        bench.loop.on_failure.append(lambda: self.end("the simulation has failed"))
+        session.loop.on_tick.append(self._watch_time)
+        session.loop.on_failure.append(lambda: self.end("the simulation has failed"))
 
     def visit_goals(self) -> MoveBaseResult:
         """Visit the goals of the scenario, and others if they come; returns the result of the last one."""
-        self._deadline = limit = self._bench.scenario.time_limit
+        self._deadline = limit = self._session.scenario.time_limit
         result = NO_GOALS
-        for goal in self._bench.goals:
+        for goal in self._session.goals:
             result = self._visit(AskedGoal(goal))
             if not result.success or self._next is not None or self._ended:
                 break
         while (asked := self._await_goal()) is not None:
-            self._bench.recorder.goals.append(asked.pose)
+            self._session.recorder.goals.append(asked.pose)
             for listener in self.on_goal:
                 listener(asked.pose)
-            self._deadline = self._bench.simulation.time + limit
+            self._deadline = self._session.simulation.time + limit
             result = self._visit(asked)
         return result
 
@@ -110,7 +110,7 @@ class GoalTour:
         self.last_result = result = self._driver.drive(goal.pose, goal.planner, goal.controller)
         self.target = None
         if result.success and self._driver.arrives:
-            self.arrivals.append(Arrival.at(goal.pose, self._bench.loop.true_pose, result))
+            self.arrivals.append(Arrival.at(goal.pose, self._session.loop.true_pose, result))
         return result
 
     def _await_goal(self) -> AskedGoal | None:
@@ -127,4 +127,4 @@ class GoalTour:
     def _watch_time(self, time: float) -> None:
         if time >= self._deadline:
             self._deadline = float("inf")
-            self.cancel(f"the time limit of {self._bench.scenario.time_limit:g} s")
+            self.cancel(f"the time limit of {self._session.scenario.time_limit:g} s")

@@ -20,7 +20,7 @@ from mbf_abstract.events import JsonLinesSink
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.time.clock import wall_seconds
-from terrain.physics.incidents import MishapKind
+from terrain.physics.incidents import IncidentKind
 from terrain.recording.metrics import measure
 from terrain.recording.recording import Recording
 from terrain.recording.recording_parts import RecordingParts, has_parts
@@ -31,11 +31,11 @@ from terrain.recording.whole_files import write_whole
 from terrain.scenarios.scenario import Scenario
 from terrain.scenarios.world import ScenarioWorld
 from terrain.session.arrival import arrival_tolerance
-from terrain.session.bench import Bench
-from terrain.session.executives import make_goal_driver
-from terrain.session.goal_sequence import NO_GOALS, GoalTour
+from terrain.session.executives import make_executive
+from terrain.session.goal_sequence import NO_GOALS, GoalSequence
+from terrain.session.session import Session
 from terrain.viewer.live.options import ViewOptions
-from terrain.worlds.geodesics import shortest_way
+from terrain.worlds.geodesics import geodesic_length
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     clear_results(options.folder)
     write_versions(options.folder)
     log = JsonLinesSink(options.folder / "events.jsonl")
-    bench = Bench(
+    session = Session(
         scenario,
         options.backend,
         options.seed,
@@ -134,25 +134,25 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
         options.settings,
     )
     parts = RecordingParts(
-        options.folder, bench.recorder, bench.events, bench.memory.events, lambda: bench.loop.origin
+        options.folder, session.recorder, session.events, session.memory.events, lambda: session.loop.origin
     )  # fmt: skip
-    bench.loop.on_tick.append(parts.after_step)
+    session.loop.on_tick.append(parts.after_step)
     try:
-        for note in bench.navigator.server.notes:
+        for note in session.navigator.server.notes:
             options.on_note(f"note: {note}")
-        tour, wall_time = _drive(bench, options)
+        tour, wall_time = _drive(session, options)
     except BaseException:
         if has_parts(options.folder):
             options.on_note(f"the run was cut short; what happened until then: mbf replay {options.folder}")
         raise
     finally:
-        bench.close()
+        session.close()
         parts.end()
-    recording = bench.recorder.finish(events=bench.memory.events, began=bench.loop.origin)
-    metrics, result = _measure(recording, bench, tour), tour.last_result or NO_GOALS
+    recording = session.recorder.finish(events=session.memory.events, began=session.loop.origin)
+    metrics, result = _measure(recording, session, tour), tour.last_result or NO_GOALS
     if options.geodesic and result.success:
-        metrics |= _compare_with_geodesic(recording, bench.world)
-    recording = replace(recording, verdict=judge(result, bench.scenario.limits, metrics))
+        metrics |= _compare_with_geodesic(recording, session.world)
+    recording = replace(recording, verdict=judge(result, session.scenario.limits, metrics))
     metrics = _write_numbers(recording, metrics, wall_time, options.folder)
     parts.remove()
     if options.draw:
@@ -160,15 +160,15 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     return RunResult(recording.verdict, options.folder, metrics)
 
 
-def _drive(bench: Bench, options: RunOptions) -> tuple[GoalTour, float]:
+def _drive(session: Session, options: RunOptions) -> tuple[GoalSequence, float]:
     """Visit the goals, watched or not; returns the finished tour and the wall time [s] it took."""
-    tour = GoalTour(bench, make_goal_driver(options.executive, bench.navigator), stay=_stays(options))
-    with _live_view(bench, tour, options):
+    tour = GoalSequence(session, make_executive(options.executive, session.navigator), stay=_stays(options))
+    with _live_view(session, tour, options):
         started = wall_seconds()
-        bench.run(_ProgressReporter(bench, options.on_progress, started).report)
+        session.run(_ProgressReporter(session, options.on_progress, started).report)
         tour.visit_goals()
-        if bench.loop.failure is not None:
-            raise bench.loop.failure
+        if session.loop.failure is not None:
+            raise session.loop.failure
         return tour, wall_seconds() - started
 
 
@@ -176,20 +176,20 @@ def _stays(options: RunOptions) -> bool:
     return options.view is not None and options.view.stay
 
 
-def _live_view(bench: Bench, tour: GoalTour, options: RunOptions) -> AbstractContextManager[object]:
+def _live_view(session: Session, tour: GoalSequence, options: RunOptions) -> AbstractContextManager[object]:
     """Serve the page while the run goes on, if it is wanted; raises ViewerMissing where it cannot be served."""
     if options.view is None:
         return nullcontext()
     from terrain.viewer.live.session import LiveSession
 
-    return LiveSession(bench, tour, options.view, options.on_page, options.on_note)
+    return LiveSession(session, tour, options.view, options.on_page, options.on_note)
 
 
 class _ProgressReporter:
     """Makes a line of news from each sample of the robot."""
 
-    def __init__(self, bench: Bench, tell: Callable[[Progress], None], started: float) -> None:
-        self._server = bench.navigator.server
+    def __init__(self, session: Session, tell: Callable[[Progress], None], started: float) -> None:
+        self._server = session.navigator.server
         self._tell = tell
         self._started = started
 
@@ -211,21 +211,21 @@ class _ProgressReporter:
         )
 
 
-def _measure(recording: Recording, bench: Bench, tour: GoalTour) -> dict[str, Any]:
+def _measure(recording: Recording, session: Session, tour: GoalSequence) -> dict[str, Any]:
     """Return the numbers of a run: those of its recording, and those that only its simulation knows."""
     metrics = measure(recording).to_json()
-    metrics["mishaps"] = sorted({mishap.kind.value for mishap in bench.simulation.mishaps})
-    counts = bench.simulation.monitor.counts
-    metrics["collisions"] = counts[MishapKind.COLLISION]
-    metrics["collisions_while_moving"] = counts[MishapKind.COLLISION_WHILE_MOVING]
+    metrics["incidents"] = sorted({incident.kind.value for incident in session.simulation.incidents})
+    counts = session.simulation.monitor.counts
+    metrics["collisions"] = counts[IncidentKind.COLLISION]
+    metrics["collisions_while_moving"] = counts[IncidentKind.COLLISION_WHILE_MOVING]
     metrics["arrivals"] = [arrival.to_json() for arrival in tour.arrivals]
     metrics["arrival_tolerance"] = arrival_tolerance(
-        bench.scenario.limits, bench.scenario.localization, bench.navigator.server.runtime.parameters
+        session.scenario.limits, session.scenario.localization, session.navigator.server.runtime.parameters
     )
-    metrics["tip_overs"] = counts[MishapKind.TIPPED_OVER]
-    metrics["energy_j"] = round(bench.simulation.monitor.energy, 3)
-    metrics["slipped_m"] = round(bench.simulation.monitor.slipped, 6)
-    metrics["seed"], metrics["digest"] = bench.seed, bench.digest.hexdigest()
+    metrics["tip_overs"] = counts[IncidentKind.TIPPED_OVER]
+    metrics["energy_j"] = round(session.simulation.monitor.energy, 3)
+    metrics["slipped_m"] = round(session.simulation.monitor.slipped, 6)
+    metrics["seed"], metrics["digest"] = session.seed, session.digest.hexdigest()
     return metrics
 
 
@@ -244,7 +244,7 @@ def _compare_with_geodesic(recording: Recording, world: ScenarioWorld) -> dict[s
     """Return the shortest way over all goals to where the robot stopped, and how many times as far it drove."""
     goals = [goal.position for goal in recording.goals[:-1]]
     stops = [recording.start.position, *goals, tuple(recording.poses[-1, :3].tolist())]
-    shortest = shortest_way(world.open_surface(), stops)
+    shortest = geodesic_length(world.open_surface(), stops)
     if not 0.0 < shortest < float("inf"):
         return {}
     driven = measure(recording).path_length_m

@@ -31,7 +31,7 @@ COLUMNS = (
     "collisions",
     "collisions_while_moving",
     "tip_overs",
-    "mishaps",
+    "incidents",
     "recoveries",
     "wall_time_s",
     "verdict",
@@ -60,7 +60,7 @@ def write_tables(title: str, rows: Iterable[Row], folder: Path) -> list[Path]:
 
 
 def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return one line per variant: runs, share of successes in percent, medians of the successful runs, mishaps."""
+    """Return one line per variant: runs, share of successes in percent, medians of the successful runs, incidents."""
     lines = []
     for variant in sorted({row["variant"] for row in rows}):
         runs = [row for row in rows if row["variant"] == variant]
@@ -76,7 +76,7 @@ def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
                 "median_path_over_geodesic": round(median(ratios), 3) if ratios else "",
                 "collisions": sum(row.get("collisions") or 0 for row in runs),
                 "tip_overs": sum(row.get("tip_overs") or 0 for row in runs),
-                "runs_with_mishaps": sum(bool(row.get("mishaps")) for row in runs),
+                "runs_with_incidents": sum(bool(row.get("incidents")) for row in runs),
             }
         )
     return lines
@@ -85,7 +85,7 @@ def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
 def _flat(row: Row) -> dict[str, Any]:
     """One row of the table; what a failed start did not measure stays empty."""
     values = {name: row.get(name, "") for name in COLUMNS}
-    values["mishaps"] = " ".join(row.get("mishaps", ()))
+    values["incidents"] = " ".join(row.get("incidents", ()))
     return values
 
 

@@ -29,7 +29,7 @@ SEARCH_RADIUS = 1.0  # m around a place in which its face is looked for
 FLOOR_CELL = 0.2  # m; width of the squares that a building's floor is made of
 
 
-def shortest_way(surface: Surface, places: Sequence[Sequence[float]]) -> float:
+def geodesic_length(surface: Surface, places: Sequence[Sequence[float]]) -> float:
     """Length [m] of the shortest way over a surface through places in their order, inf where there is none.
 
     Parameters

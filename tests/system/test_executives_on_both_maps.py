@@ -10,7 +10,7 @@ from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
 from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
-from terrain.session.bench import Bench
+from terrain.session.session import Session
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -35,13 +35,13 @@ def test_all_legs_are_planned_first_and_the_cheap_order_is_driven(backend, waypo
 
 @pytest.mark.parametrize("backend", ["costmap", "mesh"])
 def test_the_tree_and_the_classic_machine_drive_the_same_robot(backend):
-    with Bench("indoor", backend) as bench:
-        there = Pose.planar(4.5, 2.0, 0.5, bench.world.height_at(4.5, 2.0))
-        back = Pose.planar(3.0, 3.0, 3.0, bench.world.height_at(3.0, 3.0))
-        tree = TreeExecutive(navigation_tree(TreeOptions(second_planner_pause=1.0)), bench.navigator)
+    with Session("indoor", backend) as session:
+        there = Pose.planar(4.5, 2.0, 0.5, session.world.height_at(4.5, 2.0))
+        back = Pose.planar(3.0, 3.0, 3.0, session.world.height_at(3.0, 3.0))
+        tree = TreeExecutive(navigation_tree(TreeOptions(second_planner_pause=1.0)), session.navigator)
         result = tree.run(there)
         assert result.success, result.message
-        classic = ClassicMoveBase(bench.navigator).run(back)
+        classic = ClassicMoveBase(session.navigator).run(back)
         assert classic.success, classic.message
         assert classic.dist_to_goal < 0.3
-        assert not bench.memory.of_kind(EventKind.FAULT)
+        assert not session.memory.of_kind(EventKind.FAULT)

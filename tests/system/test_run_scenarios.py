@@ -66,7 +66,7 @@ def test_the_robot_drives_in_a_real_building(tmp_path, shared_data):
     )
     result = run(scenario, tmp_path)
     assert result.success, result.verdict
-    assert "collision" not in result.metrics["mishaps"]
+    assert "collision" not in result.metrics["incidents"]
 
 
 def test_a_goal_that_cannot_be_reached_ends_with_its_reason(tmp_path):

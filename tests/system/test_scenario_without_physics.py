@@ -10,8 +10,8 @@ import pytest
 from mbf_abstract.geometry import Twist
 from terrain.scenarios.actors import Walker
 from terrain.scenarios.scenario import PlanarPose, load_scenario
-from terrain.session.bench import Bench
 from terrain.session.runner import RunOptions, run_scenario
+from terrain.session.session import Session
 
 
 @pytest.fixture
@@ -32,11 +32,11 @@ def test_the_crowded_corridor_is_driven_with_lidar_and_people_and_repeats(corrid
 
 def test_a_finished_run_leaves_no_thread_and_no_world_behind(corridor, tmp_path):
     before = threading.active_count()
-    with Bench(corridor, folder=tmp_path) as bench:
-        bench.clock.sleep(1.0)
+    with Session(corridor, folder=tmp_path) as session:
+        session.clock.sleep(1.0)
         assert threading.active_count() > before
-        world = weakref.ref(bench.world)
-    del bench
+        world = weakref.ref(session.world)
+    del session
     gc.collect()
     assert threading.active_count() == before
     assert world() is None
@@ -45,17 +45,20 @@ def test_a_finished_run_leaves_no_thread_and_no_world_behind(corridor, tmp_path)
 def test_a_person_in_the_way_is_seen_by_the_lidar_and_stops_the_robot(corridor, tmp_path):
     standing = Walker(type="walker", route=((4.0, 9.7), (4.0, 9.71)), speed=0.0)
     scenario = corridor.model_copy(update={"actors": (standing,), "start": PlanarPose(x=2.0, y=9.7)})
-    with Bench(scenario, folder=tmp_path) as bench:
-        ends, hits = bench.simulation.latest["lidar"].ends, bench.simulation.latest["lidar"].hits
+    with Session(scenario, folder=tmp_path) as session:
+        ends, hits = session.simulation.latest["lidar"].ends, session.simulation.latest["lidar"].hits
         ahead = ends[hits & (abs(ends[:, 1] - 9.7) < 0.1) & (ends[:, 0] > 2.0)]
         assert ahead[:, 0].min() == pytest.approx(3.75, abs=0.05)
-        drive_ahead(bench, 8.0)
-        assert 3.2 < bench.robot.pose().x < 3.75
-        assert {mishap.kind.value for mishap in bench.simulation.mishaps} >= {"collision", "collision_with_person"}
+        drive_ahead(session, 8.0)
+        assert 3.2 < session.robot.pose().x < 3.75
+        assert {incident.kind.value for incident in session.simulation.incidents} >= {
+            "collision",
+            "collision_with_person",
+        }
 
 
-def drive_ahead(bench, seconds):
-    end = bench.clock.now() + seconds
-    while bench.clock.now() < end:
-        bench.robot.send_command(Twist.planar(0.4))
-        bench.clock.sleep(0.1)
+def drive_ahead(session, seconds):
+    end = session.clock.now() + seconds
+    while session.clock.now() < end:
+        session.robot.send_command(Twist.planar(0.4))
+        session.clock.sleep(0.1)

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 
 @kernel
-def cover_polygon(corners: FloatArray, box: tuple[int, int, int, int]) -> tuple[int, int, NDArray[np.uint8]]:
+def rasterise_polygon(corners: FloatArray, box: tuple[int, int, int, int]) -> tuple[int, int, NDArray[np.uint8]]:
     """Cells of a box that a simple polygon covers.
 
     Parameters
@@ -104,7 +104,7 @@ def polygon_costs(cells: NDArray[np.uint8], corners: FloatArray) -> tuple[int, i
     for i in range(len(corners)):
         if not (0.0 <= corners[i, 0] < width and 0.0 <= corners[i, 1] < height):
             return -1, 0, 0, 0, 0, 0
-    x0, y0, mask = cover_polygon(corners, (0, 0, width, height))
+    x0, y0, mask = rasterise_polygon(corners, (0, 0, width, height))
     covered, lethal, inscribed, unknown, rest, highest = 0, 0, 0, 0, 0, 0
     for row in range(mask.shape[0]):
         for column in range(mask.shape[1]):
@@ -129,7 +129,7 @@ def polygon_costs(cells: NDArray[np.uint8], corners: FloatArray) -> tuple[int, i
 def fill_polygon(cells: NDArray[Any], corners: FloatArray, value: int) -> tuple[int, int, int, int]:
     """Write ``value`` into all covered cells on the grid; return the half-open box (x0, y0, x1, y1) around them."""
     height, width = cells.shape
-    x0, y0, mask = cover_polygon(corners, (0, 0, width, height))
+    x0, y0, mask = rasterise_polygon(corners, (0, 0, width, height))
     for row in range(mask.shape[0]):
         for column in range(mask.shape[1]):
             if mask[row, column] != 0:

@@ -92,7 +92,7 @@ def runs_along(faces: IntArray, face: int, start: int, end: int) -> bool:
 def winding_flips(faces: IntArray, face_neighbours: IntArray, areas: FloatArray) -> tuple[BoolArray, IntArray, int]:
     """Faces (F,) to turn round so that neighbours agree, patch of every face (F,), and edges where none can.
 
-    Edges at which neighbours cannot agree are those of one-sided surfaces, such as a Moebius strip.
+    Edges at which neighbours cannot agree are those of one-sided surfaces, such as a Moebius corridor.
 
     Each patch of faces is oriented from its first face; of the two possible answers the one that turns less area wins.
     """

@@ -19,7 +19,7 @@ _SEED: Any = np.uint8(2)
 
 
 @kernel
-def forget_changed_ways(
+def invalidate_subtrees(
     neighbour_offsets: Int32Array,
     neighbours: Int32Array,
     blocked: BoolArray,

@@ -1,8 +1,8 @@
-"""Leading a strip round the other side of the vertices beside it, as long as its path becomes shorter.
+"""Leading a corridor round the other side of the vertices beside it, as long as its path becomes shorter.
 
 A geodesic is shortest among its neighbours only: where the surface has a peak, one passes it on the left and another on
-the right. ``straighten`` turns a strip where its path bends; here it is turned where the path passes a vertex straight,
-one vertex at a time, and the geodesic on the other side is taken where it is shorter.
+the right. ``straighten`` turns a corridor where its path bends; here it is turned where the path passes a vertex
+straight, one vertex at a time, and the geodesic on the other side is taken where it is shorter.
 """
 
 from __future__ import annotations
@@ -10,7 +10,14 @@ from __future__ import annotations
 from mbf_mesh_nav.kernels.compiled import Count, kernel
 from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector
 from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Int32Array
-from mbf_mesh_nav.kernels.wave.corridors import corner_of, fan_length, next_round, path_length, straighten, turned_strip
+from mbf_mesh_nav.kernels.wave.corridors import (
+    corner_of,
+    fan_length,
+    next_round,
+    path_length,
+    straighten,
+    turned_corridor,
+)
 
 _SHORTER = 1.0 - 1e-6
 """Only what makes a path shorter by more than rounding is another path."""
@@ -23,34 +30,34 @@ def pass_vertices(
     faces: Int32Array,
     face_neighbours: Int32Array,
     blocked: BoolArray,
-    strip: Int32Array,
+    corridor: Int32Array,
     start: Vector,
     goal: Vector,
 ) -> tuple[Float64Array, Int32Array]:
     """Shortest geodesic that vertices passed on their other side lead to; arguments and result of ``straighten``."""
-    points, strip = straighten(vertices, faces, face_neighbours, blocked, strip, start, goal, True)
-    length, index, tries = path_length(points), Count(0), _MAX_TRIES_A_FACE * len(strip)
-    while index < len(strip) - 1 and tries > 0:
+    points, corridor = straighten(vertices, faces, face_neighbours, blocked, corridor, start, goal, True)
+    length, index, tries = path_length(points), Count(0), _MAX_TRIES_A_FACE * len(corridor)
+    while index < len(corridor) - 1 and tries > 0:
         is_shorter = False
         for corner in range(3):
-            # Every vertex once: at the first face of the strip that has it, if the next one has it, too.
-            vertex = Count(faces[strip[index], corner])
-            begins = index == 0 or corner_of(faces[strip[index - 1]], vertex) < 0
-            if not begins or corner_of(faces[strip[index + 1]], vertex) < 0:
+            # Every vertex once: at the first face of the corridor that has it, if the next one has it, too.
+            vertex = Count(faces[corridor[index], corner])
+            begins = index == 0 or corner_of(faces[corridor[index - 1]], vertex) < 0
+            if not begins or corner_of(faces[corridor[index + 1]], vertex) < 0:
                 continue
             last = index + 1
-            while last < len(strip) - 1 and corner_of(faces[strip[last + 1]], vertex) >= 0:
+            while last < len(corridor) - 1 and corner_of(faces[corridor[last + 1]], vertex) >= 0:
                 last += 1
-            begin, end = Count(strip[index]), Count(strip[last])
-            inner = Count(strip[index + 1])
+            begin, end = Count(corridor[index]), Count(corridor[last])
+            inner = Count(corridor[index + 1])
             side = Count(2) if next_round(faces, face_neighbours, vertex, begin, Count(0)) == inner else Count(0)
             if begin == end or fan_length(faces, face_neighbours, blocked, vertex, begin, end, side) < 0:
                 continue
             tries -= 1
-            other = turned_strip(faces, face_neighbours, strip, vertex, index, last, side)
-            found, found_strip = straighten(vertices, faces, face_neighbours, blocked, other, start, goal, True)
+            other = turned_corridor(faces, face_neighbours, corridor, vertex, index, last, side)
+            found, found_corridor = straighten(vertices, faces, face_neighbours, blocked, other, start, goal, True)
             if path_length(found) < _SHORTER * length:
-                points, strip, length, is_shorter = found, found_strip, path_length(found), True
+                points, corridor, length, is_shorter = found, found_corridor, path_length(found), True
                 break
         index = Count(0) if is_shorter else index + 1
-    return points, strip
+    return points, corridor

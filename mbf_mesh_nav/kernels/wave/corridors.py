@@ -1,9 +1,9 @@
-"""Strips of free faces along a path, and turning them to the other side of the vertices at which the path bends.
+"""Corridors of free faces along a path, and turning them to the other side of the vertices at which the path bends.
 
-Within a strip the shortest path is found by ``funnel.pull_taut``. Where it bends round a vertex, the faces on the other
-side of that vertex may make it shorter still: if the angle it leaves there is less than half a turn. Turned again and
-again, the strip becomes that of a geodesic, a path that is shortest among its neighbours (Xin and Wang 2007; Sharp and
-Crane 2020 turn edges instead of faces).
+Within a corridor the shortest path is found by ``funnel.pull_string``. Where it bends round a vertex, the faces on the
+other side of that vertex may make it shorter still: if the angle it leaves there is less than half a turn. Turned again
+and again, the corridor becomes that of a geodesic, a path that is shortest among its neighbours (Xin and Wang 2007;
+Sharp and Crane 2020 turn edges instead of faces).
 """
 
 from __future__ import annotations
@@ -15,35 +15,35 @@ import numpy as np
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, difference, dot, norm, row
 from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Int32Array
-from mbf_mesh_nav.kernels.wave.funnel import pull_taut
+from mbf_mesh_nav.kernels.wave.funnel import pull_string
 
 _AT_VERTEX = 1e-7  # m; a crossing this near to the end of a portal is that vertex
 _LESS_THAN_HALF_A_TURN = math.pi - 1e-6
-_MAX_TURNS_A_FACE = 50  # tries; a bound, a traced strip needs a turn for few of its faces
+_MAX_TURNS_A_FACE = 50  # tries; a bound, a traced corridor needs a turn for few of its faces
 
 
 @kernel
 def link_faces(
     faces: Int32Array, face_neighbours: Int32Array, blocked: BoolArray, point_faces: Int32Array
 ) -> tuple[Int32Array, Int32Array]:
-    """Join the faces of a path to strips in which each shares an edge with the next.
+    """Join the faces of a path to corridors in which each shares an edge with the next.
 
     Parameters
     ----------
     faces, face_neighbours, blocked : (F, 3) int32, (F, 3) int32, (V,) bool
-        The mesh; a face with a blocked corner is in no strip.
+        The mesh; a face with a blocked corner is in no corridor.
     point_faces : (n,) int32
         The face in which the way to each point lies.
 
     Returns
     -------
-    strip : (s,) int32
-        The faces of all strips.
+    corridor : (s,) int32
+        The faces of all corridors.
     pieces : (p, 4) int32
-        Of every piece of the path its first and last point, and where its strip begins and ends; an empty one where
+        Of every piece of the path its first and last point, and where its corridor begins and ends; an empty one where
         the path is not among free faces.
     """
-    strip = np.empty(2 * len(point_faces) + 64, dtype=np.int32)
+    corridor = np.empty(2 * len(point_faces) + 64, dtype=np.int32)
     pieces = np.empty((len(point_faces), 4), dtype=np.int32)
     count, begin, piece_count, first = Count(0), Count(0), Count(0), Count(0)
     for index in range(1, len(point_faces)):
@@ -52,21 +52,21 @@ def link_faces(
         if index > 1:
             linked = Count(-1)
             if is_free and count > begin:
-                strip, linked = _linked(faces, face_neighbours, blocked, strip, begin, count, following)
+                corridor, linked = _linked(faces, face_neighbours, blocked, corridor, begin, count, following)
             if linked >= 0:
                 count = linked
                 continue
             if not is_free and count == begin:
-                continue  # one more point of a piece without a strip
+                continue  # one more point of a piece without a corridor
             _end_piece(pieces, piece_count, first, index - 1, begin, count)
             piece_count, first, begin = piece_count + 1, Count(index - 1), Count(count)
         if is_free:
-            if count + 1 > len(strip):
-                strip = _grown(strip)
-            strip[count] = following
+            if count + 1 > len(corridor):
+                corridor = _grown(corridor)
+            corridor[count] = following
             count += 1
     _end_piece(pieces, piece_count, first, len(point_faces) - 1, begin, count)
-    return strip[:count].copy(), pieces[: piece_count + 1].copy()
+    return corridor[:count].copy(), pieces[: piece_count + 1].copy()
 
 
 @inner_kernel
@@ -75,10 +75,10 @@ def _end_piece(pieces: Int32Array, index: int, first: int, last: int, begin: int
 
 
 @inner_kernel
-def _grown(strip: Int32Array) -> Int32Array:
-    longer = np.empty(2 * len(strip), dtype=np.int32)
-    for index in range(len(strip)):
-        longer[index] = strip[index]
+def _grown(corridor: Int32Array) -> Int32Array:
+    longer = np.empty(2 * len(corridor), dtype=np.int32)
+    for index in range(len(corridor)):
+        longer[index] = corridor[index]
     return longer
 
 
@@ -101,18 +101,18 @@ def _linked(
     faces: Int32Array,
     face_neighbours: Int32Array,
     blocked: BoolArray,
-    strip: Int32Array,
+    corridor: Int32Array,
     begin: int,
     count: int,
     following: int,
 ) -> tuple[Int32Array, int]:
-    """Lead the strip on to a face: at once, or by the shorter free fan round a common vertex; (strip, length or -1)."""
-    last = Count(strip[count - 1])
+    """Lead the corridor on to a face: at once, or by the shorter free fan round a common vertex; its length, or -1."""
+    last = Count(corridor[count - 1])
     if last == following:
-        return strip, count
+        return corridor, count
     for side in range(3):
         if face_neighbours[last, side] == following:
-            return _appended(strip, begin, count, following)
+            return _appended(corridor, begin, count, following)
     for corner in range(3):
         vertex = Count(faces[last, corner])
         if corner_of(faces[following], vertex) < 0:
@@ -120,25 +120,25 @@ def _linked(
         left = fan_length(faces, face_neighbours, blocked, vertex, last, following, Count(0))
         right = fan_length(faces, face_neighbours, blocked, vertex, last, following, Count(2))
         if left < 0 and right < 0:
-            return strip, Count(-1)
+            return corridor, Count(-1)
         side = Count(0) if right < 0 or 0 <= left < right else Count(2)
         face = last
         while face != following:
             face = next_round(faces, face_neighbours, vertex, face, side)
-            strip, count = _appended(strip, begin, count, face)
-        return strip, count
-    return strip, Count(-1)
+            corridor, count = _appended(corridor, begin, count, face)
+        return corridor, count
+    return corridor, Count(-1)
 
 
 @inner_kernel
-def _appended(strip: Int32Array, begin: int, count: int, face: int) -> tuple[Int32Array, int]:
+def _appended(corridor: Int32Array, begin: int, count: int, face: int) -> tuple[Int32Array, int]:
     """Append a face; into a face and straight back out of it is no step at all."""
-    if count - begin > 1 and strip[count - 2] == face:
-        return strip, count - 1
-    if count + 1 > len(strip):
-        strip = _grown(strip)
-    strip[count] = face
-    return strip, count + 1
+    if count - begin > 1 and corridor[count - 2] == face:
+        return corridor, count - 1
+    if count + 1 > len(corridor):
+        corridor = _grown(corridor)
+    corridor[count] = face
+    return corridor, count + 1
 
 
 @inner_kernel
@@ -176,60 +176,60 @@ def straighten(
     faces: Int32Array,
     face_neighbours: Int32Array,
     blocked: BoolArray,
-    strip: Int32Array,
+    corridor: Int32Array,
     start: Vector,
     goal: Vector,
     turn: bool,
 ) -> tuple[Float64Array, Int32Array]:
-    """Pull a path taut through a strip and turn the strip round the vertices where that makes the path shorter.
+    """Pull a path taut through a corridor and turn the corridor round the vertices where that makes the path shorter.
 
     Parameters
     ----------
     vertices, faces, face_neighbours, blocked
         The mesh, as in ``link_faces``.
-    strip : (s,) int32
+    corridor : (s,) int32
         Faces, each sharing an edge with the next.
     start, goal : (float, float, float)
         Points in the first and the last face [m].
     turn : bool
-        Whether the strip may be turned; without it the path is that of ``pull_taut``.
+        Whether the corridor may be turned; without it the path is that of ``pull_string``.
 
     Returns
     -------
     points : (n + 1, 3) float64
         Start, one point on each crossed edge, goal.
-    strip : (n,) int32
+    corridor : (n,) int32
         The faces the path goes through.
     """
-    points = pull_taut(vertices, faces, strip, start, goal)
+    points = pull_string(vertices, faces, corridor, start, goal)
     length = path_length(points)
-    index, tries, is_changed = Count(0), _MAX_TURNS_A_FACE * len(strip) if turn else Count(0), False
-    while tries > 0 and len(strip) > 1:
-        if index >= len(strip) - 1:
+    index, tries, is_changed = Count(0), _MAX_TURNS_A_FACE * len(corridor) if turn else Count(0), False
+    while tries > 0 and len(corridor) > 1:
+        if index >= len(corridor) - 1:
             if not is_changed:
                 break
             index, is_changed = Count(0), False  # a turn may have made the path bend before it
-        vertex = _bend_at(vertices, faces, strip, points, index)
+        vertex = _bend_at(vertices, faces, corridor, points, index)
         if vertex < 0:
             index += 1
             continue
         first, last = index, index + 1
-        while first > 0 and corner_of(faces[strip[first - 1]], vertex) >= 0:
+        while first > 0 and corner_of(faces[corridor[first - 1]], vertex) >= 0:
             first -= 1
-        while last < len(strip) - 1 and corner_of(faces[strip[last + 1]], vertex) >= 0:
+        while last < len(corridor) - 1 and corner_of(faces[corridor[last + 1]], vertex) >= 0:
             last += 1
-        side = _free_side(vertices, faces, face_neighbours, blocked, strip, points, vertex, first, last)
-        turned = strip if side < 0 else turned_strip(faces, face_neighbours, strip, vertex, first, last, side)
+        side = _free_side(vertices, faces, face_neighbours, blocked, corridor, points, vertex, first, last)
+        turned = corridor if side < 0 else turned_corridor(faces, face_neighbours, corridor, vertex, first, last, side)
         index = last
         if side < 0:
             continue
         tries -= 1
-        shorter = pull_taut(vertices, faces, turned, start, goal)
+        shorter = pull_string(vertices, faces, turned, start, goal)
         new_length = path_length(shorter)
         if new_length < length:
-            points, strip, length, is_changed = shorter, turned, new_length, True
+            points, corridor, length, is_changed = shorter, turned, new_length, True
             index = max(first - 1, 0)
-    return points, strip
+    return points, corridor
 
 
 @inner_kernel
@@ -242,11 +242,11 @@ def path_length(points: Float64Array) -> float:
 
 
 @inner_kernel
-def _bend_at(vertices: Float64Array, faces: Int32Array, strip: Int32Array, points: Float64Array, portal: int) -> int:
+def _bend_at(vertices: Float64Array, faces: Int32Array, corridor: Int32Array, points: Float64Array, portal: int) -> int:
     """Vertex at an end of a portal through which the path goes, else -1."""
-    following, crossing = faces[strip[portal + 1]], row(points, Count(portal + 1))
+    following, crossing = faces[corridor[portal + 1]], row(points, Count(portal + 1))
     for corner in range(3):
-        vertex = Count(faces[strip[portal], corner])
+        vertex = Count(faces[corridor[portal], corner])
         if corner_of(following, vertex) >= 0 and norm(difference(row(vertices, vertex), crossing)) < _AT_VERTEX:
             return vertex  # type: ignore[no-any-return]
     return Count(-1)  # type: ignore[no-any-return]
@@ -264,19 +264,21 @@ def _free_side(
     faces: Int32Array,
     face_neighbours: Int32Array,
     blocked: BoolArray,
-    strip: Int32Array,
+    corridor: Int32Array,
     points: Float64Array,
     vertex: int,
     first: int,
     last: int,
 ) -> int:
-    """Which way round a vertex (0, 2) leads from face ``first`` of a strip to ``last`` by the other side; -1 for none.
+    """Which way round a vertex (0, 2) leads from face ``first`` of a corridor to ``last`` on the other side; -1: none.
 
     None if it is not free, or if the path leaves an angle of half a turn or more there.
     """
-    inner = Count(strip[first + 1])
-    side = Count(2) if next_round(faces, face_neighbours, vertex, Count(strip[first]), Count(0)) == inner else Count(0)
-    begin, end = Count(strip[first]), Count(strip[last])
+    inner = Count(corridor[first + 1])
+    side = (
+        Count(2) if next_round(faces, face_neighbours, vertex, Count(corridor[first]), Count(0)) == inner else Count(0)
+    )
+    begin, end = Count(corridor[first]), Count(corridor[last])
     if begin == end or fan_length(faces, face_neighbours, blocked, vertex, begin, end, side) < 0:
         return Count(-1)  # type: ignore[no-any-return]
     # The path comes to the vertex from the point before face ``first`` and leaves it to the one behind ``last``.
@@ -299,21 +301,25 @@ def _free_side(
 
 
 @inner_kernel
-def turned_strip(
-    faces: Int32Array, face_neighbours: Int32Array, strip: Int32Array, vertex: int, first: int, last: int, side: int
+def turned_corridor(
+    faces: Int32Array, face_neighbours: Int32Array, corridor: Int32Array, vertex: int, first: int, last: int, side: int
 ) -> Int32Array:
-    """The strip led round the other side of a vertex between two of its faces."""
-    between, face, end = Count(0), next_round(faces, face_neighbours, vertex, Count(strip[first]), side), strip[last]
+    """The corridor led round the other side of a vertex between two of its faces."""
+    between, face, end = (
+        Count(0),
+        next_round(faces, face_neighbours, vertex, Count(corridor[first]), side),
+        corridor[last],
+    )
     while face != end:
         face = next_round(faces, face_neighbours, vertex, face, side)
         between += 1
-    turned = np.empty(first + 1 + between + len(strip) - last, dtype=np.int32)
+    turned = np.empty(first + 1 + between + len(corridor) - last, dtype=np.int32)
     for index in range(first + 1):
-        turned[index] = strip[index]
-    face = Count(strip[first])
+        turned[index] = corridor[index]
+    face = Count(corridor[first])
     for index in range(between):
         face = next_round(faces, face_neighbours, vertex, face, side)
         turned[first + 1 + index] = face
-    for index in range(last, len(strip)):
-        turned[first + 1 + between + index - last] = strip[index]
+    for index in range(last, len(corridor)):
+        turned[first + 1 + between + index - last] = corridor[index]
     return turned

@@ -1,4 +1,4 @@
-"""The shortest path within a strip of faces: unfold the strip into the plane and pull the string taut.
+"""The shortest path within a corridor of faces: unfold the corridor into the plane and pull the string taut.
 
 Funnel algorithm of Lee and Preparata (1984) in the form of Mononen's "simple stupid funnel": left and right side of the
 funnel are narrowed portal by portal; where they cross, the string bends round a corner and a new funnel begins there.
@@ -15,19 +15,19 @@ from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, between, dif
 from mbf_mesh_nav.kernels.search.dijkstra import Int32Array
 
 FlatPoint = tuple[float, float]
-"""A point of the unfolded strip."""
+"""A point of the unfolded corridor."""
 
 
 @kernel
-def pull_taut(
-    vertices: Float64Array, faces: Int32Array, strip: Int32Array, start: Vector, goal: Vector
+def pull_string(
+    vertices: Float64Array, faces: Int32Array, corridor: Int32Array, start: Vector, goal: Vector
 ) -> Float64Array:
-    """Shortest path through a strip of faces.
+    """Shortest path through a corridor of faces.
 
     Parameters
     ----------
     vertices, faces : (V, 3) float64 [m], (F, 3) int32
-    strip : (n,) int32
+    corridor : (n,) int32
         Faces, each sharing an edge with the next.
     start, goal : (float, float, float)
         Points in the first and the last face [m].
@@ -37,10 +37,10 @@ def pull_taut(
     (n + 1, 3) float64
         Start, one point on each crossed edge, goal.
     """
-    portal_count = len(strip) - 1
+    portal_count = len(corridor) - 1
     portals = np.empty((portal_count, 2), dtype=np.int32)  # vertices at the left and right end
     flat_portals = np.empty((portal_count + 1, 4), dtype=np.float64)  # left x y, right x y
-    apex, target = _unfold(vertices, faces, strip, start, goal, portals, flat_portals)
+    apex, target = _unfold(vertices, faces, corridor, start, goal, portals, flat_portals)
     _set_portal(flat_portals, portal_count, target, target)  # the goal is the last portal, of no width
 
     bends = np.empty((portal_count + 2, 2), dtype=np.float64)
@@ -89,21 +89,21 @@ def pull_taut(
 def _unfold(
     vertices: Float64Array,
     faces: Int32Array,
-    strip: Int32Array,
+    corridor: Int32Array,
     start: Vector,
     goal: Vector,
     portals: Int32Array,
     flat_portals: Float64Array,
 ) -> tuple[FlatPoint, FlatPoint]:
-    """Lay the strip into the plane; fills the portals' vertices and ends, returns start and goal in the plane."""
-    a, b, c = Count(faces[strip[0], 0]), Count(faces[strip[0], 1]), Count(faces[strip[0], 2])
+    """Lay the corridor into the plane; fills the portals' vertices and ends, returns start and goal in the plane."""
+    a, b, c = Count(faces[corridor[0], 0]), Count(faces[corridor[0], 1]), Count(faces[corridor[0], 2])
     edge = difference(row(vertices, b), row(vertices, a))
     flat_a, flat_b = (0.0, 0.0), (math.sqrt(dot(edge, edge)), 0.0)
     flat_c = _placed(vertices, a, b, flat_a, flat_b, row(vertices, c), 1.0)
     flat_start = _placed(vertices, a, b, flat_a, flat_b, start, 1.0)
-    for i in range(len(strip) - 1):
+    for i in range(len(corridor) - 1):
         # The corner of this face that the next one does not have; the edge opposite to it is the portal.
-        following = faces[strip[i + 1]]
+        following = faces[corridor[i + 1]]
         while c == following[0] or c == following[1] or c == following[2]:
             a, b, c = b, c, a
             flat_a, flat_b, flat_c = flat_b, flat_c, flat_a

@@ -16,8 +16,8 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.scenarios.faults import LocalizationJump, SensorFault
 from terrain.sensors.rays import StaticRays
-from terrain.session.bench import Bench
-from terrain.session.goal_sequence import AskedGoal, GoalTour
+from terrain.session.goal_sequence import AskedGoal, GoalSequence
+from terrain.session.session import Session
 
 MAX_WAITING = 100  # commands; a page that sends more between two steps loses the oldest
 MAX_RANGE = 1e4  # m from the camera to the ground
@@ -28,8 +28,8 @@ class LiveControls:
 
     Parameters
     ----------
-    bench : Bench
-    tour : GoalTour
+    session : Session
+    tour : GoalSequence
 
     Attributes
     ----------
@@ -39,13 +39,13 @@ class LiveControls:
         Whether goals are paused, those to come as well.
     """
 
-    def __init__(self, bench: Bench, tour: GoalTour) -> None:
+    def __init__(self, session: Session, tour: GoalSequence) -> None:
         self.planner = ""
         self.controller = ""
         self.holding = False
-        self._bench = bench
+        self._session = session
         self._tour = tour
-        self._server = bench.navigator.server
+        self._server = session.navigator.server
         self._waiting: deque[Callable[[], None]] = deque(maxlen=MAX_WAITING)
         self._ground: StaticRays | None = None
 
@@ -72,7 +72,7 @@ class LiveControls:
             self._tell("there is no ground where the click was")
             return
         x, y, z = place.tolist()
-        robot = self._bench.simulation.robot.pose()
+        robot = self._session.simulation.robot.pose()
         yaw = math.atan2(y - robot.y, x - robot.x)
         self._tell("new goal", x=round(x, 3), y=round(y, 3), z=round(z, 3))
         self._tour.go_to(AskedGoal(Pose.planar(x, y, yaw, z), self.planner, self.controller))
@@ -96,7 +96,7 @@ class LiveControls:
     def inject(self, fault: SensorFault | LocalizationJump) -> None:
         """Let a fault happen."""
         self._tell("fault", **fault.model_dump())
-        self._bench.faults.add(fault)
+        self._session.faults.add(fault)
 
     def end(self, reason: str) -> None:
         """End the run."""
@@ -106,7 +106,7 @@ class LiveControls:
     # -----------------------------------------------------------------------------------------------------
     def _where_it_hits(self, origin: FloatArray, direction: FloatArray) -> FloatArray | None:
         if self._ground is None:
-            ground = self._bench.world.ground
+            ground = self._session.world.ground
             self._ground = StaticRays(ground.vertices, ground.faces)
         direction = direction / np.linalg.norm(direction)
         distance = float(self._ground.distances(origin[None], direction[None], MAX_RANGE)[0])
@@ -114,4 +114,4 @@ class LiveControls:
 
     def _tell(self, what: str, **facts: object) -> None:
         """Write into the event log that somebody has interfered with the run."""
-        self._bench.events.emit(EventKind.CUSTOM, "live_view", what=what, **facts)
+        self._session.events.emit(EventKind.CUSTOM, "live_view", what=what, **facts)

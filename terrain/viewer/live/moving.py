@@ -12,7 +12,7 @@ from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.view import FieldView
 from mbf_abstract.plugins import PlannedMotion, PluginKind
-from terrain.session.bench import Bench
+from terrain.session.session import Session
 from terrain.viewer.live.overlay import Overlay
 from terrain.viewer.pictures.colours import GOAL, PLANNED
 from terrain.viewer.scene import (
@@ -43,18 +43,18 @@ class MovingThings:
     Parameters
     ----------
     server_page : viser.ViserServer
-    bench : Bench
+    session : Session
     pin_height : float
         Height [m] of markers.
     """
 
-    def __init__(self, server_page: Any, bench: Bench, pin_height: float) -> None:
+    def __init__(self, server_page: Any, session: Session, pin_height: float) -> None:
         self._scene = server_page.scene
-        self._bench = bench
+        self._session = session
         self._pin_height = pin_height
-        self._shape = bench.recorder.robot
+        self._shape = session.recorder.robot
         self._robot = RobotModel(self._scene, self._shape, pin_height)
-        self._actors = ActorModels(self._scene, bench.recorder.actor_tracks())
+        self._actors = ActorModels(self._scene, session.recorder.actor_tracks())
         self._angles = np.zeros(len(self._shape.wheels))
         self._time = 0.0
         self._path: Path | None = None
@@ -65,7 +65,7 @@ class MovingThings:
         self._ahead = Overlay(gui, "local plan")
         self._field = Overlay(gui, "vector field")
         self._scan = Overlay(gui, "lidar")
-        bench.navigator.server.get_path.listeners.append(self._take_plan)
+        session.navigator.server.get_path.listeners.append(self._take_plan)
 
     def show_goal(self, goal: Pose) -> None:
         """Mark a goal that is none of the scenario's."""
@@ -74,17 +74,17 @@ class MovingThings:
     def show(self, time: float, text: str, is_driving: bool) -> None:
         """Draw the present state with ``text`` above the robot; a plan only while there is a goal."""
         self._show_robot(time, text)
-        self._actors.place(as_row(actor.pose()) for actor in self._bench.recorder.actors)
+        self._actors.place(as_row(actor.pose()) for actor in self._session.recorder.actors)
         self._show_plan(self._path if is_driving else None)
         self._show_scans()
-        track = self._bench.simulation.track
+        track = self._session.simulation.track
         self._track.update(len(track) // TRACK_PERIOD, lambda: self._draw_track(track))
         if self._goal is not None:
             add_pin(self._scene, "/goal_asked_for", self._goal, GOAL, "new goal", self._pin_height)
             self._goal = None
 
     def _show_robot(self, time: float, text: str) -> None:
-        robot = self._bench.simulation.robot
+        robot = self._session.simulation.robot
         pose, velocity = robot.pose(), robot.velocity()
         times = np.array([self._time, time])
         twists = np.tile([velocity.vx, velocity.vy, velocity.wz], (2, 1))
@@ -99,7 +99,7 @@ class MovingThings:
 
     def _next_motion(self) -> PlannedMotion | None:
         """What the controller at work has planned, or else its present command, for a while."""
-        server = self._bench.navigator.server
+        server = self._session.navigator.server
         driving = server.exe_path.unfinished
         if driving:
             names = server.plugins.names(PluginKind.CONTROLLER)
@@ -123,7 +123,7 @@ class MovingThings:
         self._field.update(id(path), lambda: self._draw_field(path))
 
     def _draw_field(self, path: Path) -> Any:
-        field = self._bench.navigator.server.field_view(path)
+        field = self._session.navigator.server.field_view(path)
         if field is None:
             return None
         segments, spacing = field_arrows(field)
@@ -138,7 +138,7 @@ class MovingThings:
         return add_track_piece(self._scene, "/track", points)
 
     def _show_scans(self) -> None:
-        scans = [scan for scan in self._bench.simulation.latest.values() if isinstance(scan, RangeScan)]
+        scans = [scan for scan in self._session.simulation.latest.values() if isinstance(scan, RangeScan)]
         if scans:
             points = np.concatenate([scan.points for scan in scans])
             stamps = tuple(scan.stamp for scan in scans)

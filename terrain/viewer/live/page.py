@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.geometry import Pose
-from terrain.session.bench import Bench
-from terrain.session.goal_sequence import GoalTour
+from terrain.session.goal_sequence import GoalSequence
+from terrain.session.session import Session
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.follow import FollowCamera
 from terrain.viewer.live.ground import Ground
@@ -35,8 +35,8 @@ class LivePage:
     Parameters
     ----------
     server_page : viser.ViserServer
-    bench : Bench
-    tour : GoalTour
+    session : Session
+    tour : GoalSequence
     controls : LiveControls
     log : LiveLog
     steered : bool
@@ -46,31 +46,31 @@ class LivePage:
     def __init__(
         self,
         server_page: Any,
-        bench: Bench,
-        tour: GoalTour,
+        session: Session,
+        tour: GoalSequence,
         controls: LiveControls,
         log: LiveLog,
         steered: bool = True,
     ) -> None:
         self._server = server_page
-        self._bench = bench
+        self._session = session
         self._tour = tour
         self._log = log
         self._frame = 0
-        gui, start = server_page.gui, bench.recorder.finish()
+        gui, start = server_page.gui, session.recorder.finish()
         gui.configure_theme(show_logo=False, show_share_button=False)
         add_surroundings(server_page.scene, start)
         look_at_route(server_page.initial_camera, start, FARTHER)
         with gui.add_folder("Drive"):
             self._headline = gui.add_html("")
-            self._drive = DrivePanel(server_page, controls, bench) if steered else None
+            self._drive = DrivePanel(server_page, controls, session) if steered else None
         with gui.add_folder("Show"):
             self._camera = FollowCamera(server_page)
-            self._ground = Ground(server_page, bench.navigator.server, bench.world.ground)
-            self.things = MovingThings(server_page, bench, pin_height(start))
+            self._ground = Ground(server_page, session.navigator.server, session.world.ground)
+            self.things = MovingThings(server_page, session, pin_height(start))
         if steered:
             with gui.add_folder("Fault", expand_by_default=False):
-                FaultPanel(server_page, controls, bench)
+                FaultPanel(server_page, controls, session)
         else:
             for control in gui._gui_input_handle_from_uuid.values():
                 control.disabled = True
@@ -85,7 +85,7 @@ class LivePage:
         """Draw the present state; ``time`` is simulated time [s]."""
         with self._server.atomic():
             self.things.show(time, self._words(time), is_driving=self._tour.target is not None)
-            self._camera.show(np.array(self._bench.simulation.robot.pose().position))
+            self._camera.show(np.array(self._session.simulation.robot.pose().position))
             self._ground.show()
             if self._drive is not None:
                 self._drive.show()
@@ -115,7 +115,7 @@ class LivePage:
         tree = tree_html(snapshot.nodes) if snapshot.nodes else NO_TREE
         for element, content in (
             (self._headline, headline_html(time, self._tour)),
-            (self._actions, actions_html(self._bench.navigator.server, snapshot)),
+            (self._actions, actions_html(self._session.navigator.server, snapshot)),
             (self._tree, f'<div style="{SMALL}">{tree}</div>'),
             (self._lines, lines_html(snapshot.lines)),
         ):
@@ -124,7 +124,7 @@ class LivePage:
 
     def _words(self, time: float) -> str:
         """What stands above the robot."""
-        robot = self._bench.simulation.robot
+        robot = self._session.simulation.robot
         return f"{time:.0f} s   {robot.velocity().speed:.1f} m/s   tilt {tilt_of(robot.pose()):.0f}°"
 
 

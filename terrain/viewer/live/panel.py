@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 from mbf_abstract.plugins import PluginKind
 from terrain.scenarios.faults import LocalizationJump, SensorFault
-from terrain.session.bench import Bench
+from terrain.session.session import Session
 from terrain.viewer.live.controls import LiveControls
 
 JUMP = "localisation jumps"
@@ -22,10 +22,10 @@ class DrivePanel:
     ----------
     server_page : viser.ViserServer
     controls : LiveControls
-    bench : Bench
+    session : Session
     """
 
-    def __init__(self, server_page: Any, controls: LiveControls, bench: Bench) -> None:
+    def __init__(self, server_page: Any, controls: LiveControls, session: Session) -> None:
         gui = server_page.gui
         self._controls = controls
         gui.add_markdown(HINT)
@@ -36,7 +36,7 @@ class DrivePanel:
         )
         self._hold = gui.add_button("Pause", hint="Hold the robot where it is; goals are kept")
         self._hold.on_click(self._take_hold)
-        plugins = bench.navigator.server.plugins
+        plugins = session.navigator.server.plugins
         self._planner = gui.add_dropdown("planner", plugins.names(PluginKind.PLANNER))
         self._controller = gui.add_dropdown("controller", plugins.names(PluginKind.CONTROLLER))
         for choice in (self._planner, self._controller):
@@ -66,11 +66,11 @@ class DrivePanel:
 class FaultPanel:
     """A fault that begins at once and lasts a while."""
 
-    def __init__(self, server_page: Any, controls: LiveControls, bench: Bench) -> None:
+    def __init__(self, server_page: Any, controls: LiveControls, session: Session) -> None:
         gui = server_page.gui
         self._controls = controls
-        self._simulation = bench.simulation
-        sensors = bench.faults.sensors
+        self._simulation = session.simulation
+        sensors = session.faults.sensors
         self._sensor = gui.add_dropdown("of", sensors)
         self._kind = gui.add_dropdown("fault", (*SENSOR_FAULTS, JUMP))
         self._seconds = gui.add_number("for [s]", 5.0, min=0.1, step=0.1)

@@ -14,8 +14,8 @@ from types import FrameType
 
 from mbf_abstract.events import EventKind
 from mbf_abstract.time.clock import WallClock
-from terrain.session.bench import Bench
-from terrain.session.goal_sequence import GoalTour
+from terrain.session.goal_sequence import GoalSequence
+from terrain.session.session import Session
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.options import ViewOptions
@@ -33,9 +33,9 @@ class LiveSession:
 
     Parameters
     ----------
-    bench : Bench
+    session : Session
         Made, not running yet.
-    tour : GoalTour
+    tour : GoalSequence
     options : ViewOptions
     tell : callable
         Told where the page is.
@@ -58,15 +58,15 @@ class LiveSession:
 
     def __init__(
         self,
-        bench: Bench,
-        tour: GoalTour,
+        session: Session,
+        tour: GoalSequence,
         options: ViewOptions,
         tell: Callable[[str], None] = lambda text: None,
         warn: Callable[[str], None] = lambda text: None,
     ) -> None:
         self.address = self.watching_address = ""
-        self.controls = LiveControls(bench, tour)
-        self._bench = bench
+        self.controls = LiveControls(session, tour)
+        self._session = session
         self._tour = tour
         self._options = options
         self._tell = tell
@@ -80,18 +80,18 @@ class LiveSession:
         self._exits = ExitStack()
 
     def __enter__(self) -> LiveSession:
-        bench, access = self._bench, self._options.access()
+        session, access = self._session, self._options.access()
         with ExitStack() as exits:
-            server = exits.enter_context(page_server(self._options.port, access, "mbf " + bench.scenario.name))
+            server = exits.enter_context(page_server(self._options.port, access, "mbf " + session.scenario.name))
             steered = Role.STEER in access.roles.values()
-            self._page = page = LivePage(server, bench, self._tour, self.controls, self._log, steered)
+            self._page = page = LivePage(server, session, self._tour, self.controls, self._log, steered)
             exits.enter_context(_ctrl_c(lambda: self.controls.post(lambda: self.controls.end("Ctrl-C"))))
             self.address = access.address(server.get_port(), Role.STEER) or ""
             self.watching_address = access.address(server.get_port(), Role.WATCH) or ""
             self._exits = exits.pop_all()
         self._tour.on_goal.append(page.things.show_goal)
-        bench.events.add_sink(self._log)
-        bench.loop.on_tick.append(self._after_step)
+        session.events.add_sink(self._log)
+        session.loop.on_tick.append(self._after_step)
         self._tell_addresses()
         return self
 
@@ -106,8 +106,8 @@ class LiveSession:
             )
 
     def __exit__(self, *exc: object) -> None:
-        self._bench.loop.on_tick.remove(self._after_step)
-        self._bench.events.remove_sink(self._log)
+        self._session.loop.on_tick.remove(self._after_step)
+        self._session.events.remove_sink(self._log)
         self._exits.close()
 
     def _after_step(self, time: float) -> None:
@@ -120,17 +120,17 @@ class LiveSession:
             self._show(self._page, time)
         except Exception as error:  # whatever the page's library may raise, the run does not depend on it
             self._page = None
-            self._bench.events.emit(EventKind.FAULT, "live_view", type=type(error).__name__, message=str(error))
+            self._session.events.emit(EventKind.FAULT, "live_view", type=type(error).__name__, message=str(error))
 
     def _speed(self) -> float:
         """Simulated seconds per second; who waits for a goal waits in real time. A wall clock keeps its own pace."""
-        if isinstance(self._bench.clock, WallClock):
+        if isinstance(self._session.clock, WallClock):
             return 0.0
         return self._options.speed or (1.0 if self._tour.is_waiting else 0.0)
 
     def _sample(self, time: float, period: float) -> None:
         if self._history.is_due(time, period):
-            robot, queries = self._bench.simulation.robot, self._bench.navigator.server.queries
+            robot, queries = self._session.simulation.robot, self._session.navigator.server.queries
             pose = robot.pose()
             self._history.add(time, robot.velocity().speed, tilt_of(pose), queries.check_point(pose).cost)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
-from terrain.session.goal_sequence import GoalTour
+from terrain.session.goal_sequence import GoalSequence
 from terrain.viewer.live.log import Snapshot
 from terrain.viewer.reports.event_lines import BAD, GOOD, NEITHER, Line
 
@@ -32,7 +32,7 @@ def actions_html(server: AbstractNavigationServer, snapshot: Snapshot) -> str:
     return f'<table style="{SMALL}">{"".join(rows)}</table>'
 
 
-def headline_html(time: float, tour: GoalTour) -> str:
+def headline_html(time: float, tour: GoalSequence) -> str:
     """Simulated time [s], and the goal the robot goes to, or how the last one has ended."""
     if tour.target is not None:
         x, y, z = tour.target.position

@@ -128,10 +128,10 @@ def test_relaxing_leaves_every_cell_forbidden_on_which_the_robot_would_touch_som
 
 def test_an_inflation_narrower_than_the_robot_is_widened_and_told_until_the_robot_is_smaller(build):
     costmap = build("inflation", inflation={"inflation_radius": 0.3}, robot_radius=0.6)
-    (doubt,) = costmap.doubts()
+    (doubt,) = costmap.configuration_warnings()
     assert doubt.startswith("layer 'inflation': inflation_radius 0.3 m is smaller than the inscribed radius")
     costmap.set_footprint(type(costmap.footprint).circle(0.3))
-    assert costmap.doubts() == []
+    assert costmap.configuration_warnings() == []
 
 
 def test_unknown_cells_are_inflated_only_where_told(build):
@@ -160,15 +160,15 @@ def test_a_map_nearly_all_occupied_is_told(free, told):
     parameters = CostmapParameters.model_validate(
         {"robot_radius": 0.0, "layers": [{"name": "walls", "type": "static"}]}
     )
-    doubts = build_layered_costmap(parameters, static_map=Costmap(cells, 1.0)).doubts()
-    assert any("of the known cells are occupied, so hardly anything can be planned" in one for one in doubts) == told
+    warnings = build_layered_costmap(parameters, static_map=Costmap(cells, 1.0)).configuration_warnings()
+    assert any("of the known cells are occupied, so hardly anything can be planned" in one for one in warnings) == told
 
 
 def test_a_robot_on_a_map_without_inflation_is_told_and_a_point_is_not(build):
-    (doubt,) = build("static", robot_radius=0.5).doubts()
+    (doubt,) = build("static", robot_radius=0.5).configuration_warnings()
     assert doubt == "no inflation layer: grid planners take the robot, of inscribed radius 0.49 m, for a point"
-    assert build("static", "inflation", robot_radius=0.5).doubts() == []
-    assert build("static").doubts() == build(robot_radius=0.5).doubts() == []
+    assert build("static", "inflation", robot_radius=0.5).configuration_warnings() == []
+    assert build("static").configuration_warnings() == build(robot_radius=0.5).configuration_warnings() == []
 
 
 def test_the_limit_of_cells_is_a_parameter_for_grids_maps_and_masks(tmp_path):

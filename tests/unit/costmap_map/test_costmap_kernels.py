@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from mbf_costmap_nav.grid.costmap import GridGeometry
-from mbf_costmap_nav.kernels.map.footprint_samples import cover_polygon, fill_polygon, polygon_costs
+from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon, polygon_costs, rasterise_polygon
 from mbf_costmap_nav.kernels.map.inflation import inflate
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays, mark_points
 from mbf_costmap_nav.kernels.map.voxel import clear_voxel_rays, count_bits, project_columns
@@ -85,7 +85,7 @@ def test_cover_holds_all_cells_the_polygon_enters_and_none_it_does_not_touch(cor
     angles = turn + 2 * np.pi * np.arange(corners) / corners
     stretch = data.draw(st.floats(0.1, 1.0))
     polygon = np.column_stack([x + size * np.cos(angles), y + stretch * size * np.sin(angles)])
-    x0, y0, mask = cover_polygon(polygon, (-20, -20, 20, 20))
+    x0, y0, mask = rasterise_polygon(polygon, (-20, -20, 20, 20))
     for iy in range(-8, 8):
         for ix in range(-8, 8):
             row, column = iy - y0, ix - x0
@@ -99,13 +99,13 @@ def test_cover_holds_all_cells_the_polygon_enters_and_none_it_does_not_touch(cor
 
 def test_a_concave_polygon_leaves_its_notch_out():
     notched = np.array([(0.5, 0.5), (5.5, 0.5), (5.5, 4.5), (4.5, 4.5), (4.5, 1.5), (1.5, 1.5), (1.5, 4.5), (0.5, 4.5)])
-    _, _, mask = cover_polygon(notched, (0, 0, 10, 10))
+    _, _, mask = rasterise_polygon(notched, (0, 0, 10, 10))
     assert mask.tolist() == [[1] * 6, [1] * 6, [1, 1, 0, 0, 1, 1], [1, 1, 0, 0, 1, 1], [1, 1, 0, 0, 1, 1]]
 
 
 def test_a_polygon_on_grid_lines_covers_the_cells_right_and_above():
     square = np.array([(2.0, 2.0), (4.0, 2.0), (4.0, 4.0), (2.0, 4.0)])
-    x0, y0, mask = cover_polygon(square, (0, 0, 10, 10))
+    x0, y0, mask = rasterise_polygon(square, (0, 0, 10, 10))
     assert (x0, y0) == (2, 2) and mask.tolist() == [[1, 1, 1]] * 3
 
 

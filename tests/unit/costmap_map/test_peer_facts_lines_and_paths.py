@@ -10,7 +10,7 @@ from mbf_abstract.maps.queries import CellState
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.zones import Zone
-from mbf_costmap_nav.kernels.map.footprint_samples import cover_polygon
+from mbf_costmap_nav.kernels.map.footprint_samples import rasterise_polygon
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays
 from mbf_costmap_nav.map.pose_checks import check_path
 
@@ -41,8 +41,8 @@ def test_f156_points_beside_an_l_shape_are_outside():
 
 def test_f342_a_polygon_over_everything_and_one_far_away():
     box = (0, 0, 8, 5)
-    _, _, everything = cover_polygon(np.array([(-9.0, -9.0), (99.0, -9.0), (99.0, 99.0), (-9.0, 99.0)]), box)
-    _, _, nothing = cover_polygon(np.array([(50.0, 50.0), (51.0, 50.0), (51.0, 51.0)]), box)
+    _, _, everything = rasterise_polygon(np.array([(-9.0, -9.0), (99.0, -9.0), (99.0, 99.0), (-9.0, 99.0)]), box)
+    _, _, nothing = rasterise_polygon(np.array([(50.0, 50.0), (51.0, 50.0), (51.0, 51.0)]), box)
     assert np.count_nonzero(everything) == 40 and np.count_nonzero(nothing) == 0
 
 

@@ -13,7 +13,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.grid.footprint_check import covering_points
+from mbf_costmap_nav.grid.footprint_check import footprint_samples
 from mbf_costmap_nav.kernels.car.curves import curve_between
 from mbf_costmap_nav.kernels.car.ground import driven_cost, fitting_cost, ground_of, pose_cost
 from mbf_costmap_nav.kernels.car.motion_primitives import (
@@ -49,7 +49,7 @@ def test_where_no_obstacle_is_near_the_short_answer_is_the_full_one(seed, length
     rng = np.random.default_rng(seed)
     cells = np.where(rng.uniform(size=(60, 70)) < share, 254, 7).astype(np.uint8)
     outline = np.array([[length, width], [-0.2, width], [-0.2, -width], [length, -width]])
-    geometry, samples = np.array([0.1, -2.0, 5.0]), covering_points(outline, 0.1)
+    geometry, samples = np.array([0.1, -2.0, 5.0]), footprint_samples(outline, 0.1)
     ground = ground_of(cells, 252, geometry, samples)
     poses = rng.uniform((-2.5, 4.5, -4.0), (5.5, 11.5, 4.0), (60, 3))
     for pose in poses:
@@ -136,7 +136,7 @@ def test_a_shortened_path_keeps_its_ends_stays_free_and_costs_no_more(seed):
     rng = np.random.default_rng(seed)
     cells = np.where(rng.uniform(size=(80, 80)) < 0.002, 254, 20).astype(np.uint8)
     cells[30:50, 30:50] = 20
-    car, ground = a_car(), ground_of(cells, 252, np.array([0.1, 0.0, 0.0]), covering_points(SQUARE, 0.1))
+    car, ground = a_car(), ground_of(cells, 252, np.array([0.1, 0.0, 0.0]), footprint_samples(SQUARE, 0.1))
     poses, arc = [np.array([4.0, 4.0, 0.0])], np.empty((2, 3))
     for motion in rng.integers(0, MOTIONS, 60).tolist():
         sample_arc(poses[-1], motion, FORWARD_SIDE, car, arc)
@@ -191,7 +191,7 @@ def test_what_a_plain_search_of_all_states_reaches_is_reached_at_a_cost_near_the
     cells = np.where(rng.uniform(size=(24, 24)) < 0.04, 254, 0).astype(np.uint8)
     cells[[0, -1]] = cells[:, [0, -1]] = 254
     grid, outline = Costmap(closed_loop.inflated(cells, 0.15, 0.15, 0.6, 4.0), 0.15), 1.5 * SQUARE
-    ground = ground_of(grid.cells, 252, np.array([0.15, 0.0, 0.0]), covering_points(outline, 0.15))
+    ground = ground_of(grid.cells, 252, np.array([0.15, 0.0, 0.0]), footprint_samples(outline, 0.15))
     car = a_car(radius=0.5, reversing=reversing, bin_size=0.15, step=0.225)
     while True:
         start, goal = rng.uniform((0.3, 0.3, -3.0), (3.3, 3.3, 3.0), (2, 3))

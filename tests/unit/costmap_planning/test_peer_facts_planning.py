@@ -20,7 +20,7 @@ from mbf_costmap_nav.files.map_io import load_image
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck, arc_poses
-from mbf_costmap_nav.kernels.map.footprint_samples import cover_polygon
+from mbf_costmap_nav.kernels.map.footprint_samples import rasterise_polygon
 from mbf_costmap_nav.layers.speed_limit import SpeedLimitLayer
 from mbf_costmap_nav.map.layer import LayerContext
 from mbf_costmap_nav.map.pose_checks import check_path
@@ -60,7 +60,7 @@ def test_a_square_that_moves_into_lethal_cells_collides(vx, wz, lethal):
 
 @pytest.mark.parametrize("yaw", [0.0, math.pi / 2], ids=["F072", "F073"])
 def test_the_cells_of_a_square_have_the_published_outline(yaw):
-    x0, y0, covered = cover_polygon(SQUARE.at(4.5, 4.5, yaw), (0, 0, 10, 10))
+    x0, y0, covered = rasterise_polygon(SQUARE.at(4.5, 4.5, yaw), (0, 0, 10, 10))
     cells = {(int(ix) + x0, int(iy) + y0) for iy, ix in np.argwhere(covered)}
     outline = {(x, y) for x in range(2, 7) for y in range(2, 7) if x in (2, 6) or y in (2, 6)}
     assert outline <= cells

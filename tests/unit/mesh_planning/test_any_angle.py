@@ -1,4 +1,4 @@
-"""Shortening over a strip of faces: against a search over its corners, exact geodesics of real terrain, and costs."""
+"""Shortening within a corridor: against a search over its corners, exact geodesics of real terrain, and costs."""
 
 import csv
 import itertools
@@ -9,7 +9,7 @@ import trimesh
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.kernels.wave.funnel import pull_taut
+from mbf_mesh_nav.kernels.wave.funnel import pull_string
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
@@ -17,13 +17,13 @@ from mbf_mesh_nav.planners.cvp import CVPPlanner
 
 def random_strip(mesh_map, rng, length):
     """A walk over faces that never turns straight back."""
-    strip = [int(rng.integers(len(mesh_map.faces)))]
-    while len(strip) < length:
-        choices = [f for f in mesh_map.face_neighbours[strip[-1]].tolist() if f >= 0 and f not in strip]
+    corridor = [int(rng.integers(len(mesh_map.faces)))]
+    while len(corridor) < length:
+        choices = [f for f in mesh_map.face_neighbours[corridor[-1]].tolist() if f >= 0 and f not in corridor]
         if not choices:
             break
-        strip.append(int(rng.choice(choices)))
-    return np.array(strip, np.int32)
+        corridor.append(int(rng.choice(choices)))
+    return np.array(corridor, np.int32)
 
 
 ROUNDING = 1e-9
@@ -32,8 +32,8 @@ ON_LINE = 1e-16
 """Product of two areas [m^4] of about 1e-2 m^2 and their rounding error."""
 
 
-def unfolded(mesh_map, strip, points):
-    """The strip laid into the plane: both ends (n - 1, 2, 2) of its portals, and the points of the first and last face.
+def unfolded(mesh_map, corridor, points):
+    """The corridor laid into the plane: both ends (n - 1, 2, 2) of its portals, and the points of its end faces.
 
     Faces are turned about their common edge one by one, so every corner keeps its distances to that edge's ends.
     """
@@ -47,11 +47,11 @@ def unfolded(mesh_map, strip, points):
         axis = (flat[b] - flat[a]) / length
         return flat[a] + x * axis + y * np.array([-axis[1], axis[0]])
 
-    a, b, c = mesh_map.faces[strip[0]].tolist()
+    a, b, c = mesh_map.faces[corridor[0]].tolist()
     flat[a], flat[b] = np.zeros(2), np.array([np.sqrt(((mesh_map.vertices[b] - mesh_map.vertices[a]) ** 2).sum()), 0])
     flat[c], start = place(mesh_map.vertices[c], a, b, 1.0), place(points[0], a, b, 1.0)
     portals = []
-    for face, following in itertools.pairwise(strip.tolist()):
+    for face, following in itertools.pairwise(corridor.tolist()):
         left = [corner for corner in mesh_map.faces[face].tolist() if corner in mesh_map.faces[following]]
         (behind,) = set(mesh_map.faces[face].tolist()) - set(left)
         (ahead,) = set(mesh_map.faces[following].tolist()) - set(left)
@@ -70,9 +70,9 @@ def crosses(a, b, portal):
     return ends[0] * ends[1] <= ON_LINE and sides[0] * sides[1] <= ON_LINE
 
 
-def shortest_length(mesh_map, strip, points):
+def shortest_length(mesh_map, corridor, points):
     """The slow twin: the shortest chain of lines over ends of portals, each line crossing all portals on its way."""
-    start, portals, goal = unfolded(mesh_map, strip, points)
+    start, portals, goal = unfolded(mesh_map, corridor, points)
     nodes = [(-1, start), *((index, end) for index, portal in enumerate(portals) for end in portal)]
     best = {0: 0.0}
     for there, (index, point) in enumerate([*nodes, (len(portals), goal)][1:], start=1):
@@ -88,11 +88,11 @@ def shortest_length(mesh_map, strip, points):
 @pytest.mark.parametrize("seed", range(8))
 def test_the_taut_path_is_the_shortest_through_its_strip(hills, seed):
     rng = np.random.default_rng(seed)
-    strip = random_strip(hills, rng, 14)
-    ends = hills.vertices[hills.faces[strip[[0, -1]]]].mean(axis=1)
-    points = pull_taut(hills.vertices, hills.faces, strip, *(tuple(end) for end in ends))
+    corridor = random_strip(hills, rng, 14)
+    ends = hills.vertices[hills.faces[corridor[[0, -1]]]].mean(axis=1)
+    points = pull_string(hills.vertices, hills.faces, corridor, *(tuple(end) for end in ends))
     length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
-    assert length == pytest.approx(shortest_length(hills, strip, ends), rel=ROUNDING)
+    assert length == pytest.approx(shortest_length(hills, corridor, ends), rel=ROUNDING)
     np.testing.assert_array_equal(points[[0, -1]], ends)
     assert (hills.locate(points).distances < 1e-9).all()
 
@@ -125,4 +125,4 @@ def test_round_a_corner_the_path_is_taut_and_free(make_plugin, plain, paint):
     path = make_plugin(AnyAnglePlanner, mesh_map).make_plan(PlanRequest(Pose.planar(1, 1), Pose.planar(5, 1))).path
     corners = [(1, 1), (1.8, 4.2), (4.0, 4.2), (4.2, 4.0), (5, 1)]  # the last but one: a free face cuts the corner
     shortest = sum(np.hypot(*np.subtract(a, b)) for a, b in itertools.pairwise(corners))
-    assert path.length == pytest.approx(shortest, rel=3e-3)  # the strip may miss the best corner by a vertex
+    assert path.length == pytest.approx(shortest, rel=3e-3)  # the corridor may miss the best corner by a vertex

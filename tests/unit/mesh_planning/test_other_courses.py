@@ -42,14 +42,14 @@ def test_paths_on_coarse_rough_meshes_are_within_three_percent_of_exact_ones(mak
     assert np.mean(errors) < 0.005
 
 
-def other_sides(mesh_map, blocked, strip):
-    """Naive: the strip led round the other side of every vertex it passes, where free faces lead round it."""
-    for vertex in np.unique(mesh_map.faces[strip]).tolist():
-        at = [index for index, face in enumerate(strip) if vertex in mesh_map.faces[face]]
+def other_sides(mesh_map, blocked, corridor):
+    """Naive: the corridor led round the other side of every vertex it passes, where free faces lead round it."""
+    for vertex in np.unique(mesh_map.faces[corridor]).tolist():
+        at = [index for index, face in enumerate(corridor) if vertex in mesh_map.faces[face]]
         runs = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)
-        for run in (run for run in runs if len(run) > 1 and strip[run[0]] != strip[run[-1]]):
-            way, previous = [strip[run[0]]], strip[run[1]]
-            while way[-1] != strip[run[-1]]:
+        for run in (run for run in runs if len(run) > 1 and corridor[run[0]] != corridor[run[-1]]):
+            way, previous = [corridor[run[0]]], corridor[run[1]]
+            while way[-1] != corridor[run[-1]]:
                 around = [f for f in mesh_map.face_neighbours[way[-1]] if f >= 0 and vertex in mesh_map.faces[f]]
                 following = [face for face in around if face != previous]
                 if not following or blocked[mesh_map.faces[following[0]]].any() or len(way) > 30:
@@ -57,7 +57,7 @@ def other_sides(mesh_map, blocked, strip):
                 previous = way[-1]
                 way.append(following[0])
             else:
-                yield np.array([*strip[: run[0]], *way, *strip[run[-1] + 1 :]], np.int32)
+                yield np.array([*corridor[: run[0]], *way, *corridor[run[-1] + 1 :]], np.int32)
 
 
 @given(seed=st.integers(0, 10**6))
@@ -68,15 +68,15 @@ def test_no_single_vertex_passed_on_its_other_side_makes_a_path_shorter(seed):
     blocked = rng.random(len(mesh_map.vertices)) < 0.05
     free = np.flatnonzero(~blocked[mesh_map.faces].any(axis=1))
     walk = [int(rng.choice(free))]
-    for _ in range(60):  # a random walk over free faces is a poor strip
+    for _ in range(60):  # a random walk over free faces is a poor corridor
         around = [f for f in mesh_map.face_neighbours[walk[-1]] if f >= 0 and f in free]
         walk += [int(rng.choice(around))] if around else []
-    strip, pieces = link_faces(mesh_map.faces, mesh_map.face_neighbours, blocked, np.array(walk, np.int32))
-    if len(pieces) != 1 or len(strip) < 2:
+    corridor, pieces = link_faces(mesh_map.faces, mesh_map.face_neighbours, blocked, np.array(walk, np.int32))
+    if len(pieces) != 1 or len(corridor) < 2:
         return
-    ends = [tuple(mesh_map.vertices[mesh_map.faces[face]].mean(axis=0).tolist()) for face in strip[[0, -1]]]
-    before, _ = straighten(*mesh, blocked, strip, *ends, True)
-    points, found = pass_vertices(*mesh, blocked, strip, *ends)
+    ends = [tuple(mesh_map.vertices[mesh_map.faces[face]].mean(axis=0).tolist()) for face in corridor[[0, -1]]]
+    before, _ = straighten(*mesh, blocked, corridor, *ends, True)
+    points, found = pass_vertices(*mesh, blocked, corridor, *ends)
     assert length_of(points) <= length_of(before)
     assert not blocked[mesh_map.faces[found]].any()
     assert all(following in mesh_map.face_neighbours[face] for face, following in itertools.pairwise(found))

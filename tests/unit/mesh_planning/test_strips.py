@@ -1,4 +1,4 @@
-"""Geodesics from strips of faces: against exact geodesics, and what may not be part of a strip."""
+"""Geodesics from corridors of faces: against exact geodesics, and what may not be part of a corridor."""
 
 import itertools
 
@@ -29,10 +29,10 @@ def test_on_flat_free_ground_a_winding_strip_becomes_the_straight_line(seed):
     x = np.linspace(0.7, 5.3, 2000)
     free = np.zeros(len(mesh_map.vertices), np.bool_)
     winding = faces_along(mesh_map, np.column_stack([x, 3.0 + 1.2 * np.sin(waves * x + phase)]))
-    strip, _ = link_faces(mesh_map.faces, mesh_map.face_neighbours, free, winding)
-    start, goal = mesh_map.vertices[mesh_map.faces[strip[[0, -1]]]].mean(axis=1)
+    corridor, _ = link_faces(mesh_map.faces, mesh_map.face_neighbours, free, winding)
+    start, goal = mesh_map.vertices[mesh_map.faces[corridor[[0, -1]]]].mean(axis=1)
     points, faces = straighten(
-        mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, free, strip, tuple(start), tuple(goal), True
+        mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, free, corridor, tuple(start), tuple(goal), True
     )
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(np.linalg.norm(goal - start))
     assert len(points) == len(faces) + 1

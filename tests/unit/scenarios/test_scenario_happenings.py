@@ -9,7 +9,7 @@ import yaml
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.sensing import RangeScan
-from terrain.physics.incidents import MishapKind
+from terrain.physics.incidents import IncidentKind
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.robot_models import TURTLEBOT
@@ -126,8 +126,8 @@ def test_actors_move_in_the_world_and_the_seed_draws_the_crowd(tmp_path):
 
 
 def test_each_broken_limit_is_named():
-    limits = Limits(max_tilt=20.0, max_path_length=50.0, forbidden=(MishapKind.COLLISION,))
-    metrics = {"max_tilt_deg": 25.0, "path_length_m": 40.0, "mishaps": ["collision", "slipping"]}
+    limits = Limits(max_tilt=20.0, max_path_length=50.0, forbidden=(IncidentKind.COLLISION,))
+    metrics = {"max_tilt_deg": 25.0, "path_length_m": 40.0, "incidents": ["collision", "slipping"]}
     assert broken_limits(limits, metrics) == ["max_tilt_deg 25.0 is above 20 degrees", "collision happened"]
     assert broken_limits(Limits(), metrics) == []
 

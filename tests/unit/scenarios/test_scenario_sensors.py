@@ -1,4 +1,4 @@
-"""The sensors of a scenario on a running bench: what the server is told, and what faults do to it."""
+"""The sensors of a scenario on a running session: what the server is told, and what faults do to it."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from terrain.scenarios.faults import LocalizationJump, SensorFault
 from terrain.scenarios.noise import LocalizationNoise
 from terrain.scenarios.scenario import PlanarPose, Sensor, load_scenario
 from terrain.scenarios.world_types import GeneratedWorld
-from terrain.session.bench import Bench
+from terrain.session.session import Session
 
 CAMERA = Sensor(name="camera", type="depth", rays=16, rate=5.0)
 
@@ -33,26 +33,26 @@ def sensing():
     return make
 
 
-def drive(bench, seconds):
+def drive(session, seconds):
     """Push the robot straight ahead without a controller."""
-    end = bench.clock.now() + seconds
-    while bench.clock.now() < end:
-        bench.robot.send_command(Twist.planar(0.5))
-        bench.clock.sleep(0.1)
+    end = session.clock.now() + seconds
+    while session.clock.now() < end:
+        session.robot.send_command(Twist.planar(0.5))
+        session.clock.sleep(0.1)
 
 
-def place(bench, target, source):
-    return bench.navigator.server.runtime.transforms.lookup(target, source)
+def place(session, target, source):
+    return session.navigator.server.runtime.transforms.lookup(target, source)
 
 
 def test_wheel_odometry_drifts_in_odom_and_the_localisation_corrects_it(sensing):
-    with Bench(sensing(), "mesh", seed=4) as bench:
-        drive(bench, 4.0)
-        believed, truth = place(bench, "map", "base_link"), bench.robot.pose()
-        travelled = place(bench, "odom", "base_link")
-        told, true = bench.navigator.server.runtime.robot.velocity(), bench.robot.velocity()
+    with Session(sensing(), "mesh", seed=4) as session:
+        drive(session, 4.0)
+        believed, truth = place(session, "map", "base_link"), session.robot.pose()
+        travelled = place(session, "odom", "base_link")
+        told, true = session.navigator.server.runtime.robot.velocity(), session.robot.velocity()
     assert believed.translation == pytest.approx(truth.position, abs=0.03)  # one period of odometry old
-    assert travelled.translation[0] == pytest.approx(truth.distance_to(bench.recorder.start), rel=0.1)
+    assert travelled.translation[0] == pytest.approx(truth.distance_to(session.recorder.start), rel=0.1)
     assert travelled.translation[1] == pytest.approx(0.0, abs=0.2)  # odom lies along the robot's first heading
     assert told.vx != true.vx
     assert told.vx == pytest.approx(true.vx, rel=0.2)
@@ -60,10 +60,10 @@ def test_wheel_odometry_drifts_in_odom_and_the_localisation_corrects_it(sensing)
 
 def test_a_jump_of_the_localisation_moves_odom_in_the_map_and_not_the_robot_in_odom(sensing):
     jump = LocalizationJump(type="jump", start=1.0, dx=0.4)
-    with Bench(sensing(jump), "mesh") as bench:
-        before = place(bench, "map", "odom"), place(bench, "odom", "base_link")
-        bench.clock.sleep(1.0)
-        after = place(bench, "map", "odom"), place(bench, "odom", "base_link")
+    with Session(sensing(jump), "mesh") as session:
+        before = place(session, "map", "odom"), place(session, "odom", "base_link")
+        session.clock.sleep(1.0)
+        after = place(session, "map", "odom"), place(session, "odom", "base_link")
     assert after[0].translation[0] - before[0].translation[0] == pytest.approx(0.4, abs=0.02)
     assert after[1].translation == pytest.approx(before[1].translation, abs=0.02)
 
@@ -75,9 +75,9 @@ def test_every_sensor_can_be_made_silent_stale_and_wrong_by_the_scenario(sensing
         for start, kind in ((1.0, "silent"), (2.0, "stale"), (3.0, "wrong"))
     ]
     seen = []
-    with Bench(sensing(*faults), "mesh") as bench:
-        bench.simulation.on_measurement(lambda topic, m: seen.append(m) if topic == name else None)
-        drive(bench, 4.2)
+    with Session(sensing(*faults), "mesh") as session:
+        session.simulation.on_measurement(lambda topic, m: seen.append(m) if topic == name else None)
+        drive(session, 4.2)
     stamps = [getattr(m, "stamp", None) or m.pose.stamp for m in seen]
     assert not [stamp for stamp in stamps if 1.05 < stamp < 1.95]  # silent
     assert len(stamps) - len(set(stamps)) >= 4  # stale: the last one comes again and again
@@ -92,8 +92,8 @@ def test_every_sensor_can_be_made_silent_stale_and_wrong_by_the_scenario(sensing
 
 def test_a_robot_whose_odometry_falls_silent_loses_its_pose_and_is_told_so(sensing):
     silent = SensorFault(type="silent", sensor="odometry", start=1.0)
-    with Bench(sensing(silent), "mesh") as bench:
-        result = bench.navigator.go_to(bench.goals[0])
+    with Session(sensing(silent), "mesh") as session:
+        result = session.navigator.go_to(session.goals[0])
         assert not result.success
-        assert bench.robot.velocity().speed < 0.02
-        assert bench.robot.pose().distance_to(bench.goals[0]) > 3.0
+        assert session.robot.velocity().speed < 0.02
+        assert session.robot.pose().distance_to(session.goals[0]) > 3.0

@@ -14,7 +14,7 @@ from terrain.sweeps.sweep import SweepRun, hash_of, plan_sweep
 
 
 def row(seed, variant="planner=cvp", success=True, **more):
-    numbers = {"time_s": 10.0 + seed, "path_length_m": 20.0, "mishaps": ["slipping"] if seed else []}
+    numbers = {"time_s": 10.0 + seed, "path_length_m": 20.0, "incidents": ["slipping"] if seed else []}
     return {"seed": seed, "variant": variant, "success": success, "outcome": "SUCCESS", **numbers, **more}
 
 
@@ -138,7 +138,7 @@ def test_the_summary_counts_per_variant_and_takes_medians_of_successes():
     assert lines["planner=cvp"]["median_time_s"] == 10.5
     assert lines["planner=cvp"]["median_path_over_geodesic"] == 1.1
     assert (lines["planner=cvp"]["collisions"], lines["planner=cvp"]["tip_overs"]) == (2, 1)
-    assert lines["planner=cvp"]["runs_with_mishaps"] == 2
+    assert lines["planner=cvp"]["runs_with_incidents"] == 2
     assert lines["planner=astar"]["median_time_s"] == ""
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from mbf_abstract.goals.goal_types import MoveBaseResult
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
-from terrain.physics.incidents import MishapKind
+from terrain.physics.incidents import IncidentKind
 from terrain.recording.verdict import UNFINISHED, judge
 from terrain.scenarios.limits import Limits
 
@@ -14,7 +14,7 @@ NEAR = {"distance_m": 0.1, "angle_deg": 5.0, "believed_distance_m": 0.1, "believ
 CALM = {
     "max_tilt_deg": 5.0,
     "path_length_m": 10.0,
-    "mishaps": [],
+    "incidents": [],
     "collisions": 0,
     "collisions_while_moving": 0,
     "arrivals": [NEAR],
@@ -23,11 +23,11 @@ CALM = {
 FAR = CALM | {"arrivals": [NEAR, NEAR | {"distance_m": 2.17}]}
 TURNED = CALM | {"arrivals": [NEAR | {"angle_deg": 40.0}], "arrival_tolerance": (0.4, 20.0)}
 HIT = CALM | {
-    "mishaps": ["collision", "collision_while_moving", "collision_with_person", "collision_with_wall"],
+    "incidents": ["collision", "collision_while_moving", "collision_with_person", "collision_with_wall"],
     "collisions": 3,
     "collisions_while_moving": 2,
 }
-PUSHED = CALM | {"mishaps": ["collision", "collision_with_person"], "collisions": 1}
+PUSHED = CALM | {"incidents": ["collision", "collision_with_person"], "collisions": 1}
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ PUSHED = CALM | {"mishaps": ["collision", "collision_with_person"], "collisions"
         ),
         (
             ARRIVED,
-            Limits(max_tilt=4.0, forbidden=(MishapKind.COLLISION,)),
+            Limits(max_tilt=4.0, forbidden=(IncidentKind.COLLISION,)),
             PUSHED,
             False,
             "FAILED: max_tilt_deg 5.0 is above 4 degrees; collision happened (navigation: SUCCESS, goal reached)",

@@ -8,19 +8,19 @@ import pytest
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.tilt import tilt_of
-from terrain.physics.incidents import MishapKind, MishapMonitor, MotionSample, Thing, roll_pitch
+from terrain.physics.incidents import IncidentKind, IncidentMonitor, MotionSample, Thing, roll_pitch
 
 
 def rolled(angle: float, stamp: float = 0.0, x: float = 0.0) -> Pose:
     return Pose((x, 0.0, 0.0), (math.sin(angle / 2), 0.0, 0.0, math.cos(angle / 2)), stamp=stamp)
 
 
-def feed(monitor: MishapMonitor, seconds: float, start: float = 0.0, **fields: object) -> list[MishapKind]:
+def feed(monitor: IncidentMonitor, seconds: float, start: float = 0.0, **fields: object) -> list[IncidentKind]:
     defaults = {"velocity": Twist(), "commanded": Twist(), "rolling": Twist()}
     kinds = []
     for step in range(round(seconds / 0.05)):
         sample = MotionSample(**{"pose": rolled(0.0, start + 0.05 * step), **defaults, **fields})  # type: ignore[arg-type]
-        kinds += [mishap.kind for mishap in monitor.update(sample)]
+        kinds += [incident.kind for incident in monitor.update(sample)]
     return kinds
 
 
@@ -32,62 +32,62 @@ def test_tilt_roll_and_pitch() -> None:
 
 
 def test_tipping_over_counts_once_while_it_lasts() -> None:
-    monitor = MishapMonitor()
+    monitor = IncidentMonitor()
     for step in range(40):
         still = Twist()
         monitor.update(MotionSample(rolled(1.3, 0.05 * step), still, still, still))
-    assert monitor.counts[MishapKind.TIPPED_OVER] == 1 and monitor.max_roll == pytest.approx(1.3)
+    assert monitor.counts[IncidentKind.TIPPED_OVER] == 1 and monitor.max_roll == pytest.approx(1.3)
 
 
 def test_a_short_slip_is_forgiven_a_long_one_counts() -> None:
-    monitor = MishapMonitor()
+    monitor = IncidentMonitor()
     asked = Twist.planar(0.8)
     sliding = {"velocity": Twist.planar(0.4), "rolling": asked}
     assert feed(monitor, 0.4, **sliding) == []
     assert feed(monitor, 1.0, 0.4, velocity=asked, rolling=asked) == []
-    assert feed(monitor, 1.0, 1.4, **sliding) == [MishapKind.SLIPPING]
+    assert feed(monitor, 1.0, 1.4, **sliding) == [IncidentKind.SLIPPING]
     assert feed(monitor, 1.0, 3.4, velocity=asked, rolling=asked) == []
-    assert feed(monitor, 1.0, 4.4, **sliding) == [MishapKind.SLIPPING]
+    assert feed(monitor, 1.0, 4.4, **sliding) == [IncidentKind.SLIPPING]
 
 
 def test_stuck_needs_a_command_and_high_centred_needs_ground_contact() -> None:
-    monitor = MishapMonitor()
+    monitor = IncidentMonitor()
     assert feed(monitor, 10.0) == []
     driven = {"commanded": Twist.planar(0.5)}
-    assert feed(monitor, 4.0, 10.0, **driven) == [MishapKind.STUCK]
-    monitor = MishapMonitor()
+    assert feed(monitor, 4.0, 10.0, **driven) == [IncidentKind.STUCK]
+    monitor = IncidentMonitor()
     kinds = feed(monitor, 2.0, body_on_ground=True, **driven)
-    assert kinds == [MishapKind.HIGH_CENTRED]
+    assert kinds == [IncidentKind.HIGH_CENTRED]
 
 
 def test_turning_on_the_spot_and_slow_driving_are_not_stuck_but_twitching_is() -> None:
-    def kinds(pose_at: Callable[[float], Pose], commanded: Twist) -> list[MishapKind]:
-        monitor, found = MishapMonitor(), []
+    def kinds(pose_at: Callable[[float], Pose], commanded: Twist) -> list[IncidentKind]:
+        monitor, found = IncidentMonitor(), []
         for stamp in np.arange(0.0, 8.0, 0.05).tolist():
             sample = MotionSample(pose_at(stamp).stamped(stamp), Twist(), commanded, Twist())
-            found += [mishap.kind for mishap in monitor.update(sample)]
+            found += [incident.kind for incident in monitor.update(sample)]
         return found
 
     assert kinds(lambda t: Pose.planar(0.0, 0.0, 0.2 * t), Twist.planar(0.0, 0.0, 0.3)) == []
     assert kinds(lambda t: Pose.planar(0.06 * t, 0.0), Twist.planar(0.06)) == []
-    assert kinds(lambda t: Pose.planar(0.01 * math.sin(9.0 * t), 0.0), Twist.planar(0.5)) == [MishapKind.STUCK]
+    assert kinds(lambda t: Pose.planar(0.01 * math.sin(9.0 * t), 0.0), Twist.planar(0.5)) == [IncidentKind.STUCK]
 
 
 @pytest.mark.parametrize("thing", Thing)
 def test_a_collision_counts_at_once_and_by_what_was_hit(thing: Thing) -> None:
-    kinds = feed(MishapMonitor(), 0.05, touched=frozenset({thing}))
+    kinds = feed(IncidentMonitor(), 0.05, touched=frozenset({thing}))
     assert [kind.value for kind in kinds] == ["collision", f"collision_with_{thing.value}"]
 
 
 def test_a_person_that_is_hit_while_a_wall_is_touched_counts_too() -> None:
-    monitor = MishapMonitor()
+    monitor = IncidentMonitor()
     feed(monitor, 0.2, touched=frozenset({Thing.WALL}))
     kinds = feed(monitor, 0.2, 0.2, touched=frozenset({Thing.WALL, Thing.PERSON}))
-    assert kinds == [MishapKind.COLLISION_WITH_PERSON]
+    assert kinds == [IncidentKind.COLLISION_WITH_PERSON]
 
 
 def test_distance_slip_and_energy_add_up() -> None:
-    monitor = MishapMonitor()
+    monitor = IncidentMonitor()
     for step in range(21):
         pose = rolled(0.0, 0.05 * step, x=0.02 * step)
         asked = Twist.planar(0.5)
@@ -101,10 +101,10 @@ DRIVEN = {"commanded": Twist.planar(0.3), "rolling": Twist.planar(0.3)}
 
 
 def contacts_while_moving(*phases: dict[str, object]) -> int:
-    monitor = MishapMonitor()
+    monitor = IncidentMonitor()
     for number, phase in enumerate(phases):
         feed(monitor, 0.2, 0.2 * number, **phase)
-    return monitor.counts[MishapKind.COLLISION_WHILE_MOVING]
+    return monitor.counts[IncidentKind.COLLISION_WHILE_MOVING]
 
 
 @pytest.mark.parametrize(

@@ -70,4 +70,4 @@ def test_the_husky_drives_up_the_first_ramp_of_the_garage() -> None:
             robot.send_command(Twist.planar(1.0 if abs(error) < 0.5 else 0.1, 0.0, max(-1.0, min(1.0, 2.0 * error))))
             simulation.advance_to(simulation.time + 0.05)
         assert not route and robot.pose().z == pytest.approx(2.8, abs=0.02)
-        assert simulation.mishaps == [] and simulation.monitor.max_pitch == pytest.approx(math.radians(8.0), abs=0.03)
+        assert simulation.incidents == [] and simulation.monitor.max_pitch == pytest.approx(math.radians(8.0), abs=0.03)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from mbf_abstract.geometry import Twist
-from terrain.physics.incidents import MishapKind
+from terrain.physics.incidents import IncidentKind
 from terrain.physics.robot_models import HUSKY
 from terrain.physics.robots import WheeledRobot
 from terrain.physics.simulation import Simulation
@@ -36,18 +36,18 @@ def test_a_ramp_under_the_left_wheels_tips_the_robot_over() -> None:
     simulation = drive_along_x(
         flat.with_heights(np.where(y > 3.1, np.clip(0.7 * (x - 3.0), 0.0, 1.0), 0.0)), Twist.planar(0.8), 5.0
     )
-    assert simulation.monitor.counts[MishapKind.TIPPED_OVER] == 1 and simulation.monitor.max_roll > math.radians(60.0)
+    assert simulation.monitor.counts[IncidentKind.TIPPED_OVER] == 1 and simulation.monitor.max_roll > math.radians(60.0)
 
 
 def test_a_rail_under_the_belly_lifts_the_wheels_and_the_robot_is_stuck() -> None:
     flat, x, y = ground()
     rail = np.where(np.abs(y - 3.0) < 0.12, np.clip(0.1 * (x - 3.0), 0.0, 0.3), 0.0)
     simulation = drive_along_x(flat.with_heights(rail), Twist.planar(0.5), 12.0)
-    kinds = [mishap.kind for mishap in simulation.mishaps]
-    assert kinds[-2:] == [MishapKind.HIGH_CENTRED, MishapKind.STUCK]
-    assert MishapKind.TIPPED_OVER not in kinds and MishapKind.COLLISION not in kinds
+    kinds = [incident.kind for incident in simulation.incidents]
+    assert kinds[-2:] == [IncidentKind.HIGH_CENTRED, IncidentKind.STUCK]
+    assert IncidentKind.TIPPED_OVER not in kinds and IncidentKind.COLLISION not in kinds
 
 
 def test_level_ground_is_free_of_mishaps() -> None:
     flat, _, _ = ground()
-    assert drive_along_x(flat, Twist.planar(0.8), 4.0).mishaps == []
+    assert drive_along_x(flat, Twist.planar(0.8), 4.0).incidents == []

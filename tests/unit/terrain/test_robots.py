@@ -10,7 +10,7 @@ import pytest
 
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.tilt import tilt_of
-from terrain.physics.incidents import MishapKind, MishapMonitor
+from terrain.physics.incidents import IncidentKind, IncidentMonitor
 from terrain.physics.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
 from terrain.physics.robots import WheeledRobot
 from terrain.physics.world import BulletWorld
@@ -118,7 +118,7 @@ def slope(degrees: float) -> Heightfield:
 
 @pytest.mark.parametrize(("degrees", "slips"), [(20.0, False), (35.0, True)])
 def test_crossing_a_slope_slips_only_where_it_is_steep(degrees: float, slips: bool) -> None:
-    hill, monitor = slope(degrees), MishapMonitor()
+    hill, monitor = slope(degrees), IncidentMonitor()
     with BulletWorld() as world:
         world.add_heightfield(hill)
         robot = WheeledRobot(world, HUSKY, hill.pose_at(2.0, -2.0, math.pi / 2))
@@ -127,11 +127,11 @@ def test_crossing_a_slope_slips_only_where_it_is_steep(degrees: float, slips: bo
         for _ in range(60):
             drive(world, robot, Twist.planar(0.8), 0.05)
             monitor.update(robot.motion_sample())
-    assert (monitor.counts[MishapKind.SLIPPING] > 0) is slips
+    assert (monitor.counts[IncidentKind.SLIPPING] > 0) is slips
 
 
 def test_a_wall_is_a_collision_and_leaves_the_robot_stuck() -> None:
-    monitor = MishapMonitor()
+    monitor = IncidentMonitor()
     with BulletWorld() as world:
         robot = on_flat_ground(world, TURTLEBOT)
         robot.place(Pose.planar(0.0, 0.0))
@@ -140,7 +140,7 @@ def test_a_wall_is_a_collision_and_leaves_the_robot_stuck() -> None:
             drive(world, robot, Twist.planar(0.4), 0.05)
             monitor.update(robot.motion_sample())
         assert robot.pose().x < 0.75
-    assert monitor.counts[MishapKind.COLLISION] >= 1 and monitor.counts[MishapKind.STUCK] == 1
+    assert monitor.counts[IncidentKind.COLLISION] >= 1 and monitor.counts[IncidentKind.STUCK] == 1
 
 
 def test_importing_and_loading_prints_nothing() -> None:

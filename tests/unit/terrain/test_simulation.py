@@ -8,7 +8,7 @@ import pytest
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.maps.sensing import RangeScan
 from terrain.physics.actors import RouteWalker, SlidingDoor, other_robot, random_route
-from terrain.physics.incidents import MishapKind, Thing
+from terrain.physics.incidents import IncidentKind, Thing
 from terrain.physics.indoor import add_building
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import KinematicWorld
@@ -95,7 +95,7 @@ def test_on_a_slope_the_kinematic_robot_tilts_and_covers_ground_length() -> None
     assert simulation.monitor.distance == pytest.approx(5.0, abs=0.3)
     robot.place(Pose.planar(14.0, 7.0))
     simulation.advance_to(10.0)
-    assert robot.pose().x <= 15.0 and simulation.monitor.counts[MishapKind.COLLISION] == 1
+    assert robot.pose().x <= 15.0 and simulation.monitor.counts[IncidentKind.COLLISION] == 1
 
 
 def test_walls_stop_the_kinematic_robot() -> None:
@@ -105,7 +105,7 @@ def test_walls_stop_the_kinematic_robot() -> None:
     robot.send_command(Twist.planar(0.5))
     simulation = Simulation(world, robot)
     simulation.advance_to(5.0)
-    assert robot.pose().y < 11.0 and simulation.monitor.counts[MishapKind.COLLISION] == 1
+    assert robot.pose().y < 11.0 and simulation.monitor.counts[IncidentKind.COLLISION] == 1
     robot.send_command(Twist.planar(-0.5))
     simulation.advance_to(6.0)
     assert robot.pose().y < 10.6
@@ -120,7 +120,7 @@ def test_the_nose_of_a_kinematic_car_stops_at_the_wall_and_not_its_axle() -> Non
     simulation = Simulation(world, robot)
     simulation.advance_to(6.0)
     assert 4.9 < robot.pose().x + 0.75 <= 5.0
-    assert simulation.monitor.counts[MishapKind.COLLISION_WITH_WALL] == 1
+    assert simulation.monitor.counts[IncidentKind.COLLISION_WITH_WALL] == 1
     robot.send_command(Twist.planar(-1.0))
     simulation.advance_to(8.0)
     assert robot.pose().x < 3.0
@@ -135,7 +135,7 @@ def test_a_long_robot_cannot_turn_its_corners_through_a_wall() -> None:
     simulation = Simulation(world, robot)
     simulation.advance_to(6.0)
     assert 0.1 < robot.pose().yaw < math.radians(60.0)  # its diagonal of 1.21 m does not fit across
-    assert simulation.monitor.counts[MishapKind.COLLISION_WITH_WALL] >= 1
+    assert simulation.monitor.counts[IncidentKind.COLLISION_WITH_WALL] >= 1
     robot.send_command(Twist.planar(0.0, 0.0, -0.5))
     simulation.advance_to(6.5)
     assert robot.velocity().wz < -0.4
@@ -228,9 +228,9 @@ def test_a_door_closes_at_its_time_and_stops_the_robot() -> None:
         assert door.pose().y == 1.5
         simulation.advance_to(6.0)
         assert door.pose().y == 0.0 and robot.pose().x < 0.85
-    kinds = {mishap.kind for mishap in simulation.mishaps}
-    assert {MishapKind.COLLISION, MishapKind.COLLISION_WITH_DOOR} <= kinds
-    assert MishapKind.COLLISION_WITH_WALL not in kinds
+    kinds = {incident.kind for incident in simulation.incidents}
+    assert {IncidentKind.COLLISION, IncidentKind.COLLISION_WITH_DOOR} <= kinds
+    assert IncidentKind.COLLISION_WITH_WALL not in kinds
 
 
 @pytest.mark.parametrize("thing", [Thing.PERSON, Thing.ROBOT])
@@ -247,7 +247,7 @@ def test_whom_the_robot_hits_is_told(thing: Thing) -> None:
         simulation = Simulation(world, robot)
         robot.send_command(Twist.planar(0.4))
         simulation.advance_to(3.0)
-    kinds = {mishap.kind.value for mishap in simulation.mishaps}
+    kinds = {incident.kind.value for incident in simulation.incidents}
     assert {kind for kind in kinds if kind.startswith("collision_with_")} == {f"collision_with_{thing.value}"}
 
 

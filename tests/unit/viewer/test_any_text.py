@@ -34,7 +34,7 @@ TEXTS = [
 CALM = {
     "max_tilt_deg": 5.0,
     "path_length_m": 10.0,
-    "mishaps": [],
+    "incidents": [],
     "collisions_while_moving": 0,
     "arrivals": [],
     "arrival_tolerance": (0.4, 180.0),

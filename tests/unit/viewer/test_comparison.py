@@ -26,13 +26,20 @@ def test_the_page_has_both_runs_in_two_columns_and_needs_nothing_else(hill_recor
 
 
 def test_differences_are_right_minus_left_and_only_of_numbers():
-    left = {"time_s": 10.0, "success": True, "mishaps": [], "plans": 3, "energy_j": 5.0, "limit": None}
-    right = {"time_s": 12.5, "success": False, "mishaps": ["collision"], "plans": 3, "wall_time_s": 1.0, "limit": None}
+    left = {"time_s": 10.0, "success": True, "incidents": [], "plans": 3, "energy_j": 5.0, "limit": None}
+    right = {
+        "time_s": 12.5,
+        "success": False,
+        "incidents": ["collision"],
+        "plans": 3,
+        "wall_time_s": 1.0,
+        "limit": None,
+    }
 
     assert compare_metrics(left, right) == [
         ("time_s", "10", "12.5", "+2.5"),
         ("success", "True", "False", "differs"),
-        ("mishaps", "none", "collision", "differs"),
+        ("incidents", "none", "collision", "differs"),
         ("plans", "3", "3", "0"),
         ("energy_j", "5", "-", "differs"),
         ("limit", "-", "-", ""),

@@ -18,7 +18,7 @@ from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorder import MAP_PERIOD, Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
-from terrain.session.bench import Bench
+from terrain.session.session import Session
 from terrain.viewer.logs.foxglove_messages import MAP_LIFT, nanoseconds
 from terrain.viewer.logs.mcap_log import write_mcap
 from terrain.viewer.logs.run_messages import action_states
@@ -175,9 +175,9 @@ def test_a_mesh_map_is_drawn_in_the_colours_of_its_costs_and_what_changes_is_dra
 
 
 def test_a_run_on_a_mesh_keeps_the_costs_it_was_planned_on(meadow):
-    with Bench(meadow) as bench:
-        assert bench.navigator.get_path(bench.goals[0]).success
-        view, recorded = bench.navigator.server.map_view(), bench.recorder.meshes
+    with Session(meadow) as session:
+        assert session.navigator.get_path(session.goals[0]).success
+        view, recorded = session.navigator.server.map_view(), session.recorder.meshes
 
     assert len(recorded) == 1
     np.testing.assert_array_equal(recorded[0].faces, view.faces)

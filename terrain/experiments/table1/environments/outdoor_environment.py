@@ -1,7 +1,7 @@
 """The stage of the outdoor table: a Husky with physics on rough ground, navigated on a mesh, among rocks nobody mapped.
 
 It offers what ``environment.Stage`` offers to a repetition; the world is a scenario file, run by
-``terrain.session.bench.Bench``.
+``terrain.session.session.Session``.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
 from terrain.experiments.table1.conditions import Conditions
 from terrain.experiments.table1.plugin_wrappers import SOURCE, wrap_plugins
-from terrain.physics.incidents import MishapKind
+from terrain.physics.incidents import IncidentKind
 from terrain.scenarios.scenario import load_scenario
-from terrain.session.bench import Bench
+from terrain.session.session import Session
 
 OUTDOOR = Path(__file__).with_name("outdoor.yaml")
 STANDS_BELOW = 0.05  # m/s; the wheels of a standing robot creep a little on a slope
@@ -34,27 +34,27 @@ class OutdoorStage:
     """
 
     def __init__(self, scenario_file: Path, conditions: Conditions, seed: int) -> None:
-        self._bench = Bench(load_scenario(scenario_file), seed=seed)
-        self.clock, self.events, self.memory = self._bench.clock, self._bench.events, self._bench.memory
-        self.digest = self._bench.digest
-        self.navigator, self.simulation = self._bench.navigator, self._bench.simulation
+        self._session = Session(load_scenario(scenario_file), seed=seed)
+        self.clock, self.events, self.memory = self._session.clock, self._session.events, self._session.memory
+        self.digest = self._session.digest
+        self.navigator, self.simulation = self._session.navigator, self._session.simulation
         self.on_tick: list[Callable[[float], None]] = []
         self.distance = 0.0
         self._last: Pose | None = None
         self._moves = False
-        self._told_mishaps = 0
+        self._reported_incidents = 0
         wrap_plugins(self.navigator.server, seed, conditions.planner_latency)
 
     def goals(self) -> list[Pose]:
         """Return the waypoints on the ground."""
-        return self._bench.goals
+        return self._session.goals
 
     def __enter__(self) -> OutdoorStage:
-        self._bench.run(self._tick)
+        self._session.run(self._tick)
         return self
 
     def __exit__(self, *exc: object) -> None:
-        self._bench.close()
+        self._session.close()
 
     def _tick(self, time: float, pose: Pose, speed: float) -> None:
         """Look at the robot, ten times a second."""
@@ -63,10 +63,10 @@ class OutdoorStage:
         if (speed > STANDS_BELOW) != self._moves:
             self._moves = not self._moves
             self.events.emit(EventKind.CUSTOM, SOURCE, what="motion", moves=self._moves)
-        new = self.simulation.mishaps[self._told_mishaps :]
-        self._told_mishaps += len(new)
-        for mishap in new:
-            if mishap.kind is MishapKind.COLLISION:
+        new = self.simulation.incidents[self._reported_incidents :]
+        self._reported_incidents += len(new)
+        for incident in new:
+            if incident.kind is IncidentKind.COLLISION:
                 self.events.emit(EventKind.CUSTOM, SOURCE, what="contact", touched="rack", moved="we")
         for listener in self.on_tick:
             listener(self.clock.now())

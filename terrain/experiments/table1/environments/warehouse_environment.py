@@ -34,7 +34,7 @@ from terrain.physics.simulation import Simulation
 from terrain.recording.run_digest import RunDigest
 from terrain.sensors.lidar import Lidar, planar_directions
 from terrain.sensors.rays import StaticRays
-from terrain.session.bench import TIME_TO_END
+from terrain.session.session import TIME_TO_END
 from terrain.worlds.floor_plan import write_map
 from terrain.worlds.occupancy import wall_triangles
 

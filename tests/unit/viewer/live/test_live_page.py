@@ -6,9 +6,9 @@ import pytest
 from mbf_abstract.maps.view import GridView, MeshView
 from terrain.scenarios.actors import OtherRobot, Walker
 from terrain.scenarios.scenario import PlanarPose, load_scenario
-from terrain.session.bench import Bench
-from terrain.session.executives import make_goal_driver
-from terrain.session.goal_sequence import GoalTour
+from terrain.session.executives import make_executive
+from terrain.session.goal_sequence import GoalSequence
+from terrain.session.session import Session
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.page import LivePage
@@ -18,13 +18,13 @@ from terrain.viewer.server.page_server import page_server
 NODES = ("ground", "map", "local_map", "lethal", "robot", "plan", "track", "ahead", "field", "scan", "goal_asked_for")
 
 
-def look_once(bench, controls, tour, time, port):
+def look_once(session, controls, tour, time, port):
     """Drive until ``time``, draw the page once, end the run; returns the names of the nodes and the panels' words."""
     seen = {}
     log, history = LiveLog(), History()
-    bench.events.add_sink(log)
+    session.events.add_sink(log)
     with page_server(port) as server:
-        page = LivePage(server, bench, tour, controls, log)
+        page = LivePage(server, session, tour, controls, log)
         tour.on_goal.append(page.things.show_goal)
 
         def look(now):
@@ -34,8 +34,8 @@ def look_once(bench, controls, tour, time, port):
                 seen["words"] = page._headline.content + page._actions.content + page._tree.content
                 tour.end("seen")
 
-        bench.loop.on_tick.append(look)
-        bench.run()
+        session.loop.on_tick.append(look)
+        session.run()
         tour.visit_goals()
         assert not page.is_watched
     return seen["nodes"], seen["words"]
@@ -57,12 +57,12 @@ def test_on_costmaps_the_page_shows_both_maps():
     scenario = load_scenario("indoor")
     goal = PlanarPose(x=scenario.start.x + 2.0, y=scenario.start.y + 3.0, yaw=1.0)
     with_goal = scenario.model_copy(update={"goals": (goal,)})
-    bench = Bench(with_goal, "costmap")
+    session = Session(with_goal, "costmap")
     try:
-        tour = GoalTour(bench, make_goal_driver("move_base", bench.navigator), stay=True)
-        nodes, words = look_once(bench, LiveControls(bench, tour), tour, 3.0, 18230)
+        tour = GoalSequence(session, make_executive("move_base", session.navigator), stay=True)
+        nodes, words = look_once(session, LiveControls(session, tour), tour, 3.0, 18230)
     finally:
-        bench.close()
+        session.close()
 
     assert nodes == {"map", "local_map", "robot", "plan", "track", "ahead", "scan"}
     assert "No behaviour tree runs" in words
@@ -71,15 +71,15 @@ def test_on_costmaps_the_page_shows_both_maps():
 def test_people_and_other_robots_are_drawn_where_they_are_now(meadow):
     route = ((2.0, 2.0), (10.0, 2.0))
     actors = (Walker(type="walker", route=route), OtherRobot(type="robot", route=route, start=4.0))
-    with Bench(meadow.model_copy(update={"actors": actors})) as bench, page_server(18240) as server:
-        tour = GoalTour(bench, make_goal_driver("move_base", bench.navigator))
-        page = LivePage(server, bench, tour, LiveControls(bench, tour), LiveLog())
+    with Session(meadow.model_copy(update={"actors": actors})) as session, page_server(18240) as server:
+        tour = GoalSequence(session, make_executive("move_base", session.navigator))
+        page = LivePage(server, session, tour, LiveControls(session, tour), LiveLog())
         shown = []
         for time in (1.0, 2.0):
-            bench.clock.sleep(1.0)
+            session.clock.sleep(1.0)
             page.show(time, History())
             frames = [server.scene.get_handle_by_name(f"/actor_{number}") for number in range(2)]
-            assert [tuple(frame.position) for frame in frames] == [a.pose().position for a in bench.recorder.actors]
+            assert [tuple(frame.position) for frame in frames] == [a.pose().position for a in session.recorder.actors]
             shown.append(frames[0].position[0])
 
         assert shown[1] - shown[0] == pytest.approx(0.8, abs=0.05), "somebody walks at 0.8 m/s"
@@ -87,8 +87,8 @@ def test_people_and_other_robots_are_drawn_where_they_are_now(meadow):
 
 
 def test_a_mesh_server_shows_each_layer_by_name_the_default_one_first(meadow):
-    with Bench(meadow) as bench:
-        server = bench.navigator.server
+    with Session(meadow) as session:
+        server = session.navigator.server
         default, *others = server.map_views
         views = {name: server.map_view(name) for name in server.map_views}
 
@@ -103,10 +103,10 @@ def test_a_mesh_server_shows_each_layer_by_name_the_default_one_first(meadow):
 
 
 def test_only_a_planner_with_a_field_has_one_to_show_and_it_leads_to_the_goal(meadow):
-    with Bench(meadow) as bench:
-        server, goal = bench.navigator.server, bench.goals[0]
-        straight = bench.navigator.get_path(goal, planner="any_angle").path
-        field = server.field_view(bench.navigator.get_path(goal, planner="cvp").path)
+    with Session(meadow) as session:
+        server, goal = session.navigator.server, session.goals[0]
+        straight = session.navigator.get_path(goal, planner="any_angle").path
+        field = server.field_view(session.navigator.get_path(goal, planner="cvp").path)
 
         assert server.field_view(straight) is None
         np.testing.assert_allclose(np.linalg.norm(field.directions, axis=1), 1.0, atol=1e-3)
@@ -116,8 +116,8 @@ def test_only_a_planner_with_a_field_has_one_to_show_and_it_leads_to_the_goal(me
 
 
 def test_a_costmap_server_shows_both_maps_where_they_are():
-    with Bench("indoor", "costmap") as bench:
-        server, robot = bench.navigator.server, bench.simulation.robot.pose()
+    with Session("indoor", "costmap") as session:
+        server, robot = session.navigator.server, session.simulation.robot.pose()
         whole, local = (server.map_view(name) for name in server.map_views)
 
         assert isinstance(whole, GridView) and server.map_view().extent == whole.extent

@@ -12,10 +12,10 @@ from websockets.asyncio.client import connect
 
 from mbf_abstract.cli import make_app
 from mbf_abstract.events import EventKind
-from terrain.session.bench import Bench
-from terrain.session.executives import make_goal_driver
-from terrain.session.goal_sequence import GoalTour
+from terrain.session.executives import make_executive
+from terrain.session.goal_sequence import GoalSequence
 from terrain.session.runner import RunOptions, run_scenario
+from terrain.session.session import Session
 from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.session import LiveSession
 
@@ -50,15 +50,15 @@ def test_a_command_that_fails_is_noted_and_the_run_goes_on(steered):
 
 def test_what_a_client_sends_neither_raises_nor_stops_a_run_that_ends_in_order(meadow, tmp_path):
     """Every control of the page gets values it cannot have, from a client that has the right address."""
-    with Bench(meadow) as bench:
-        tour = GoalTour(bench, make_goal_driver("move_base", bench.navigator), stay=True)
-        with LiveSession(bench, tour, ViewOptions(port=18600, speed=0.0)) as session:
+    with Session(meadow) as session:
+        tour = GoalSequence(session, make_executive("move_base", session.navigator), stay=True)
+        with LiveSession(session, tour, ViewOptions(port=18600, speed=0.0)) as session:
             controls = list(session._page._server.gui._gui_input_handle_from_uuid)
             attacker = threading.Thread(target=lambda: asyncio.run(attack(session, controls)))
             attacker.start()
             result = tour.visit_goals()
             attacker.join()
-        events = bench.memory.events
+        events = session.memory.events
 
     assert result.success, result.message
     assert not [event for event in events if event.kind is EventKind.FAULT]

@@ -8,10 +8,10 @@ import pytest
 
 from mbf_abstract.events import EventKind, read_events
 from mbf_abstract.time.clock import WallClock
-from terrain.session.bench import Bench
-from terrain.session.executives import EXECUTIVES, make_goal_driver
-from terrain.session.goal_sequence import GoalTour
+from terrain.session.executives import EXECUTIVES, make_executive
+from terrain.session.goal_sequence import GoalSequence
 from terrain.session.runner import RunOptions, run_scenario
+from terrain.session.session import Session
 from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.session import LiveSession
 from terrain.viewer.pictures.picture import ViewerMissing
@@ -34,9 +34,9 @@ def test_a_run_that_is_served_and_a_run_that_is_not_write_the_same_events(meadow
 
 
 def test_the_page_answers_while_the_run_goes_on_and_is_gone_afterwards(meadow):
-    with Bench(meadow) as bench:
-        tour = GoalTour(bench, make_goal_driver("move_base", bench.navigator))
-        with LiveSession(bench, tour, ViewOptions(port=18190, speed=0.0)) as session:
+    with Session(meadow) as session:
+        tour = GoalSequence(session, make_executive("move_base", session.navigator))
+        with LiveSession(session, tour, ViewOptions(port=18190, speed=0.0)) as session:
             address = session.address
             with urllib.request.urlopen(address, timeout=10.0) as answer:
                 assert b"<html" in answer.read().lower()
@@ -62,13 +62,13 @@ def test_ctrl_c_ends_a_run_that_waits_for_goals_and_its_results_are_written(mead
 
 
 def test_a_page_that_breaks_down_is_reported_once_and_the_run_goes_on(meadow):
-    with Bench(meadow) as bench:
-        tour = GoalTour(bench, make_goal_driver("move_base", bench.navigator))
-        with LiveSession(bench, tour, ViewOptions(port=18210, speed=0.0)) as session:
+    with Session(meadow) as session:
+        tour = GoalSequence(session, make_executive("move_base", session.navigator))
+        with LiveSession(session, tour, ViewOptions(port=18210, speed=0.0)) as session:
             del session._history
-            bench.loop.on_tick.append(lambda time: tour.end("done") if tour.is_waiting else None)
+            session.loop.on_tick.append(lambda time: tour.end("done") if tour.is_waiting else None)
             assert tour.visit_goals().success
-        faults = [event for event in bench.memory.of_kind(EventKind.FAULT) if event.source == "live_view"]
+        faults = [event for event in session.memory.of_kind(EventKind.FAULT) if event.source == "live_view"]
         assert len(faults) == 1
 
 
@@ -89,15 +89,15 @@ def test_every_executive_drives_a_run_or_plans_it(meadow, tmp_path, executive):
 
 
 def test_in_real_time_the_world_is_closed_after_the_step_that_is_under_way(meadow):
-    bench, begun, done = Bench(meadow, wall_clock=True), [], []
+    session, begun, done = Session(meadow, wall_clock=True), [], []
 
     def look_slowly(time):
         begun.append(time)
         WallClock().sleep(0.15)
-        done.append(bench.simulation.robot.pose())
+        done.append(session.simulation.robot.pose())
 
-    bench.loop.on_tick.append(look_slowly)
-    bench.run()
-    bench.close()
+    session.loop.on_tick.append(look_slowly)
+    session.run()
+    session.close()
 
     assert begun and len(done) == len(begun)

@@ -1,12 +1,12 @@
 """A scenario, ready to be driven by your own script: world, robot, server and navigator on one simulated clock.
 
-``mbf run`` is this plus ``move_base`` to each goal and the results on disk; use ``Bench`` to try an executive or
+``mbf run`` is this plus ``move_base`` to each goal and the results on disk; use ``Session`` to try an executive or
 plugins of your own in a world that ships.
 
 Example
 -------
->>> with Bench("outdoor", "mesh") as bench:
-...     plan = bench.navigator.get_path(bench.goals[0])
+>>> with Session("outdoor", "mesh") as session:
+...     plan = session.navigator.get_path(session.goals[0])
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from terrain.scenarios.environment import set_stage, with_noise
 from terrain.scenarios.faults import ODOMETRY, FaultSchedule
 from terrain.scenarios.perturbation import draw_disturbance
 from terrain.scenarios.scenario import Scenario, load_scenario
-from terrain.scenarios.sensors import AnyRobot, make_ego_sensors, make_localization, make_sensors
+from terrain.scenarios.sensors import AnyRobot, make_localization, make_proprioceptive_sensors, make_sensors
 from terrain.scenarios.settings import apply_settings, apply_world_settings
 from terrain.scenarios.world import ScenarioWorld
 from terrain.sensors.lidar import Sensor
@@ -51,7 +51,7 @@ MAX_EVENTS = 200_000
 TIME_TO_END = 1.0  # s of simulated time for threads to end; it passes only while somebody waits for it
 
 
-class Bench:
+class Session:
     """One scenario, built and running; a context manager.
 
     Parameters
@@ -95,7 +95,7 @@ class Bench:
         self.scenario = with_noise(asked)
         self.backend = backend or self.scenario.backend
         self.seed = self.scenario.seed if seed is None else seed
-        self._temporary = tempfile.TemporaryDirectory(prefix="mbf_bench_")  # removed with the bench, used or not
+        self._temporary = tempfile.TemporaryDirectory(prefix="mbf_bench_")  # removed with the session, used or not
         self.folder = Path(self._temporary.name if folder is None else folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         try:
@@ -152,7 +152,7 @@ class Bench:
         self.world.physics.close()
         self._temporary.cleanup()
 
-    def __enter__(self) -> Bench:
+    def __enter__(self) -> Session:
         self.run()
         return self
 
@@ -172,7 +172,7 @@ class Bench:
         self.world.introduce(robot)
         sensors: dict[str, Sensor[Any]] = {
             **make_sensors(self.scenario.sensors, robot, self.world, self.seed),
-            **make_ego_sensors(self.scenario, robot, self.seed),
+            **make_proprioceptive_sensors(self.scenario, robot, self.seed),
         }
         self.localization = make_localization(self.scenario.localization, robot, self.seed)
         self.faults = FaultSchedule(self.world.physics, sensors, self.localization, self.scenario.faults)

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from terrain.recording.recording import Surface
-from terrain.worlds.geodesics import free_floor, shortest_way
+from terrain.worlds.geodesics import free_floor, geodesic_length
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid
 
@@ -26,7 +26,7 @@ def test_on_a_slanted_plane_it_is_the_straight_line(angle):
     x, y = 1.03 + 6.0 * math.cos(angle), 1.11 + 6.0 * math.sin(angle)
     places = [(px, py, float(terrain.height_at(px, py))) for px, py in ((1.03, 1.11), (x, y))]
     straight = math.dist(*places)
-    assert straight * (1.0 - 1e-9) <= shortest_way(Surface(*terrain.triangles()), places) <= LONGEST * straight
+    assert straight * (1.0 - 1e-9) <= geodesic_length(Surface(*terrain.triangles()), places) <= LONGEST * straight
 
 
 def test_it_is_close_to_the_exact_geodesics_of_real_ground(shared_data):
@@ -38,12 +38,12 @@ def test_it_is_close_to_the_exact_geodesics_of_real_ground(shared_data):
     for row in rows:
         places = [tuple(float(row[end + axis]) for axis in "xyz") for end in "st"]
         exact = float(row["exact_mmp"])
-        assert exact * (1.0 - 1e-6) <= shortest_way(surface, places) <= LONGEST * exact
+        assert exact * (1.0 - 1e-6) <= geodesic_length(surface, places) <= LONGEST * exact
 
 
 def test_legs_over_several_places_add_up():
     surface, places = Surface(*plane(0.0).triangles()), [(1.0, 1.0, 0.0), (4.0, 1.0, 0.0), (4.0, 3.0, 0.0)]
-    assert shortest_way(surface, places) == pytest.approx(5.0)
+    assert geodesic_length(surface, places) == pytest.approx(5.0)
 
 
 def test_in_a_building_it_leads_through_the_door_and_not_through_a_wall():
@@ -51,13 +51,13 @@ def test_in_a_building_it_leads_through_the_door_and_not_through_a_wall():
     occupied[:80, 48:52] = True
     floor = free_floor(OccupancyGrid(occupied, ~occupied, 0.05, 0.0, 0.0))
     around = 2.0 * math.hypot(1.4, 3.0) + 0.2
-    assert around <= shortest_way(floor, [(1.0, 1.0, 0.0), (4.0, 1.0, 0.0)]) <= LONGEST * around
+    assert around <= geodesic_length(floor, [(1.0, 1.0, 0.0), (4.0, 1.0, 0.0)]) <= LONGEST * around
 
 
 def test_there_is_no_way_to_where_no_surface_is():
     surface = Surface(*plane(0.0).triangles())
-    assert shortest_way(surface, [(1.0, 1.0, 0.0), (1.0, 1.0, 9.0)]) == math.inf
+    assert geodesic_length(surface, [(1.0, 1.0, 0.0), (1.0, 1.0, 9.0)]) == math.inf
     occupied = np.zeros((20, 20), dtype=bool)
     occupied[:, 8:12] = True
     floor = free_floor(OccupancyGrid(occupied, ~occupied, 0.2, 0.0, 0.0))
-    assert shortest_way(floor, [(1.0, 1.0, 0.0), (3.0, 1.0, 0.0)]) == math.inf
+    assert geodesic_length(floor, [(1.0, 1.0, 0.0), (3.0, 1.0, 0.0)]) == math.inf
