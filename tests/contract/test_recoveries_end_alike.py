@@ -30,6 +30,18 @@ class StuckMotion(RigMotion):
         return True
 
 
+class PausedMotion(RigMotion):
+    """Refuses the first command, as the motion of a goal that is paused for a while does."""
+
+    refused = False
+
+    def send(self, command):
+        if not self.refused:
+            self.refused = True
+            return False
+        return super().send(command)
+
+
 def stale_costmap(base):
     costmap = build_layered_costmap(CostmapParameters(resolution=0.05, robot_radius=0.2, max_age=0.5))
     costmap.update(START, -1.0)
@@ -84,6 +96,12 @@ def test_a_gate_that_refuses_is_stopped(run):
     result, _ = run(closed=True)
     assert result.outcome == RecoveryOutcome.STOPPED
     assert "the velocity gate refused the command" in result.message
+
+
+def test_a_refusal_for_the_time_of_a_pause_is_no_end(run):
+    result, commands = run(PausedMotion)
+    assert result.outcome == RecoveryOutcome.PAT_EXCEEDED, "it drives on until its second is over"
+    assert not commands[0].is_stopped()
 
 
 def test_a_cancel_is_canceled_with_its_reason(run):

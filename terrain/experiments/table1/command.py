@@ -10,7 +10,10 @@ from typing import Any
 import typer
 
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
-from terrain.experiments.table1.environments.world import WAREHOUSE
+
+WAREHOUSE = (
+    Path(__file__).parent / "environments" / "warehouse.yaml"
+)  # also in environments.world, which is slow to import
 
 
 def register(app: typer.Typer) -> None:

@@ -55,20 +55,21 @@ def told(navigator) -> list[tuple[str, int, bool]]:
 
 
 def test_every_finding_in_a_mesh_is_an_event_when_it_is_loaded_and_when_it_is_swapped(navigator, tmp_path):
-    assert told(navigator) == [("coarse", 441, False)]
+    assert told(navigator) == [("coarse", 441, False), ("narrow", 0, False)]
     vertices, faces = heightfield_mesh(np.zeros((21, 21)), 0.2, 0.2)
     far = np.vstack([vertices, vertices + np.array([10.0, 0.0, 0.0])])
     turned = np.vstack([faces, faces[:, ::-1] + len(vertices)])
     trimesh.Trimesh(far, turned, process=False).export(tmp_path / "two.ply")
     with pytest.raises(MeshError):
         navigator.server.swap_mesh("broken.ply")
-    assert len(told(navigator)) == 1
+    assert len(told(navigator)) == 2
 
     navigator.server.swap_mesh("two.ply")
 
-    assert told(navigator)[1:] == [("facing_down", 800, False), ("components", 2, False), ("coarse", 882, False)]
+    defects = [("facing_down", 800, False), ("components", 2, False)]
+    assert told(navigator)[2:] == [*defects, ("coarse", 882, False), ("narrow", 0, False)]
     messages = [event.data["message"] for event in navigator.server.runtime.events.memory.of_kind(EventKind.MAP)]
-    assert messages[2].startswith("components: 2 components, the largest with 441 of 882 vertices (indices 0, 441)")
+    assert messages[3].startswith("components: 2 components, the largest with 441 of 882 vertices (indices 0, 441)")
 
 
 @pytest.mark.parametrize("planner", ["astar", "cvp"])

@@ -45,12 +45,12 @@ class SteeredRun:
 @pytest.fixture
 def steered(meadow):
     """Make steered runs; all are closed at the end of the test."""
-    benches = []
+    sessions = []
 
     def make(executive="move_base"):
-        benches.append(Session(meadow))
-        return SteeredRun(benches[-1], executive)
+        sessions.append(Session(meadow))
+        return SteeredRun(sessions[-1], executive)
 
     yield make
-    for session in benches:
+    for session in sessions:
         session.close()

@@ -30,8 +30,8 @@ def test_the_robot_goes_where_the_click_hits_the_ground_instead_of_to_the_scenar
 
     assert result.success, result.message
     assert np.hypot(result.final_pose.x - 5.0, result.final_pose.y - 7.0) < 0.5
-    clicked = run.bench.recorder.goals[-1]
-    assert clicked.z == pytest.approx(run.bench.world.height_at(5.0, 7.0), abs=1e-3)
+    clicked = run.session.recorder.goals[-1]
+    assert clicked.z == pytest.approx(run.session.world.height_at(5.0, 7.0), abs=1e-3)
     finished = [event.data["outcome_name"] for event in run.events(EventKind.GOAL_FINISHED, source="move_base")]
     assert finished == ["CANCELED", "SUCCESS"]
     assert told(run) == ["new goal"]
@@ -43,7 +43,7 @@ def test_a_click_beside_the_ground_changes_nothing(steered):
 
     assert run.visit_goals().success
     assert told(run) == ["there is no ground where the click was"]
-    assert len(run.bench.recorder.goals) == 1
+    assert len(run.session.recorder.goals) == 1
 
 
 @pytest.mark.parametrize("executive", ["move_base", "navigation", "classic"])
@@ -90,8 +90,10 @@ def test_the_chosen_planner_makes_the_plans_of_the_goals_to_come(steered):
 def test_injected_faults_befall_the_sensor_and_the_localisation_and_end(steered):
     run = steered()
     stamps, offsets = {}, {}
-    run.bench.loop.on_tick.append(lambda t: stamps.update({round(t, 1): run.bench.simulation.latest["lidar"].stamp}))
-    run.bench.loop.on_tick.append(lambda t: offsets.update({round(t, 1): run.bench.localization.offset}))
+    run.session.loop.on_tick.append(
+        lambda t: stamps.update({round(t, 1): run.session.simulation.latest["lidar"].stamp})
+    )
+    run.session.loop.on_tick.append(lambda t: offsets.update({round(t, 1): run.session.localization.offset}))
     silent = SensorFault(type="silent", sensor="lidar", start=2.0, end=3.0)
     run.at(1.5, lambda: run.controls.inject(silent))
     run.at(1.5, lambda: run.controls.inject(LocalizationJump(type="jump", dx=0.3, start=2.0, end=3.0)))
@@ -106,7 +108,7 @@ def test_injected_faults_befall_the_sensor_and_the_localisation_and_end(steered)
 
 def test_a_clicked_goal_has_the_scenarios_time_limit_of_its_own(steered, meadow):
     run = steered()
-    run.bench.scenario = meadow.model_copy(update={"time_limit": 2.0})
+    run.session.scenario = meadow.model_copy(update={"time_limit": 2.0})
     run.at(3.0, lambda: run.controls.go_to(above(9.0, 8.0), DOWN))
 
     result = run.visit_goals()

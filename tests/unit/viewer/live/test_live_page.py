@@ -47,7 +47,7 @@ def test_on_a_mesh_the_page_shows_layers_plan_field_and_what_is_forbidden(steere
         0.6, lambda: run.controls.choose("cvp", "follower"), lambda: run.controls.go_to((9.0, 7.0, 50.0), (0, 0, -1))
     )
 
-    nodes, words = look_once(run.bench, run.controls, run.tour, 3.0, 18220)
+    nodes, words = look_once(run.session, run.controls, run.tour, 3.0, 18220)
 
     assert nodes == set(NODES) - {"map", "local_map"}
     assert "going to 9.0, 7.0" in words and "follow path" in words and "plan found" in words

@@ -52,9 +52,9 @@ def test_what_a_client_sends_neither_raises_nor_stops_a_run_that_ends_in_order(m
     """Every control of the page gets values it cannot have, from a client that has the right address."""
     with Session(meadow) as session:
         tour = GoalSequence(session, make_executive("move_base", session.navigator), stay=True)
-        with LiveSession(session, tour, ViewOptions(port=18600, speed=0.0)) as session:
-            controls = list(session._page._server.gui._gui_input_handle_from_uuid)
-            attacker = threading.Thread(target=lambda: asyncio.run(attack(session, controls)))
+        with LiveSession(session, tour, ViewOptions(port=18600, speed=0.0)) as live:
+            controls = list(live._page._server.gui._gui_input_handle_from_uuid)
+            attacker = threading.Thread(target=lambda: asyncio.run(attack(live, controls)))
             attacker.start()
             result = tour.visit_goals()
             attacker.join()

@@ -36,8 +36,8 @@ def test_a_run_that_is_served_and_a_run_that_is_not_write_the_same_events(meadow
 def test_the_page_answers_while_the_run_goes_on_and_is_gone_afterwards(meadow):
     with Session(meadow) as session:
         tour = GoalSequence(session, make_executive("move_base", session.navigator))
-        with LiveSession(session, tour, ViewOptions(port=18190, speed=0.0)) as session:
-            address = session.address
+        with LiveSession(session, tour, ViewOptions(port=18190, speed=0.0)) as live:
+            address = live.address
             with urllib.request.urlopen(address, timeout=10.0) as answer:
                 assert b"<html" in answer.read().lower()
         with pytest.raises(OSError):
@@ -64,8 +64,8 @@ def test_ctrl_c_ends_a_run_that_waits_for_goals_and_its_results_are_written(mead
 def test_a_page_that_breaks_down_is_reported_once_and_the_run_goes_on(meadow):
     with Session(meadow) as session:
         tour = GoalSequence(session, make_executive("move_base", session.navigator))
-        with LiveSession(session, tour, ViewOptions(port=18210, speed=0.0)) as session:
-            del session._history
+        with LiveSession(session, tour, ViewOptions(port=18210, speed=0.0)) as live:
+            del live._history
             session.loop.on_tick.append(lambda time: tour.end("done") if tour.is_waiting else None)
             assert tour.visit_goals().success
         faults = [event for event in session.memory.of_kind(EventKind.FAULT) if event.source == "live_view"]
