@@ -1,7 +1,7 @@
 """Label: costs by kind of ground, drawn as labelled polygons.
 
 When to use: lawn costs more than path, mud is forbidden. When not: shapes known from the mesh itself. Where regions
-overlap the last one in the list counts. Forbidden regions are closed as those of ``keep_out`` are.
+overlap the last one in the list counts. Forbidden regions are closed as those of ``keepout`` are.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ LAYER_TYPES: dict[str, str] = {
     "clearance": "mbf_mesh_nav.layers.clearance:ClearanceLayer",
     "height_diff": "mbf_mesh_nav.layers.height_diff:HeightDiffLayer",
     "inflation": "mbf_mesh_nav.layers.inflation:InflationLayer",
-    "keep_out": "mbf_mesh_nav.layers.keep_out:KeepOutLayer",
+    "keepout": "mbf_mesh_nav.layers.keepout:KeepoutLayer",
     "label": "mbf_mesh_nav.layers.label:LabelLayer",
     "max_combination": "mbf_mesh_nav.layers.max_combination:MaxCombinationLayer",
     "mean": "mbf_mesh_nav.layers.mean:MeanLayer",

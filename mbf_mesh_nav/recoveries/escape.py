@@ -3,7 +3,7 @@
 For a robot that stands in an inflated or lethal area (a new obstacle, a pushed robot), where every planner answers
 BLOCKED_START. It crosses costly ground on purpose, so it is slow, short (``max_distance``) and measures distance on the
 surface, never across a gap or to another storey. Lethal ground it crosses only where the robot stands on it, and does
-not know what that really is: order it after ``mesh.clear_layers`` and ``mesh.back_up``. Where something appears on its
+not know what that really is: order it after ``mesh.clear`` and ``mesh.back_up``. Where something appears on its
 way while it drives, or the end of the way is safe no more, it looks for another way and stops if there is none.
 """
 

@@ -2,7 +2,7 @@
 
 For a robot that finds no way although one is there, say a door narrower than the distance it usually keeps, for a goal
 that is just occupied, or one that cannot be reached exactly. It opens no way narrower than the robot: a layer's
-inscribed radius shrinks to that of the map at most. When not: on stale obstacles, for which ``mesh.clear_layers`` is
+inscribed radius shrinks to that of the map at most. When not: on stale obstacles, for which ``mesh.clear`` is
 the cure. The robot does not move: the behaviour returns at once and planning goes on with what is relaxed. Running it
 again meanwhile only prolongs it. Cost: the layer is computed twice, when relaxed and when restored.
 """
@@ -21,7 +21,7 @@ class RelaxParameters(PluginParameters):
     """Parameters of ``mesh.relax``."""
 
     layer: str = parameter("inflation", "The inflation layer to relax; empty = none.")
-    scale: float = parameter(0.8, "Factor on its radii meanwhile.", gt=0.0, le=1.0)
+    inflation_factor: float = parameter(0.8, "Factor on its radii meanwhile.", gt=0.0, le=1.0)
     planner_tolerance: float = parameter(
         0.2, "Paths may end at least this far from the goal; 0 = unchanged.", unit="m", ge=0.0, le=100.0
     )
@@ -64,8 +64,8 @@ class RelaxRecovery(MeshRecovery):
         if not isinstance(usual, InflationParameters):
             return RecoveryResult(RecoveryOutcome.FAILURE, f"the layer '{p.layer}' has no radius to relax")
         robot = self.mesh_map.inscribed_radius or usual.inscribed_radius
-        inscribed = min(usual.inscribed_radius, max(p.scale * usual.inscribed_radius, robot))
-        inflation = max(p.scale * usual.inflation_radius, inscribed)
+        inscribed = min(usual.inscribed_radius, max(p.inflation_factor * usual.inscribed_radius, robot))
+        inflation = max(p.inflation_factor * usual.inflation_radius, inscribed)
         relaxed = {"inscribed_radius": inscribed, "inflation_radius": inflation}
         self.mesh_map.set_layer_parameters(p.layer, usual.model_copy(update=relaxed), until=until)
         return f"layer '{p.layer}' with " + ", ".join(f"{name} {value:g} m" for name, value in relaxed.items())

@@ -24,7 +24,7 @@ COSTMAP_PARAMETERS = {
 }
 MESH_PARAMETERS = {
     "clearance": {"robot_height": 0.8},
-    "keep_out": {"regions": [{"polygon": CORNERS}]},
+    "keepout": {"regions": [{"polygon": CORNERS}]},
     "label": {"regions": [{"polygon": CORNERS, "label": "mud"}], "label_costs": {"mud": 0.4}},
     "obstacle": {"decay_time": 10.0},
 }

@@ -19,7 +19,7 @@ CONFIGS = {
     "mesh": """
 backend: mesh
 dist_tolerance: 0.6
-mesh_map: {mesh_file: floor.ply, layers: [{name: area, type: keep_out}], area: {regions: [{polygon: SPOT}]}}
+mesh_map: {mesh_file: floor.ply, layers: [{name: area, type: keepout}], area: {regions: [{polygon: SPOT}]}}
 planners: [{name: shortest, type: dijkstra}]
 """,
     "costmap": """

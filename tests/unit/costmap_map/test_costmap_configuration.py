@@ -25,7 +25,7 @@ def lethal_cells(costmap):
 ZONE = {"name": "stairs", "polygon": [[2.5, 2.5], [4.5, 2.5], [4.5, 3.5], [2.5, 3.5]], "speed_limit": 0.3}
 
 
-def test_a_keep_out_polygon_is_lethal_and_survives_clearing(build, tmp_path):
+def test_a_keepout_polygon_is_lethal_and_survives_clearing(build, tmp_path):
     (tmp_path / "zones.yaml").write_text(yaml.safe_dump({"zones": [ZONE]}))
     costmap = build("keepout", keepout={"zones_file": str(tmp_path / "zones.yaml")})
     costmap.clear()
@@ -33,7 +33,7 @@ def test_a_keep_out_polygon_is_lethal_and_survives_clearing(build, tmp_path):
     assert lethal_cells(costmap) == {(x, y) for x in (2, 3, 4) for y in (2, 3)}
 
 
-def test_a_keep_out_mask_of_another_resolution_raises_costs(build, tmp_path):
+def test_a_keepout_mask_of_another_resolution_raises_costs(build, tmp_path):
     occupancy = np.zeros((20, 20), dtype=np.uint8)
     occupancy[4:6, 6:8], occupancy[8:10, 8:10] = 100, 50
     save_map(tmp_path / "mask.yaml", OccupancyMap(occupancy, 0.5), mode=MapMode.SCALE, occupied_thresh=0.6)

@@ -154,7 +154,7 @@ def on(odom, pose):
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.6, -2.0])
-def test_keep_out_zones_and_masks_lie_where_their_frame_does(tmp_path, yaw):
+def test_keepout_zones_and_masks_lie_where_their_frame_does(tmp_path, yaw):
     odom = odom_at(1.5, 0.5, yaw)
     costmap, _ = filters(tmp_path, odom)
     costmap.update(None, 0.0)

@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 
 from mbf_mesh_nav.kernels.layers.inflation import front_arrival
 from mbf_mesh_nav.layers.inflation import InflationLayer, InflationParameters
-from mbf_mesh_nav.layers.keep_out import KeepOutLayer, KeepOutParameters
+from mbf_mesh_nav.layers.keepout import KeepoutLayer, KeepoutParameters
 from mbf_mesh_nav.map.layer import LayerContext
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
 
-def chain(mesh: MeshMap, lethal: np.ndarray, **parameters: float) -> tuple[KeepOutLayer, InflationLayer]:
-    source = KeepOutLayer(LayerContext("source", mesh.topology, mesh.locator, KeepOutParameters()))
+def chain(mesh: MeshMap, lethal: np.ndarray, **parameters: float) -> tuple[KeepoutLayer, InflationLayer]:
+    source = KeepoutLayer(LayerContext("source", mesh.topology, mesh.locator, KeepoutParameters()))
     source.replace(lethal.astype(np.float32), lethal.copy())
     radius = parameters.get("inflation_radius", 1.0)
     settings_ = InflationParameters(**{"inflation_radius": 1.0, "inscribed_radius": min(0.25, radius), **parameters})

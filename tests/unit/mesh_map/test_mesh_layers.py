@@ -11,7 +11,7 @@ from mbf_mesh_nav.kernels.mesh.polygons import inside_polygon
 from mbf_mesh_nav.layers.border import BorderLayer
 from mbf_mesh_nav.layers.clearance import ClearanceLayer
 from mbf_mesh_nav.layers.height_diff import HeightDiffLayer
-from mbf_mesh_nav.layers.keep_out import KeepOutLayer
+from mbf_mesh_nav.layers.keepout import KeepoutLayer
 from mbf_mesh_nav.layers.label import LabelLayer
 from mbf_mesh_nav.layers.ridge import RidgeLayer
 from mbf_mesh_nav.layers.roughness import RoughnessLayer
@@ -164,12 +164,12 @@ def test_clearance_needs_the_robots_height():
         ClearanceLayer.Parameters()
 
 
-def test_keep_out_polygon_applies_to_its_storey_only():
+def test_keepout_polygon_applies_to_its_storey_only():
     vertices, faces = heightfield_mesh(np.zeros((5, 5)), 1.0, 1.0)
     mesh = MeshMap.from_arrays(np.vstack([vertices, vertices + np.array([0, 0, 3.0])]), np.vstack([faces, faces + 25]))
     square = ((0.5, 0.5), (2.5, 0.5), (2.5, 1.5), (0.5, 1.5))
 
-    layer = computed(mesh, KeepOutLayer, regions=[{"polygon": square, "z_max": 1.0}])
+    layer = computed(mesh, KeepoutLayer, regions=[{"polygon": square, "z_max": 1.0}])
 
     marked = {tuple(point) for point in mesh.vertices[layer.lethal].tolist()}
     assert marked == {(1.0, 1.0, 0.0), (2.0, 1.0, 0.0)}
@@ -192,7 +192,7 @@ def test_label_without_a_cost_and_polygon_without_inside_are_refused():
     with pytest.raises(ValidationError, match=r"a cost for every label.*: sand"):
         LabelLayer.Parameters(regions=[{"polygon": ((0, 0), (1, 0), (0, 1)), "label": "sand"}])
     with pytest.raises(ValidationError, match="at least 3 corners"):
-        KeepOutLayer.Parameters(regions=[{"polygon": ((0, 0), (1, 0))}])
+        KeepoutLayer.Parameters(regions=[{"polygon": ((0, 0), (1, 0))}])
 
 
 @pytest.mark.parametrize(("scale", "offset"), [(1e-3, 0.0), (1.0, 1e4)])
@@ -219,22 +219,22 @@ def crosses(p, q, a, b):
 
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 10**6), width=st.floats(0.001, 0.6))
-def test_no_free_edge_leads_through_a_keep_out_region_however_narrow(seed, width):
+def test_no_free_edge_leads_through_a_keepout_region_however_narrow(seed, width):
     rng = np.random.default_rng(seed)
     mesh = MeshMap.from_heights(np.zeros((12, 12)), 0.25, 0.25)
     begin, end = rng.uniform(0.3, 2.4, (2, 2))
     aside = np.array([begin[1] - end[1], end[0] - begin[0]]) / np.linalg.norm(end - begin) * width / 2.0
     outline = [begin + aside, end + aside, end - aside, begin - aside]
-    layer = computed(mesh, KeepOutLayer, regions=[{"polygon": [tuple(corner) for corner in outline]}])
+    layer = computed(mesh, KeepoutLayer, regions=[{"polygon": [tuple(corner) for corner in outline]}])
     sides = list(zip(outline, [*outline[1:], outline[0]], strict=True))
     assert layer.lethal.any()
     for p, q in mesh.edges[~layer.lethal[mesh.edges].any(axis=1)]:
         assert not any(crosses(mesh.vertices[p], mesh.vertices[q], a, b) for a, b in sides)
 
 
-def test_a_keep_out_region_inside_one_face_closes_that_face():
+def test_a_keepout_region_inside_one_face_closes_that_face():
     mesh = MeshMap.from_heights(np.zeros((3, 3)), 1.0, 1.0)
-    layer = computed(mesh, KeepOutLayer, regions=[{"polygon": [(0.2, 0.2), (0.3, 0.2), (0.25, 0.3)]}])
+    layer = computed(mesh, KeepoutLayer, regions=[{"polygon": [(0.2, 0.2), (0.3, 0.2), (0.25, 0.3)]}])
     closed = mesh.faces[mesh.locate([[0.25, 0.23, 0.0]]).faces[0]]
     assert set(np.flatnonzero(layer.lethal)) == set(closed.tolist())
 
@@ -248,9 +248,9 @@ def test_a_keep_out_region_inside_one_face_closes_that_face():
     ],
     ids=["cell", "face", "corners on edges"],
 )
-def test_a_keep_out_region_drawn_along_the_edges_of_the_mesh_leaves_no_face_of_it_free(polygon):
+def test_a_keepout_region_drawn_along_the_edges_of_the_mesh_leaves_no_face_of_it_free(polygon):
     mesh = MeshMap.from_heights(np.zeros((5, 5)), 1.0, 1.0)
-    layer = computed(mesh, KeepOutLayer, regions=[{"polygon": polygon}])
+    layer = computed(mesh, KeepoutLayer, regions=[{"polygon": polygon}])
     free = mesh.faces[~layer.lethal[mesh.faces].any(axis=1)]
     shares = np.random.default_rng(0).dirichlet((1.0, 1.0, 1.0), 200)
     inside = inside_polygon(np.einsum("ks,fsc->fkc", shares, mesh.vertices[free]).reshape(-1, 3), np.array(polygon))
@@ -271,4 +271,4 @@ def test_a_forbidden_label_closes_a_strip_that_runs_between_the_vertices():
 
 def test_a_region_whose_heights_are_exchanged_is_refused():
     with pytest.raises(ValueError, match="z_min 2 m is above z_max 1 m"):
-        KeepOutLayer.Parameters(regions=[{"polygon": ((0, 0), (1, 0), (0, 1)), "z_min": 2.0, "z_max": 1.0}])
+        KeepoutLayer.Parameters(regions=[{"polygon": ((0, 0), (1, 0), (0, 1)), "z_min": 2.0, "z_max": 1.0}])

@@ -30,7 +30,7 @@ def walled_map() -> MeshMap:
     wall = {"polygon": ((1.95, -1.0), (2.05, -1.0), (2.05, 3.0), (1.95, 3.0)), "z_max": 1.0}
     parameters = MeshMapParameters(
         layers=[
-            {"name": "wall", "type": "keep_out"},
+            {"name": "wall", "type": "keepout"},
             {"name": "lawn", "type": "label"},
             {"name": "sum", "type": "weighted_sum", "inputs": ["wall", "lawn"]},
         ],

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbf_mesh_nav.layers.keep_out import KeepOutLayer, KeepOutParameters
+from mbf_mesh_nav.layers.keepout import KeepoutLayer, KeepoutParameters
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerContext
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -18,7 +18,7 @@ COSTS = [0.0, 0.5, 1.0, 2.0, np.inf, np.nan]
 def test_the_remembered_mask_equals_that_of_the_snapshot_after_every_change(seed):
     rng = np.random.default_rng(seed)
     mesh_map = MeshMap.from_heights(np.zeros((6, 7)), 0.1, 0.1)
-    layer = KeepOutLayer(LayerContext("seen", mesh_map.topology, mesh_map.locator, KeepOutParameters()))
+    layer = KeepoutLayer(LayerContext("seen", mesh_map.topology, mesh_map.locator, KeepoutParameters()))
     mesh_map.set_layers(LayerGraph([layer]), "seen", 1.0)
     remembered = BlockedVertices(mesh_map)
     given_out = []

@@ -18,7 +18,7 @@ def storeys(*heights, blocked_below=-np.inf):
     floor, faces = heightfield_mesh(np.zeros((16, 16)), 0.2, 0.2)
     floors = [floor + np.array([0.0, 0.0, height]) for height in heights]
     everywhere = ((-1.0, -1.0), (4.0, -1.0), (4.0, 4.0), (-1.0, 4.0))
-    parameters = MeshMapParameters(layers=[{"name": "closed", "type": "keep_out"}])
+    parameters = MeshMapParameters(layers=[{"name": "closed", "type": "keepout"}])
     blocks = {"closed": {"regions": [{"polygon": everywhere, "z_max": blocked_below}]}}
     joined = np.vstack([faces + index * len(floor) for index in range(len(heights))])
     return build_mesh_map(parameters, blocks, vertices=np.vstack(floors), faces=joined)

@@ -17,7 +17,7 @@ from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerContext
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.recoveries.back_up import BackUpRecovery
-from mbf_mesh_nav.recoveries.clear_layers import ClearLayersRecovery
+from mbf_mesh_nav.recoveries.clear import ClearRecovery
 from mbf_mesh_nav.recoveries.escape import EscapeRecovery
 from mbf_mesh_nav.recoveries.relax import RelaxRecovery
 from mbf_mesh_nav.recoveries.rotate import RotateRecovery
@@ -144,7 +144,7 @@ def test_clearing_layers_frees_what_was_sensed(run, plain, paint, monkeypatch):
     layer = mesh_map.layers["painted"]
     monkeypatch.setattr(layer, "clear", lambda: layer.replace(np.zeros_like(layer.costs), np.zeros_like(layer.lethal)))
     lethal = int(mesh_map.snapshot().lethal.sum())
-    result, _ = run(ClearLayersRecovery, mesh_map)
+    result, _ = run(ClearRecovery, mesh_map)
     assert result.success and f"{lethal} vertices" in result.message
     assert not mesh_map.snapshot().lethal.any()
     assert layer.update_from_inputs(NOTHING_CHANGED) is NOTHING_CHANGED
@@ -159,7 +159,7 @@ def test_relaxed_inflation_comes_back_by_itself(run, plain, paint, make_plugin):
     mesh_map.set_layers(LayerGraph([source, inflation]), "inflation")
     usual = mesh_map.snapshot().costs
     for _ in range(2):  # the second run relaxes the usual radii again, not the relaxed ones
-        result, _ = run(RelaxRecovery, mesh_map, scale=0.5, duration=20.0)
+        result, _ = run(RelaxRecovery, mesh_map, inflation_factor=0.5, duration=20.0)
         assert result.success and "inflation_radius 0.5 m" in result.message
     relaxed = mesh_map.snapshot().costs
     assert np.count_nonzero(relaxed) < np.count_nonzero(usual)

@@ -10,7 +10,7 @@ from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_mesh_nav.plugins import MeshRecovery
 
 
-class ClearLayersRecovery(MeshRecovery):
+class ClearRecovery(MeshRecovery):
     """Clears the obstacle layers of the map."""
 
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:

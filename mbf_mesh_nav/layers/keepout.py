@@ -13,17 +13,17 @@ from mbf_mesh_nav.layers.polygon_regions import Region
 from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 
 
-class KeepOutParameters(LayerParameters):
-    """Parameters of ``keep_out``."""
+class KeepoutParameters(LayerParameters):
+    """Parameters of ``keepout``."""
 
     regions: tuple[Region, ...] = parameter((), "Polygons that must not be entered.")
 
 
-class KeepOutLayer(MeshLayer):
+class KeepoutLayer(MeshLayer):
     """Lethal inside the regions, free outside."""
 
-    Parameters = KeepOutParameters
-    parameters: KeepOutParameters
+    Parameters = KeepoutParameters
+    parameters: KeepoutParameters
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost 1 and lethal inside any region and at what closes it between vertices, else 0."""
