@@ -47,7 +47,7 @@ SLOPE_ONLY = {  # what mesh_navigation's steepness and inflation layers know: sl
 FLAT = {  # the best of five variants of lethal slope, inflation and collision check on the seeds from 1000
     "backend": "costmap",
     "planner": "astar",
-    "pursuit.max_linear_vel": "0.8",  # the speed of the controller on the mesh
+    "pursuit.max_vel_x": "0.8",  # the speed of the controller on the mesh
     "pursuit.cost_scaling_dist": "0.0",  # a slope is no obstacle to slow down for
     "pursuit.collision_check": "false",
 }

@@ -54,6 +54,10 @@ class ConfigError(Exception):
         self.findings = sorted(findings, key=lambda finding: (finding.file, finding.line))
         super().__init__("\n".join(finding.text for finding in self.findings))
 
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        """Survive the way back from a worker process."""
+        return type(self), (self.findings,)
+
 
 def format_key_path(path: KeyPath) -> str:
     """Return ``planners[0].type`` for ``("planners", 0, "type")``."""

@@ -134,13 +134,13 @@ class NavigationParameters(ParameterModel):
     max_quarantined: int = parameter(
         8, "Hung plugin threads that are tolerated before goals are rejected.", ge=1, le=1000
     )
-    max_vx: float | None = parameter(None, "Forward limit of commands; absent = none.", unit="m/s", ge=0.0)
-    min_vx: float | None = parameter(None, "Reverse limit of commands, negative or 0.", unit="m/s", le=0.0)
-    max_vy: float | None = parameter(None, "Sideways limit of commands.", unit="m/s", ge=0.0)
-    max_vz: float | None = parameter(None, "Limit of commands upwards and downwards.", unit="m/s", ge=0.0)
-    max_wx: float | None = parameter(None, "Roll rate limit of commands.", unit="rad/s", ge=0.0)
-    max_wy: float | None = parameter(None, "Pitch rate limit of commands.", unit="rad/s", ge=0.0)
-    max_wz: float | None = parameter(None, "Yaw rate limit of commands.", unit="rad/s", ge=0.0)
+    max_vel_x: float | None = parameter(None, "Forward limit of commands; absent = none.", unit="m/s", ge=0.0)
+    min_vel_x: float | None = parameter(None, "Reverse limit of commands, negative or 0.", unit="m/s", le=0.0)
+    max_vel_y: float | None = parameter(None, "Sideways limit of commands.", unit="m/s", ge=0.0)
+    max_vel_z: float | None = parameter(None, "Limit of commands upwards and downwards.", unit="m/s", ge=0.0)
+    max_vel_roll: float | None = parameter(None, "Roll rate limit of commands.", unit="rad/s", ge=0.0)
+    max_vel_pitch: float | None = parameter(None, "Pitch rate limit of commands.", unit="rad/s", ge=0.0)
+    max_vel_theta: float | None = parameter(None, "Yaw rate limit of commands.", unit="rad/s", ge=0.0)
     max_steering_angle: float | None = parameter(
         None, "Limit of a car's steering angle.", unit="rad", gt=0.0, le=math.pi / 2.0
     )

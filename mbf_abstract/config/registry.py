@@ -35,6 +35,10 @@ class PluginError(Exception):
         self.type = type_name
         self.reason = reason
 
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        """Survive the way back from a worker process."""
+        return type(self), (self.group, self.type, self.reason)
+
 
 @dataclass(frozen=True)
 class PluginEntry:

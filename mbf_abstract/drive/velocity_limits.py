@@ -16,13 +16,13 @@ class VelocityLimits:
 
     Attributes
     ----------
-    max_vx, min_vx : float
+    max_vel_x, min_vel_x : float
         Forward and (negative or zero) reverse limit [m/s].
-    max_vy : float
+    max_vel_y : float
         Sideways limit [m/s].
-    max_vz : float
+    max_vel_z : float
         Limit upwards and downwards [m/s].
-    max_wx, max_wy, max_wz : float
+    max_vel_roll, max_vel_pitch, max_vel_theta : float
         Roll, pitch and yaw rate limits [rad/s].
     max_steering_angle : float
         Limit of an Ackermann command's steering angle [rad], clamped on its own.
@@ -31,20 +31,20 @@ class VelocityLimits:
         too much of its yaw rate, all of it where it does not drive.
     """
 
-    max_vx: float = math.inf
-    min_vx: float = -math.inf
-    max_vy: float = math.inf
-    max_vz: float = math.inf
-    max_wx: float = math.inf
-    max_wy: float = math.inf
-    max_wz: float = math.inf
+    max_vel_x: float = math.inf
+    min_vel_x: float = -math.inf
+    max_vel_y: float = math.inf
+    max_vel_z: float = math.inf
+    max_vel_roll: float = math.inf
+    max_vel_pitch: float = math.inf
+    max_vel_theta: float = math.inf
     max_steering_angle: float = math.inf
     min_turning_radius: float = 0.0
 
     def apply(self, command: Command) -> Command:
         """Return the command within the limits; the same object if it already is."""
         if isinstance(command, AckermannCommand):
-            speed = min(max(command.speed, self.min_vx), self.max_vx)
+            speed = min(max(command.speed, self.min_vel_x), self.max_vel_x)
             angle = min(max(command.steering_angle, -self.max_steering_angle), self.max_steering_angle)
             limited = AckermannCommand(speed, angle)
             return command if limited == command else limited
@@ -63,12 +63,12 @@ class VelocityLimits:
         vx, vy, vz = command.linear
         wx, wy, wz = command.angular
         scale = min(
-            _scale(vx, self.max_vx if vx > 0.0 else -self.min_vx),
-            _scale(vy, self.max_vy),
-            _scale(vz, self.max_vz),
-            _scale(wx, self.max_wx),
-            _scale(wy, self.max_wy),
-            _scale(wz, self.max_wz),
+            _scale(vx, self.max_vel_x if vx > 0.0 else -self.min_vel_x),
+            _scale(vy, self.max_vel_y),
+            _scale(vz, self.max_vel_z),
+            _scale(wx, self.max_vel_roll),
+            _scale(wy, self.max_vel_pitch),
+            _scale(wz, self.max_vel_theta),
         )
         if scale >= 1.0:
             return command

@@ -6,7 +6,7 @@ small computers (a cycle of 2000 x 56 takes about 1 ms), or when the path must b
 Known failure: two equally good ways around an obstacle can average to neither; the footprint check then falls back to
 the best single sample. A robot that can turn on the spot turns to a path that begins behind it. A car turns onto a path
 it looks away from by a right angle, slowly where its turning radius is larger than the way it looks ahead
-(``vx_max * time_steps * model_dt``); one that looks back along its path drives it backward and ends with the wrong
+(``max_vel_x * time_steps * model_dt``); one that looks back along its path drives it backward and ends with the wrong
 heading. Give it paths that begin with its heading, as ``costmap.hybrid_astar`` does; it drives their cusps, and asks
 for another plan (NO_VALID_CMD) where it stands beside its goal.
 
@@ -51,17 +51,19 @@ FALLBACK_SAMPLES = 30
 class MppiParameters(PluginParameters):
     """Parameters of ``costmap.mppi``."""
 
-    motion_model: Literal["diff", "omni", "ackermann"] = parameter("diff", "How the robot moves.", dynamic=False)
+    motion_model: Literal["differential", "omni", "ackermann"] = parameter(
+        "differential", "How the robot moves.", dynamic=False
+    )
     batch_size: int = parameter(2000, "Sampled trajectories a cycle.", ge=10, le=100000, dynamic=False)
     time_steps: int = parameter(56, "Steps of a trajectory.", ge=9, le=500, dynamic=False)
     model_dt: float = parameter(0.05, "Length of a step; also the control period.", unit="s", gt=0.0, le=0.5)
-    vx_max: float = parameter(0.5, "Largest forward speed.", unit="m/s", gt=0.0, le=20.0)
-    vx_min: float = parameter(-0.35, "Least speed; negative = may drive back.", unit="m/s", ge=-20.0, le=0.0)
-    vy_max: float = parameter(0.5, "Largest sideways speed (omni).", unit="m/s", ge=0.0, le=20.0)
-    wz_max: float = parameter(1.9, "Largest yaw rate.", unit="rad/s", gt=0.0, le=20.0)
-    ax_max: float = parameter(3.0, "Largest forward acceleration.", unit="m/s^2", gt=0.0, le=100.0)
-    ay_max: float = parameter(3.0, "Largest sideways acceleration.", unit="m/s^2", gt=0.0, le=100.0)
-    az_max: float = parameter(3.5, "Largest yaw acceleration.", unit="rad/s^2", gt=0.0, le=100.0)
+    max_vel_x: float = parameter(0.5, "Largest forward speed.", unit="m/s", gt=0.0, le=20.0)
+    min_vel_x: float = parameter(-0.35, "Least speed; negative = may drive back.", unit="m/s", ge=-20.0, le=0.0)
+    max_vel_y: float = parameter(0.5, "Largest sideways speed (omni).", unit="m/s", ge=0.0, le=20.0)
+    max_vel_theta: float = parameter(1.9, "Largest yaw rate.", unit="rad/s", gt=0.0, le=20.0)
+    acc_lim_x: float = parameter(3.0, "Largest forward acceleration.", unit="m/s^2", gt=0.0, le=100.0)
+    acc_lim_y: float = parameter(3.0, "Largest sideways acceleration.", unit="m/s^2", gt=0.0, le=100.0)
+    acc_lim_theta: float = parameter(3.5, "Largest yaw acceleration.", unit="rad/s^2", gt=0.0, le=100.0)
     vx_std: float = parameter(0.2, "Noise of the forward speed.", unit="m/s", gt=0.0, le=10.0)
     vy_std: float = parameter(0.2, "Noise of the sideways speed.", unit="m/s", gt=0.0, le=10.0)
     wz_std: float = parameter(0.4, "Noise of the yaw rate.", unit="rad/s", gt=0.0, le=10.0)
@@ -106,10 +108,10 @@ class MppiController(PathFollower):
         """Take over new weights and limits."""
         p = self.parameters
         self._critics = build_critics(p.critics)
-        sideways = p.vy_max if p.motion_model == "omni" else 0.0
-        self._low = np.array([p.vx_min, -sideways, -p.wz_max], dtype=np.float32)
-        self._high = np.array([p.vx_max, sideways, p.wz_max], dtype=np.float32)
-        self._change = np.array([p.ax_max, p.ay_max, p.az_max], dtype=np.float32) * np.float32(p.model_dt)
+        sideways = p.max_vel_y if p.motion_model == "omni" else 0.0
+        self._low = np.array([p.min_vel_x, -sideways, -p.max_vel_theta], dtype=np.float32)
+        self._high = np.array([p.max_vel_x, sideways, p.max_vel_theta], dtype=np.float32)
+        self._change = np.array([p.acc_lim_x, p.acc_lim_y, p.acc_lim_theta], dtype=np.float32) * np.float32(p.model_dt)
         deviation = [p.vx_std, p.vy_std if p.motion_model == "omni" else 0.0, p.wz_std]
         self._deviation = np.array(deviation, dtype=np.float32)
         self._radius = self.turning_radius
@@ -138,7 +140,7 @@ class MppiController(PathFollower):
     def full_speed(self) -> float:
         """Largest speed in any direction [m/s]."""
         p = self.parameters
-        return max(p.vx_max, p.vy_max) if p.motion_model == "omni" else p.vx_max
+        return max(p.max_vel_x, p.max_vel_y) if p.motion_model == "omni" else p.max_vel_x
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
         """One cycle: sample around the nominal sequence, score, average, check, shift."""
@@ -178,7 +180,7 @@ class MppiController(PathFollower):
         velocities = self._velocities
         add_noise(self._nominal, noise, self._deviation, velocities)
         self._clip(cycle, velocities)
-        reach = p.vx_max * p.model_dt * p.time_steps
+        reach = p.max_vel_x * p.model_dt * p.time_steps
         rollouts = roll_out(cycle, velocities, p.model_dt, reach, self._poses, self._radius)
         costs = score(self._critics, rollouts)
         if rollouts.collided.all():

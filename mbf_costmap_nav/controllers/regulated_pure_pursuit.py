@@ -32,8 +32,8 @@ SLOWEST = 0.01  # m/s; slower commands are looked ahead for as long as this one,
 class RegulatedPurePursuitParameters(PluginParameters):
     """Parameters of ``costmap.regulated_pure_pursuit``."""
 
-    max_linear_vel: float = parameter(0.5, "Speed on a free straight path.", unit="m/s", gt=0.0, le=20.0)
-    max_linear_accel: float = parameter(2.5, "Largest change of speed.", unit="m/s^2", gt=0.0, le=100.0)
+    max_vel_x: float = parameter(0.5, "Speed on a free straight path.", unit="m/s", gt=0.0, le=20.0)
+    acc_lim_x: float = parameter(2.5, "Largest change of speed.", unit="m/s^2", gt=0.0, le=100.0)
     look_ahead_dist: float = parameter(0.6, "Carrot distance if it is fixed.", unit="m", gt=0.0, le=20.0)
     use_velocity_scaled_look_ahead: bool = parameter(True, "Let the carrot distance grow with speed.")
     look_ahead_time: float = parameter(1.5, "Carrot distance per speed.", unit="s", gt=0.0, le=20.0)
@@ -59,11 +59,11 @@ class RegulatedPurePursuitParameters(PluginParameters):
         0.785, "Turn in place if the carrot is further off than this.", unit="rad", gt=0.0, le=3.2
     )
     rotate_to_heading_vel: float = parameter(1.8, "Yaw rate of turning in place.", unit="rad/s", gt=0.0, le=20.0)
-    max_angular_vel: float = parameter(1.8, "Largest yaw rate while driving.", unit="rad/s", gt=0.0, le=20.0)
+    max_vel_theta: float = parameter(1.8, "Largest yaw rate while driving.", unit="rad/s", gt=0.0, le=20.0)
     min_turning_radius: float | None = parameter(
         None, "Radius of the tightest arc; 0 = any, absent = the robot's.", unit="m", ge=0.0, le=100.0
     )
-    max_angular_accel: float = parameter(3.2, "Change of the yaw rate in place.", unit="rad/s^2", gt=0.0, le=100.0)
+    acc_lim_theta: float = parameter(3.2, "Change of the yaw rate in place.", unit="rad/s^2", gt=0.0, le=100.0)
     allow_reversing: bool = parameter(True, "Drive backward where the poses of the path look against its direction.")
     max_cross_track: float = parameter(1.5, "Farther from the path than this it is missed.", unit="m", gt=0.0, le=100.0)
     collision_check: bool = parameter(True, "Simulate the footprint ahead along the arc.")
@@ -112,7 +112,7 @@ class RegulatedPurePursuitController(PathFollower):
     @property
     def full_speed(self) -> float:
         """Speed [m/s] on a free straight path."""
-        return self.parameters.max_linear_vel
+        return self.parameters.max_vel_x
 
     @property
     def turning_radius(self) -> float:
@@ -169,23 +169,23 @@ class RegulatedPurePursuitController(PathFollower):
     def rotation_speed(self, angle: float, speed: float) -> float:
         """Yaw rate [rad/s] that turns by ``angle`` [rad] and can still brake in time, from the present ``speed``."""
         p = self.parameters
-        change = p.max_angular_accel * p.control_period
+        change = p.acc_lim_theta * p.control_period
         wanted = math.copysign(p.rotate_to_heading_vel, angle)
         reachable = min(max(wanted, speed - change), speed + change)
-        braking = math.sqrt(2.0 * p.max_angular_accel * abs(angle))
+        braking = math.sqrt(2.0 * p.acc_lim_theta * abs(angle))
         return min(max(reachable, -braking), braking)
 
     def regulated_speed(self, curvature: float, cost: int, remaining: float) -> float:
         """Speed [m/s] for a curvature [1/m], the cost under the robot, and the length left [m]."""
         p = self.parameters
-        in_curve = near_obstacle = p.max_linear_vel
+        in_curve = near_obstacle = p.max_vel_x
         if p.regulated_min_radius > 0.0 and abs(curvature) * p.regulated_min_radius > 1.0:
             in_curve *= 1.0 / (abs(curvature) * p.regulated_min_radius)
         if p.cost_scaling_dist > 0.0 and FREE < cost <= INSCRIBED:
             clearance = self.costmap.inscribed_radius - math.log(cost / (INSCRIBED - 1)) / self.decay
             if clearance < p.cost_scaling_dist:
                 near_obstacle *= p.cost_scaling_gain * max(clearance, 0.0) / p.cost_scaling_dist
-        speed = max(min(in_curve, near_obstacle), min(p.regulated_min_speed, p.max_linear_vel))
+        speed = max(min(in_curve, near_obstacle), min(p.regulated_min_speed, p.max_vel_x))
         if remaining < p.approach_dist:
             speed = min(speed, max(speed * remaining / p.approach_dist, p.min_approach_vel))
         return speed
@@ -220,10 +220,10 @@ class RegulatedPurePursuitController(PathFollower):
         cost = cycle.costmap.cost_at(cycle.request.pose.x, cycle.request.pose.y) or FREE
         regulated = min(self.regulated_speed(curvature, cost, cycle.tracker.to_cusp), cycle.speed_limit)
         wanted = -regulated if backward else regulated
-        change = p.max_linear_accel * p.control_period
+        change = p.acc_lim_x * p.control_period
         speed = min(max(wanted, velocity.vx - change), velocity.vx + change)
-        if abs(speed * curvature) > p.max_angular_vel:
-            speed = math.copysign(p.max_angular_vel / abs(curvature), speed)
+        if abs(speed * curvature) > p.max_vel_theta:
+            speed = math.copysign(p.max_vel_theta / abs(curvature), speed)
         return Twist.planar(vx=speed, wz=speed * curvature)
 
     # ----------------------------------------------------------------------------------------------- collisions

@@ -43,6 +43,10 @@ class MapError(Exception):
         self.file = file
         self.reason = reason
 
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        """Survive the way back from a worker process."""
+        return type(self), (self.file, self.reason)
+
 
 class MapMode(str, Enum):
     """How grey values between the two thresholds are read."""

@@ -1,10 +1,10 @@
 """Model predictive path integral control on the surface: sample motions, roll them out on the mesh, blend the best.
 
 Strengths: reads the map of *now*, so it drives round obstacles seen after planning; knows slopes, costs and the robot's
-motion model (differential or Ackermann). Known failure: a local method with a horizon of ``horizon_steps * step_time``;
+motion model (differential or Ackermann). Known failure: a local method with a horizon of ``time_steps * model_dt``;
 out of a pocket deeper than that only a new plan leads. An Ackermann robot cannot mend its heading
 where it stands; it comes in on a curve along the goal's heading, if there is room for one. A path whose poses ask for
-reverse it drives as it is, cusp after cusp, where ``min_lin_velocity`` allows that, and refuses otherwise.
+reverse it drives as it is, cusp after cusp, where ``min_vel_x`` allows that, and refuses otherwise.
 Cost: about 3 ms a cycle with 400 samples of 30 steps; so many times more as a step is longer than half
 the shortest edge of the mesh, or than 0.05 m if that is more.
 
@@ -58,18 +58,18 @@ class MPPIParameters(PluginParameters):
     """Parameters of ``mesh.mppi``."""
 
     motion_model: Literal["differential", "ackermann"] = parameter("differential", "How the robot moves.")
-    samples: int = parameter(400, "Motions tried in a cycle.", ge=10, le=10000)
-    horizon_steps: int = parameter(30, "Steps of a motion.", ge=5, le=200)
-    step_time: float = parameter(0.1, "Length of a step.", unit="s", gt=0.0, le=1.0)
+    batch_size: int = parameter(400, "Motions tried in a cycle.", ge=10, le=10000)
+    time_steps: int = parameter(30, "Steps of a motion.", ge=5, le=200)
+    model_dt: float = parameter(0.1, "Length of a step.", unit="s", gt=0.0, le=1.0)
     temperature: float = parameter(0.15, "How much worse a motion may be and still count.", gt=0.0)
-    max_lin_velocity: float = parameter(0.8, "Forward speed limit.", unit="m/s", gt=0.0, le=5.0)
-    min_lin_velocity: float = parameter(0.0, "Least forward speed; negative allows reversing.", unit="m/s", le=0.0)
-    max_ang_velocity: float = parameter(1.0, "Yaw rate limit, both ways.", unit="rad/s", gt=0.0, le=5.0)
+    max_vel_x: float = parameter(0.8, "Forward speed limit.", unit="m/s", gt=0.0, le=5.0)
+    min_vel_x: float = parameter(0.0, "Least forward speed; negative allows reversing.", unit="m/s", le=0.0)
+    max_vel_theta: float = parameter(1.0, "Yaw rate limit, both ways.", unit="rad/s", gt=0.0, le=5.0)
     wheelbase: float = parameter(0.5, "Distance of the axles (Ackermann).", unit="m", gt=0.0)
     max_steering_angle: float = parameter(0.5, "Steering limit (Ackermann).", unit="rad", gt=0.0, lt=1.5)
     linear_noise: float = parameter(0.25, "Standard deviation of the speed samples.", unit="m/s", gt=0.0)
     angular_noise: float = parameter(0.5, "Standard deviation of yaw rate (or steering) samples.", gt=0.0)
-    max_deceleration: float = parameter(0.4, "Deceleration planned before the goal.", unit="m/s^2", gt=0.0)
+    decel_lim_x: float = parameter(0.4, "Deceleration planned before the goal.", unit="m/s^2", gt=0.0)
     path_weight: float = parameter(3.0, "Weight of the squared distance to the path.", ge=0.0)
     cost_weight: float = parameter(2.0, "Weight of the map's cost.", ge=0.0)
     tilt_weight: float = parameter(0.5, "Weight of roll and pitch over their limits, squared.", ge=0.0)
@@ -108,7 +108,7 @@ class MPPIController(MeshController):
             return False
         p, is_car = self.parameters, self.parameters.motion_model == "ackermann"
         self._reverses = is_car and bool(reverse_segments(path, path.positions).any())
-        if self._reverses and p.min_lin_velocity == 0.0:
+        if self._reverses and p.min_vel_x == 0.0:
             return False
         self._approach = GoalApproach(path[-1], p.goal_distance)
         self._strict_below = 0.0
@@ -118,7 +118,7 @@ class MPPIController(MeshController):
             path = bent
         self._begun, self._idle_cycles = False, 0
         self._follow(path)
-        self._nominal: NDArray[np.float64] = np.zeros((p.horizon_steps, 2))
+        self._nominal: NDArray[np.float64] = np.zeros((p.time_steps, 2))
         return True
 
     @property
@@ -176,7 +176,7 @@ class MPPIController(MeshController):
             if self._idle_cycles > _IDLE_CYCLES:
                 message = f"the goal is reached but for {off:.2f} rad, which a car cannot mend where it stands"
                 return ControlResult(ExePathOutcome.NO_VALID_CMD, message)
-            turn = clamp(2.0 * off, p.max_ang_velocity)
+            turn = clamp(2.0 * off, p.max_vel_theta)
             return ControlResult(ExePathOutcome.SUCCESS, "", self._as_command(0.0, turn))
         motion = self._best_motion(spot, pose)
         if motion is None:
@@ -189,7 +189,7 @@ class MPPIController(MeshController):
         if self._approach is None:
             return None
         speed, yaw_rate = np.moveaxis(self._as_motions(self._nominal), -1, 0)
-        return PlannedMotion(np.stack([speed, np.zeros_like(speed), yaw_rate], axis=1), self.parameters.step_time)
+        return PlannedMotion(np.stack([speed, np.zeros_like(speed), yaw_rate], axis=1), self.parameters.model_dt)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the path has been driven to its last pose, and that is reached."""
@@ -198,10 +198,10 @@ class MPPIController(MeshController):
         return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
 
     def _best_motion(self, spot: SurfacePoint, pose: Pose) -> NDArray[np.float64] | None:
-        """Blend the sampled motions by their scores; (horizon_steps, 2), or None if the robot cannot get on."""
+        """Blend the sampled motions by their scores; (time_steps, 2), or None if the robot cannot get on."""
         max_speed = min(
-            self.parameters.max_lin_velocity,
-            max(braking_speed(self._tracker.to_cusp, self.parameters.max_deceleration), 0.1),
+            self.parameters.max_vel_x,
+            max(braking_speed(self._tracker.to_cusp, self.parameters.decel_lim_x), 0.1),
         )
         # A robot beside its goal or past it has no path ahead of it, but still a way to go.
         end = self._tracker.point_at(self._tracker.next_cusp)
@@ -216,7 +216,7 @@ class MPPIController(MeshController):
             blended = np.asarray(controls[int(np.argmin(scores))])
         # Where most motions collide and the best one hardly moves, standing there would last for ever. So it would
         # where none leads nearer, as for a car that has passed its goal; a cycle or two of it are chance.
-        travel, turn = np.abs(blended.sum(axis=0)) * self.parameters.step_time
+        travel, turn = np.abs(blended.sum(axis=0)) * self.parameters.model_dt
         stands = travel < _STANDSTILL and turn < _STANDSTILL
         has_far_to_go = self._distance_to_goal(pose) > _STANDSTILL + self.parameters.goal_distance
         self._idle_cycles = self._idle_cycles + 1 if stands and has_far_to_go else 0
@@ -228,27 +228,27 @@ class MPPIController(MeshController):
         return ground_distance(pose, self._approach.goal)
 
     def _sample(self, max_speed: float, remaining: float) -> NDArray[np.float64]:
-        """Motions (samples, horizon_steps, 2) around the last one; the first is that one, the second stands still.
+        """Motions (batch_size, time_steps, 2) around the last one; the first is that one, the second stands still.
 
         No robot that can turn where it stands goes on past the goal, ``remaining`` [m] away: motions that run beyond it
         would speak for creeping there.
         """
         p = self.parameters
-        held = -(-p.horizon_steps // _NOISE_HOLD)
+        held = -(-p.time_steps // _NOISE_HOLD)
         # Two parts: one that changes, and one that lasts; only lasting turns lead round an obstacle.
-        noise = self.rng.standard_normal((p.samples, held, 2)) + self.rng.standard_normal((p.samples, 1, 2))
+        noise = self.rng.standard_normal((p.batch_size, held, 2)) + self.rng.standard_normal((p.batch_size, 1, 2))
         noise *= (p.linear_noise, p.angular_noise)
-        noise = np.repeat(noise, _NOISE_HOLD, axis=1)[:, : p.horizon_steps]
+        noise = np.repeat(noise, _NOISE_HOLD, axis=1)[:, : p.time_steps]
         noise[0] = 0.0
         controls = self._nominal + noise
         controls[1] = 0.0
-        slowest = max(p.min_lin_velocity, -max_speed) if self._reverses else p.min_lin_velocity
+        slowest = max(p.min_vel_x, -max_speed) if self._reverses else p.min_vel_x
         np.clip(controls[..., 0], slowest, max_speed, out=controls[..., 0])
         if p.motion_model == "differential":
             before = np.cumsum(controls[..., 0], axis=1) - controls[..., 0]
-            room = np.maximum(remaining / p.step_time - before, 0.0)
+            room = np.maximum(remaining / p.model_dt - before, 0.0)
             np.minimum(controls[..., 0], room, out=controls[..., 0])
-        turn_limit = p.max_ang_velocity if p.motion_model == "differential" else self._steering_limit
+        turn_limit = p.max_vel_theta if p.motion_model == "differential" else self._steering_limit
         np.clip(controls[..., 1], -turn_limit, turn_limit, out=controls[..., 1])
         return np.asarray(controls)
 
@@ -260,7 +260,7 @@ class MPPIController(MeshController):
         snapshot = mesh_map.snapshot()
         pieces = self._pieces_of_a_step()
         motions = np.repeat(self._as_motions(controls), pieces, axis=1)
-        reach = p.max_lin_velocity * p.horizon_steps * p.step_time + 1.0
+        reach = p.max_vel_x * p.time_steps * p.model_dt + 1.0
         tracker = self._tracker
         end = min(tracker.progress + reach, tracker.next_cusp)
         along = np.append(np.arange(tracker.progress, end, _PATH_SPACING), end)
@@ -292,7 +292,7 @@ class MPPIController(MeshController):
             _vector(spot.point),
             tangent(_vector(pose.rotation[:, 0]), _vector(mesh_map.face_normals[spot.face])),
             motions,
-            p.step_time / pieces,
+            p.model_dt / pieces,
             ahead,
             remaining,
             np.array(weights),
@@ -318,7 +318,7 @@ class MPPIController(MeshController):
         is finest.
         """
         p = self.parameters
-        stride = max(p.max_lin_velocity, -p.min_lin_velocity) * p.step_time
+        stride = max(p.max_vel_x, -p.min_vel_x) * p.model_dt
         return math.ceil(stride / max(0.5 * self._shortest_edge, _LEAST_STRIDE))
 
     def _blocked(self) -> NDArray[np.bool_]:

@@ -39,10 +39,10 @@ class PathFollowerParameters(PluginParameters):
     """Parameters of ``mesh.path_follower``."""
 
     lookahead: float = parameter(0.6, "Distance of the pursued point along the path.", unit="m", gt=0.0, le=10.0)
-    max_lin_velocity: float = parameter(0.8, "Forward speed on flat, straight ground.", unit="m/s", gt=0.0, le=5.0)
-    min_lin_velocity: float = parameter(0.08, "Lowest forward speed while driving.", unit="m/s", gt=0.0, le=1.0)
-    max_ang_velocity: float = parameter(1.0, "Yaw rate limit, both ways.", unit="rad/s", gt=0.0, le=5.0)
-    max_deceleration: float = parameter(0.4, "Deceleration planned before the goal.", unit="m/s^2", gt=0.0)
+    max_vel_x: float = parameter(0.8, "Forward speed on flat, straight ground.", unit="m/s", gt=0.0, le=5.0)
+    min_speed: float = parameter(0.08, "Lowest forward speed while driving.", unit="m/s", gt=0.0, le=1.0)
+    max_vel_theta: float = parameter(1.0, "Yaw rate limit, both ways.", unit="rad/s", gt=0.0, le=5.0)
+    decel_lim_x: float = parameter(0.4, "Deceleration planned before the goal.", unit="m/s^2", gt=0.0)
     max_lateral_acceleration: float = parameter(0.6, "Limits the speed in bends.", unit="m/s^2", gt=0.0)
     turn_in_place_angle: float = parameter(
         0.9, "Beyond this heading error the robot turns on the spot.", unit="rad", gt=0.0, le=math.pi
@@ -151,14 +151,14 @@ class PathFollower(MeshController):
         # the ground does not count.
         left = max(tracker.to_cusp, math.hypot(*in_robot_frame(pose, target)[:2]))
         speed = min(
-            p.max_lin_velocity * slope_factor,
+            p.max_vel_x * slope_factor,
             math.sqrt(p.max_lateral_acceleration / max(abs(curvature), 1e-6)),
-            p.max_ang_velocity / max(abs(curvature), 1e-6),
-            braking_speed(left, p.max_deceleration),
+            p.max_vel_theta / max(abs(curvature), 1e-6),
+            braking_speed(left, p.decel_lim_x),
         )
-        speed = max(speed, min(p.min_lin_velocity, p.max_ang_velocity / max(abs(curvature), 1e-6)))
+        speed = max(speed, min(p.min_speed, p.max_vel_theta / max(abs(curvature), 1e-6)))
         return self._command(speed, speed * curvature)
 
     def _command(self, speed: float, turn: float) -> ControlResult:
-        turn = clamp(turn, self.parameters.max_ang_velocity)
+        turn = clamp(turn, self.parameters.max_vel_theta)
         return ControlResult(ExePathOutcome.SUCCESS, "", Twist.planar(vx=speed, wz=turn))

@@ -31,15 +31,15 @@ STRAYING = 2.0
 class VectorFieldParameters(PluginParameters):
     """Parameters of ``mesh.vector_field``."""
 
-    max_lin_velocity: float = parameter(1.0, "Forward speed limit.", unit="m/s", gt=0.0, le=5.0)
-    max_ang_velocity: float = parameter(0.5, "Yaw rate limit, both ways.", unit="rad/s", gt=0.0, le=2.0)
+    max_vel_x: float = parameter(1.0, "Forward speed limit.", unit="m/s", gt=0.0, le=5.0)
+    max_vel_theta: float = parameter(0.5, "Yaw rate limit, both ways.", unit="rad/s", gt=0.0, le=2.0)
     max_angle: float = parameter(
         math.radians(20.0), "Beyond this heading error the robot turns on the spot.", unit="rad", gt=0.0, le=math.pi
     )
     lin_vel_factor: float = parameter(1.0, "Multiplies the speed before it is limited.", ge=0.1, le=10.0)
     ang_vel_factor: float = parameter(7.0, "Multiplies the yaw rate before it is limited.", ge=0.1, le=10.0)
     arrival_fading: float = parameter(0.5, "The speed falls linearly within this distance.", unit="m", gt=0.0, le=5.0)
-    min_lin_velocity: float = parameter(0.08, "Speed at which fading ends.", unit="m/s", gt=0.0, le=1.0)
+    min_speed: float = parameter(0.08, "Speed at which fading ends.", unit="m/s", gt=0.0, le=1.0)
     goal_distance: float = parameter(
         0.08, "Nearer to the goal than this the robot only turns to the final heading.", unit="m", gt=0.0
     )
@@ -123,14 +123,14 @@ class VectorFieldController(MeshController):
         p = self.parameters
         if abs(error) > p.max_angle:
             return self._command(0.0, self._turn_rate(error))
-        speed = p.max_lin_velocity * (1.0 - abs(error) / p.max_angle) * p.lin_vel_factor
+        speed = p.max_vel_x * (1.0 - abs(error) / p.max_angle) * p.lin_vel_factor
         fading = min(1.0, distance_to_goal / p.arrival_fading) if self._on_last_leg else 1.0
-        faded = max(p.max_lin_velocity * fading, p.min_lin_velocity)
-        return self._command(min(speed, faded, p.max_lin_velocity), self._turn_rate(error))
+        faded = max(p.max_vel_x * fading, p.min_speed)
+        return self._command(min(speed, faded, p.max_vel_x), self._turn_rate(error))
 
     def _turn_rate(self, error: float) -> float:
-        return error * self.parameters.max_ang_velocity / math.pi * self.parameters.ang_vel_factor
+        return error * self.parameters.max_vel_theta / math.pi * self.parameters.ang_vel_factor
 
     def _command(self, speed: float, turn: float) -> ControlResult:
-        turn = clamp(turn, self.parameters.max_ang_velocity)
+        turn = clamp(turn, self.parameters.max_vel_theta)
         return ControlResult(ExePathOutcome.SUCCESS, "", Twist.planar(vx=speed, wz=turn))

@@ -84,3 +84,7 @@ class MeshError(ValueError):
         self.reasons = list(reasons)
         self.hint = hint
         super().__init__(f"{file}: " + "; ".join(self.reasons) + (f". {hint}" if hint else ""))
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        """Survive the way back from a worker process."""
+        return type(self), (self.file, self.reasons, self.hint)

@@ -40,6 +40,12 @@ class TerrainFileError(Exception):
 
     def __init__(self, path: str | Path, reason: str) -> None:
         super().__init__(f"{path}: {reason}")
+        self.path = path
+        self.reason = reason
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        """Survive the way back from a worker process."""
+        return type(self), (self.path, self.reason)
 
 
 class Elevation(NamedTuple):

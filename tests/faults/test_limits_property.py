@@ -14,7 +14,7 @@ from mbf_abstract.plugins import ControlResult
 from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive
 
-LIMITS = VelocityLimits(max_vx=1.0, min_vx=-0.3, max_vy=0.5, max_wz=2.0, max_steering_angle=0.6)
+LIMITS = VelocityLimits(max_vel_x=1.0, min_vel_x=-0.3, max_vel_y=0.5, max_vel_theta=2.0, max_steering_angle=0.6)
 number = st.floats(-50.0, 50.0).map(lambda value: round(value, 6))
 
 
@@ -23,9 +23,9 @@ def test_a_limited_twist_keeps_its_direction_and_its_limits(vx, vy, wz):
     asked = Twist.planar(vx, vy, wz)
     sent = LIMITS.apply(asked)
     slack = 1.0 + 1e-9
-    assert LIMITS.min_vx * slack <= sent.vx <= LIMITS.max_vx * slack
-    assert abs(sent.vy) <= LIMITS.max_vy * slack
-    assert abs(sent.wz) <= LIMITS.max_wz * slack
+    assert LIMITS.min_vel_x * slack <= sent.vx <= LIMITS.max_vel_x * slack
+    assert abs(sent.vy) <= LIMITS.max_vel_y * slack
+    assert abs(sent.wz) <= LIMITS.max_vel_theta * slack
     pairs = zip((sent.vx, sent.vy, sent.wz), (vx, vy, wz), strict=True)
     scale = max((abs(given) / abs(wanted) for given, wanted in pairs if wanted), default=1.0)
     assert (sent.vx, sent.vy, sent.wz) == pytest.approx((vx * scale, vy * scale, wz * scale), abs=1e-12)
@@ -35,7 +35,7 @@ def test_a_limited_twist_keeps_its_direction_and_its_limits(vx, vy, wz):
 @given(number, st.floats(-3.0, 3.0))
 def test_a_limited_ackermann_command_keeps_each_limit(speed, angle):
     sent = LIMITS.apply(AckermannCommand(speed, angle))
-    assert LIMITS.min_vx <= sent.speed <= LIMITS.max_vx
+    assert LIMITS.min_vel_x <= sent.speed <= LIMITS.max_vel_x
     assert abs(sent.steering_angle) <= LIMITS.max_steering_angle
     assert math.copysign(1.0, sent.steering_angle) == math.copysign(1.0, angle) or sent.steering_angle == 0.0
 
@@ -46,7 +46,7 @@ def test_within_the_limits_a_command_passes_untouched():
 
 
 def test_the_robot_gets_the_limited_command_and_the_event_tells_both():
-    with Bench(max_vx=0.4, max_wz=0.8) as bench:
+    with Bench(max_vel_x=0.4, max_vel_theta=0.8) as bench:
         bench.controller.play(drive(2.0, 1.0))
         handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
         bench.clock.sleep(1.0)
@@ -70,7 +70,7 @@ def test_a_car_that_is_driven_with_twists_gets_no_curve_tighter_than_its_own():
 
 
 def test_a_car_is_limited_in_speed_and_steering_angle():
-    with Bench(max_vx=0.4, max_steering_angle=0.3) as bench:
+    with Bench(max_vel_x=0.4, max_steering_angle=0.3) as bench:
         bench.controller.play(ControlResult(0, "go", AckermannCommand(2.0, 1.0)))
         handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
         bench.clock.sleep(0.5)

@@ -24,9 +24,9 @@ NAVIGATION = f"""
 backend: costmap
 dist_tolerance: 0.3
 angle_tolerance: 0.5
-max_vx: 1.0
-min_vx: -0.6
-max_wz: 1.0
+max_vel_x: 1.0
+min_vel_x: -0.6
+max_vel_theta: 1.0
 min_turning_radius: 1.0
 planners: [{{name: hybrid, type: hybrid_astar}}]
 controllers: [{{name: pursuit, type: regulated_pure_pursuit}}]
@@ -57,15 +57,15 @@ MPPI = f"""
 backend: costmap
 dist_tolerance: 0.3
 angle_tolerance: 0.4
-max_vx: 1.0
-min_vx: -0.6
-max_wz: 1.0
+max_vel_x: 1.0
+min_vel_x: -0.6
+max_vel_theta: 1.0
 planners: [{{name: hybrid, type: hybrid_astar}}]
 controllers: [{{name: mppi, type: mppi}}]
 recovery_behaviors: [{{name: wait, type: wait}}]
 wait: {{duration: 0.5}}
 hybrid: {{min_turning_radius: 1.3}}
-mppi: {{motion_model: ackermann, vx_max: 0.8, vx_min: -0.5, wz_max: 1.0, batch_size: 1000}}
+mppi: {{motion_model: ackermann, max_vel_x: 0.8, min_vel_x: -0.5, max_vel_theta: 1.0, batch_size: 1000}}
 global_costmap: {COSTMAP}
 local_costmap: {COSTMAP}
 """

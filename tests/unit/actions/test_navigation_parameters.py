@@ -81,21 +81,21 @@ def test_a_value_out_of_range_is_refused_and_nothing_changes(make_bench, bad):
 
 def test_a_change_is_recorded_and_restore_defaults_brings_the_configured_values_back(make_bench):
     bench = make_bench(planner_patience=7.0)
-    bench.server.set_parameters(planner_patience=1.0, max_vx=0.3)
+    bench.server.set_parameters(planner_patience=1.0, max_vel_x=0.3)
     assert bench.server.runtime.parameters.planner_patience == 1.0
-    assert bench.server.runtime.gate.limits.max_vx == 0.3
-    assert bench.events(EventKind.PARAMETER_CHANGED)[0].data == {"planner_patience": 1.0, "max_vx": 0.3}
+    assert bench.server.runtime.gate.limits.max_vel_x == 0.3
+    assert bench.events(EventKind.PARAMETER_CHANGED)[0].data == {"planner_patience": 1.0, "max_vel_x": 0.3}
     bench.server.set_parameters(restore_defaults=True)
     assert bench.server.runtime.parameters.planner_patience == 7.0
-    assert bench.server.runtime.gate.limits.max_vx == math.inf
+    assert bench.server.runtime.gate.limits.max_vel_x == math.inf
 
 
 def test_parameters_that_a_part_keeps_reach_it(make_bench):
     bench = make_bench()
-    bench.server.set_parameters(command_timeout=0.2, tf_timeout=0.7, hang_guard=9.0, max_vz=0.1)
+    bench.server.set_parameters(command_timeout=0.2, tf_timeout=0.7, hang_guard=9.0, max_vel_z=0.1)
     runtime = bench.server.runtime
     assert (runtime.gate.command_timeout, runtime.robot.max_pose_age, runtime.robot.max_velocity_age) == (0.2, 0.7, 0.7)
-    assert (bench.clock.hang_guard, runtime.gate.limits.max_vz) == (9.0, 0.1)
+    assert (bench.clock.hang_guard, runtime.gate.limits.max_vel_z) == (9.0, 0.1)
 
 
 @pytest.mark.parametrize("name", ["global_frame", "robot_frame", "odom_topic", "tf_cache_time"])

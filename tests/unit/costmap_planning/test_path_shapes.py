@@ -137,7 +137,7 @@ HYBRID_GOALS = [(-1.2, 0.19, -2.68), (-0.3, 1.46, 0.59), (-0.2, 1.02, 0.71), (0.
 def test_a_car_comes_to_the_end_of_a_hybrid_plan_with_its_heading_at_once(make_plugin, closed_loop, goal):
     planner = make_plugin(HybridAStarPlanner, FREE_MAP, min_turning_radius=1.3)
     path = planner.make_plan(PlanRequest(Pose.planar(0.0, 0.0), Pose.planar(*goal))).path
-    controller = make_plugin(MppiController, FREE_MAP, **{**MPPI_CAR, "min_turning_radius": 1.06, "wz_max": 1.0})
+    controller = make_plugin(MppiController, FREE_MAP, **{**MPPI_CAR, "min_turning_radius": 1.06, "max_vel_theta": 1.0})
     robot, outcome, seconds = closed_loop.follow(
         controller, path, FREE_MAP, start=(0.0, 0.0, 0.0), seconds=60.0, dist_tolerance=0.25, angle_tolerance=0.3
     )

@@ -100,7 +100,7 @@ def first_command(controller, velocity=0.0):
 
 
 def test_f104_from_rest_only_the_window_of_one_period_is_reachable(make_plugin):
-    command = first_command(make_plugin(RegulatedPurePursuitController, FREE_MAP, max_linear_accel=2.5))
+    command = first_command(make_plugin(RegulatedPurePursuitController, FREE_MAP, acc_lim_x=2.5))
     assert (command.vx, command.wz) == pytest.approx((0.125, 0.0))
 
 

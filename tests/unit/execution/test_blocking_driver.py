@@ -217,7 +217,7 @@ def test_a_coroutine_for_an_answer_is_a_command_that_did_not_arrive(scene):
     assert "coroutine" in lease.problem
 
 
-LIMITS = VelocityLimits(max_vz=0.1, max_wx=0.2, max_wy=0.4)
+LIMITS = VelocityLimits(max_vel_z=0.1, max_vel_roll=0.2, max_vel_pitch=0.4)
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def test_the_gate_widens_curves_to_what_the_driver_tells_or_the_configuration_sa
     with Bench(robot=Car(), **given) as bench:
         assert bench.server.runtime.gate.limits.apply(Twist.planar(1.0, wz=2.0)) == Twist.planar(1.0, wz=1.0 / radius)
         assert bench.planner.min_turning_radius == bench.controller.min_turning_radius == radius
-        bench.server.set_parameters(max_vx=0.5)
+        bench.server.set_parameters(max_vel_x=0.5)
         assert bench.server.runtime.gate.limits.min_turning_radius == radius
 
 

@@ -185,7 +185,7 @@ def test_a_stopped_car_keeps_its_wheels_turned(scene):
 
 
 # ------------------------------------------------------------------------------------------------- limits
-LIMITS = VelocityLimits(max_vx=1.0, min_vx=-0.2, max_vy=0.5, max_wz=2.0, max_steering_angle=0.6)
+LIMITS = VelocityLimits(max_vel_x=1.0, min_vel_x=-0.2, max_vel_y=0.5, max_vel_theta=2.0, max_steering_angle=0.6)
 speeds = st.floats(-100.0, 100.0).map(lambda value: round(value, 6))
 
 
@@ -222,7 +222,7 @@ def test_a_command_within_the_limits_is_passed_as_it_is():
 
 
 def test_a_robot_that_can_not_reverse_stands_when_told_to():
-    assert VelocityLimits(min_vx=0.0).apply(Twist.planar(-0.5, wz=0.3)) == Twist()
+    assert VelocityLimits(min_vel_x=0.0).apply(Twist.planar(-0.5, wz=0.3)) == Twist()
 
 
 @settings(deadline=None)
@@ -237,7 +237,7 @@ def test_a_curve_tighter_than_the_turning_circle_is_widened_at_the_same_speed(vx
 @settings(deadline=None)
 @given(speeds, speeds, st.floats(0.05, 20.0))
 def test_no_limit_that_is_applied_with_a_turning_circle_breaks_it(vx, wz, radius):
-    limits = VelocityLimits(max_vx=1.0, min_vx=-0.2, max_wz=2.0, min_turning_radius=radius)
+    limits = VelocityLimits(max_vel_x=1.0, min_vel_x=-0.2, max_vel_theta=2.0, min_turning_radius=radius)
     limited = limits.apply(Twist.planar(vx, wz=wz))
     assert -0.2 - 1e-12 <= limited.vx <= 1.0 + 1e-12 and abs(limited.wz) <= 2.0 + 1e-12
     assert abs(limited.wz) * radius <= abs(limited.vx) * (1.0 + 2e-6) + 1e-12

@@ -132,8 +132,8 @@ def test_it_tells_what_it_means_to_drive_next_with_the_turns_of_a_car_as_yaw_rat
 
     motion = controller.planned_motion()
 
-    assert motion.velocities.shape == (controller.parameters.horizon_steps, 3)
-    assert motion.step_time == controller.parameters.step_time
+    assert motion.velocities.shape == (controller.parameters.time_steps, 3)
+    assert motion.step_time == controller.parameters.model_dt
     forward, sideways, turn = motion.velocities.sum(axis=0) * motion.step_time
     assert forward > 0.1 and sideways == 0.0 and turn > 0.1  # to the left, where the path leads
     if model == "ackermann":
@@ -152,7 +152,7 @@ def coarse_with_a_fine_strip():
 def test_a_wall_thinner_than_a_step_is_not_jumped_over(make_plugin, plain, paint, refined):
     mesh_map = coarse_with_a_fine_strip() if refined else plain(spacing=0.1)
     paint(mesh_map, lambda v: np.where(np.abs(v[:, 0] - 3.0) < 0.01, np.inf, 0.0))
-    controller = make_plugin(MPPIController, mesh_map, step_time=0.5, horizon_steps=8, max_lin_velocity=2.0)
+    controller = make_plugin(MPPIController, mesh_map, model_dt=0.5, time_steps=8, max_vel_x=2.0)
     controller.set_plan(straight_path())
     pose = Pose.planar(1.0, 3.0)
     for _ in range(200):

@@ -21,7 +21,7 @@ def command_at(follower, pose):
 
 
 def test_on_a_straight_line_it_drives_straight_at_full_speed(make_plugin, plain):
-    follower = make_plugin(PathFollower, plain(), max_lin_velocity=0.8)
+    follower = make_plugin(PathFollower, plain(), max_vel_x=0.8)
     assert follower.set_plan(line(0.5, 5.5))
     command = command_at(follower, Pose.planar(1.0, 3.0)).command
     assert command.vx == pytest.approx(0.8) and command.wz == pytest.approx(0.0, abs=1e-9)
@@ -37,7 +37,7 @@ def test_beside_the_line_it_steers_back_equally_from_both_sides(make_plugin, pla
 
 @pytest.mark.parametrize("yaw", [-2.5, 2.5])
 def test_looking_elsewhere_it_turns_on_the_spot_within_the_symmetric_limit(make_plugin, plain, yaw):
-    follower = make_plugin(PathFollower, plain(), max_ang_velocity=0.9)
+    follower = make_plugin(PathFollower, plain(), max_vel_theta=0.9)
     follower.set_plan(line(0.5, 5.5))
     command = command_at(follower, Pose.planar(2.0, 3.0, yaw)).command
     assert command.vx == 0.0 and command.wz == pytest.approx(-math.copysign(0.9, yaw))
@@ -89,7 +89,7 @@ def test_steep_ground_is_driven_more_slowly(make_plugin, pose_on):
     follower = make_plugin(PathFollower, ramp)
     follower.set_plan(Path.from_points([(x, 2.0, 0.4 * x) for x in np.linspace(1, 7, 30)]))
     pose = pose_on(ramp, (2.0, 2.0, 0.8), (1, 0, 0.4))
-    assert command_at(follower, pose).command.vx < 0.7 * follower.parameters.max_lin_velocity
+    assert command_at(follower, pose).command.vx < 0.7 * follower.parameters.max_vel_x
 
 
 @pytest.mark.parametrize("yaw_response", [0.6, 0.8, 1.0])

@@ -13,7 +13,7 @@ from mbf_mesh_nav.controllers.path_follower import PathFollower
 from mbf_mesh_nav.controllers.vector_field import VectorFieldController
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 
-FOLLOWERS = {"follower": (PathFollower, {}), "mppi": (MPPIController, {"samples": 200})}
+FOLLOWERS = {"follower": (PathFollower, {}), "mppi": (MPPIController, {"batch_size": 200})}
 
 
 def out_and_back(spacing):
@@ -125,7 +125,7 @@ def turn_in_three_points(radius=1.0, step=0.05):
 
 @pytest.mark.parametrize("path", [turn_in_three_points(), with_cusps()], ids=["three points", "straight"])
 def test_a_car_drives_cusps_forward_and_back_and_keeps_to_the_robots_curves(make_plugin, plain, drive_car, path):
-    controller = make_plugin(MPPIController, plain(8.0, 6.0), motion_model="ackermann", min_lin_velocity=-0.5)
+    controller = make_plugin(MPPIController, plain(8.0, 6.0), motion_model="ackermann", min_vel_x=-0.5)
     controller.min_turning_radius = 0.95
     assert controller.set_plan(path)
     poses, speeds, angles = drive_car(controller, path[0], 60.0)
