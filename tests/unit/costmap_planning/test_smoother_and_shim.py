@@ -229,8 +229,8 @@ def test_an_inner_type_that_is_no_controller_is_a_finding_with_its_line(make_plu
 
 
 def test_the_inner_block_is_checked_like_any_other(tmp_path):
-    ((line, key, message),) = findings_of(tmp_path, "shim:\n  inner:\n    vx_maxx: 1.0\n")
-    assert (line, key) == (8, "shim.inner.vx_maxx") and "did you mean 'max_vel_x'" in message
+    ((line, key, message),) = findings_of(tmp_path, "shim:\n  inner:\n    max_vel_xx: 1.0\n")
+    assert (line, key) == (8, "shim.inner.max_vel_xx") and "did you mean 'max_vel_x'" in message
     nested = "shim:\n  inner_type: rotation_shim\n  inner: {inner_type: dwa, inner: {max_vel_x: -1.0}}\n"
     assert [key for _, key, _ in findings_of(tmp_path, nested)] == ["shim.inner.inner.max_vel_x"]
 
