@@ -49,6 +49,11 @@ class MeshPlanner(MeshPlugin, AbstractPlanner):
 class MeshController(MeshPlugin, AbstractController):
     """Follows a path over the surface of a triangle mesh."""
 
+    @property
+    def limit_factor(self) -> float:
+        """At least 1: what a recovery behaviour grants at this time, see ``Slack.controller_factor``."""
+        return self.relaxation.slack(self.clock.now()).controller_factor
+
 
 class MeshRecovery(MeshPlugin, AbstractRecovery):
     """Gets a robot on a triangle mesh out of trouble."""

@@ -13,7 +13,7 @@ from pydantic import model_validator
 
 from mbf_abstract.parameters import ParameterModel, parameter
 
-READ_ONCE = ("global_frame", "robot_frame", "odom_topic", "tf_cache_time")
+READ_ONCE = ("global_frame", "robot_frame", "use_odometry", "tf_cache_time")
 """What a running server cannot change; the attempt is an error."""
 
 
@@ -39,9 +39,6 @@ class NavigationParameters(ParameterModel):
     refiner_max_retries: int = parameter(
         0, "Further refiner calls after a failure; 0 = none, -1 = unlimited.", ge=-1, le=1000
     )
-    planner_lock_costmap: bool = parameter(
-        True, "Whether the map of a planner stays unchanged during its call.", dynamic=False
-    )
     replan_failed_policy: Literal["keep", "stop", "recover"] = parameter(
         "keep", "What move_base does if planning while driving fails: keep the old path, stop, or start recovery."
     )
@@ -53,9 +50,6 @@ class NavigationParameters(ParameterModel):
     )
     controller_max_retries: int = parameter(
         -1, "Failing cycles in a row that are tolerated; 0 = none, -1 = unlimited.", ge=-1, le=1000
-    )
-    controller_lock_costmap: bool = parameter(
-        True, "Whether the map of a controller stays unchanged during its call.", dynamic=False
     )
     force_stop_at_goal: bool = parameter(
         True, "Stop on arrival, and succeed once the robot stands; upstream's default is false.", dynamic=False
@@ -117,8 +111,8 @@ class NavigationParameters(ParameterModel):
         3.0, "Longest wait for a transform, and greatest age of the robot pose.", unit="s", gt=0.0, dynamic=False
     )
     tf_cache_time: float = parameter(10.0, "History kept of each frame.", unit="s", gt=0.0, le=3600.0, dynamic=False)
-    odom_topic: str = parameter(
-        "odom", "Source of the robot's velocity; empty = the robot has none and counts as standing.", dynamic=False
+    use_odometry: bool = parameter(
+        True, "Whether the robot's velocity comes from its odometry; otherwise it counts as standing.", dynamic=False
     )
 
     # Safety: the velocity gate and the limits of what a fault may cost
@@ -153,11 +147,11 @@ class NavigationParameters(ParameterModel):
     )
 
     # Life of the maps
-    shutdown_costmaps: bool = parameter(False, "Whether maps stop updating while no goal runs.")
+    shutdown_costmaps: bool = parameter(False, "Whether costmaps stop updating while no goal runs.")
     shutdown_costmaps_delay: float = parameter(
         1.0, "Time after the last goal before they do.", unit="s", ge=0.0, le=60.0
     )
-    clear_on_shutdown: bool = parameter(False, "Whether maps forget their obstacles when they stop.", dynamic=False)
+    clear_on_shutdown: bool = parameter(False, "Whether costmaps forget their obstacles when they stop.", dynamic=False)
     restore_defaults: bool = parameter(False, "Set all dynamic parameters back to their configured values.")
 
     @model_validator(mode="after")

@@ -25,7 +25,7 @@ class Slack:
         Arrival tolerances are at least this wide [m, rad].
     controller_factor : float
         At least 1. A controller's limits are wider by this factor: the distance from the path it may have is multiplied
-        by it, the time ahead that must be free of collision is divided by it.
+        by it, the time or distance ahead that must be free of obstacles is divided by it.
     """
 
     plan_distance: float = 0.0

@@ -309,7 +309,7 @@ class AbstractNavigationServer(PluginHost):
                 parameters.robot_frame,
                 max_pose_age=parameters.tf_timeout,
                 max_velocity_age=parameters.tf_timeout,
-                uses_odometry=bool(parameters.odom_topic),
+                uses_odometry=parameters.use_odometry,
             ),
             transforms=transforms,
             parameters=parameters,

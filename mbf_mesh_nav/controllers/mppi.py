@@ -37,6 +37,7 @@ from mbf_mesh_nav.motion.goal_approach import (
     clamp,
     ground_distance,
     heading_error,
+    missed_path,
     tracker_on_surface,
 )
 from mbf_mesh_nav.plugins import MeshContext, MeshController
@@ -166,10 +167,8 @@ class MPPIController(MeshController):
         if not self._begun:
             self._begin(spot, pose)
         self._tracker.update(spot.point)
-        if self._tracker.deviation > p.max_path_distance:
-            off = self._tracker.deviation
-            message = f"the robot is {off:.2f} m from the path, allowed are {p.max_path_distance:g} m"
-            return ControlResult(ExePathOutcome.MISSED_PATH, message)
+        if missed := missed_path(self._tracker, p.max_path_distance * self.limit_factor):
+            return missed
         if self._approach.is_only_turning(pose, self._tracker):
             off = heading_error(pose, self._approach.goal)
             self._idle_cycles += p.motion_model == "ackermann"

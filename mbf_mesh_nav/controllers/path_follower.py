@@ -28,6 +28,7 @@ from mbf_mesh_nav.motion.goal_approach import (
     clamp,
     heading_error,
     in_robot_frame,
+    missed_path,
     tracker_on_surface,
 )
 from mbf_mesh_nav.plugins import MeshController
@@ -98,12 +99,8 @@ class PathFollower(MeshController):
             reach = self.parameters.max_surface_distance
             return ControlResult(ExePathOutcome.OUT_OF_MAP, f"the robot is more than {reach:g} m from the surface")
         self._tracker.update(surface.point)
-        if self._tracker.deviation > self.parameters.max_path_distance:
-            message = (
-                f"the robot is {self._tracker.deviation:.2f} m from the path, "
-                f"allowed are {self.parameters.max_path_distance:g} m"
-            )
-            return ControlResult(ExePathOutcome.MISSED_PATH, message)
+        if missed := missed_path(self._tracker, self.parameters.max_path_distance * self.limit_factor):
+            return missed
         if self._approach.is_only_turning(pose, self._tracker):
             turn = self.parameters.turn_gain * heading_error(pose, self._approach.goal)
             return self._command(0.0, turn)
@@ -125,7 +122,7 @@ class PathFollower(MeshController):
         A robot that stands on forbidden ground itself may leave it, see ``kernels.forbidden_ground``. Where the path
         leads off the surface it is blocked too.
         """
-        ahead = np.arange(0.0, self.parameters.obstacle_distance, OBSTACLE_STEP)
+        ahead = np.arange(0.0, self.parameters.obstacle_distance / self.limit_factor, OBSTACLE_STEP)
         places = np.concatenate([here[None], self._tracker.points_at(self._tracker.progress + ahead)])
         location = self.mesh_map.locate(places, self.parameters.max_surface_distance)
         corners = self.mesh_map.faces[location.faces]

@@ -1,4 +1,4 @@
-"""Every parameter of MBF (mbf.md 4.1) with its default, its range, and what can be changed at run time."""
+"""The parameters of MBF (mbf.md 4.1) with their defaults and ranges, and what can be changed at run time."""
 
 import math
 
@@ -24,8 +24,6 @@ MBF_DEFAULTS = {
     "shutdown_costmaps": False,
     "shutdown_costmaps_delay": 1.0,
     "clear_on_shutdown": False,
-    "planner_lock_costmap": True,
-    "controller_lock_costmap": True,
     "force_stop_on_retry": True,
     "mbf_tolerance_check": False,
     "dist_tolerance": 0.1,
@@ -34,7 +32,6 @@ MBF_DEFAULTS = {
     "tf_timeout": 3.0,
     "global_frame": "map",
     "robot_frame": "base_link",
-    "odom_topic": "odom",
     "tf_cache_time": 10.0,
 }
 OURS_ARE_SAFER = {"force_stop_at_goal": True, "force_stop_on_cancel": True}
@@ -98,15 +95,17 @@ def test_parameters_that_a_part_keeps_reach_it(make_bench):
     assert (bench.clock.hang_guard, runtime.gate.limits.max_vel_z) == (9.0, 0.1)
 
 
-@pytest.mark.parametrize("name", ["global_frame", "robot_frame", "odom_topic", "tf_cache_time"])
+@pytest.mark.parametrize("name", ["global_frame", "robot_frame", "use_odometry", "tf_cache_time"])
 def test_a_parameter_that_is_read_once_is_not_accepted_without_effect(make_bench, name):
     bench = make_bench()
     before = bench.server.runtime.parameters
     with pytest.raises(ValueError, match=f"{name}: read once, at the start"):
-        bench.server.set_parameters(**{name: 3.0 if name == "tf_cache_time" else "other"}, planner_patience=1.0)
+        bench.server.set_parameters(
+            **{name: {"use_odometry": False, "tf_cache_time": 3.0}.get(name, "other")}, planner_patience=1.0
+        )
     assert bench.server.runtime.parameters is before
 
 
-def test_a_robot_without_an_odometry_topic_counts_as_standing(make_bench):
-    bench = make_bench(odom_topic="")
+def test_a_robot_without_odometry_counts_as_standing(make_bench):
+    bench = make_bench(use_odometry=False)
     assert not bench.server.runtime.robot.has_odometry

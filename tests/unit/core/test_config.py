@@ -250,8 +250,6 @@ MBF_PARAMETERS = [
     ("shutdown_costmaps", False, True),
     ("shutdown_costmaps_delay", 1.0, True),
     ("clear_on_shutdown", False, False),
-    ("planner_lock_costmap", True, False),
-    ("controller_lock_costmap", True, False),
     ("force_stop_at_goal", True, False),  # upstream: False, which lets the robot roll on
     ("force_stop_on_cancel", True, False),  # upstream: False
     ("force_stop_on_retry", True, False),
@@ -262,7 +260,6 @@ MBF_PARAMETERS = [
     ("tf_timeout", 3.0, False),
     ("global_frame", "map", False),
     ("robot_frame", "base_link", False),
-    ("odom_topic", "odom", False),
     ("tf_cache_time", 10.0, False),
 ]
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.maps.relaxation import Slack
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
+from mbf_mesh_nav.controllers.mppi import MPPIController
 from mbf_mesh_nav.controllers.path_follower import PathFollower
 from mbf_mesh_nav.planners.astar import AStarPlanner
 
@@ -74,6 +76,26 @@ def test_far_from_the_path_is_missed_path_and_off_the_surface_is_out_of_map(make
     follower.set_plan(line(0.5, 5.5))
     assert command_at(follower, Pose.planar(2.0, 4.0)).outcome == ExePathOutcome.MISSED_PATH
     assert command_at(follower, Pose.planar(2.0, 3.0, z=2.0)).outcome == ExePathOutcome.OUT_OF_MAP
+
+
+@pytest.mark.parametrize("controller", [PathFollower, MPPIController])
+def test_a_controller_tolerates_twice_the_distance_from_its_path_while_relaxed(make_plugin, plain, controller):
+    follower = make_plugin(controller, plain(), max_path_distance=0.5)
+    follower.set_plan(line(0.5, 5.5))
+    missed = command_at(follower, Pose.planar(2.0, 3.8))
+    follower.relaxation.grant("relax", Slack(controller_factor=2.0), until=follower.clock.now() + 5.0)
+    assert missed.outcome == ExePathOutcome.MISSED_PATH
+    assert command_at(follower, Pose.planar(2.0, 3.8)).success
+
+
+def test_it_looks_half_as_far_ahead_for_obstacles_while_relaxed(make_plugin, plain, paint):
+    walled = paint(plain(), lambda places: np.where(np.abs(places[:, 0] - 3.0) < 0.3, np.inf, 0.0))
+    follower = make_plugin(PathFollower, walled, obstacle_distance=1.5)
+    follower.set_plan(line(0.5, 5.5))
+    blocked = command_at(follower, Pose.planar(1.8, 3.0))
+    follower.relaxation.grant("relax", Slack(controller_factor=2.0), until=follower.clock.now() + 5.0)
+    assert blocked.outcome == ExePathOutcome.BLOCKED_PATH
+    assert command_at(follower, Pose.planar(1.8, 3.0)).success
 
 
 def test_an_empty_path_and_a_path_in_another_frame_are_refused(make_plugin, plain):

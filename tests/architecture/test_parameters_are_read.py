@@ -1,0 +1,55 @@
+"""A documented parameter has an effect: some code reads it."""
+
+import ast
+import importlib
+import pkgutil
+from pathlib import Path
+
+from mbf_abstract.parameters import ParameterModel
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")
+READ_BY_NAME = {
+    ("NavigationParameters", "restore_defaults"): "taken out of the changes before they are applied",
+    ("CriticParameters", None): "one block for each critic, read in the order of the table of critics",
+}
+
+
+def attributes_read(package):
+    """Names of all attributes that the code of a package reads."""
+    trees = (ast.parse(file.read_text("utf-8")) for file in (REPOSITORY / package).rglob("*.py"))
+    nodes = (node for tree in trees for node in ast.walk(tree))
+    return {node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load)}
+
+
+def parameter_models():
+    """Every parameter model of the packages, wherever it is defined."""
+    for package in PACKAGES:
+        for module in pkgutil.walk_packages(importlib.import_module(package).__path__, package + "."):
+            if ".templates." not in module.name:
+                importlib.import_module(module.name)
+    found = [ParameterModel]
+    for model in found:
+        found += (derived for derived in model.__subclasses__() if derived not in found)
+    return [model for model in found if model.__module__.split(".")[0] in PACKAGES]
+
+
+def packages_that_may_read(model, name):
+    """Those that know the model, or the base that declares the parameter first."""
+    first = next(base for base in reversed(model.__mro__) if name in getattr(base, "model_fields", ()))
+    homes = {kind.__module__.split(".")[0] for kind in (model, first)}
+    return PACKAGES if "mbf_abstract" in {model.__module__.split(".")[0]} else homes
+
+
+def test_every_parameter_is_read():
+    reads = {package: attributes_read(package) for package in PACKAGES}
+    models = parameter_models()
+    dead = [
+        f"{model.__module__}.{model.__name__}.{name}"
+        for model in models
+        for name in model.__annotations__.keys() & model.model_fields.keys()
+        if not any(name in reads[package] for package in packages_that_may_read(model, name))
+        and not {(model.__name__, name), (model.__name__, None)} & READ_BY_NAME.keys()
+    ]
+    assert len(models) > 80
+    assert not dead, "read by no code: " + ", ".join(sorted(dead))
