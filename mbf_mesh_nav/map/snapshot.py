@@ -7,10 +7,13 @@ more.
 
 from __future__ import annotations
 
-import sys
+import weakref
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.layers.edge_weights import show_changes
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS
@@ -63,24 +66,40 @@ class MeshSnapshot:
         return np.where(lethal | np.isposinf(costs), LETHAL_HARDNESS, by_cost).astype(np.float32)
 
 
-@dataclass(eq=False)
-class _Arrays:
-    """What a snapshot shows read-only views of."""
+class _Loan:
+    """Lives as long as anybody holds a view of the arrays of one snapshot."""
 
-    costs: CostArray
-    lethal: LethalArray
-    edge_weights: CostArray
+
+class _Lent:
+    """An array as a snapshot shows it; numpy keeps this object, and so the loan, alive for every view made of it."""
+
+    def __init__(self, array: NDArray[Any], loan: _Loan) -> None:
+        self.__array_interface__ = array.__array_interface__
+        self._owner, self._loan = array, loan
+
+
+class _Arrays:
+    """Arrays that are shown by one snapshot after the other."""
+
+    def __init__(self, costs: CostArray, lethal: LethalArray, edge_weights: CostArray) -> None:
+        self.costs, self.lethal, self.edge_weights = costs, lethal, edge_weights
+        self._loan: Callable[[], _Loan | None] = lambda: None
 
     def copy(self) -> _Arrays:
         return _Arrays(self.costs.copy(), self.lethal.copy(), self.edge_weights.copy())
 
-    def references(self) -> int:
-        """How often the most wanted of the arrays is referred to; every view of an array refers to it."""
-        return max(sys.getrefcount(array) for array in (self.costs, self.lethal, self.edge_weights))
+    def is_held(self) -> bool:
+        """Whether anybody still has the last snapshot of these arrays, or any part of it."""
+        return self._loan() is not None
 
-
-UNHELD = _Arrays(np.zeros(1, np.float32), np.zeros(1, np.bool_), np.zeros(1, np.float32)).references()
-"""References to arrays no snapshot and no view shows; what the interpreter itself holds while it counts."""
+    def show(self, version: int, edge_cost_factor: float) -> MeshSnapshot:
+        """Make the snapshot of what the arrays are now."""
+        loan = _Loan()
+        self._loan = weakref.ref(loan)
+        costs, lethal, weights = (
+            np.asarray(_Lent(part, loan)) for part in (self.costs, self.lethal, self.edge_weights)
+        )
+        return MeshSnapshot(version, costs, lethal, weights, edge_cost_factor)
 
 
 class SnapshotSeries:
@@ -103,7 +122,7 @@ class SnapshotSeries:
     def follow(self, costs: CostArray, lethal: LethalArray, changed: IntArray) -> MeshSnapshot:
         """Make the snapshot that differs from the last one at the ``changed`` vertices (k,) only."""
         last, arrays = self._current, self._spare
-        if arrays is None or arrays.references() > UNHELD:
+        if arrays is None or arrays.is_held():
             arrays, outdated = last.copy(), changed
         else:
             outdated = np.concatenate([self._missed, changed])
@@ -117,4 +136,4 @@ class SnapshotSeries:
         factor = float(self._edge_cost_factor)
         show_changes(*graph, costs, lethal, factor, outdated, now.costs, now.lethal, now.edge_weights)
         self._version += 1
-        return MeshSnapshot(self._version, now.costs.view(), now.lethal.view(), now.edge_weights.view(), factor)
+        return now.show(self._version, factor)
