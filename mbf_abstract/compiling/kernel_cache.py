@@ -5,15 +5,18 @@ of another file; ``cache=True`` alone is right for it.
 
 numba keeps the machine code of a kernel for as long as the very file that defines it stays as it was. But that code
 holds the kernels and constants that were taken from other files too, so that after an upgrade old steps would go on
-working on new arrays (a limitation of caching that numba's manual names). Here all files of the folder count as the
-source of each kernel in it.
+working on new arrays (a limitation of caching that numba's manual names). Here each state of a folder's files has a
+cache folder of its own.
 """
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import inspect
+import os
+import shutil
+import tempfile
+import threading
 import warnings
 from collections.abc import Callable
 from functools import lru_cache
@@ -22,16 +25,17 @@ from typing import Any
 
 from numba import config, njit
 from numba.core import event
-from numba.core.caching import IndexDataCacheFile, NullCache
 
 from mbf_abstract.compiling.compilation import CompilerClock
+
+_deciding_where = threading.Lock()
 
 
 def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
     """Compile ``function`` at its first call, without the interpreter lock, and keep the machine code on disk.
 
-    Where neither the package's folder nor the user's home can be written to, as in a read-only installation, nothing is
-    kept: every process compiles anew, and a warning says so and what to set.
+    It is kept in NUMBA_CACHE_DIR, beside the source or in the user's home. Where none of them can be written to, as in
+    a read-only installation, every process compiles anew, and a warning says so and what to set.
 
     Parameters
     ----------
@@ -47,25 +51,15 @@ def compile_lazily(function: Callable[..., Any], **options: Any) -> Any:
     """
     if config.DISABLE_JIT:
         return function
-    try:
-        dispatcher = njit(cache=True, nogil=True, **options)(function)
-    except RuntimeError:  # numba found no folder that it may write to
-        _tell_that_nothing_is_kept()
+    cache = _cache_folder(_folder_of_kernels(Path(inspect.getfile(function))))
+    if cache is None:
         return njit(nogil=True, **options)(function)
-    cache = dispatcher._cache
-    stamp = _sources(_folder_of_kernels(Path(inspect.getfile(function))))
-    # numba has no option for this; its own constructor makes the same object with the stamp of one file.
-    cache._cache_file = IndexDataCacheFile(cache.cache_path, cache._impl.filename_base, stamp)
-    return dispatcher
-
-
-@lru_cache
-def _tell_that_nothing_is_kept() -> None:
-    text = (
-        "compiled kernels cannot be kept, so every process compiles them anew: neither the folder of the package nor "
-        "the home folder can be written to; set NUMBA_CACHE_DIR to a folder of your own"
-    )
-    warnings.warn(text, stacklevel=3)
+    with _deciding_where:  # numba asks for the folder once, when it wraps the function
+        usual, config.CACHE_DIR = config.CACHE_DIR, str(cache)
+        try:
+            return njit(cache=True, nogil=True, **options)(function)
+        finally:
+            config.CACHE_DIR = usual
 
 
 def _folder_of_kernels(file: Path) -> Path:
@@ -74,43 +68,58 @@ def _folder_of_kernels(file: Path) -> Path:
 
 
 @lru_cache
-def _sources(folder: Path) -> bytes:
+def _cache_folder(kernels: Path) -> Path | None:
+    """Folder for the machine code of the kernels as they are now; those of earlier versions are removed."""
+    name = "kernels-" + hashlib.sha256(str(kernels.absolute()).encode()).hexdigest()[:16]
+    for place in (config.CACHE_DIR, kernels / "__pycache__", os.path.expanduser("~/.cache/mbf-flex")):
+        folder = Path(place, name, _sources(kernels))
+        try:
+            if not place or not kernels.is_dir():
+                continue
+            folder.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=folder).close()
+        except OSError:
+            continue
+        for other in folder.parent.iterdir():
+            if other != folder:
+                shutil.rmtree(other, ignore_errors=True)
+        return folder
+    _warn_that_nothing_is_kept()
+    return None
+
+
+def _sources(folder: Path) -> str:
     """Digest of all Python files of a folder and those below it."""
     digest = hashlib.sha256()
     for file in sorted(folder.rglob("*.py")):
         digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
-    return digest.digest()
+    return digest.hexdigest()[:16]
+
+
+@lru_cache
+def _warn_that_nothing_is_kept() -> None:
+    text = (
+        "compiled kernels cannot be kept, so every process compiles them anew: neither the folder of the package nor "
+        "the home folder can be written to; set NUMBA_CACHE_DIR to a folder of your own"
+    )
+    warnings.warn(text, stacklevel=4)
 
 
 class _CompilerWatch(event.Listener):  # type: ignore[misc]
-    """Tells who watches calls, and lets Python's search for cyclic garbage wait while numba compiles.
+    """Reports compilations to those who watch calls; numba notifies it while it holds its lock, a thread at a time."""
 
-    The search cost a tenth of every compilation. The compiler makes some hundred thousand objects and keeps them until
-    it is done, so the collector searches them, and all others of the process, again and again in vain. numba tells of
-    start and end while it holds its lock, so one count of the compilations within each other is right for all threads.
-    """
-
-    depth = 0
-    was_enabled = False
-    clock = CompilerClock()
+    def __init__(self) -> None:
+        self._clock = CompilerClock()
 
     def on_start(self, event: event.Event) -> None:
         """A compilation begins, perhaps within another one."""
         dispatcher = event.data["dispatcher"]
         function = dispatcher.py_func
-        kept = not isinstance(dispatcher._cache, NullCache)
-        self.clock.start(f"{function.__module__}.{function.__qualname__}", kept)
-        if self.depth == 0:
-            self.was_enabled = gc.isenabled()
-            gc.disable()
-        self.depth += 1
+        self._clock.start(f"{function.__module__}.{function.__qualname__}", dispatcher.stats.cache_path is not None)
 
     def on_end(self, _event: event.Event) -> None:
         """A compilation has ended, or failed."""
-        self.depth -= 1
-        if self.depth == 0 and self.was_enabled:
-            gc.enable()
-        self.clock.end()
+        self._clock.end()
 
 
 event.register("numba:compile", _CompilerWatch())

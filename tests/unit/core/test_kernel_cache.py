@@ -56,22 +56,33 @@ def test_two_first_runs_at_once_both_come_out_right_and_leave_a_cache_that_is_us
     assert call_in_a_process_of_its_own(tmp_path) == (20, 1)
 
 
-def test_the_garbage_collector_pauses_for_a_compilation_and_goes_on_after_one_that_failed():
+def test_the_code_of_earlier_sources_is_removed_and_that_of_todays_is_kept_beside_them(tmp_path):
+    kernels = tmp_path / "kernels"
+    kernels.mkdir()
+    (kernels / "search.py").write_text(SEARCH)
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment["PYTHONPATH"] = os.pathsep.join(sys.path)
+    for added in (1, 2):
+        (kernels / "step.py").write_text(STEP.format(added))
+        subprocess.run([sys.executable, "-c", CALL], cwd=tmp_path, env=environment, check=True)
+        assert len({file.parents[1] for file in (kernels / "__pycache__").rglob("*.nbc")}) == 1
+
+
+def test_a_compilation_leaves_the_garbage_collector_alone():
     during = []
 
     @numba.extending.overload(call_in_a_process_of_its_own)
     def note_the_collector(_value):
         during.append(gc.isenabled())
 
-    failing = compile_lazily(lambda value: call_in_a_process_of_its_own(value))
     with pytest.raises(numba.TypingError):
-        failing(1)
-    assert during and not any(during)
-    assert gc.isenabled()
+        compile_lazily(lambda value: call_in_a_process_of_its_own(value))(1)
+    assert during and all(during)
 
 
 def test_without_a_folder_to_write_to_kernels_are_compiled_anew_and_a_warning_says_what_to_set():
-    kernel_cache._tell_that_nothing_is_kept.cache_clear()
+    kernel_cache._warn_that_nothing_is_kept.cache_clear()
+    kernel_cache._cache_folder.cache_clear()
     space: dict = {}
     source = "def doubled(x):\n    return 2 * x\n\ndef halved(x):\n    return x / 2\n"
     exec(compile(source, "/a/read-only/installation/kernels.py", "exec"), space)  # for numba a file without a folder
