@@ -1,5 +1,23 @@
-"""For tests of plugins and executives: scripted and failing plugins, a loopback robot, a bench, the plugin contract.
+"""For tests of plugins, executives and map backends: scripted plugins, a loopback robot, a bench, the contracts.
 
-Nothing here is meant for a real robot. Start with ``bench.Bench`` to run goals, and with ``check_planner`` and its
-siblings in ``contract`` to test a plugin of your own.
+Nothing here is meant for a real robot. Start with ``bench.Bench`` to run goals, with ``check_planner`` and its siblings
+in ``contract`` to test a plugin of your own, and with ``check_map_backend`` to test a map backend of your own.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mbf_abstract.testing.conformance import check_map_backend
+
+__all__ = ["check_map_backend"]
+
+
+def __getattr__(name: str) -> object:
+    """Import the suite at its first use: it needs a whole server, a loopback robot does not."""
+    if name == "check_map_backend":
+        from mbf_abstract.testing.conformance import check_map_backend
+
+        return check_map_backend
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

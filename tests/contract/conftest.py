@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import Costmap
@@ -12,6 +13,7 @@ from mbf_costmap_nav.plugins import CostmapContext
 from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.plugins import MeshContext
 
 
@@ -61,3 +63,80 @@ def mesh_site():
     snapshot = mesh_map.snapshot()
     watched = [snapshot.costs, snapshot.lethal, snapshot.edge_weights, mesh_map.vertices]
     return SimpleNamespace(make_context=lambda base: MeshContext(**vars(base), mesh_map=mesh_map), watched=watched)
+
+
+PLUGINS = """
+recovery_behaviors:
+  - {name: wait, type: wait}
+  - {name: rotate, type: rotate}
+  - {name: back_up, type: back_up}
+  - {name: clear, type: clear}
+  - {name: relax, type: relax}
+"""
+
+COSTMAP = (
+    PLUGINS
+    + """
+backend: costmap
+planners: [{name: astar, type: astar}]
+controllers: [{name: pursuit, type: regulated_pure_pursuit}]
+global_costmap:
+  width: 12.0
+  height: 8.0
+  resolution: 0.1
+  robot_radius: 0.3
+  layers: [{name: obstacles, type: obstacle}, {name: inflation, type: inflation}]
+  obstacles: {sources: {lidar: {obstacle_max_range: 4.5, raytrace_max_range: 5.0}}}
+  inflation: {inflation_radius: 0.5}
+local_costmap:
+  rolling_window: true
+  width: 6.0
+  height: 6.0
+  resolution: 0.05
+  robot_radius: 0.3
+  update_frequency: 10.0
+  layers: [{name: obstacles, type: obstacle}, {name: inflation, type: inflation}]
+  obstacles: {sources: {lidar: {obstacle_max_range: 4.5, raytrace_max_range: 5.0}}}
+  inflation: {inflation_radius: 0.5}
+"""
+)
+
+MESH = (
+    PLUGINS
+    + """
+backend: mesh
+planners: [{name: cvp, type: cvp}]
+controllers: [{name: follower, type: path_follower}]
+mesh_map:
+  mesh_file: floor.ply
+  inscribed_radius: 0.3
+  default_layer: inflation
+  layers: [{name: obstacles, type: obstacle}, {name: inflation, type: inflation, inputs: [obstacles]}]
+  obstacles: {sources: [lidar]}
+  inflation: {inscribed_radius: 0.3, inflation_radius: 0.5, lethal_value: .inf, inscribed_value: 1.0}
+"""
+)
+
+
+def costmap_server(rig, **parameters):
+    return rig.server(COSTMAP, parameters)
+
+
+def mesh_server(rig, **parameters):
+    trimesh.Trimesh(*heightfield_mesh(np.zeros((81, 121)), 0.1, 0.1), process=False).export(rig.folder / "floor.ply")
+    return rig.server(MESH, parameters)
+
+
+BACKENDS = {"costmap": costmap_server, "mesh": mesh_server}
+
+
+@pytest.fixture(scope="session")
+def backends():
+    """What makes the servers of the backends for the conformance suite, by name."""
+    return BACKENDS
+
+
+@pytest.fixture(params=BACKENDS)
+def make_server(request):
+    """What makes the server of a backend for the conformance suite, one backend after the other."""
+    return BACKENDS[request.param]

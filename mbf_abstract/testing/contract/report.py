@@ -1,4 +1,4 @@
-"""Collects what a plugin does against the contract."""
+"""Collects what a plugin, or a map backend, does against its contract."""
 
 from __future__ import annotations
 
@@ -18,14 +18,17 @@ R = TypeVar("R")
 
 
 class ContractBroken(AssertionError):
-    """A plugin breaks the contract; the text lists how."""
+    """A plugin or a map backend breaks its contract; the text lists how."""
 
 
 class Report:
-    """Violations of one plugin class, and the arrays it must not change."""
+    """Violations of one plugin class or situation, and the arrays that must not change."""
 
-    def __init__(self, plugin_class: type, watched: Sequence[NDArray[Any]] = ()) -> None:
-        self._name = plugin_class.__qualname__
+    def __init__(
+        self, subject: type | str, watched: Sequence[NDArray[Any]] = (), contract: str = "plugin contract"
+    ) -> None:
+        self._name = subject if isinstance(subject, str) else subject.__qualname__
+        self._contract = contract
         self._watched = watched
         self._fingerprint = self._hash()
         self._violations: list[str] = []
@@ -82,7 +85,7 @@ class Report:
         """Raise ContractBroken if anything was recorded or a watched array has changed."""
         self.expect(self._hash() == self._fingerprint, "it changed an array it was only shown")
         if self._violations:
-            raise ContractBroken(f"{self._name} breaks the plugin contract:\n- " + "\n- ".join(self._violations))
+            raise ContractBroken(f"{self._name} breaks the {self._contract}:\n- " + "\n- ".join(self._violations))
 
     def _record_exception(self, situation: str, error: Exception) -> None:
         frame = traceback.extract_tb(error.__traceback__)[-1]

@@ -1,0 +1,117 @@
+"""The questions to a map: points, poses, paths, the nearest valid pose; in free, blocked and unknown places."""
+
+from __future__ import annotations
+
+import math
+
+from mbf_abstract.geometry import Path
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_abstract.testing.conformance.planning import FACE, WALL
+from mbf_abstract.testing.conformance.rig import T_map_dock
+from mbf_abstract.testing.conformance.site import Site, situation, somewhere
+
+NEAR = somewhere(3.8, 4.0)
+"""A place from which a robot would touch the wall."""
+AWAY = somewhere(3.2, 4.0)
+"""A place from which it would not."""
+
+
+@situation()
+def a_point_is_free_inscribed_lethal_or_outside(site: Site) -> None:
+    """check_point says FREE, INSCRIBED where a robot would touch something, LETHAL, and that there is no ground."""
+    site.place(WALL)
+    site.expect_free(AWAY)
+    site.expect_state(NEAR, CellState.INSCRIBED)
+    site.expect_state(FACE, CellState.LETHAL)
+    outside = site.server.queries.check_point(somewhere(40.0, 4.0)).state
+    site.expect(outside in (CellState.OUTSIDE, CellState.UNKNOWN), f"off the ground check_point says {outside.name}")
+
+
+@situation()
+def a_pose_is_lethal_where_the_robot_touches_something(site: Site) -> None:
+    """check_pose says FREE, or LETHAL where the robot touches something; without a pose it looks at the robot."""
+    site.place(WALL)
+    check = site.server.queries.check_pose
+    for pose, state in (
+        (None, CellState.FREE),
+        (AWAY, CellState.FREE),
+        (NEAR, CellState.LETHAL),
+        (FACE, CellState.LETHAL),
+    ):
+        said = check(pose).state
+        site.expect(said is state, f"check_pose({pose}) says {said.name}, expected {state.name}")
+    grown = check(AWAY, PlaceQuery(safety_dist=0.7)).state
+    site.expect(grown is CellState.LETHAL, f"with 0.7 m of safety check_pose says {grown.name} 0.8 m before the wall")
+
+
+@situation()
+def a_path_is_as_bad_as_its_worst_pose(site: Site) -> None:
+    """check_path gives the worst state, stops where it is asked to, and looks at no pose of an empty path."""
+    site.place(WALL)
+    queries, path = site.server.queries, site.path((2.0, 4.0), (4.2, 4.0))
+    whole, early = queries.check_path(path), queries.check_path(path, return_on=CellState.LETHAL)
+    site.expect(whole.state is CellState.LETHAL, f"the state of a path into the wall is {whole.state.name}")
+    site.expect(whole.last_checked == len(path) - 1, f"it ended at pose {whole.last_checked} of {len(path)}")
+    site.expect(early.state is CellState.LETHAL, f"with return_on the state is {early.state.name}")
+    site.expect(5 < early.last_checked < 21, f"return_on ended it at pose {early.last_checked}")
+    some = queries.check_path(path[:9], skip_poses=3)
+    site.expect(some.state is CellState.FREE, f"the state of the free part is {some.state.name}")
+    site.expect(
+        some.last_checked == 8, f"with skip_poses 3 the last pose looked at was {some.last_checked}, expected 8"
+    )
+    none = queries.check_path(Path.from_poses([]))
+    site.expect(none.last_checked == -1, f"of a path without poses it looked at pose {none.last_checked}")
+    site.expect_raises(ValueError, lambda: queries.check_path(path, skip_poses=-2), "skip_poses of -2")
+
+
+@situation()
+def a_valid_pose_is_the_nearest_one(site: Site) -> None:
+    """find_valid_pose returns a free pose as it is, else the nearest free one within the tolerance, else none."""
+    site.place(WALL)
+    find = site.server.queries.find_valid_pose
+    free, beside, none = find(AWAY, 1.0, 0.0), find(NEAR, 1.0, 0.0), find(FACE, 0.1, 0.0)
+    for name, answer, least, most in (("a free pose", free, 0.0, 0.15), ("a blocked one", beside, 0.0, 0.6)):
+        asked = AWAY if answer is free else NEAR
+        gap = math.inf if answer.pose is None else answer.pose.distance_to(asked)
+        site.expect(least <= gap <= most, f"asked about {name} it answers with one {gap:.2f} m away")
+        site.expect(answer.state <= CellState.INSCRIBED, f"asked about {name} it answers with {answer.state.name}")
+    site.expect(none.pose is None, f"within 0.1 m of the wall it found {none.pose}")
+    site.expect(none.state >= CellState.LETHAL, f"where nothing fits it says {none.state.name}")
+    site.expect_raises(ValueError, lambda: find(AWAY, -1.0, 0.0), "a negative tolerance")
+
+
+@situation()
+def poses_of_other_frames_are_transformed(site: Site) -> None:
+    """Every question takes poses of known frames, and raises TransformError for those of unknown ones."""
+    site.place(WALL)
+    queries, dock = site.server.queries, T_map_dock.inverse()
+    there = dock.apply_to_pose(FACE)
+    path = dock.apply_to_path(site.path((2.0, 4.0), (4.0, 4.0)))
+    site.expect_state(there, CellState.LETHAL)
+    site.expect(queries.check_pose(there).state is CellState.LETHAL, "check_pose misses the wall in another frame")
+    site.expect(queries.check_path(path).state is CellState.LETHAL, "check_path misses the wall in another frame")
+    found = queries.find_valid_pose(there, 1.0, 0.0).pose
+    site.expect(
+        found is not None and found.frame_id == "map", f"find_valid_pose answers {found}, not in the map's frame"
+    )
+    lost = somewhere(1.0, 1.0, "nowhere")
+    site.expect_raises(TransformError, lambda: queries.check_point(lost), "check_point in an unknown frame")
+    site.expect_raises(TransformError, lambda: queries.check_pose(lost), "check_pose in an unknown frame")
+    site.expect_raises(
+        TransformError, lambda: queries.check_path(Path.from_poses([lost])), "check_path in an unknown frame"
+    )
+    site.expect_raises(
+        TransformError, lambda: queries.find_valid_pose(lost, 1.0, 0.0), "find_valid_pose in an unknown frame"
+    )
+
+
+@situation()
+def a_cleared_map_has_forgotten(site: Site) -> None:
+    """clear_map forgets what sensors have marked, update_map shows what was seen since."""
+    site.place(WALL)
+    site.rig.sensing = False
+    site.server.queries.clear_map()
+    site.expect_free(FACE)
+    site.sees(site.ray(2.0, 4.0, hit=True))
+    site.expect_state(FACE, CellState.LETHAL)

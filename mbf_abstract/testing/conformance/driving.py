@@ -1,0 +1,139 @@
+"""What every backend does when it drives: straight, in loops, there and back, past obstacles, after newer goals."""
+
+from __future__ import annotations
+
+import math
+
+from mbf_abstract.goals.goal_area import DiscArea
+from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
+from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
+from mbf_abstract.testing.conformance.rig import Box
+from mbf_abstract.testing.conformance.site import Site, situation, somewhere
+
+CORNERS = ((2.0, 4.0), (5.0, 4.0), (5.0, 6.0), (2.0, 6.0), (2.0, 4.0))
+EIGHT = tuple(
+    (2.0 + 2.0 * math.sin(2.0 * math.pi * k / 80), 4.0 + 1.5 * math.sin(4.0 * math.pi * k / 80)) for k in range(81)
+)
+"""A figure of eight through the robot's start, which it crosses halfway."""
+
+
+@situation()
+def a_path_is_driven_to_its_end(site: Site) -> None:
+    """A path is driven to its end, and the robot stands there."""
+    result = site.navigator.exe_path(site.path((2.0, 4.0), (5.0, 4.0)))
+    site.expect_outcome(result, ExePathOutcome.SUCCESS)
+    site.expect_near(5.0, 4.0, 0.25, "arrived")
+    site.expect_stands(0.5, "the robot stands at its goal")
+
+
+@situation()
+def a_loop_is_driven_whole(site: Site) -> None:
+    """A path that ends where it began is driven whole, not arrived at once."""
+    result = site.navigator.exe_path(site.path(*CORNERS))
+    site.expect_outcome(result, ExePathOutcome.SUCCESS)
+    site.expect_visits(CORNERS)
+
+
+@situation()
+def a_path_out_and_back_is_driven_whole(site: Site) -> None:
+    """A path that turns back on itself is driven to its turn and back."""
+    corners = ((2.0, 4.0), (5.0, 4.0), (2.2, 4.0))
+    result = site.navigator.exe_path(site.path(*corners))
+    site.expect_outcome(result, ExePathOutcome.SUCCESS)
+    site.expect_visits(corners)
+
+
+@situation()
+def a_figure_of_eight_is_driven_in_order(site: Site) -> None:
+    """A path that crosses itself is driven in its order, with both of its loops."""
+    result = site.navigator.exe_path(site.path(*EIGHT))
+    site.expect_outcome(result, ExePathOutcome.SUCCESS)
+    site.expect_visits(EIGHT[::10])
+
+
+@situation(controller_max_retries=0)
+def an_obstacle_on_the_path_stops_the_robot(site: Site) -> None:
+    """An obstacle on the path ends driving with BLOCKED_PATH before it is touched."""
+    site.place(Box(4.5, 3.0, 4.8, 5.0))
+    result = site.navigator.exe_path(site.path((2.0, 4.0), (8.0, 4.0)))
+    site.expect_outcome(result, ExePathOutcome.BLOCKED_PATH)
+    site.expect_no_contact()
+    site.expect(site.rig.robot.pose.x > 2.5, "the robot did not even drive up to the obstacle")
+
+
+@situation(planner_frequency=2.0)
+def a_goal_behind_an_obstacle_is_reached(site: Site) -> None:
+    """move_base drives around an obstacle that it sees on its way."""
+    handle = site.navigator.send(MoveBaseGoal(somewhere(7.0, 4.0)))
+    site.rig.clock.sleep(0.5)
+    site.rig.boxes = [Box(4.5, 3.5, 4.8, 4.6)]
+    site.expect_outcome(handle.wait(120.0), MoveBaseOutcome.SUCCESS)
+    site.expect_near(7.0, 4.0, 0.3, "arrived")
+    site.expect_no_contact()
+
+
+@situation()
+def a_goal_area_ends_the_drive_at_its_border(site: Site) -> None:
+    """With a goal area the robot stops as soon as it is inside."""
+    area = DiscArea(somewhere(6.0, 4.0), 1.0)
+    result = site.navigator.go_to(somewhere(6.0, 4.0), goal_area=area)
+    site.expect_outcome(result, MoveBaseOutcome.SUCCESS)
+    pose = site.rig.robot.pose
+    site.expect(area.contains(pose), f"the robot stands {area.depth(pose):.2f} m inside the area")
+    site.expect(pose.x < 5.5, f"the robot drove on to x = {pose.x:.2f} m, the area begins at 5 m")
+
+
+@situation()
+def a_wide_tolerance_ends_the_drive_early(site: Site) -> None:
+    """The goal's tolerance decides where a robot has arrived."""
+    result = site.navigator.exe_path(site.path((2.0, 4.0), (6.0, 4.0)), dist_tolerance=1.0)
+    site.expect_outcome(result, ExePathOutcome.SUCCESS)
+    pose = site.rig.robot.pose
+    site.expect(4.9 < pose.x < 5.6, f"the robot stands at x = {pose.x:.2f} m, tolerated is 5 m")
+
+
+@situation()
+def a_path_in_an_unknown_frame_is_a_tf_error(site: Site) -> None:
+    """A path in an unknown frame, or a pose to go to, ends with TF_ERROR and the name of the frame."""
+    from dataclasses import replace
+
+    path = replace(site.path((2.0, 4.0), (5.0, 4.0)), frame_id="nowhere")
+    site.expect_outcome(site.navigator.exe_path(path), ExePathOutcome.TF_ERROR, "nowhere")
+    site.expect_outcome(site.navigator.go_to(somewhere(5.0, 4.0, "nowhere")), MoveBaseOutcome.TF_ERROR, "nowhere")
+
+
+@situation()
+def a_newer_path_takes_over_while_driving(site: Site) -> None:
+    """A newer path in the same slot takes over without a stop; the older goal ends CANCELED."""
+    first = site.navigator.send(ExePathGoal(site.path((2.0, 4.0), (8.0, 4.0))))
+    site.rig.clock.sleep(2.0)
+    here = site.rig.robot.pose
+    second = site.navigator.send(ExePathGoal(site.path((here.x, here.y), (here.x + 1.0, here.y), (6.0, 6.0))))
+    site.rig.clock.sleep(0.3)
+    site.expect(not site.rig.robot.command.is_stopped(), "the robot stopped for the newer path")
+    site.expect_outcome(first.wait(1.0), ExePathOutcome.CANCELED, "preempted")
+    site.expect_outcome(second.wait(60.0), ExePathOutcome.SUCCESS)
+    site.expect_near(6.0, 6.0, 0.3, "arrived at the newer goal")
+
+
+@situation()
+def a_newer_goal_takes_over_while_driving(site: Site) -> None:
+    """A newer goal of move_base takes over; the older one ends CANCELED."""
+    first = site.navigator.send(MoveBaseGoal(somewhere(8.0, 4.0)))
+    site.rig.clock.sleep(2.0)
+    second = site.navigator.send(MoveBaseGoal(somewhere(5.0, 6.0)))
+    site.expect_outcome(first.wait(1.0), MoveBaseOutcome.CANCELED)
+    site.expect_outcome(second.wait(60.0), MoveBaseOutcome.SUCCESS)
+    site.expect_near(5.0, 6.0, 0.3, "arrived at the newer goal")
+
+
+@situation()
+def a_paused_goal_stands_and_goes_on(site: Site) -> None:
+    """A paused goal stands however long, and goes on when it is resumed."""
+    handle = site.navigator.send(MoveBaseGoal(somewhere(6.0, 4.0)))
+    site.rig.clock.sleep(1.5)
+    handle.pause()
+    site.rig.clock.sleep(0.3)
+    site.expect_stands(6.0, "paused")
+    handle.resume()
+    site.expect_outcome(handle.wait(60.0), MoveBaseOutcome.SUCCESS)

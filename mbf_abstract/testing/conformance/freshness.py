@@ -1,0 +1,80 @@
+"""A map whose sensor is silent, whose marks were cleared, or whose stamps lie in the future is not driven on."""
+
+from __future__ import annotations
+
+from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal, RecoveryGoal
+from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome, RecoveryOutcome
+from mbf_abstract.testing.conformance.planning import WALL
+from mbf_abstract.testing.conformance.rig import MAX_SILENCE, SENSOR
+from mbf_abstract.testing.conformance.site import Site, situation, somewhere
+
+SILENT = MAX_SILENCE + 0.5  # s after which the robot must stand
+
+
+@situation(controller_patience=20.0)
+def a_silent_sensor_holds_the_robot_while_it_drives(site: Site) -> None:
+    """The robot stands while its sensor is silent, and drives on when it speaks again."""
+    handle = site.navigator.send(MoveBaseGoal(somewhere(8.0, 4.0)))
+    site.expect_moves(1.0, "with a sensor that works")
+    site.rig.sensing = False
+    site.rig.clock.sleep(SILENT)
+    site.expect_stands(3.0, "the sensor is silent")
+    site.expect(
+        SENSOR in site.server.map_problem(), f"map_problem does not name the sensor: {site.server.map_problem()!r}"
+    )
+    site.rig.sensing = True
+    site.expect_moves(1.5, "the sensor speaks again")
+    site.expect_outcome(handle.wait(60.0), MoveBaseOutcome.SUCCESS)
+
+
+@situation()
+def a_sensor_that_stays_silent_ends_the_path_with_map_error(site: Site) -> None:
+    """A path that cannot be driven because the sensor stays silent ends with MAP_ERROR and the sensor's name."""
+    handle = site.navigator.send(ExePathGoal(site.path((2.0, 4.0), (9.0, 4.0))))
+    site.rig.clock.sleep(1.0)
+    site.rig.sensing = False
+    site.expect_outcome(handle.wait(30.0), ExePathOutcome.MAP_ERROR, SENSOR)
+
+
+@situation()
+def a_silent_sensor_holds_a_recovery(site: Site) -> None:
+    """A recovery stands while the sensor is silent, and finishes when it speaks again."""
+    handle = site.navigator.send(RecoveryGoal("rotate"))
+    site.expect_moves(0.5, "with a sensor that works")
+    site.rig.sensing = False
+    site.rig.clock.sleep(SILENT)
+    site.expect_stands(3.0, "the sensor is silent")
+    site.rig.sensing = True
+    site.expect_moves(1.5, "the sensor speaks again")
+    site.expect_outcome(handle.wait(60.0), RecoveryOutcome.SUCCESS)
+
+
+@situation(controller_patience=20.0)
+def a_cleared_map_is_not_driven_on_until_it_sees_again(site: Site) -> None:
+    """After clearing, by query or by recovery, the robot stands until a scan is in the map again."""
+    site.place(WALL)
+    for clear in (site.server.queries.clear_map, lambda: site.navigator.recover("clear")):
+        site.rig.sensing = False
+        clear()
+        site.expect(bool(site.server.map_problem()), "a map that has forgotten what it saw counts as current")
+        here = site.rig.robot.pose
+        handle = site.navigator.send(ExePathGoal(site.path((here.x, here.y), (here.x, here.y + 1.0))))
+        site.expect_stands(0.6, "the map was cleared and nothing was seen since")
+        site.rig.sensing = True
+        site.expect_outcome(handle.wait(30.0), ExePathOutcome.SUCCESS)
+
+
+@situation(controller_patience=20.0)
+def a_stamp_from_the_future_is_no_sign_of_life(site: Site) -> None:
+    """A scan from the future does not keep the map current, and holds the robot until one of now comes."""
+    site.rig.sensing = False
+    now = site.rig.clock.now()
+    try:
+        site.server.take_scan(site.ray(2.0, 3.9, hit=False, stamp=now + 60.0))
+    except ValueError:
+        pass  # refused is as good
+    handle = site.navigator.send(ExePathGoal(site.path((2.0, 4.0), (4.0, 4.0))))
+    site.rig.clock.sleep(SILENT)
+    site.expect_stands(2.0, "the newest stamp lies a minute in the future")
+    site.rig.sensing = True
+    site.expect_outcome(handle.wait(30.0), ExePathOutcome.SUCCESS)

@@ -1,0 +1,140 @@
+"""What every backend answers when it is asked for a path: goals free and blocked, tolerances, via points, frames."""
+
+from __future__ import annotations
+
+import math
+
+from mbf_abstract.geometry import Path
+from mbf_abstract.goals.goal_area import DiscArea
+from mbf_abstract.maps.queries import CellState
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import PluginKind
+from mbf_abstract.testing.conformance.rig import ROBOT_RADIUS, START, Box, T_map_dock
+from mbf_abstract.testing.conformance.site import Site, situation, somewhere
+
+WALL = Box(4.0, 3.5, 4.4, 4.5)
+FACE = somewhere(4.0, 4.0)
+"""Where the sensor sees the wall first."""
+CAGE = (Box(0.6, 2.6, 3.4, 2.8), Box(0.6, 5.2, 3.4, 5.4), Box(0.6, 2.6, 0.8, 5.4), Box(3.2, 2.6, 3.4, 5.4))
+"""Four walls around the robot's start, 1.2 m away."""
+
+
+def _end(path: Path | None, x: float, y: float) -> float:
+    """Distance [m] of a path's end from a place; inf without a path."""
+    return math.inf if path is None or not len(path) else path[-1].distance_to(somewhere(x, y))
+
+
+@situation()
+def a_free_goal_gets_a_free_path(site: Site) -> None:
+    """A path over empty ground leads from the robot to the goal and nowhere else."""
+    plan = site.navigator.get_path(somewhere(9.0, 6.0))
+    site.expect_outcome(plan, GetPathOutcome.SUCCESS)
+    if plan.path is None:
+        return
+    site.expect(plan.path[0].distance_to(START) < 0.3, "the path begins away from the robot")
+    site.expect(_end(plan.path, 9.0, 6.0) < 0.2, f"the path ends {_end(plan.path, 9.0, 6.0):.2f} m from the goal")
+    site.expect(7.2 < plan.path.length < 8.6, f"the path is {plan.path.length:.2f} m long, the goal 7.28 m away")
+    site.expect(plan.cost > 0.0, f"the path costs {plan.cost:g}")
+    worst = site.server.queries.check_path(plan.path).state
+    site.expect(worst in (CellState.FREE, CellState.UNKNOWN), f"check_path says {worst.name} of the path")
+
+
+@situation()
+def a_path_leads_around_what_was_seen(site: Site) -> None:
+    """A plan keeps away from an obstacle that only the sensor knows, by the radius of the robot."""
+    site.place(WALL)
+    plan = site.navigator.get_path(somewhere(7.0, 4.0))
+    site.expect_outcome(plan, GetPathOutcome.SUCCESS)
+    if plan.path is not None:
+        gap = min(math.hypot(x - 4.0, max(abs(y - 4.0) - 0.5, 0.0)) for x, y, _ in plan.path.positions.tolist())
+        site.expect(gap > ROBOT_RADIUS - 0.1, f"the path passes the wall's face at {gap:.2f} m")
+
+
+@situation()
+def a_goal_inside_walls_is_not_found(site: Site) -> None:
+    """A goal that cannot be reached ends with NO_PATH_FOUND."""
+    site.place(*CAGE)
+    plan = site.navigator.get_path(somewhere(8.0, 4.0))
+    site.expect_outcome(plan, GetPathOutcome.NO_PATH_FOUND)
+
+
+@situation()
+def a_blocked_goal_is_named(site: Site) -> None:
+    """A goal on an obstacle ends with BLOCKED_GOAL if the path must end exactly there."""
+    site.place(WALL)
+    site.expect_outcome(site.navigator.get_path(FACE, dist_tolerance=0.0), GetPathOutcome.BLOCKED_GOAL)
+
+
+@situation()
+def a_blocked_start_is_named(site: Site) -> None:
+    """A start on an obstacle ends with BLOCKED_START."""
+    site.place(WALL)
+    plan = site.navigator.get_path(somewhere(7.0, 2.0), start_pose=FACE)
+    site.expect_outcome(plan, GetPathOutcome.BLOCKED_START)
+
+
+@situation()
+def a_goal_off_the_ground_is_refused(site: Site) -> None:
+    """A goal where there is no ground gets no path."""
+    plan = site.navigator.get_path(somewhere(40.0, 4.0))
+    refused = {
+        GetPathOutcome.OUT_OF_MAP,
+        GetPathOutcome.INVALID_GOAL,
+        GetPathOutcome.BLOCKED_GOAL,
+        GetPathOutcome.NO_PATH_FOUND,
+    }
+    site.expect(plan.outcome in refused, f"expected OUT_OF_MAP or alike, got {plan.outcome_name}: {plan.message}")
+
+
+@situation()
+def a_tolerance_lets_a_path_end_beside_a_blocked_goal(site: Site) -> None:
+    """A tolerance of the goal lets the path end beside what blocks it, and no farther."""
+    site.place(WALL)
+    plan = site.navigator.get_path(FACE, dist_tolerance=1.0)
+    site.expect_outcome(plan, GetPathOutcome.SUCCESS)
+    end = _end(plan.path, FACE.x, FACE.y)
+    site.expect(0.2 < end <= 1.0, f"the path ends {end:.2f} m from the goal, allowed is 1 m")
+
+
+@situation()
+def via_points_are_passed(site: Site) -> None:
+    """A path leads by its via points, in their order."""
+    via = (somewhere(4.0, 6.0), somewhere(7.0, 2.0))
+    plan = site.navigator.get_path(somewhere(9.0, 4.0), via=via)
+    site.expect_outcome(plan, GetPathOutcome.SUCCESS)
+    if plan.path is None:
+        return
+    nearest = [min(range(len(plan.path)), key=lambda i, at=pose: plan.path[i].distance_to(at)) for pose in via]  # type: ignore[misc]
+    gaps = [plan.path[i].distance_to(pose) for i, pose in zip(nearest, via, strict=True)]
+    site.expect(max(gaps) < 0.3, f"the path passes its via points at {gaps[0]:.2f} m and {gaps[1]:.2f} m")
+    site.expect(nearest[0] < nearest[1], "the path passes its via points in another order")
+
+
+@situation()
+def any_member_of_a_goal_area_will_do(site: Site) -> None:
+    """A goal area is reached at another place where its middle is blocked."""
+    site.place(WALL)
+    area = DiscArea(somewhere(4.0, 4.0), 1.2)
+    plan = site.navigator.get_path(somewhere(4.0, 4.0), goal_area=area)
+    site.expect_outcome(plan, GetPathOutcome.SUCCESS)
+    if plan.path is not None:
+        site.expect(area.contains(plan.path[-1]), "the path ends outside the area")
+
+
+@situation()
+def a_goal_in_another_frame_is_transformed(site: Site) -> None:
+    """A goal in a known frame is planned for in the map, one in an unknown frame ends with TF_ERROR."""
+    there = T_map_dock.apply_to_pose(somewhere(1.0, -2.0, "dock"))
+    plan = site.navigator.get_path(somewhere(1.0, -2.0, "dock"))
+    site.expect_outcome(plan, GetPathOutcome.SUCCESS)
+    end = _end(plan.path, there.x, there.y)
+    site.expect(end < 0.2, f"the path ends {end:.2f} m from the goal")
+    site.expect_outcome(site.navigator.get_path(somewhere(1.0, 1.0, "nowhere")), GetPathOutcome.TF_ERROR, "nowhere")
+
+
+@situation(planner_patience=1.0)
+def a_planner_out_of_time_ends_with_pat_exceeded(site: Site) -> None:
+    """A planner that takes longer than its patience ends with PAT_EXCEEDED."""
+    planner = site.server.plugins.all_of(PluginKind.PLANNER)[0].instance
+    planner.modelled_compute_time = 10.0
+    site.expect_outcome(site.navigator.get_path(somewhere(9.0, 4.0)), GetPathOutcome.PAT_EXCEEDED)
