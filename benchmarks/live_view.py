@@ -30,12 +30,12 @@ def drive(scenario: Scenario, executive: str, served: bool) -> tuple[float, floa
     """CPU and wall seconds from the first step of the world to the goal."""
     session = Session(scenario)
     try:
-        tour = GoalSequence(session, make_executive(executive, session.navigator))
-        page = LiveSession(session, tour, ViewOptions(port=PORT, speed=0.0, stay=False)) if served else nullcontext()
+        sequence = GoalSequence(session, make_executive(executive, session.navigator))
+        page = LiveSession(session, sequence, ViewOptions(port=PORT, speed=0.0)) if served else nullcontext()
         with page:
             cpu, wall = time.process_time(), time.perf_counter()
             session.run()
-            result = tour.visit_goals()
+            result = sequence.visit_goals()
             cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
     finally:
         session.close()

@@ -59,7 +59,7 @@ def run_job(job: Job) -> dict[str, Any]:
     """Run one seed of one variant of a scenario, for its verdict only."""
     name, variant, seed = job
     with tempfile.TemporaryDirectory(prefix="mbf_margins_") as folder:
-        result = run_scenario(scenario_of(name, variant), RunOptions(Path(folder), seed=seed, draw=False))
+        result = run_scenario(scenario_of(name, variant), RunOptions(Path(folder), seed=seed))
     numbers = result.metrics
     return {"scenario": name, "variant": variant, "seed": seed} | {key: numbers.get(key) for key in KEPT}
 

@@ -35,6 +35,7 @@ from terrain.scenarios.scenario import Scenario
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.sweeps.log import SweepLog
 from terrain.sweeps.sweep import Job, SweepRun, hash_of, run_all
+from terrain.viewer.results import write_results
 
 SLOPE_ONLY = {  # what mesh_navigation's steepness and inflation layers know: slopes without a direction, no footprint
     "planner": "dijkstra",
@@ -149,7 +150,9 @@ def keep_replays(chosen: list[tuple[Scenario, int]], rows: list[Row], folder: Fi
     for (method, failure), (scenario, run) in jobs.items():
         settings = dict(run.settings)
         target = folder / f"{method} {failure}".replace("*", "star").replace(",", "").replace(" ", "_")
-        run_scenario(scenario, RunOptions(target, settings.pop("backend", None), run.seed, settings=settings))
+        backend = settings.pop("backend", None)
+        options = RunOptions(target, backend, run.seed, settings=settings, write_views=write_results)
+        run_scenario(scenario, options)
 
 
 def by_place(rows: list[Row]) -> list[Row]:

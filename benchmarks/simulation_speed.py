@@ -25,7 +25,7 @@ from terrain.physics.robot_models import HUSKY
 from terrain.physics.robots import WheeledRobot
 from terrain.physics.simulation import SimulatedRobot, Simulation, SteppedWorld
 from terrain.physics.world import STATIC, BulletWorld
-from terrain.sensors.lidar import Lidar, ring_directions
+from terrain.sensors.lidar import Lidar, LidarModel, ring_directions
 from terrain.sensors.rays import StaticRays
 from terrain.worlds.elevation_files import jacksboro
 from terrain.worlds.heightfield import Heightfield
@@ -41,8 +41,8 @@ def cpu_seconds(work: Callable[[], object]) -> float:
 
 
 def ring_lidar(robot: SimulatedRobot, rays: StaticRays) -> Lidar:
-    rng = np.random.default_rng(0)
-    return Lidar(robot, "lidar", [rays], HUSKY.lidar_position, ring_directions(), 10.0, rng, max_range=RANGE)
+    model = LidarModel(HUSKY.lidar_position, ring_directions(), 10.0, RANGE)
+    return Lidar(robot, "lidar", [rays], model, np.random.default_rng(0))
 
 
 def realtime_factor(world: SteppedWorld, robot: SimulatedRobot, sensors: dict[str, Lidar], seconds: float) -> float:

@@ -14,6 +14,7 @@ import tempfile
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -23,6 +24,7 @@ from PIL import Image
 from terrain.scenarios.scenario import load_scenario
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.viewer.live.options import ViewOptions
+from terrain.viewer.live.session import LiveSession
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PICTURES = REPOSITORY / "docs" / "pictures"
@@ -65,10 +67,8 @@ def browser_of_the_tests() -> ModuleType:
 def serve(shot: Shot, folder: Path) -> str:
     """Start the run in the background and return the address of its page."""
     addresses: queue.Queue[str] = queue.Queue()
-    view = ViewOptions(port=18700, stay=False)
-    options = RunOptions(
-        folder, draw=False, executive=shot.executive, settings=shot.settings, view=view, on_page=addresses.put
-    )
+    watch = partial(LiveSession, options=ViewOptions(port=18700), on_page=addresses.put)
+    options = RunOptions(folder, executive=shot.executive, settings=shot.settings, watch=watch)
     threading.Thread(target=run_scenario, args=(load_scenario(shot.scenario), options), daemon=True).start()
     return addresses.get(timeout=START_TIMEOUT)
 

@@ -11,6 +11,7 @@ from terrain.recording.recording import Recording
 from terrain.scenarios.scenario import load_scenario
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.viewer.pictures.animation import write_animation
+from terrain.viewer.results import write_results
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
 WIDTH = 900  # pixels
@@ -19,7 +20,7 @@ WIDTH = 900  # pixels
 def make(name: str) -> None:
     """Run a shipped scenario and keep its picture, small, and its animation."""
     with tempfile.TemporaryDirectory() as folder:
-        result = run_scenario(load_scenario(name), RunOptions(Path(folder)))
+        result = run_scenario(load_scenario(name), RunOptions(Path(folder), write_views=write_results))
         if not result.success:
             raise SystemExit(f"{name}: {result.verdict}")
         image = Image.open(Path(folder) / "picture.png").convert("RGB")

@@ -9,13 +9,13 @@ Run it twice and change nothing but the configuration::
 import sys
 
 from mbf_abstract.outcomes import ExePathOutcome
-from terrain.session.session import Session
+from terrain.session.session import Session, SessionOptions
 
 RECOVERY_FOR = {ExePathOutcome.COLLISION: "back_up", ExePathOutcome.ROBOT_STUCK: "back_up"}
 
 
 def main(scenario: str, backend: str) -> bool:
-    with Session(scenario, backend) as session:
+    with Session(scenario, SessionOptions(backend=backend)) as session:
         navigator, goal = session.navigator, session.goals[0]
         for attempt in range(5):
             plan = navigator.get_path(goal)

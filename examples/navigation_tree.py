@@ -13,13 +13,13 @@ from mbf_abstract.executives.pacing import TimeLimit
 from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_drawing import as_text
 from mbf_abstract.executives.tree_executive import TreeExecutive
-from terrain.session.session import Session
+from terrain.session.session import Session, SessionOptions
 
 
 def main(scenario: str, backend: str, time_limit: float = 600.0) -> bool:
     tree = TimeLimit("in time", navigation_tree(TreeOptions(second_planner_pause=1.0)), time_limit)
     print(as_text(tree))
-    with Session(scenario, backend) as session:
+    with Session(scenario, SessionOptions(backend=backend)) as session:
         result = TreeExecutive(tree, session.navigator).run(session.goals[0])
         print(f"{result.message}; at {session.clock.now():.1f} s the robot is at {session.navigator.robot_pose()}")
     return result.success

@@ -20,7 +20,7 @@ from mbf_abstract.executives.state_machine import State, StateMachine
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult
-from terrain.session.session import Session
+from terrain.session.session import Session, SessionOptions
 
 WAYPOINTS = [(7.5, 1.5), (1.5, 5.0), (6.0, 5.5), (3.5, 1.5)]  # x, y [m], all in the reception
 
@@ -107,7 +107,7 @@ def waypoint_machine(tour: Tour) -> StateMachine:
 
 
 def main(scenario: str, backend: str) -> bool:
-    with Session(scenario, backend) as session:
+    with Session(scenario, SessionOptions(backend=backend)) as session:
         start = session.navigator.robot_pose()
         poses = [Pose.planar(x, y, 0.0, session.world.height_at(x, y)) for x, y in WAYPOINTS]
         tour = Tour([start, *poses])

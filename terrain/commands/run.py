@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -61,6 +63,8 @@ def run(
         from terrain.scenarios.scenario import load_scenario
         from terrain.session.runner import RunOptions, run_scenario
         from terrain.viewer.live.options import ViewOptions
+        from terrain.viewer.live.session import LiveSession
+        from terrain.viewer.results import write_results
 
         loaded = load_scenario(scenario)
         if map_file is not None:
@@ -76,11 +80,16 @@ def run(
                 on_step=live.step,
                 on_note=live.note,
                 executive=executive,
-                on_page=lambda address: live.note(f"live view at {address}"),
-                view=ViewOptions(view_host, view_port, view_speed, stay, view_token, view_read_only) if view else None,
+                write_views=partial(write_results, on_step=live.step),
             )
+            if view:
+                page = ViewOptions(view_host, view_port, view_speed, view_token, view_read_only)
+                watch = partial(
+                    LiveSession, options=page, on_page=lambda at: live.note(f"live view at {at}"), on_note=live.note
+                )
+                options = replace(options, watch=watch, stay=stay)
             result = run_scenario(loaded, options)
-    _tell(result, as_json)
+    _print_result(result, as_json)
     if not result.success:
         raise typer.Exit(FAILURE)
 
@@ -159,7 +168,7 @@ def new_run_folder(parent: Path, now: datetime) -> Path:
     return next(parent / name for name in names if not (parent / name).exists())
 
 
-def _tell(result: RunResult, as_json: bool) -> None:
+def _print_result(result: RunResult, as_json: bool) -> None:
     metrics = result.metrics
     if as_json:
         typer.echo(json.dumps({**result.verdict.to_json(), "folder": str(result.folder), "metrics": metrics}))

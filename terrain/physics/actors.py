@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
 
@@ -32,7 +33,6 @@ Triangles = tuple[FloatArray, NDArray[np.int32]]
 
 PERSON_RADIUS: float = 0.25  # m
 PERSON_HEIGHT: float = 1.7  # m
-PERSON_SIZE = (PERSON_RADIUS, PERSON_HEIGHT)
 MAX_ROUTE_DRAWS = 10_000
 COURTESY = 0.3  # m; who gives way stops this far from the robot
 
@@ -65,6 +65,27 @@ class VisibleRobot(Protocol):
         """Where it is."""
 
 
+@dataclass(frozen=True)
+class Body:
+    """What moves on a route.
+
+    Attributes
+    ----------
+    size : (2,) or (3,) float
+        Radius and height of an upright cylinder, or length, width and height of a box [m].
+    thing : Thing
+    looks : triangles, optional
+        In the frame of its middle; those of the cylinder or box where absent.
+    """
+
+    size: Sequence[float] = (PERSON_RADIUS, PERSON_HEIGHT)
+    thing: Thing = Thing.PERSON
+    looks: Triangles | None = None
+
+
+PERSON = Body()
+
+
 class RouteWalker:
     """Somebody or something that follows a closed route of straight lines at constant speed.
 
@@ -77,11 +98,7 @@ class RouteWalker:
         [m/s]
     start : float
         How far along the route [m] it is at time 0.
-    size : (2,) or (3,) float
-        Radius and height of an upright cylinder, or length, width and height of a box [m].
-    thing : Thing
-    looks : triangles, optional
-        In the frame of its middle; those of the cylinder or box where absent.
+    body : Body
     gives_way : bool
         Wait as long as the robot it has met is just ahead, instead of pushing it.
     """
@@ -92,9 +109,7 @@ class RouteWalker:
         route: FloatArray,
         speed: float,
         start: float = 0.0,
-        size: Sequence[float] = PERSON_SIZE,
-        thing: Thing = Thing.PERSON,
-        looks: Triangles | None = None,
+        body: Body = PERSON,
         gives_way: bool = False,
     ) -> None:
         corners = np.asarray(route, dtype=float)
@@ -105,20 +120,21 @@ class RouteWalker:
         self._world = world
         self._speed = speed
         self._start = start
+        size = body.size
         self._lift = 0.5 * size[-1]
         self._reach = size[0] if len(size) == 2 else 0.5 * math.hypot(size[0], size[1])
         self._waited = 0.0
         self._gives_way = gives_way
         self._robot: VisibleRobot | None = None
-        self.thing = thing
+        self.thing = body.thing
         if len(size) == 2:
             radius, height = size
             self.body = world.add_cylinder(self.pose(), radius, height, moving=True)
-            self.looks = looks or cylinder_triangles(radius, height)
+            self.looks = body.looks or cylinder_triangles(radius, height)
         else:
             self.body = world.add_box(self.pose(), size, moving=True)
-            self.looks = looks or box_triangles(size)
-        world.things[self.body] = thing
+            self.looks = body.looks or box_triangles(size)
+        world.things[self.body] = body.thing
         world.before_step(self._move)
 
     def pose(self) -> Pose:
@@ -195,7 +211,8 @@ def other_robot(
     """Put in another robot that follows a route: a box as large as the model, with its body and wheels to look at."""
     length, width = np.ptp(spec.footprint_array(), axis=0).tolist()
     size = (length, width, spec.height)
-    return RouteWalker(world, route, speed, start, size, Thing.ROBOT, _robot_looks(spec, size), gives_way)
+    body = Body(size, Thing.ROBOT, _robot_looks(spec, size))
+    return RouteWalker(world, route, speed, start, body, gives_way)
 
 
 def _robot_looks(spec: RobotSpec, size: tuple[float, float, float]) -> Triangles:

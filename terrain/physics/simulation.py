@@ -16,8 +16,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
+from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Command, Pose
 from terrain.physics.incidents import Incident, IncidentMonitor, MotionSample
+from terrain.physics.robot_models import RobotSpec
 from terrain.sensors.lidar import SensedRobot, Sensor
 
 MONITOR_RATE = 20.0  # Hz
@@ -44,8 +46,15 @@ class SteppedWorld(Protocol):
 class SimulatedRobot(SensedRobot, Protocol):
     """A robot in such a world: ``WheeledRobot`` or ``KinematicRobot``."""
 
+    @property
+    def spec(self) -> RobotSpec:
+        """Its model."""
+
     def send_command(self, command: Command) -> None:
         """Hold a command until the next one or the time-out."""
+
+    def odometry(self) -> Odometry:
+        """Ground truth of the velocity, stamped with the world's time."""
 
     def motion_sample(self) -> MotionSample:
         """Collect what ``IncidentMonitor`` looks at."""

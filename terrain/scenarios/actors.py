@@ -10,7 +10,15 @@ from pydantic import Field
 
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
-from terrain.physics.actors import PERSON_HEIGHT, PERSON_RADIUS, RouteWalker, SlidingDoor, other_robot, random_route
+from terrain.physics.actors import (
+    PERSON_HEIGHT,
+    PERSON_RADIUS,
+    Body,
+    RouteWalker,
+    SlidingDoor,
+    other_robot,
+    random_route,
+)
 from terrain.physics.robot_models import ROBOTS
 from terrain.scenarios.places import PlanarPose
 from terrain.scenarios.world import ScenarioWorld
@@ -83,8 +91,8 @@ def add_actors(
 def _on_route(world: ScenarioWorld, actor: Walker | OtherRobot, route: FloatArray) -> RouteWalker:
     if isinstance(actor, OtherRobot):
         return other_robot(world.physics, ROBOTS[actor.model], route, actor.speed, actor.start, actor.gives_way)
-    size = (actor.radius, actor.height)
-    return RouteWalker(world.physics, route, actor.speed, actor.start, size, gives_way=actor.gives_way)
+    body = Body((actor.radius, actor.height))
+    return RouteWalker(world.physics, route, actor.speed, actor.start, body, actor.gives_way)
 
 
 def _crowd(world: ScenarioWorld, crowd: Crowd, rng: np.random.Generator) -> list[RouteWalker]:

@@ -18,7 +18,7 @@ from terrain.worlds.map_files import MapFiles
 WORLD_STREAM, FOREST_STREAM, ACTOR_STREAM, MAP_STREAM = 1, 2, 3, 4  # each part draws from its own generator
 
 
-def set_stage(scenario: Scenario, folder: Path, seed: int) -> tuple[ScenarioWorld, Surface | None]:
+def build_environment(scenario: Scenario, folder: Path, seed: int) -> tuple[ScenarioWorld, Surface | None]:
     """Build the world of a scenario, write its map files into ``folder``, then add obstacles and actors.
 
     Returns

@@ -15,8 +15,8 @@ from terrain.scenarios import scenario as model
 from terrain.scenarios.faults import IMU, LOCALIZATION, ODOMETRY
 from terrain.scenarios.noise import LocalizationNoise
 from terrain.scenarios.world import ScenarioWorld
-from terrain.sensors.lidar import Lidar, Sensor, camera_directions, planar_directions, ring_directions
-from terrain.sensors.proprioception import Imu, Localization, WheelOdometry
+from terrain.sensors.lidar import Lidar, LidarModel, Sensor, camera_directions, planar_directions, ring_directions
+from terrain.sensors.proprioception import Imu, Localization, PoseNoise, WheelOdometry
 from terrain.sensors.rays import MovingRays, RayCaster, StaticRays
 from terrain.worlds.upright_solids import SolidRays
 
@@ -42,13 +42,9 @@ def make_proprioceptive_sensors(scenario: model.Scenario, robot: AnyRobot, seed:
 
 def make_localization(noise: LocalizationNoise, robot: AnyRobot, seed: int) -> Localization:
     """Make the localisation of a robot, which is as noisy as the scenario says."""
+    angles = math.radians(noise.yaw_noise), math.radians(noise.tilt_noise)
     return Localization(
-        robot,
-        _generator(seed, LOCALIZATION),
-        position_noise=noise.position_noise,
-        yaw_noise=math.radians(noise.yaw_noise),
-        height_noise=noise.height_noise,
-        tilt_noise=math.radians(noise.tilt_noise),
+        robot, _generator(seed, LOCALIZATION), PoseNoise(noise.position_noise, noise.height_noise, *angles)
     )
 
 
@@ -62,15 +58,7 @@ def _lidar(sensor: model.Sensor, robot: AnyRobot, casters: list[RayCaster], seed
         directions = camera_directions(sensor.rays, 3 * sensor.rays // 4)
     else:
         directions = planar_directions(sensor.rays) if sensor.type == "planar" else ring_directions(rays=sensor.rays)
-    return Lidar(
-        robot,
-        sensor.name,
-        casters,
-        robot.spec.lidar_position,
-        directions,
-        sensor.rate,
-        _generator(seed, sensor.name),
-        max_range=sensor.max_range,
-        noise=sensor.noise,
-        drop_out=sensor.drop_out,
+    scanner = LidarModel(
+        robot.spec.lidar_position, directions, sensor.rate, sensor.max_range, sensor.noise, sensor.drop_out
     )
+    return Lidar(robot, sensor.name, casters, scanner, _generator(seed, sensor.name))

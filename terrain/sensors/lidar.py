@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -88,6 +88,35 @@ class Sensor(ABC, Generic[Measurement]):
         """Return what a defective sensor would say instead."""
 
 
+@dataclass(frozen=True)
+class LidarModel:
+    """What a scanner can do.
+
+    Attributes
+    ----------
+    position : (3,) float
+        In base_link [m].
+    directions : (n, 3) float64
+        Unit rays in base_link.
+    rate : float
+        Turns per second [Hz].
+    max_range, min_range : float
+        Farther hits are no hits, nearer ones are dropped [m].
+    noise : float
+        Standard deviation of ranges [m].
+    drop_out : float
+        Share of rays without any answer, 0..1.
+    """
+
+    position: Vector3
+    directions: FloatArray
+    rate: float
+    max_range: float = 20.0
+    noise: float = 0.01
+    drop_out: float = 0.0
+    min_range: float = 0.1
+
+
 class Lidar(Sensor[RangeScan]):
     """A scanner with a fixed fan of rays; all rays of a turn are cast at once.
 
@@ -100,16 +129,7 @@ class Lidar(Sensor[RangeScan]):
         Name of this sensor in its scans, as layers of a server's configuration call it.
     casters : sequence of RayCaster
         What it can see.
-    position : (3,) float
-        In base_link [m].
-    directions : (n, 3) float64
-        Unit rays in base_link.
-    min_range, max_range : float
-        Nearer hits are dropped, farther ones are no hits [m].
-    noise : float
-        Standard deviation of ranges [m].
-    drop_out : float
-        Share of rays without any answer, 0..1.
+    model : LidarModel
     """
 
     def __init__(
@@ -117,40 +137,29 @@ class Lidar(Sensor[RangeScan]):
         robot: SensedRobot,
         source: str,
         casters: Sequence[RayCaster],
-        position: Vector3,
-        directions: FloatArray,
-        rate: float,
+        model: LidarModel,
         rng: np.random.Generator,
-        min_range: float = 0.1,
-        max_range: float = 20.0,
-        noise: float = 0.01,
-        drop_out: float = 0.0,
     ) -> None:
-        super().__init__(robot, rate, rng)
+        super().__init__(robot, model.rate, rng)
         self.source = source
         self.casters = list(casters)
-        self.position = np.asarray(position, dtype=float)
-        self.directions = directions
-        self.min_range = min_range
-        self.max_range = max_range
-        self.noise = noise
-        self.drop_out = drop_out
+        self.model = model
 
     def _sense(self, stamp: float) -> RangeScan:
-        pose = self.robot.pose()
+        model, pose = self.model, self.robot.pose()
         R_map_base = pose.rotation
-        origin = np.array(pose.position) + rotated(R_map_base, self.position)
-        directions = rotated(R_map_base, self.directions)
+        origin = np.array(pose.position) + rotated(R_map_base, np.asarray(model.position, dtype=float))
+        directions = rotated(R_map_base, model.directions)
         origins = np.broadcast_to(origin, directions.shape)
         ranges = np.full(len(directions), np.inf)
         for caster in self.casters:
-            ranges = np.minimum(ranges, caster.distances(origins, directions, self.max_range))
+            ranges = np.minimum(ranges, caster.distances(origins, directions, model.max_range))
         # every turn draws the same amount of noise, whatever it sees: seeds stay comparable between scenarios
-        noise = self.noise * self.rng.normal(size=len(ranges))
-        kept = self.rng.uniform(size=len(ranges)) >= self.drop_out
+        noise = model.noise * self.rng.normal(size=len(ranges))
+        kept = self.rng.uniform(size=len(ranges)) >= model.drop_out
         hit = np.isfinite(ranges)
-        kept &= ~hit | (ranges >= self.min_range)
-        ranges = np.where(hit, np.clip(ranges + noise, self.min_range, self.max_range), self.max_range)
+        kept &= ~hit | (ranges >= model.min_range)
+        ranges = np.where(hit, np.clip(ranges + noise, model.min_range, model.max_range), model.max_range)
         ends = origin + ranges[:, None] * directions
         return RangeScan(self.source, pose.frame_id, origin, ends[kept], hit[kept], stamp)
 

@@ -111,15 +111,25 @@ class WheelOdometry(Sensor[WheelOdometryReading]):
         return replace(measurement, odometry=replace(measurement.odometry, velocity=twist))
 
 
+@dataclass(frozen=True)
+class PoseNoise:
+    """Standard deviations of x and y, and of z [m]; of the heading, and of roll and pitch [rad]."""
+
+    position: float = 0.0
+    height: float = 0.0
+    yaw: float = 0.0
+    tilt: float = 0.0
+
+
+NO_NOISE = PoseNoise()
+
+
 class Localization(Sensor[Pose]):
     """The pose of base_link in map as a localisation would give it: ground truth, noise, and an offset that can jump.
 
     Parameters
     ----------
-    position_noise, height_noise : float
-        Standard deviations of x and y, and of z [m].
-    yaw_noise, tilt_noise : float
-        Standard deviations of the heading, and of roll and pitch [rad].
+    noise : PoseNoise
 
     Attributes
     ----------
@@ -128,35 +138,25 @@ class Localization(Sensor[Pose]):
     """
 
     def __init__(
-        self,
-        robot: SensedRobot,
-        rng: np.random.Generator,
-        rate: float = 50.0,
-        position_noise: float = 0.0,
-        yaw_noise: float = 0.0,
-        height_noise: float = 0.0,
-        tilt_noise: float = 0.0,
+        self, robot: SensedRobot, rng: np.random.Generator, noise: PoseNoise = NO_NOISE, rate: float = 50.0
     ) -> None:
         super().__init__(robot, rate, rng)
-        self.position_noise = position_noise
-        self.yaw_noise = yaw_noise
-        self.height_noise = height_noise
-        self.tilt_noise = tilt_noise
+        self.noise = noise
         self.offset: Vector3 = (0.0, 0.0, 0.0)
 
     def _sense(self, stamp: float) -> Pose:
-        noise = self.rng.normal(size=6).tolist()
+        noise, drawn = self.noise, self.rng.normal(size=6).tolist()
         dx, dy, dyaw = self.offset
-        shift = (dx + self.position_noise * noise[0], dy + self.position_noise * noise[1])
-        pose = _shifted(self.robot.pose(), *shift, dyaw + self.yaw_noise * noise[2], stamp)
-        raised = (pose.x, pose.y, pose.z + self.height_noise * noise[3])
-        return replace(pose, position=raised, orientation=self._tilted(pose.orientation, noise[4], noise[5]))
+        shift = (dx + noise.position * drawn[0], dy + noise.position * drawn[1])
+        pose = _shifted(self.robot.pose(), *shift, dyaw + noise.yaw * drawn[2], stamp)
+        raised = (pose.x, pose.y, pose.z + noise.height * drawn[3])
+        return replace(pose, position=raised, orientation=self._tilted(pose.orientation, drawn[4], drawn[5]))
 
     def _tilted(self, orientation: Quaternion, roll: float, pitch: float) -> Quaternion:
         """Turn an orientation about its own x and y axis by so many standard deviations."""
-        if self.tilt_noise == 0.0:
+        if self.noise.tilt == 0.0:
             return orientation
-        half = 0.5 * self.tilt_noise
+        half = 0.5 * self.noise.tilt
         about_x = (math.sin(half * roll), 0.0, 0.0, math.cos(half * roll))
         about_y = (0.0, math.sin(half * pitch), 0.0, math.cos(half * pitch))
         return quaternion_multiply(orientation, quaternion_multiply(about_x, about_y))

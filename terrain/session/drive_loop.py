@@ -4,27 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.events import EventKind
-from mbf_abstract.geometry import Command, Pose
+from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.time.clock import ClockThread, Priority, WallClock
 from terrain.physics.simulation import Simulation
-from terrain.recording.recorder import Recorder
 from terrain.recording.run_digest import RunDigest
 from terrain.scenarios.faults import ODOMETRY, seen_from
 from terrain.sensors.proprioception import Localization, WheelOdometryReading
 
-PERIOD = 1.0 / 60.0  # s between two publications of the robot's pose
-TICKS_PER_SAMPLE = 6  # 10 samples a second are recorded and reported
-SCANS_PER_RECORDED = 10
 STOP_TIMEOUT = 2.0  # s
 
-Report = Callable[[float, Pose, float], None]
+
+class LoopRates(NamedTuple):
+    """Time between two publications of the pose [s], and how many of them go on one sample of the robot."""
+
+    period: float = 1.0 / 60.0
+    ticks_per_sample: int = 6
+
+
+DEFAULT_RATES = LoopRates()
 
 
 class ClockedRobot:
@@ -32,26 +36,18 @@ class ClockedRobot:
 
     Parameters
     ----------
+    simulation : Simulation
+        Its odometry is that of the wheels where the robot has that sensor, else the truth.
     send : callable
-        Takes the commands for its motors.
-    measure : callable
-        Returns its odometry, stamped with the world's time.
+        Takes the commands for the motors.
     digest : RunDigest
         Takes every command.
-    min_turning_radius : float
-        Its tightest curve [m]; 0 = it turns on the spot.
     """
 
-    def __init__(
-        self,
-        send: Callable[[Command], None],
-        measure: Callable[[], Odometry],
-        digest: RunDigest,
-        min_turning_radius: float,
-    ) -> None:
-        self.min_turning_radius = min_turning_radius
+    def __init__(self, simulation: Simulation, send: Callable[[Command], None], digest: RunDigest) -> None:
+        self.min_turning_radius = simulation.robot.spec.min_turning_radius
+        self._simulation = simulation
         self._send = send
-        self._measure = measure
         self._digest = digest
         self.time_offset = 0.0
 
@@ -62,32 +58,37 @@ class ClockedRobot:
 
     def odometry(self) -> Odometry:
         """Measured velocity; the stamp is the clock's time, not the simulation's."""
-        measured = self._measure()
+        reading = self._simulation.latest.get(ODOMETRY)
+        measured = self._simulation.robot.odometry() if reading is None else reading.odometry
         return Odometry(measured.velocity, measured.stamp + self.time_offset)
 
 
 class DriveLoop:
-    """Steps the simulator up to the clock's time, 60 times a second; publishes pose and scans.
+    """Steps the simulator up to the clock's time at a fixed period; publishes pose and scans.
 
     Parameters
     ----------
     simulation : Simulation
     robot : ClockedRobot
     localization : Localization
-        Where the robot believes to be; its pose is what the server gets.
+        Its pose is what the server gets.
     server : AbstractNavigationServer
         Gets the scans; its clock drives the loop.
-    recorder : Recorder
     digest : RunDigest
         Takes the true pose after every step.
+    rates : LoopRates
 
     Attributes
     ----------
     true_pose : Pose
         Ground truth of the robot at the last step, which is no older than any pose that was published.
     on_tick : list of callables
-        Called with the simulated time [s] after each step, 60 times a second, on the simulator's thread: while one of
-        them runs nothing else does and no simulated time passes.
+        Called with the simulated time [s] after each period, on the simulator's thread: no simulated time passes
+        while one of them runs.
+    on_sample : list of callables
+        Called with the simulated time [s], the true pose and the true velocity at each sample.
+    on_scan : list of callables
+        Called with each scan, stamped with the simulation's time.
     on_failure : list of callables
         Called once on that thread if the world or a listener raises; nothing is stepped after that.
     failure : BaseException or None
@@ -100,23 +101,24 @@ class DriveLoop:
         robot: ClockedRobot,
         localization: Localization,
         server: AbstractNavigationServer,
-        recorder: Recorder,
         digest: RunDigest,
+        rates: LoopRates = DEFAULT_RATES,
     ) -> None:
         self._robot = robot
         self._simulation = simulation
         self._localization = localization
         self._server = server
-        self._recorder = recorder
         self._digest = digest
+        self._rates = rates
         self._runtime = server.runtime
-        self._scans = 0
         self._odom_stamp: float | None = None
         self._stopped = False
         self._thread: ClockThread | None = None
         self._origin = self._runtime.clock.now()
         self.true_pose = simulation.robot.pose()
         self.on_tick: list[Callable[[float], None]] = []
+        self.on_sample: list[Callable[[float, Pose, Twist], None]] = []
+        self.on_scan: list[Callable[[RangeScan], None]] = []
         self.on_failure: list[Callable[[], None]] = []
         self.failure: BaseException | None = None
         simulation.on_measurement(self._take_measurement)
@@ -126,9 +128,8 @@ class DriveLoop:
         """Time [s] of the clock at which the simulation's time was 0."""
         return self._origin
 
-    def start(self, report: Report) -> None:
-        """Start the thread; ``report(time, pose, speed)`` is called ten times a second."""
-        self._report = report
+    def start(self) -> None:
+        """Start the thread."""
         self._origin = self._robot.time_offset = self._runtime.clock.now()
         self._thread = self._runtime.clock.spawn(self._loop, "simulator", Priority.SIMULATOR)
 
@@ -165,7 +166,7 @@ class DriveLoop:
             self._runtime.transforms.set(T_map_base @ T_odom_base.inverse())
 
     def _loop(self) -> None:
-        """Step until the end; a thread that died without a word would leave everybody waiting for the world."""
+        """Step until the end; report an error, because all other threads wait for this one."""
         try:
             self._step_on()
         except BaseException as error:
@@ -180,18 +181,18 @@ class DriveLoop:
             self.true_pose = self._simulation.robot.pose()
             self._digest.pose(self.true_pose)
             self.publish()
-            if tick % TICKS_PER_SAMPLE == 0:
+            if tick % self._rates.ticks_per_sample == 0:
                 self._sample()
             for listener in self.on_tick:
                 listener(self._simulation.time)
             tick += 1
-            clock.sleep_until(self._origin + tick * PERIOD)
+            clock.sleep_until(self._origin + tick * self._rates.period)
 
     def _sample(self) -> None:
-        robot, time = self._simulation.robot, self._simulation.time
+        robot = self._simulation.robot
         pose, velocity = robot.pose(), robot.velocity()
-        self._recorder.sample(time, pose, velocity, self._runtime.gate.last_command)
-        self._report(time, pose, velocity.speed)
+        for listener in self.on_sample:
+            listener(self._simulation.time, pose, velocity)
 
     def _take_measurement(self, name: str, measurement: Any) -> None:
         if isinstance(measurement, WheelOdometryReading):
@@ -206,6 +207,5 @@ class DriveLoop:
             self._server.take_scan(scan)
         except Exception as error:  # a map that refuses a scan must not stop the physics
             self._runtime.events.emit(EventKind.FAULT, name, type=type(error).__name__, message=str(error))
-        self._scans += 1
-        if self._scans % SCANS_PER_RECORDED == 1:
-            self._recorder.scan(measurement.stamp, measurement.points)
+        for listener in self.on_scan:
+            listener(measurement)

@@ -1,4 +1,4 @@
-"""Ways to get a robot to a goal in a run: the ``move_base`` action, a ready behaviour tree, the classic state machine.
+"""Executives of a run: the ``move_base`` action, a reference behaviour tree, the classic state machine.
 
 All of them block the thread that calls ``drive`` until the goal has ended and can be canceled from any other thread.
 ``make_executive`` finds one by the name that ``mbf run --executive`` takes.
@@ -50,7 +50,7 @@ class GoalExecutive(ABC):
 
 
 def make_executive(executive: str, navigator: Navigator) -> GoalExecutive:
-    """Make the driver of a name in ``EXECUTIVES``; raises ConfigError for another one."""
+    """Make the executive of a name in ``EXECUTIVES``; raises ConfigError for another one."""
     if executive == "move_base":
         return MoveBaseExecutive(navigator)
     if executive == "classic":
@@ -98,7 +98,7 @@ class ClassicExecutive(GoalExecutive):
 
 
 class ReferenceTreeExecutive(GoalExecutive):
-    """A ready behaviour tree, with those of its recoveries that the server has loaded.
+    """A reference behaviour tree, with those of its recoveries that the server has loaded.
 
     The tree ``control`` follows a path it is given, so ``planning`` goes before it; ``planning`` alone only plans.
     """
@@ -138,7 +138,7 @@ class ReferenceTreeExecutive(GoalExecutive):
         )
 
     def _as_move_base(self, result: TreeResult, goal: Pose) -> MoveBaseResult:
-        """Say how a tree ended in the words of ``move_base``: with the code of the failure it gave up on."""
+        """Return the result of a tree as one of ``move_base``: with the code of the failure it gave up on."""
         if result.status == Status.INVALID:
             outcome = int(MoveBaseOutcome.CANCELED)
         elif result.success:

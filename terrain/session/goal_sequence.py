@@ -1,7 +1,7 @@
-"""Which goals a run visits, one after the other: those of the scenario, then those that somebody asks for.
+"""The goals that a run visits, one after the other: those of the scenario, then those that somebody asks for.
 
-The tour runs on the thread that calls ``visit_goals``. ``go_to``, ``cancel`` and ``end`` come from the simulator's
-thread (``DriveLoop.on_tick``), between two steps, so that a goal which comes from outside comes at a definite time.
+The sequence runs on the thread that calls ``visit_goals``. ``go_to``, ``cancel`` and ``end`` are called on the
+simulator's thread (``DriveLoop.on_tick``), between two steps, so that a goal from outside comes at a definite time.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ class AskedGoal:
 
 
 class GoalSequence:
-    """Visits goals with a driver; the first failure ends the scenario's part.
+    """Visits goals with an executive; the first failure ends the scenario's part.
 
     Parameters
     ----------
     session : Session
         Running.
-    driver : GoalExecutive
+    executive : GoalExecutive
     stay : bool
         Wait for further goals after those of the scenario, until ``end`` is called.
 
     Attributes
     ----------
     on_goal : list of callables
-        Told each goal that somebody has asked for, before it is sent.
+        Called with each goal that somebody has asked for, before it is sent.
     is_waiting : bool
         Whether there is no goal to go to at the moment.
     target : Pose or None
@@ -53,13 +53,13 @@ class GoalSequence:
         Where the robot was in truth when navigation said that a goal was reached, goal by goal.
     """
 
-    def __init__(self, session: Session, driver: GoalExecutive, stay: bool = False) -> None:
+    def __init__(self, session: Session, executive: GoalExecutive, stay: bool = False) -> None:
         self.on_goal: list[Callable[[Pose], None]] = []
         self.is_waiting = False
         self.target: Pose | None = None
         self.last_result: MoveBaseResult | None = None
         self._session = session
-        self._driver = driver
+        self._executive = executive
         self._stay = stay
         self.arrivals: list[Arrival] = []
         self._condition = session.clock.condition()
@@ -95,7 +95,7 @@ class GoalSequence:
 
     def cancel(self, reason: str) -> None:
         """Cancel the present goal; the rest of the scenario goes with it."""
-        self._driver.cancel(reason)
+        self._executive.cancel(reason)
 
     def end(self, reason: str) -> None:
         """Cancel the present goal and take no more."""
@@ -107,14 +107,14 @@ class GoalSequence:
     # -------------------------------------------------------------------------------------------------
     def _visit(self, goal: AskedGoal) -> MoveBaseResult:
         self.target = goal.pose
-        self.last_result = result = self._driver.drive(goal.pose, goal.planner, goal.controller)
+        self.last_result = result = self._executive.drive(goal.pose, goal.planner, goal.controller)
         self.target = None
-        if result.success and self._driver.arrives:
+        if result.success and self._executive.arrives:
             self.arrivals.append(Arrival.at(goal.pose, self._session.loop.true_pose, result))
         return result
 
     def _await_goal(self) -> AskedGoal | None:
-        """Wait for the next goal if there may be one; None when the tour is over."""
+        """Wait for the next goal if there may be one; None when the sequence is over."""
         self._deadline = float("inf")
         with self._condition:
             self.is_waiting = True

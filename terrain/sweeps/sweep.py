@@ -88,7 +88,7 @@ def run_once(scenario: Scenario, run: SweepRun) -> dict[str, Any]:
     settings = dict(run.settings)
     backend = settings.pop("backend", None)
     with tempfile.TemporaryDirectory(prefix="mbf_sweep_") as folder:
-        options = RunOptions(Path(folder), backend, run.seed, draw=False, settings=settings, geodesic=True)
+        options = RunOptions(Path(folder), backend, run.seed, settings=settings, geodesic=True)
         try:
             result = run_scenario(scenario, options)
         except Exception as error:  # one impossible variant must not end the sweep

@@ -148,6 +148,18 @@ def test_views_stay_out_of_algorithms():
     )
 
 
+def test_sessions_and_scenarios_know_no_viewer_and_no_command():
+    """Outputs are passed in by whoever runs them."""
+    outputs = ("terrain.viewer.", "terrain.commands.")
+    assert_none(
+        (name, line, module)
+        for name in FILES
+        if name.startswith(("terrain/session/", "terrain/scenarios/"))
+        for module, line in imports(name)
+        if f"{module}.".startswith(outputs)
+    )
+
+
 def test_plugins_know_no_server_no_action_and_no_other_plugin():
     for name in FILES:
         if name.split("/")[1] not in PLUGIN_ROOMS or name.endswith("__init__.py"):

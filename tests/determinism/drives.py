@@ -11,7 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from terrain.experiments.table1.conditions import ARMS
+from terrain.experiments.table1.conditions import CONDITIONS
 from terrain.experiments.table1.environments.world import WAREHOUSE
 from terrain.experiments.table1.repetition import run_repetition
 from terrain.scenarios.scenario import load_scenario
@@ -24,13 +24,13 @@ SWEEP = "sweep"
 def drive(name: str, seed: int | None = None) -> str:
     """Digest of the shipped scenario ``name``, its outcome included."""
     with tempfile.TemporaryDirectory() as folder:
-        result = run_scenario(load_scenario(name), RunOptions(Path(folder), draw=False, seed=seed))
+        result = run_scenario(load_scenario(name), RunOptions(Path(folder), seed=seed))
     return f"{result.metrics['digest']}"
 
 
-def table_1_leg(arm: str) -> str:
+def table_1_leg(condition: str) -> str:
     """Digest of one leg among other robots, with the track driven to the last bit."""
-    run = run_repetition(ARMS[arm], WAREHOUSE, seed=101, legs=1)
+    run = run_repetition(CONDITIONS[condition], WAREHOUSE, seed=101, legs=1)
     return hashlib.sha256(run.digest.encode() + run.track.tobytes()).hexdigest()
 
 
@@ -40,7 +40,7 @@ def sweep() -> str:
 
 
 def digest_of(name: str) -> str:
-    """Digest of a shipped scenario, ``table1/ARM`` or ``sweep``."""
+    """Digest of a shipped scenario, ``table1/CONDITION`` or ``sweep``."""
     if name == SWEEP:
         return sweep()
     return table_1_leg(name.removeprefix(TABLE_1)) if name.startswith(TABLE_1) else drive(name)

@@ -25,7 +25,7 @@ def example(tmp_path):
 
 @pytest.mark.timeout(300)
 def test_the_scenario_of_the_page_succeeds(example, tmp_path):
-    result = run_scenario(example, RunOptions(tmp_path / "run", draw=False))
+    result = run_scenario(example, RunOptions(tmp_path / "run"))
     assert result.success, str(result.verdict)
 
 

@@ -10,7 +10,7 @@ from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
 from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
-from terrain.session.session import Session
+from terrain.session.session import Session, SessionOptions
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -35,7 +35,7 @@ def test_all_legs_are_planned_first_and_the_cheap_order_is_driven(backend, waypo
 
 @pytest.mark.parametrize("backend", ["costmap", "mesh"])
 def test_the_tree_and_the_classic_machine_drive_the_same_robot(backend):
-    with Session("indoor", backend) as session:
+    with Session("indoor", SessionOptions(backend=backend)) as session:
         there = Pose.planar(4.5, 2.0, 0.5, session.world.height_at(4.5, 2.0))
         back = Pose.planar(3.0, 3.0, 3.0, session.world.height_at(3.0, 3.0))
         tree = TreeExecutive(navigation_tree(TreeOptions(second_planner_pause=1.0)), session.navigator)

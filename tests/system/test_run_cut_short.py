@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from terrain.scenarios.actors import Walker
 from terrain.scenarios.scenario import PlanarPose, load_scenario
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.viewer.live.options import ViewOptions
+from terrain.viewer.live.session import LiveSession
 
 pytestmark = pytest.mark.timeout(300)
 
@@ -97,7 +99,7 @@ def recorded(tmp_path_factory):
         if (folder / PARTS).is_dir():
             shutil.copytree(folder / PARTS, kept / PARTS, dirs_exist_ok=True)
 
-    result = run_scenario(scenario, RunOptions(folder, draw=False, on_progress=keep))
+    result = run_scenario(scenario, RunOptions(folder, on_progress=keep))
     assert result.success, result.verdict
     return folder, kept
 
@@ -147,7 +149,7 @@ def test_a_new_run_in_the_same_folder_starts_from_nothing(recorded, tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_scenario(scenario, RunOptions(folder, draw=False, on_step=stop))
+        run_scenario(scenario, RunOptions(folder, on_step=stop))
 
     left = {file.name for file in folder.iterdir()}
     assert not left & {"recording.npz", "metrics.json", "report.html", PARTS}
@@ -163,7 +165,7 @@ def test_a_disk_that_takes_no_parts_is_told_once_and_the_run_goes_on(tmp_path):
             shutil.rmtree(tmp_path / PARTS)
             (tmp_path / PARTS).write_text("in the way")
 
-    result = run_scenario(scenario, RunOptions(tmp_path, draw=False, on_progress=block))
+    result = run_scenario(scenario, RunOptions(tmp_path, on_progress=block))
 
     assert result.success, result.verdict
     lines = [json.loads(line) for line in (tmp_path / "events.jsonl").read_text().splitlines()]
@@ -180,11 +182,10 @@ def test_a_simulation_that_fails_ends_the_run_with_its_error(tmp_path, stay):
             raise ValueError("the floor has gone")
 
     notes = []
-    view = ViewOptions(port=18800, speed=0.0, stay=stay) if stay else None
+    watch = partial(LiveSession, options=ViewOptions(port=18800, speed=0.0)) if stay else RunOptions.watch
     with pytest.raises(ValueError, match="the floor has gone"):
-        run_scenario(
-            scenario, RunOptions(tmp_path, draw=False, on_progress=fail, view=view, on_note=notes.append)
-        )  # fmt: skip
+        options = RunOptions(tmp_path, on_progress=fail, watch=watch, stay=stay, on_note=notes.append)
+        run_scenario(scenario, options)
 
     assert "mbf replay" in notes[-1]
     assert read_parts(tmp_path).duration > 2.9

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.timeout(300)
 
 
 def run(scenario, folder, **options):
-    return run_scenario(scenario, RunOptions(folder, draw=False, **options))
+    return run_scenario(scenario, RunOptions(folder, **options))
 
 
 def nearby(scenario, **changes):

@@ -42,7 +42,7 @@ def test_a_car_reaches_a_pose_behind_it_without_turning_on_the_spot(tmp_path, ph
     (tmp_path / "nav.yaml").write_text(NAVIGATION)
     (tmp_path / "parking.yaml").write_text(SCENARIO + f"physics: {physics}\n")
 
-    result = run_scenario(load_scenario(tmp_path / "parking.yaml"), RunOptions(tmp_path / "run", draw=False))
+    result = run_scenario(load_scenario(tmp_path / "parking.yaml"), RunOptions(tmp_path / "run"))
 
     assert result.success, result.verdict
     with np.load(tmp_path / "run" / "recording.npz") as recording:
@@ -85,7 +85,7 @@ def test_a_car_drives_hybrid_plans_with_cusps_by_mppi_on_the_curves_its_driver_t
     (tmp_path / "nav.yaml").write_text(MPPI)
     (tmp_path / "parking.yaml").write_text(text)
 
-    result = run_scenario(load_scenario(tmp_path / "parking.yaml"), RunOptions(tmp_path / "run", draw=False))
+    result = run_scenario(load_scenario(tmp_path / "parking.yaml"), RunOptions(tmp_path / "run"))
 
     assert result.success, result.verdict
     with np.load(tmp_path / "run" / "recording.npz") as recording:

@@ -11,7 +11,7 @@ from mbf_abstract.geometry import Twist
 from terrain.scenarios.actors import Walker
 from terrain.scenarios.scenario import PlanarPose, load_scenario
 from terrain.session.runner import RunOptions, run_scenario
-from terrain.session.session import Session
+from terrain.session.session import Session, SessionOptions
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def corridor(monkeypatch):
 
 
 def test_the_crowded_corridor_is_driven_with_lidar_and_people_and_repeats(corridor, tmp_path):
-    runs = [run_scenario(corridor, RunOptions(tmp_path / name, draw=False)) for name in ("first", "second")]
+    runs = [run_scenario(corridor, RunOptions(tmp_path / name)) for name in ("first", "second")]
     assert runs[0].success, runs[0].verdict
     assert runs[0].metrics["real_time_factor"] > 1.0
     logs = [(tmp_path / name / "events.jsonl").read_bytes() for name in ("first", "second")]
@@ -32,7 +32,7 @@ def test_the_crowded_corridor_is_driven_with_lidar_and_people_and_repeats(corrid
 
 def test_a_finished_run_leaves_no_thread_and_no_world_behind(corridor, tmp_path):
     before = threading.active_count()
-    with Session(corridor, folder=tmp_path) as session:
+    with Session(corridor, SessionOptions(tmp_path)) as session:
         session.clock.sleep(1.0)
         assert threading.active_count() > before
         world = weakref.ref(session.world)
@@ -45,7 +45,7 @@ def test_a_finished_run_leaves_no_thread_and_no_world_behind(corridor, tmp_path)
 def test_a_person_in_the_way_is_seen_by_the_lidar_and_stops_the_robot(corridor, tmp_path):
     standing = Walker(type="walker", route=((4.0, 9.7), (4.0, 9.71)), speed=0.0)
     scenario = corridor.model_copy(update={"actors": (standing,), "start": PlanarPose(x=2.0, y=9.7)})
-    with Session(scenario, folder=tmp_path) as session:
+    with Session(scenario, SessionOptions(tmp_path)) as session:
         ends, hits = session.simulation.latest["lidar"].ends, session.simulation.latest["lidar"].hits
         ahead = ends[hits & (abs(ends[:, 1] - 9.7) < 0.1) & (ends[:, 0] > 2.0)]
         assert ahead[:, 0].min() == pytest.approx(3.75, abs=0.05)

@@ -34,6 +34,6 @@ GIVE_UP_SOON = {"controller_patience": "2.0", "recovery_enabled": "false"}  # re
 def test_the_shipped_scenario_fails_on_the_straight_line(name, shipped, tmp_path):
     scenario = shipped(name)
     settings = {"planner": STRAIGHT[scenario.backend], **GIVE_UP_SOON}
-    result = run_scenario(scenario, RunOptions(tmp_path, draw=False, settings=settings))
+    result = run_scenario(scenario, RunOptions(tmp_path, settings=settings))
     assert not result.success
     assert result.verdict.outcome_name != "INVALID_PLUGIN", result.verdict

@@ -21,14 +21,14 @@ def test_at_least_twelve_scenarios_ship_and_each_says_what_it_proves():
 
 @pytest.mark.parametrize("name", sorted(set(shipped_scenarios()) - RUN_ELSEWHERE))
 def test_the_shipped_scenario_succeeds(name, shipped, tmp_path):
-    result = run_scenario(shipped(name), RunOptions(tmp_path, draw=False))
+    result = run_scenario(shipped(name), RunOptions(tmp_path))
     assert result.success, result.verdict
 
 
 def test_the_robot_stands_still_while_its_lidar_is_silent(shipped, tmp_path):
     scenario = shipped("sensor_blackout")
     blackout = scenario.faults[0]
-    run_scenario(scenario, RunOptions(tmp_path, draw=False))
+    run_scenario(scenario, RunOptions(tmp_path))
     with np.load(tmp_path / "recording.npz") as recording:
         times, forward = recording["times"], recording["twists"][:, 0]
     silent = (times > blackout.start + TIME_TO_NOTICE) & (times < blackout.end)

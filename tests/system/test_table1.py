@@ -1,11 +1,11 @@
-"""Short real runs of the experiment: one leg in the warehouse, both arms; and the same log twice."""
+"""Short real runs of the experiment: one leg in the warehouse, both conditions; and the same log twice."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from terrain.experiments.table1.conditions import ARMS, without_traffic
+from terrain.experiments.table1.conditions import CONDITIONS, without_traffic
 from terrain.experiments.table1.environments.outdoor_environment import OUTDOOR
 from terrain.experiments.table1.environments.world import WAREHOUSE
 from terrain.experiments.table1.repetition import run_repetition
@@ -14,9 +14,9 @@ pytestmark = pytest.mark.timeout(300)  # a leg takes some ten seconds of process
 DEPOT = Path(__file__).with_name("table1_depot.yaml")
 
 
-@pytest.mark.parametrize("arm", ["S1", "B"])
-def test_an_empty_world_costs_one_plan_one_hand_over_and_no_recovery(arm):
-    run = run_repetition(without_traffic(ARMS[arm]), WAREHOUSE, seed=100, legs=1)
+@pytest.mark.parametrize("condition", ["S1", "B"])
+def test_an_empty_world_costs_one_plan_one_hand_over_and_no_recovery(condition):
+    run = run_repetition(without_traffic(CONDITIONS[condition]), WAREHOUSE, seed=100, legs=1)
     tally = run.tally
     assert (tally.all_planner_calls, tally.controller_calls, tally.all_recoveries) == (1, 1, 0)
     leg = tally.legs[0]
@@ -27,19 +27,19 @@ def test_an_empty_world_costs_one_plan_one_hand_over_and_no_recovery(arm):
 
 
 def test_both_arms_meet_the_same_traffic_and_a_run_repeats_bit_for_bit():
-    crowded = replace(ARMS["B"], conditions=replace(ARMS["B"].conditions, robots=10))
+    crowded = replace(CONDITIONS["B"], surroundings=replace(CONDITIONS["B"].surroundings, robots=10))
     first, again = (run_repetition(crowded, WAREHOUSE, seed=101, legs=1) for _ in range(2))
     assert first.digest == again.digest
     assert (first.track == again.track).all()
 
 
 def test_the_outdoor_stage_drives_a_leg_on_the_mesh():
-    run = run_repetition(ARMS["B"], OUTDOOR, seed=100, legs=1)
+    run = run_repetition(CONDITIONS["B"], OUTDOOR, seed=100, legs=1)
     assert run.tally.legs[0].end == "reached"
     assert run.tally.planner_calls["main_ok"] >= 1
 
 
 def test_the_experiment_runs_in_another_building():
-    run = run_repetition(ARMS["B"], DEPOT, seed=100, legs=1)
+    run = run_repetition(CONDITIONS["B"], DEPOT, seed=100, legs=1)
     assert run.tally.legs[0].end == "reached"
     assert not run.tally.contacts

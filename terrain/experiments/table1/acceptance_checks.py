@@ -1,4 +1,4 @@
-"""The five sanity gates: the main run means nothing before all of them are open."""
+"""The five acceptance checks: the result of the main run counts only if all of them pass."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ EQUAL_TIMES = 0.01
 
 
 @dataclass(frozen=True)
-class Gate:
-    """One gate: its name, whether it is open, and what was found."""
+class Check:
+    """One check: its name, whether it has passed, and what was found."""
 
     name: str
-    open: bool
+    passed: bool
     found: str
 
 
-def no_traffic(a: Sequence[Tally], b: Sequence[Tally]) -> Gate:
-    """Gate 1: in an empty world both arms plan and hand over once a leg, never recover, and are equally fast."""
+def no_traffic(a: Sequence[Tally], b: Sequence[Tally]) -> Check:
+    """Check 1: in an empty world both conditions plan and hand over once a leg, never recover, and are equally fast."""
     counts = [
         (tally.all_planner_calls, tally.controller_calls, tally.all_recoveries, len(tally.legs), tally.legs_lost)
         for tally in (*a, *b)
@@ -38,34 +38,34 @@ def no_traffic(a: Sequence[Tally], b: Sequence[Tally]) -> Gate:
         f"controller calls, {sum(t.all_recoveries for t in tallies)} recoveries, {time:.1f} s"
         for tallies, time in zip((a, b), times, strict=True)
     ]
-    return Gate("1 no traffic: one plan a leg, no recovery, times equal within 1 %", plain and equal, " | ".join(sums))
+    return Check("1 no traffic: one plan a leg, no recovery, times equal within 1 %", plain and equal, " | ".join(sums))
 
 
-def same_drives(first: Sequence[str], again: Sequence[str]) -> Gate:
-    """Gate 2: the same arms and seeds, run twice, were the same drives (given their digests)."""
+def same_drives(first: Sequence[str], again: Sequence[str]) -> Check:
+    """Check 2: the same conditions and seeds, run twice, were the same drives (given their digests)."""
     equal = len(first) == len(again) > 0 and all(x == y for x, y in zip(first, again, strict=True))
-    return Gate(
+    return Check(
         "2 same seed twice: identical drives", equal, f"{len(first)} runs, {len(set(first) & set(again))} found again"
     )
 
 
-def recoveries_add_up(tallies: Sequence[Tally], totals: Sequence[int]) -> Gate:
-    """Gate 3: the five behaviours' calls add up to the number of recovery goals in the log."""
+def recoveries_add_up(tallies: Sequence[Tally], totals: Sequence[int]) -> Check:
+    """Check 3: the five behaviours' calls add up to the number of recovery goals in the log."""
     counted = [tally.all_recoveries for tally in tallies]
     known = all(set(tally.recoveries) <= set(RECOVERIES) for tally in tallies)
     equal = known and counted == list(totals)
-    return Gate("3 recoveries add up to their total", equal, f"{sum(counted)} calls, {sum(totals)} goals")
+    return Check("3 recoveries add up to their total", equal, f"{sum(counted)} calls, {sum(totals)} goals")
 
 
-def no_more_hand_overs_than_plans(a: Sequence[Tally]) -> Gate:
-    """Gate 4: arm A hands over no plan that it did not ask for."""
+def no_more_hand_overs_than_plans(a: Sequence[Tally]) -> Check:
+    """Check 4: condition A hands over no more plans than it has asked for."""
     worst = max(tally.controller_calls - tally.all_planner_calls for tally in a)
-    return Gate("4 controller calls <= planner calls in arm A", worst <= 0, f"largest difference {worst}")
+    return Check("4 controller calls <= planner calls in condition A", worst <= 0, f"largest difference {worst}")
 
 
-def falls_along_the_list(a: Sequence[Tally]) -> Gate:
-    """Gate 5: arm A runs no behaviour more often than the one before it in its list."""
+def falls_along_the_list(a: Sequence[Tally]) -> Check:
+    """Check 5: condition A runs no behaviour more often than the one before it in its list."""
     mix = recovery_mix(a)
     counts = [mix[name] for name in RECOVERIES]
     falls = all(first >= second for first, second in pairwise(counts))
-    return Gate("5 arm A's recoveries do not rise along its list", falls, " >= ".join(map(str, counts)))
+    return Check("5 condition A's recoveries do not rise along its list", falls, " >= ".join(map(str, counts)))

@@ -1,7 +1,7 @@
 """All runs of the experiment: which there are, in worker processes, each done once and kept.
 
 Finished runs stand in ``runs.jsonl`` of the campaign's folder under a key that holds the hash of all parameters, so an
-interrupted campaign goes on where it was, and a change of any parameter makes all runs anew.
+interrupted campaign continues where it stopped, and a change of any parameter repeats all runs.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from typing import Any
 
 from mbf_abstract.config.yaml_source import load_yaml
 from terrain.experiments.table1 import counting, plugin_wrappers, repetition
-from terrain.experiments.table1.conditions import ARMS, outdoors, without_traffic
+from terrain.experiments.table1.conditions import CONDITIONS, outdoors, without_traffic
 from terrain.experiments.table1.counting import Leg, Tally
 from terrain.experiments.table1.environments import traffic
-from terrain.experiments.table1.environments import warehouse_environment as stage
+from terrain.experiments.table1.environments import warehouse_environment as warehouse
 from terrain.experiments.table1.environments.outdoor_environment import OUTDOOR
 from terrain.experiments.table1.environments.world import load_world
 from terrain.experiments.table1.repetition import run_repetition
@@ -30,9 +30,9 @@ LOG = "runs.jsonl"
 
 @dataclass(frozen=True)
 class Job:
-    """One run: an arm, a seed, a world file; ``empty`` = without traffic, ``again`` = for the second time."""
+    """One run: a condition, a seed, a world file; ``empty`` = without traffic, ``again`` = for the second time."""
 
-    arm: str
+    condition: str
     seed: int
     world: Path
     empty: bool = False
@@ -41,27 +41,28 @@ class Job:
     @property
     def name(self) -> str:
         """Name within one set of parameters."""
-        return f"{self.arm}{'/empty' if self.empty else ''}{'/again' if self.again else ''}/{self.seed}"
+        return f"{self.condition}{'/empty' if self.empty else ''}{'/again' if self.again else ''}/{self.seed}"
 
 
 def do(job: Job) -> dict[str, Any]:
     """Run a job and return its row."""
-    arm = outdoors(ARMS[job.arm]) if job.world == OUTDOOR else ARMS[job.arm]
-    row = run_repetition(without_traffic(arm) if job.empty else arm, job.world, job.seed).to_row()
-    return {"arm": job.arm, "seed": job.seed, "empty": job.empty, **row}
+    condition = outdoors(CONDITIONS[job.condition]) if job.world == OUTDOOR else CONDITIONS[job.condition]
+    row = run_repetition(without_traffic(condition) if job.empty else condition, job.world, job.seed).to_row()
+    return {"condition": job.condition, "seed": job.seed, "empty": job.empty, **row}
 
 
 def parameters_of(world_file: Path) -> dict[str, Any]:
-    """Everything a result depends on beside the code: arms, navigation, world, constants."""
+    """Everything a result depends on beside the code: conditions, navigation, world, constants."""
     if world_file == OUTDOOR:
         navigation = load_yaml(OUTDOOR.with_name("outdoor_navigation.yaml")).data
-        arms = {name: asdict(outdoors(arm)) for name, arm in ARMS.items()}
-        return {**_parameters_of_arms(), "arms": arms, "world": load_yaml(OUTDOOR).data, "navigation": navigation}
+        conditions = {name: asdict(outdoors(condition)) for name, condition in CONDITIONS.items()}
+        changed = {"conditions": conditions, "world": load_yaml(OUTDOOR).data, "navigation": navigation}
+        return {**_parameters_of_conditions(), **changed}
     world = load_world(world_file)
     grid = world.grid()
     return {
-        **_parameters_of_arms(),
-        "navigation": load_yaml(stage.NAVIGATION).data,
+        **_parameters_of_conditions(),
+        "navigation": load_yaml(warehouse.NAVIGATION).data,
         "world": json.loads(world.model_dump_json(exclude={"floor_plan", "map"})),
         "floor": hashlib.sha256(grid.occupied.tobytes() + grid.free.tobytes()).hexdigest(),
         "traffic": [
@@ -71,13 +72,13 @@ def parameters_of(world_file: Path) -> dict[str, Any]:
             traffic.SPEED_RANGE,
             traffic.PHASE_RANGE,
         ],
-        "lidar": [stage.LIDAR_RATE, stage.LIDAR_RANGE, stage.LIDAR_RAYS, stage.LIDAR_NOISE],
+        "lidar": [warehouse.LIDAR_RATE, warehouse.LIDAR_RANGE, warehouse.LIDAR_RAYS, warehouse.LIDAR_NOISE],
     }
 
 
-def _parameters_of_arms() -> dict[str, Any]:
+def _parameters_of_conditions() -> dict[str, Any]:
     return {
-        "arms": {name: asdict(arm) for name, arm in ARMS.items()},
+        "conditions": {name: asdict(condition) for name, condition in CONDITIONS.items()},
         "leg_time_limit": repetition.LEG_TIME_LIMIT,
         "useless_within": counting.USELESS_WITHIN,
         "latency": [plugin_wrappers.QUERY_CELL, plugin_wrappers.LATENCY_SPREAD],
@@ -115,9 +116,9 @@ class Campaign:
                 log.append(self._key(job), row)
                 yield job, row
 
-    def job(self, arm: str, seed: int, empty: bool = False, again: bool = False) -> Job:
+    def job(self, condition: str, seed: int, empty: bool = False, again: bool = False) -> Job:
         """Make a job in this campaign's world."""
-        return Job(arm, seed, self.world, empty, again)
+        return Job(condition, seed, self.world, empty, again)
 
     def _key(self, job: Job) -> str:
         return f"{self.parameters_hash}/{job.name}"

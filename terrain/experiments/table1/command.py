@@ -45,7 +45,7 @@ def table1(
         from terrain.experiments.table1.campaign import Campaign, Job
         from terrain.experiments.table1.environments.outdoor_environment import OUTDOOR
         from terrain.experiments.table1.environments.world import load_world
-        from terrain.experiments.table1.experiment import GatesClosed, run_experiment, tracks
+        from terrain.experiments.table1.experiment import ChecksFailed, run_experiment, tracks
         from terrain.experiments.table1.picture import draw_tracks
         from terrain.experiments.table1.report import show
         from terrain.sweeps.command import parse_seeds
@@ -53,13 +53,13 @@ def table1(
         chosen, console = parse_seeds(seeds), Console()
         campaign = Campaign(out, OUTDOOR if outdoor else world, workers)
 
-        def tell(job: Job, row: Mapping[str, Any]) -> None:
+        def show_row(job: Job, row: Mapping[str, Any]) -> None:
             time = sum(leg["time"] for leg in row["tally"]["legs"])
             console.print(f"{job.name}: {time:.0f} s simulated in {row['wall_time']:.0f} s", highlight=False)
 
         try:
-            result = run_experiment(campaign, chosen, ablations, tell)
-        except GatesClosed as closed:
+            result = run_experiment(campaign, chosen, ablations, show_row)
+        except ChecksFailed as closed:
             console.print(f"the main run was not begun: {closed}", markup=False, soft_wrap=True)
             raise typer.Exit(FAILURE) from closed
         loaded = None if outdoor else load_world(world)

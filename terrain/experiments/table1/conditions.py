@@ -1,7 +1,7 @@
-"""The arms of the experiment: which executive drives, with which limits, and what around it is changed.
+"""The conditions of the experiment: which executive drives, with which limits, and what around it is changed.
 
-Both arms get the same patience and retries. The main result compares ``S1`` with ``B``; ``S0`` and ``S2`` are the other
-readings of move_base's parameters (benchmarks section 6.3). ``ABLATIONS`` are the changes of section 6.4.
+Both main conditions get the same patience and retries. The main result compares ``S1`` with ``B``; ``S0`` and ``S2``
+are the other readings of move_base's parameters (benchmarks section 6.3). ``ABLATIONS`` are the changes of section 6.4.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ class TreeShape:
 
 
 @dataclass(frozen=True)
-class Conditions:
-    """What is around the executive: modelled planner time [s], number of other robots, whether these stop."""
+class Surroundings:
+    """What surrounds the executive: modelled planner time [s], number of other robots, whether these stop."""
 
     planner_latency: float = 0.4
     robots: int = 5
@@ -56,7 +56,7 @@ class Conditions:
 
 
 @dataclass(frozen=True)
-class Arm:
+class Condition:
     """One row of the tables.
 
     Attributes
@@ -74,55 +74,55 @@ class Arm:
     executive: Literal["move_base", "filtered_move_base", "tree"]
     limits: Limits = Limits()
     tree: TreeShape = TreeShape()
-    conditions: Conditions = Conditions()
+    surroundings: Surroundings = Surroundings()
 
 
-MAIN_A = Arm("S1", "move_base, patience 2 s / 2 s, watchdog off", "move_base")
-MAIN_B = Arm("B", "tree", "tree")
+MAIN_A = Condition("S1", "move_base, patience 2 s / 2 s, watchdog off", "move_base")
+MAIN_B = Condition("B", "tree", "tree")
 READINGS = (
-    Arm("S0", "move_base as it starts: 5 s / 15 s, watchdog off", "move_base", Limits(5.0, 15.0)),
-    Arm("S2", "move_base, 5 s / 5 s, watchdog 10 s", "move_base", Limits(5.0, 5.0, oscillation_timeout=10.0)),
+    Condition("S0", "move_base as it starts: 5 s / 15 s, watchdog off", "move_base", Limits(5.0, 15.0)),
+    Condition("S2", "move_base, 5 s / 5 s, watchdog 10 s", "move_base", Limits(5.0, 5.0, oscillation_timeout=10.0)),
 )
-NO_LATENCY, BLIND = Conditions(planner_latency=0.0), Conditions(polite=False)
-TWO, TEN = Conditions(robots=2), Conditions(robots=10)
+NO_LATENCY, BLIND = Surroundings(planner_latency=0.0), Surroundings(polite=False)
+TWO, TEN = Surroundings(robots=2), Surroundings(robots=10)
 ABLATIONS = (
-    Arm("A0", "move_base, planner takes no time", "move_base", conditions=NO_LATENCY),
-    Arm("B0", "tree, planner takes no time", "tree", conditions=NO_LATENCY),
-    Arm("A1", "move_base, planner_frequency 0.5 Hz", "move_base", Limits(planner_frequency=0.5)),
-    Arm("A2", "move_base, patience 1 s", "move_base", Limits(1.0, 1.0)),
-    Arm("A3", "move_base, max_planning_retries 0", "move_base", Limits(max_planning_retries=0)),
-    Arm("A4", "move_base, recoveries filtered by outcome code", "filtered_move_base"),
-    Arm("B1", "tree without path reuse", "tree", tree=TreeShape(reuse_path=False)),
-    Arm("B2", "tree that ignores outcome codes", "tree", tree=TreeShape(by_outcome=False)),
-    Arm("B3", "tree without second planner", "tree", tree=TreeShape(second_planner_pause=0.0)),
-    Arm("T1A", "move_base, blind traffic", "move_base", conditions=BLIND),
-    Arm("T1B", "tree, blind traffic", "tree", conditions=BLIND),
-    Arm("T2A", "move_base, two robots", "move_base", conditions=TWO),
-    Arm("T2B", "tree, two robots", "tree", conditions=TWO),
-    Arm("T3A", "move_base, ten robots", "move_base", conditions=TEN),
-    Arm("T3B", "tree, ten robots", "tree", conditions=TEN),
+    Condition("A0", "move_base, planner takes no time", "move_base", surroundings=NO_LATENCY),
+    Condition("B0", "tree, planner takes no time", "tree", surroundings=NO_LATENCY),
+    Condition("A1", "move_base, planner_frequency 0.5 Hz", "move_base", Limits(planner_frequency=0.5)),
+    Condition("A2", "move_base, patience 1 s", "move_base", Limits(1.0, 1.0)),
+    Condition("A3", "move_base, max_planning_retries 0", "move_base", Limits(max_planning_retries=0)),
+    Condition("A4", "move_base, recoveries filtered by outcome code", "filtered_move_base"),
+    Condition("B1", "tree without path reuse", "tree", tree=TreeShape(reuse_path=False)),
+    Condition("B2", "tree that ignores outcome codes", "tree", tree=TreeShape(by_outcome=False)),
+    Condition("B3", "tree without second planner", "tree", tree=TreeShape(second_planner_pause=0.0)),
+    Condition("T1A", "move_base, blind traffic", "move_base", surroundings=BLIND),
+    Condition("T1B", "tree, blind traffic", "tree", surroundings=BLIND),
+    Condition("T2A", "move_base, two robots", "move_base", surroundings=TWO),
+    Condition("T2B", "tree, two robots", "tree", surroundings=TWO),
+    Condition("T3A", "move_base, ten robots", "move_base", surroundings=TEN),
+    Condition("T3B", "tree, ten robots", "tree", surroundings=TEN),
 )
-ARMS = {arm.name: arm for arm in (MAIN_A, MAIN_B, *READINGS, *ABLATIONS)}
+CONDITIONS = {condition.name: condition for condition in (MAIN_A, MAIN_B, *READINGS, *ABLATIONS)}
 
 
-def outdoors(arm: Arm) -> Arm:
-    """Return the arm for the outdoor table, where nothing moves: what blocks the way stays, so its tree waits less."""
-    return replace(arm, tree=replace(arm.tree, controller_max_retries=3, control_retries=1))
+def outdoors(condition: Condition) -> Condition:
+    """Return the condition for the outdoor table; nothing moves there, so its tree waits less."""
+    return replace(condition, tree=replace(condition.tree, controller_max_retries=3, control_retries=1))
 
 
-def without_traffic(arm: Arm) -> Arm:
-    """Return the arm in an empty world, for the first sanity gate."""
-    return replace(arm, name=f"{arm.name}/empty", conditions=replace(arm.conditions, robots=0))
+def without_traffic(condition: Condition) -> Condition:
+    """Return the condition in an empty world, for the first acceptance check."""
+    return replace(condition, name=f"{condition.name}/empty", surroundings=replace(condition.surroundings, robots=0))
 
 
 Executive = ClassicMoveBase | TreeExecutive
 
 
-def make_executive(arm: Arm, navigator: Navigator) -> Executive:
-    """Make the arm's executive and give the server the arm's limits."""
-    if arm.executive == "tree":
-        return _make_tree(arm, navigator)
-    limits = arm.limits
+def make_executive(condition: Condition, navigator: Navigator) -> Executive:
+    """Make the condition's executive and give the server the condition's limits."""
+    if condition.executive == "tree":
+        return _make_tree(condition, navigator)
+    limits = condition.limits
     settings = ClassicSettings(
         planner_frequency=limits.planner_frequency,
         planner_patience=limits.planner_patience,
@@ -131,12 +131,12 @@ def make_executive(arm: Arm, navigator: Navigator) -> Executive:
         recovery_behaviors=RECOVERIES,
         oscillation_timeout=limits.oscillation_timeout,
     )
-    kind = FilteredMoveBase if arm.executive == "filtered_move_base" else ClassicMoveBase
+    kind = FilteredMoveBase if condition.executive == "filtered_move_base" else ClassicMoveBase
     return kind(navigator, settings, planner="main", controller="follow")
 
 
-def _make_tree(arm: Arm, navigator: Navigator) -> TreeExecutive:
-    limits, shape = arm.limits, arm.tree
+def _make_tree(condition: Condition, navigator: Navigator) -> TreeExecutive:
+    limits, shape = condition.limits, condition.tree
     navigator.server.set_parameters(
         planner_patience=limits.planner_patience,
         planner_max_retries=limits.max_planning_retries,

@@ -1,7 +1,7 @@
 """From the event log of a run to the numbers of the table. Nothing is counted anywhere else.
 
 Planner calls and recoveries come from the framework's events around every plugin call, hand-overs and control cycles
-from ``CountedController``, motion and contacts from the stage. Every moment of a leg is one of four things, the first
+from ``CountedController``, motion and contacts from the environment. Every moment of a leg is the first of four things
 that holds: *recovering* (a behaviour runs), *driving* (the robot moves), *planning* (the main planner works while the
 robot stands), *waiting* (the rest).
 """
@@ -151,7 +151,7 @@ class _Counter:
             self._recovered = (self._failure, event.time)
 
     def _note_outcome(self, of: str, outcome: int, now: float) -> None:
-        """Remember a failure; the first one after a recovery tells whether that was useless."""
+        """Remember a failure; the first one after a recovery shows whether that was useless."""
         if is_success(outcome):
             return
         self._failure = f"{of} {outcome}"

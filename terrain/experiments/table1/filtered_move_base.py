@@ -1,6 +1,6 @@
 """The fixed state machine with one thing changed: its recoveries are picked by the outcome code (ablation A4).
 
-Use it only to tell what outcome codes alone would have brought to move_base. The groups are those of the ready trees.
+It measures what outcome codes alone bring to move_base. The groups are those of the reference trees.
 """
 
 from __future__ import annotations

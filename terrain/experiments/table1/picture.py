@@ -1,4 +1,4 @@
-"""A picture of the world: its racks, the routes of the others, the waypoints, and where our robot drove in each arm."""
+"""A picture of the world: racks, routes of the other robots, waypoints, and our robot's tracks in each condition."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ DOTS_PER_INCH = 90
 def draw_tracks(
     file: Path, world: Table1World | None, tracks: Mapping[str, Sequence[Sequence[Sequence[float]]]], robots: int = 5
 ) -> None:
-    """Write a PNG with one map for each arm.
+    """Write a PNG with one map for each condition.
 
     Parameters
     ----------
     world : Table1World or None
         Nothing but the tracks is drawn without it.
     tracks : mapping of str to list of (n, 2) lists
-        Tracks [m] of every repetition of each arm.
+        Tracks [m] of every repetition of each condition.
     robots : int
         How many of the routes were driven.
     """
     figure, axes = plt.subplots(1, len(tracks), figsize=(6.2 * len(tracks), 6.4), squeeze=False)
-    for axis, (name, of_arm) in zip(axes[0], tracks.items(), strict=True):
+    for axis, (name, of_condition) in zip(axes[0], tracks.items(), strict=True):
         if world is not None:
             _draw_world(axis, world, robots)
         axis.set_aspect("equal")
         axis.set_xlabel("x [m]")
         axis.set_ylabel("y [m]")
-        for track in of_arm:
+        for track in of_condition:
             axis.plot(*np.transpose(track), color="tab:blue", linewidth=0.6, alpha=0.6)
-        axis.set_title(f"{TITLES.get(name, name)}: {len(of_arm)} repetitions", parse_math=False)
+        axis.set_title(f"{TITLES.get(name, name)}: {len(of_condition)} repetitions", parse_math=False)
     figure.tight_layout()
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, dpi=DOTS_PER_INCH)

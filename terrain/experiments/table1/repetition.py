@@ -1,4 +1,4 @@
-"""One run of one arm: all waypoints in order, each with its time limit; a function of (arm, world, seed)."""
+"""One run of one condition: all waypoints in order, each with a time limit; a function of condition, world and seed."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.events import EventKind
-from mbf_abstract.geometry import Pose
-from mbf_abstract.time.clock import wall_seconds
-from terrain.experiments.table1.conditions import Arm, Conditions, Executive, make_executive
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.time.clock import Clock, wall_seconds
+from terrain.experiments.table1.conditions import Condition, Executive, Surroundings, make_executive
 from terrain.experiments.table1.counting import Tally, count
-from terrain.experiments.table1.environments.outdoor_environment import OUTDOOR, OutdoorStage
-from terrain.experiments.table1.environments.warehouse_environment import Stage
+from terrain.experiments.table1.environments.outdoor_environment import OUTDOOR, OutdoorEnvironment
+from terrain.experiments.table1.environments.warehouse_environment import WarehouseEnvironment
 from terrain.experiments.table1.environments.world import load_world
 from terrain.experiments.table1.plugin_wrappers import SOURCE
+
+Environment = WarehouseEnvironment | OutdoorEnvironment
 
 LEG_TIME_LIMIT = 300.0  # s
 TRACK_SPACING = 10  # of the simulation's 20 poses a second every tenth is kept
@@ -60,53 +62,62 @@ class Repetition:
 class _Deadline:
     """Cancels an executive when the time of its leg is over; lives on the simulator's thread."""
 
-    def __init__(self) -> None:
-        self.executive: Executive | None = None
-        self.stamp = float("inf")
+    def __init__(self, executive: Executive, clock: Clock) -> None:
+        self._executive = executive
+        self._clock = clock
+        self._stamp = float("inf")
         self.passed = False
 
-    def __call__(self, now: float) -> None:
-        if self.executive is not None and not self.passed and now >= self.stamp:
+    def start(self) -> None:
+        """Begin a leg."""
+        self._stamp, self.passed = self._clock.now() + LEG_TIME_LIMIT, False
+
+    def stop(self) -> None:
+        """End a leg."""
+        self._stamp = float("inf")
+
+    def watch(self, time: float, pose: Pose, velocity: Twist) -> None:
+        """Look at the clock; called with each sample of the robot."""
+        if not self.passed and self._clock.now() >= self._stamp:
             self.passed = True
-            self.executive.cancel("time limit of the leg")
+            self._executive.cancel("time limit of the leg")
 
 
-def run_repetition(arm: Arm, world: Path, seed: int, legs: int | None = None) -> Repetition:
+def run_repetition(condition: Condition, world: Path, seed: int, legs: int | None = None) -> Repetition:
     """Drive to the waypoints of a world (the first ``legs`` of them) and count what happened.
 
     Parameters
     ----------
     world : Path
-        A world file, or ``outdoor_stage.OUTDOOR``.
+        A world file, or ``outdoor_environment.OUTDOOR``.
     """
     started = wall_seconds()
-    with _open_stage(world, arm.conditions, seed) as stage:
-        executive = make_executive(arm, stage.navigator)
-        deadline = _Deadline()
-        deadline.executive = executive
-        stage.on_tick.append(deadline)
-        for number, goal in enumerate(stage.goals()[:legs]):
-            _drive_leg(stage, executive, deadline, number, goal)
-        events, digest = stage.memory.events, stage.digest.hexdigest()
-        track = np.array([(pose.x, pose.y) for pose in stage.simulation.track[::TRACK_SPACING]])
+    with _open_environment(world, condition.surroundings, seed) as environment:
+        executive = make_executive(condition, environment.navigator)
+        deadline = _Deadline(executive, environment.clock)
+        environment.loop.on_sample.append(deadline.watch)
+        for number, goal in enumerate(environment.goals[:legs]):
+            _drive_leg(environment, executive, deadline, number, goal)
+        events, digest = environment.memory.events, environment.digest.hexdigest()
+        track = np.array([(pose.x, pose.y) for pose in environment.simulation.track[::TRACK_SPACING]])
     recovery_goals = sum(event.kind is EventKind.RECOVERY for event in events)
     return Repetition(count(events), recovery_goals, digest, track, wall_seconds() - started)
 
 
-def _open_stage(world: Path, conditions: Conditions, seed: int) -> Stage | OutdoorStage:
+def _open_environment(world: Path, surroundings: Surroundings, seed: int) -> Environment:
     if world == OUTDOOR:
-        return OutdoorStage(world, conditions, seed)
-    return Stage(load_world(world), conditions, seed)
+        return OutdoorEnvironment(world, surroundings, seed)
+    return WarehouseEnvironment(load_world(world), surroundings, seed)
 
 
-def _drive_leg(stage: Stage | OutdoorStage, executive: Executive, deadline: _Deadline, number: int, goal: Pose) -> None:
-    driven = stage.distance
-    deadline.stamp, deadline.passed = stage.clock.now() + LEG_TIME_LIMIT, False
-    stage.events.emit(EventKind.CUSTOM, SOURCE, what="leg_started", leg=number)
+def _drive_leg(environment: Environment, executive: Executive, deadline: _Deadline, number: int, goal: Pose) -> None:
+    driven = environment.distance
+    deadline.start()
+    environment.events.emit(EventKind.CUSTOM, SOURCE, what="leg_started", leg=number)
     result = executive.run(goal)
-    deadline.stamp = float("inf")
+    deadline.stop()
     end = "reached" if result.success else "timed_out" if deadline.passed else "aborted"
-    distance = stage.distance - driven
-    stage.events.emit(
+    distance = environment.distance - driven
+    environment.events.emit(
         EventKind.CUSTOM, SOURCE, what="leg_ended", leg=number, end=end, distance=distance, message=result.message
     )

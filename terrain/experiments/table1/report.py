@@ -25,18 +25,18 @@ RECOVERY_ROWS = ("clear_costmaps", "out_of_collision", "relax_controller", "rela
 
 
 def show(result: Mapping[str, Any]) -> Group:
-    """Everything a reader of the result wants to see first."""
+    """Return all tables and the verdict."""
     verdict = f"\nverdict: {result['verdict']}   (parameters {result['parameters_hash']}, seeds {result['seeds']})"
-    return Group(table_1(result), arms_table(result), gates_table(result), criteria_table(result), verdict)
+    return Group(table_1(result), conditions_table(result), checks_table(result), criteria_table(result), verdict)
 
 
 def table_1(result: Mapping[str, Any], main: tuple[str, str] = ("S1", "B")) -> Table:
     """Make the paper's table with ours beside it."""
-    a, b = (result["arms"][name] for name in main)
+    a, b = (result["conditions"][name] for name in main)
     table = Table("", "move_base", "MBF + tree", "ratio", f"ours: {main[0]}", f"ours: {main[1]}", "ratio [95 %]")
     for row in ("planner calls", "controller calls", "recovery calls", *RECOVERY_ROWS, "time"):
         paper = PAPER[row]
-        ours = [arm["recoveries"].get(row, 0) if row in RECOVERY_ROWS else round(arm[row]) for arm in (a, b)]
+        ours = [of["recoveries"].get(row, 0) if row in RECOVERY_ROWS else round(of[row]) for of in (a, b)]
         ratio = _plain_ratio(*ours)
         if row in result["ratios"]:
             found = result["ratios"][row]
@@ -48,10 +48,10 @@ def table_1(result: Mapping[str, Any], main: tuple[str, str] = ("S1", "B")) -> T
     return table
 
 
-def arms_table(result: Mapping[str, Any]) -> Table:
-    """Make one row for every arm that was run."""
+def conditions_table(result: Mapping[str, Any]) -> Table:
+    """Make one row for every condition that was run."""
     table = Table(
-        "arm",
+        "condition",
         "planner main / second (failed)",
         "ctrl",
         "rec (useless)",
@@ -62,31 +62,31 @@ def arms_table(result: Mapping[str, Any]) -> Table:
         "contacts rack / we / they",
         "legs lost",
     )
-    for name, arm in result["arms"].items():
-        planner, split, contacts = arm["planner"], arm["split"], arm["contacts"]
+    for name, condition in result["conditions"].items():
+        planner, split, contacts = condition["planner"], condition["split"], condition["contacts"]
         main = planner["main_ok"] + planner["main_failed"]
         second = planner["second_ok"] + planner["second_failed"]
         table.add_row(
-            f"{name}: {arm['text']}",
+            f"{name}: {condition['text']}",
             f"{main} ({planner['main_failed']}) / {second} ({planner['second_failed']})",
-            str(arm["controller calls"]),
-            f"{arm['recovery calls']} ({arm['useless recoveries']})",
-            f"{arm['entropy']:.2f}",
-            f"{arm['time']:.0f} s",
+            str(condition["controller calls"]),
+            f"{condition['recovery calls']} ({condition['useless recoveries']})",
+            f"{condition['entropy']:.2f}",
+            f"{condition['time']:.0f} s",
             " / ".join(f"{split[key]:.0f}" for key in ("planning", "driving", "recovering", "waiting")),
-            f"{arm['distance']:.0f} m",
+            f"{condition['distance']:.0f} m",
             " / ".join(str(contacts[key]) for key in ("rack/we", "robot/we", "robot/they")),
-            f"{arm['legs']['aborted']} + {arm['legs']['timed_out']} of {sum(arm['legs'].values())}",
+            f"{condition['legs']['aborted']} + {condition['legs']['timed_out']} of {sum(condition['legs'].values())}",
         )
     table.caption = "legs lost: aborted + timed out"
     return table
 
 
-def gates_table(result: Mapping[str, Any]) -> Table:
-    """Make the table of the sanity gates."""
-    table = Table("sanity gate", "", "found")
-    for gate in result["gates"]:
-        table.add_row(gate["name"], "open" if gate["open"] else "CLOSED", gate["found"])
+def checks_table(result: Mapping[str, Any]) -> Table:
+    """Make the table of the acceptance checks."""
+    table = Table("acceptance check", "", "found")
+    for check in result["checks"]:
+        table.add_row(check["name"], "passed" if check["passed"] else "FAILED", check["found"])
     return table
 
 

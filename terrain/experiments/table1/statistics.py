@@ -1,6 +1,6 @@
 """The numbers of the comparison: sums over repetitions, ratios with intervals, and the test of the times.
 
-All tallies come in pairs, arm A and arm B with the same seed, and are resampled as pairs.
+All tallies come in pairs, condition A and condition B with the same seed, and are resampled as pairs.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from terrain.experiments.table1.counting import Tally
 from terrain.experiments.table1.statistics import clear_share, compare, entropy, recovery_mix
 
-SAFETY_SLACK = 1  # contacts, and lost legs, that arm B may have more than arm A
+SAFETY_SLACK = 1  # contacts, and lost legs, that condition B may have more than condition A
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ class LiveControls:
     Parameters
     ----------
     session : Session
-    tour : GoalSequence
+    sequence : GoalSequence
 
     Attributes
     ----------
@@ -39,12 +39,12 @@ class LiveControls:
         Whether goals are paused, those to come as well.
     """
 
-    def __init__(self, session: Session, tour: GoalSequence) -> None:
+    def __init__(self, session: Session, sequence: GoalSequence) -> None:
         self.planner = ""
         self.controller = ""
         self.holding = False
         self._session = session
-        self._tour = tour
+        self._sequence = sequence
         self._server = session.navigator.server
         self._waiting: deque[Callable[[], None]] = deque(maxlen=MAX_WAITING)
         self._ground: StaticRays | None = None
@@ -75,12 +75,12 @@ class LiveControls:
         robot = self._session.simulation.robot.pose()
         yaw = math.atan2(y - robot.y, x - robot.x)
         self._tell("new goal", x=round(x, 3), y=round(y, 3), z=round(z, 3))
-        self._tour.go_to(AskedGoal(Pose.planar(x, y, yaw, z), self.planner, self.controller))
+        self._sequence.go_to(AskedGoal(Pose.planar(x, y, yaw, z), self.planner, self.controller))
 
     def cancel(self) -> None:
         """Cancel the present goal."""
         self._tell("cancel")
-        self._tour.cancel("canceled in the live view")
+        self._sequence.cancel("canceled in the live view")
 
     def hold(self, holding: bool) -> None:
         """Pause all goals, or let them go on."""
@@ -101,7 +101,7 @@ class LiveControls:
     def end(self, reason: str) -> None:
         """End the run."""
         self._tell("end", reason=reason)
-        self._tour.end(reason)
+        self._sequence.end(reason)
 
     # -----------------------------------------------------------------------------------------------------
     def _where_it_hits(self, origin: FloatArray, direction: FloatArray) -> FloatArray | None:

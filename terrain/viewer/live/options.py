@@ -1,4 +1,4 @@
-"""How a run is shown while it goes on; light to import, because a runner needs it for runs without a page, too."""
+"""How a run is shown while it goes on."""
 
 from __future__ import annotations
 
@@ -14,13 +14,11 @@ class ViewOptions:
     Attributes
     ----------
     host : str
-        Interface to listen at, loopback unless told otherwise.
+        Interface to listen at.
     port : int
         The first one tried; the next free one is taken.
     speed : float
         Simulated seconds per second at most; 0 = as fast as possible.
-    stay : bool
-        Wait for further goals after those of the scenario, until Ctrl-C.
     token : bool
         Let only those in who know the address, which has a token in it; without, whoever can reach it.
     read_only : bool
@@ -35,7 +33,6 @@ class ViewOptions:
     host: str = LOOPBACK
     port: int = 8080
     speed: float = 1.0
-    stay: bool = True
     token: bool = True
     read_only: bool = False
 

@@ -36,7 +36,7 @@ class LivePage:
     ----------
     server_page : viser.ViserServer
     session : Session
-    tour : GoalSequence
+    sequence : GoalSequence
     controls : LiveControls
     log : LiveLog
     steered : bool
@@ -47,14 +47,14 @@ class LivePage:
         self,
         server_page: Any,
         session: Session,
-        tour: GoalSequence,
+        sequence: GoalSequence,
         controls: LiveControls,
         log: LiveLog,
         steered: bool = True,
     ) -> None:
         self._server = server_page
         self._session = session
-        self._tour = tour
+        self._sequence = sequence
         self._log = log
         self._frame = 0
         gui, start = server_page.gui, session.recorder.finish()
@@ -84,7 +84,7 @@ class LivePage:
     def show(self, time: float, history: History) -> None:
         """Draw the present state; ``time`` is simulated time [s]."""
         with self._server.atomic():
-            self.things.show(time, self._words(time), is_driving=self._tour.target is not None)
+            self.things.show(time, self._words(time), is_driving=self._sequence.target is not None)
             self._camera.show(np.array(self._session.simulation.robot.pose().position))
             self._ground.show()
             if self._drive is not None:
@@ -114,7 +114,7 @@ class LivePage:
         snapshot = self._log.snapshot()
         tree = tree_html(snapshot.nodes) if snapshot.nodes else NO_TREE
         for element, content in (
-            (self._headline, headline_html(time, self._tour)),
+            (self._headline, headline_html(time, self._sequence)),
             (self._actions, actions_html(self._session.navigator.server, snapshot)),
             (self._tree, f'<div style="{SMALL}">{tree}</div>'),
             (self._lines, lines_html(snapshot.lines)),

@@ -1,7 +1,7 @@
-"""Watches and steers one run: serves the page, works off what it asks for, and keeps the run from being too fast.
+"""Watches and steers one run: serves the page, handles its requests, and limits the speed of the run.
 
 All of it happens on the simulator's thread after a step of the world (``DriveLoop.on_tick``). Nothing is drawn while
-nobody watches. A page that fails is given up; the run goes on without it.
+nobody watches. If the page fails, the run goes on without it.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ FRAME_PERIOD = 0.1  # s of wall time between two drawings
 
 
 class LiveSession:
-    """A context manager; the run goes on inside.
+    """Serves the page of one run; a context manager in which the run goes on.
 
     Parameters
     ----------
     session : Session
         Made, not running yet.
-    tour : GoalSequence
+    sequence : GoalSequence
     options : ViewOptions
-    tell : callable
-        Told where the page is.
-    warn : callable
-        Told what the user must know about who can reach it.
+    on_page : callable
+        Called with the page's address.
+    on_note : callable
+        Called with what the user must know about who can reach it.
 
     Attributes
     ----------
@@ -53,24 +53,24 @@ class LiveSession:
     Raises
     ------
     ViewerMissing
-        viser is not installed, or cannot listen where it is told to; from ``__enter__``.
+        viser is not installed, or cannot listen at the address; from ``__enter__``.
     """
 
     def __init__(
         self,
         session: Session,
-        tour: GoalSequence,
+        sequence: GoalSequence,
         options: ViewOptions,
-        tell: Callable[[str], None] = lambda text: None,
-        warn: Callable[[str], None] = lambda text: None,
+        on_page: Callable[[str], None] = lambda address: None,
+        on_note: Callable[[str], None] = lambda text: None,
     ) -> None:
         self.address = self.watching_address = ""
-        self.controls = LiveControls(session, tour)
+        self.controls = LiveControls(session, sequence)
         self._session = session
-        self._tour = tour
+        self._sequence = sequence
         self._options = options
-        self._tell = tell
-        self._warn = warn
+        self._on_page = on_page
+        self._on_note = on_note
         self._log = LiveLog()
         self._history = History()
         self._wall = WallClock()
@@ -84,23 +84,23 @@ class LiveSession:
         with ExitStack() as exits:
             server = exits.enter_context(page_server(self._options.port, access, "mbf " + session.scenario.name))
             steered = Role.STEER in access.roles.values()
-            self._page = page = LivePage(server, session, self._tour, self.controls, self._log, steered)
+            self._page = page = LivePage(server, session, self._sequence, self.controls, self._log, steered)
             exits.enter_context(_ctrl_c(lambda: self.controls.post(lambda: self.controls.end("Ctrl-C"))))
             self.address = access.address(server.get_port(), Role.STEER) or ""
             self.watching_address = access.address(server.get_port(), Role.WATCH) or ""
             self._exits = exits.pop_all()
-        self._tour.on_goal.append(page.things.show_goal)
+        self._sequence.on_goal.append(page.things.show_goal)
         session.events.add_sink(self._log)
         session.loop.on_tick.append(self._after_step)
-        self._tell_addresses()
+        self._report_addresses()
         return self
 
-    def _tell_addresses(self) -> None:
-        self._tell(self.address or self.watching_address)
+    def _report_addresses(self) -> None:
+        self._on_page(self.address or self.watching_address)
         if self.address and self.watching_address:
-            self._warn(f"for those who may only watch: {self.watching_address}")
+            self._on_note(f"for those who may only watch: {self.watching_address}")
         if not is_loopback(self._options.host):
-            self._warn(
+            self._on_note(
                 f"warning: other machines can reach the page at {self._options.host}, and it is not encrypted; who has "
                 "or overhears the address can drive the robot"
             )
@@ -126,7 +126,7 @@ class LiveSession:
         """Simulated seconds per second; who waits for a goal waits in real time. A wall clock keeps its own pace."""
         if isinstance(self._session.clock, WallClock):
             return 0.0
-        return self._options.speed or (1.0 if self._tour.is_waiting else 0.0)
+        return self._options.speed or (1.0 if self._sequence.is_waiting else 0.0)
 
     def _sample(self, time: float, period: float) -> None:
         if self._history.is_due(time, period):

@@ -32,13 +32,13 @@ def actions_html(server: AbstractNavigationServer, snapshot: Snapshot) -> str:
     return f'<table style="{SMALL}">{"".join(rows)}</table>'
 
 
-def headline_html(time: float, tour: GoalSequence) -> str:
+def headline_html(time: float, sequence: GoalSequence) -> str:
     """Simulated time [s], and the goal the robot goes to, or how the last one has ended."""
-    if tour.target is not None:
-        x, y, z = tour.target.position
+    if sequence.target is not None:
+        x, y, z = sequence.target.position
         text = _coloured(f"going to {x:.1f}, {y:.1f}, {z:.1f}", BUSY)
-    elif tour.last_result is not None:
-        result = tour.last_result
+    elif sequence.last_result is not None:
+        result = sequence.last_result
         text = _coloured(f"{result.outcome_name}: {result.message}", GOOD if result.success else BAD)
     else:
         text = _coloured("not started yet", NEITHER)

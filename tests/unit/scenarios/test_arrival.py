@@ -52,7 +52,7 @@ def short_drive():
 
 
 def test_truth_and_belief_are_one_where_the_pose_is_exact(short_drive, tmp_path):
-    result = run_scenario(short_drive(), RunOptions(tmp_path, draw=False))
+    result = run_scenario(short_drive(), RunOptions(tmp_path))
     (arrival,) = result.metrics["arrivals"]
     assert result.success, result.verdict
     assert arrival["distance_m"] <= 0.15
@@ -61,7 +61,7 @@ def test_truth_and_belief_are_one_where_the_pose_is_exact(short_drive, tmp_path)
 
 def test_a_run_whose_pose_has_jumped_fails_although_navigation_says_that_it_arrived(short_drive, tmp_path):
     scenario = short_drive(LocalizationJump(type="jump", dx=0.8, start=1.0))
-    result = run_scenario(scenario, RunOptions(tmp_path, draw=False))
+    result = run_scenario(scenario, RunOptions(tmp_path))
     metrics = json.loads((tmp_path / "metrics.json").read_text())
     (arrival,) = metrics["arrivals"]
     assert metrics["outcome"] == "SUCCESS" and not result.success

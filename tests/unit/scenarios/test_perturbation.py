@@ -14,7 +14,7 @@ from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.robot_models import HUSKY, TURTLEBOT
 from terrain.physics.robots import WheeledRobot
 from terrain.physics.world import BulletWorld
-from terrain.scenarios.environment import set_stage, with_noise
+from terrain.scenarios.environment import build_environment, with_noise
 from terrain.scenarios.noise import LocalizationNoise, MapNoise
 from terrain.scenarios.perturbation import Disturbance, Perturbation, draw_disturbance
 from terrain.scenarios.places import PlanarPose
@@ -32,7 +32,7 @@ FULL = Perturbation(start_position=0.05, start_yaw=3.0, friction=0.2, mass=0.1)
 def stays(name, tmp_path, **changes):
     """Vertices of the map that a shipped scenario's server would get."""
     scenario = load_scenario(name).model_copy(update=changes)
-    world, _ = set_stage(scenario, tmp_path, seed=1)
+    world, _ = build_environment(scenario, tmp_path, seed=1)
     world.physics.close()
     return (tmp_path / "world.ply").read_bytes(), world
 
@@ -201,7 +201,7 @@ def test_the_seed_changes_something_in_every_shipped_scenario(name, tmp_path):
 def test_two_seeds_drive_differently_on_ground_that_is_not_drawn(tmp_path):
     scenario = load_scenario("bridge").model_copy(update={"time_limit": 2.0})
     digests = [
-        run_scenario(scenario, RunOptions(tmp_path / str(number), seed=seed, draw=False)).metrics["digest"]
+        run_scenario(scenario, RunOptions(tmp_path / str(number), seed=seed)).metrics["digest"]
         for number, seed in enumerate((1, 1, 2))
     ]
     assert digests[0] == digests[1] != digests[2]

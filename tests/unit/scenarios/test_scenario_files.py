@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from mbf_abstract.config.findings import ConfigError
-from terrain.scenarios.environment import set_stage
+from terrain.scenarios.environment import build_environment
 from terrain.scenarios.noise import MapNoise
 from terrain.scenarios.scenario import load_scenario
 from terrain.scenarios.world import build_world
@@ -125,7 +125,7 @@ def test_a_forest_is_the_same_for_the_same_seed_and_leaves_room(tmp_path):
     scenario = load_scenario(scenario_file(tmp_path, text))
     surfaces = []
     for seed in (1, 1, 2):
-        world, posts = set_stage(scenario, tmp_path, seed)
+        world, posts = build_environment(scenario, tmp_path, seed)
         world.physics.close()
         surfaces.append(posts.vertices)
     assert np.array_equal(surfaces[0], surfaces[1])
@@ -149,7 +149,7 @@ def test_the_2d_map_of_a_terrain_has_every_shade_of_slope_up_to_the_lethal_one(t
 
 def test_the_steps_of_the_physics_are_as_long_as_the_scenario_says(tmp_path):
     text = PLAIN + "physics_rate: 120.0\n"
-    world, _ = set_stage(load_scenario(scenario_file(tmp_path, text)), tmp_path, 0)
+    world, _ = build_environment(load_scenario(scenario_file(tmp_path, text)), tmp_path, 0)
     with world.physics:
         assert world.physics.time_step == pytest.approx(1.0 / 120.0)
 

@@ -7,7 +7,7 @@ from terrain.scenarios.faults import LocalizationJump, SensorFault
 from terrain.scenarios.noise import LocalizationNoise
 from terrain.scenarios.scenario import PlanarPose, Sensor, load_scenario
 from terrain.scenarios.world_types import GeneratedWorld
-from terrain.session.session import Session
+from terrain.session.session import Session, SessionOptions
 
 CAMERA = Sensor(name="camera", type="depth", rays=16, rate=5.0)
 
@@ -46,7 +46,7 @@ def place(session, target, source):
 
 
 def test_wheel_odometry_drifts_in_odom_and_the_localisation_corrects_it(sensing):
-    with Session(sensing(), "mesh", seed=4) as session:
+    with Session(sensing(), SessionOptions(backend="mesh", seed=4)) as session:
         drive(session, 4.0)
         believed, truth = place(session, "map", "base_link"), session.robot.pose()
         travelled = place(session, "odom", "base_link")
@@ -60,7 +60,7 @@ def test_wheel_odometry_drifts_in_odom_and_the_localisation_corrects_it(sensing)
 
 def test_a_jump_of_the_localisation_moves_odom_in_the_map_and_not_the_robot_in_odom(sensing):
     jump = LocalizationJump(type="jump", start=1.0, dx=0.4)
-    with Session(sensing(jump), "mesh") as session:
+    with Session(sensing(jump), SessionOptions(backend="mesh")) as session:
         before = place(session, "map", "odom"), place(session, "odom", "base_link")
         session.clock.sleep(1.0)
         after = place(session, "map", "odom"), place(session, "odom", "base_link")
@@ -75,7 +75,7 @@ def test_every_sensor_can_be_made_silent_stale_and_wrong_by_the_scenario(sensing
         for start, kind in ((1.0, "silent"), (2.0, "stale"), (3.0, "wrong"))
     ]
     seen = []
-    with Session(sensing(*faults), "mesh") as session:
+    with Session(sensing(*faults), SessionOptions(backend="mesh")) as session:
         session.simulation.on_measurement(lambda topic, m: seen.append(m) if topic == name else None)
         drive(session, 4.2)
     stamps = [getattr(m, "stamp", None) or m.pose.stamp for m in seen]
@@ -92,7 +92,7 @@ def test_every_sensor_can_be_made_silent_stale_and_wrong_by_the_scenario(sensing
 
 def test_a_robot_whose_odometry_falls_silent_loses_its_pose_and_is_told_so(sensing):
     silent = SensorFault(type="silent", sensor="odometry", start=1.0)
-    with Session(sensing(silent), "mesh") as session:
+    with Session(sensing(silent), SessionOptions(backend="mesh")) as session:
         result = session.navigator.go_to(session.goals[0])
         assert not result.success
         assert session.robot.velocity().speed < 0.02

@@ -15,7 +15,7 @@ def judged(a, b):
 
 @pytest.fixture
 def runs(tally):
-    """Ten runs of each arm that agree with the paper, with changes to arm B."""
+    """Ten runs of each condition that agree with the paper, with changes to condition B."""
 
     def make(**changes):
         a = [tally(planner=120 + seed, controller=40, clear=18, other=2, time=480.0 + seed) for seed in range(10)]
@@ -31,7 +31,7 @@ def test_numbers_like_the_papers_are_reproduced_with_strong_agreement(runs):
     assert all(criterion.strong for criterion in judge(a, b))
 
 
-# what is changed in arm B                                          what still holds   verdict
+# what is changed in condition B                                          what still holds   verdict
 @pytest.mark.parametrize(
     ("changes", "holds", "expected"),
     [

@@ -10,7 +10,7 @@ from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.robot_models import TURTLEBOT
 from terrain.physics.robots import WheeledRobot
 from terrain.physics.world import BulletWorld
-from terrain.sensors.lidar import Lidar, camera_directions, planar_directions, ring_directions
+from terrain.sensors.lidar import Lidar, LidarModel, camera_directions, planar_directions, ring_directions
 from terrain.sensors.proprioception import Imu, Localization, WheelOdometry
 from terrain.sensors.rays import MovingRays, StaticRays
 from terrain.worlds.generate import fractal_terrain
@@ -46,7 +46,8 @@ def boxed_world() -> BulletWorld:
 def planar_lidar(world: BulletWorld, pose: Pose, **options: float) -> Lidar:
     casters = [StaticRays(*world.static_triangles()), MovingRays(world)]
     options = {"noise": 0.0, "max_range": 8.0} | options
-    return Lidar(PosedRobot(pose), "scan", casters, (0.0, 0.0, 0.4), planar_directions(), 10.0, rng(), **options)
+    model = LidarModel((0.0, 0.0, 0.4), planar_directions(), 10.0, **options)
+    return Lidar(PosedRobot(pose), "scan", casters, model, rng())
 
 
 def test_a_planar_lidar_sees_the_wall_where_it_is() -> None:

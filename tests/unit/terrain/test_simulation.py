@@ -17,7 +17,7 @@ from terrain.physics.robots import WheeledRobot
 from terrain.physics.simulation import Simulation
 from terrain.physics.world import BulletWorld
 from terrain.recording.recording import RobotShape
-from terrain.sensors.lidar import Lidar, planar_directions
+from terrain.sensors.lidar import Lidar, LidarModel, planar_directions
 from terrain.sensors.proprioception import Imu, WheelOdometry
 from terrain.sensors.rays import MovingRays, StaticRays
 from terrain.worlds.floor_plan import OFFICE_MAP
@@ -34,7 +34,8 @@ def office_run(seed: int) -> tuple[list[Pose], list[RangeScan]]:
         robot.settle()
         casters = [StaticRays(*world.static_triangles()), MovingRays(world)]
         lidar_rng, odometry_rng = np.random.default_rng([seed, 1]), np.random.default_rng([seed, 2])
-        lidar = Lidar(robot, "scan", casters, TURTLEBOT.lidar_position, planar_directions(180), 10.0, lidar_rng)
+        model = LidarModel(TURTLEBOT.lidar_position, planar_directions(180), 10.0)
+        lidar = Lidar(robot, "scan", casters, model, lidar_rng)
         simulation = Simulation(world, robot, {"scan": lidar, "odom": WheelOdometry(robot, odometry_rng)})
         scans: list[RangeScan] = [simulation.latest["scan"]]
         simulation.on_measurement(lambda name, value: scans.append(value) if name == "scan" else None)

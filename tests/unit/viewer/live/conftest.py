@@ -9,12 +9,12 @@ from terrain.viewer.live.controls import LiveControls
 
 
 class SteeredRun:
-    """A session with a tour and the controls of a page; ``at(time, command)`` posts a command at that time."""
+    """A session with a sequence and the controls of a page; ``at(time, command)`` posts a command at that time."""
 
     def __init__(self, session, executive):
         self.session = session
-        self.tour = GoalSequence(session, make_executive(executive, session.navigator), stay=True)
-        self.controls = LiveControls(session, self.tour)
+        self.sequence = GoalSequence(session, make_executive(executive, session.navigator), stay=True)
+        self.controls = LiveControls(session, self.sequence)
         self.poses = {}
         self._script = []
         self._last = 0.0
@@ -26,7 +26,7 @@ class SteeredRun:
 
     def visit_goals(self):
         self.session.run()
-        return self.tour.visit_goals()
+        return self.sequence.visit_goals()
 
     def events(self, *kinds, source=None):
         return [event for event in self.session.memory.of_kind(*kinds) if source in (None, event.source)]
@@ -37,8 +37,8 @@ class SteeredRun:
             for command in entry[1]:
                 self.controls.post(command)
         self.controls.work_off()
-        if self.tour.is_waiting and not self._script and time > self._last + 0.1:
-            self.tour.end("nothing is left to do")
+        if self.sequence.is_waiting and not self._script and time > self._last + 0.1:
+            self.sequence.end("nothing is left to do")
         self.poses[round(time, 2)] = self.session.simulation.robot.pose()
 
 

@@ -8,7 +8,7 @@ from terrain.scenarios.actors import OtherRobot, Walker
 from terrain.scenarios.scenario import PlanarPose, load_scenario
 from terrain.session.executives import make_executive
 from terrain.session.goal_sequence import GoalSequence
-from terrain.session.session import Session
+from terrain.session.session import Session, SessionOptions
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.page import LivePage
@@ -18,25 +18,25 @@ from terrain.viewer.server.page_server import page_server
 NODES = ("ground", "map", "local_map", "lethal", "robot", "plan", "track", "ahead", "field", "scan", "goal_asked_for")
 
 
-def look_once(session, controls, tour, time, port):
+def look_once(session, controls, sequence, time, port):
     """Drive until ``time``, draw the page once, end the run; returns the names of the nodes and the panels' words."""
     seen = {}
     log, history = LiveLog(), History()
     session.events.add_sink(log)
     with page_server(port) as server:
-        page = LivePage(server, session, tour, controls, log)
-        tour.on_goal.append(page.things.show_goal)
+        page = LivePage(server, session, sequence, controls, log)
+        sequence.on_goal.append(page.things.show_goal)
 
         def look(now):
             if now >= time and not seen:
                 page.show(now, history)
                 seen["nodes"] = {name for name in NODES if server.scene.get_handle_by_name(f"/{name}") is not None}
                 seen["words"] = page._headline.content + page._actions.content + page._tree.content
-                tour.end("seen")
+                sequence.end("seen")
 
         session.loop.on_tick.append(look)
         session.run()
-        tour.visit_goals()
+        sequence.visit_goals()
         assert not page.is_watched
     return seen["nodes"], seen["words"]
 
@@ -47,7 +47,7 @@ def test_on_a_mesh_the_page_shows_layers_plan_field_and_what_is_forbidden(steere
         0.6, lambda: run.controls.choose("cvp", "follower"), lambda: run.controls.go_to((9.0, 7.0, 50.0), (0, 0, -1))
     )
 
-    nodes, words = look_once(run.session, run.controls, run.tour, 3.0, 18220)
+    nodes, words = look_once(run.session, run.controls, run.sequence, 3.0, 18220)
 
     assert nodes == set(NODES) - {"map", "local_map"}
     assert "going to 9.0, 7.0" in words and "follow path" in words and "plan found" in words
@@ -57,10 +57,10 @@ def test_on_costmaps_the_page_shows_both_maps():
     scenario = load_scenario("indoor")
     goal = PlanarPose(x=scenario.start.x + 2.0, y=scenario.start.y + 3.0, yaw=1.0)
     with_goal = scenario.model_copy(update={"goals": (goal,)})
-    session = Session(with_goal, "costmap")
+    session = Session(with_goal, SessionOptions(backend="costmap"))
     try:
-        tour = GoalSequence(session, make_executive("move_base", session.navigator), stay=True)
-        nodes, words = look_once(session, LiveControls(session, tour), tour, 3.0, 18230)
+        sequence = GoalSequence(session, make_executive("move_base", session.navigator), stay=True)
+        nodes, words = look_once(session, LiveControls(session, sequence), sequence, 3.0, 18230)
     finally:
         session.close()
 
@@ -72,8 +72,8 @@ def test_people_and_other_robots_are_drawn_where_they_are_now(meadow):
     route = ((2.0, 2.0), (10.0, 2.0))
     actors = (Walker(type="walker", route=route), OtherRobot(type="robot", route=route, start=4.0))
     with Session(meadow.model_copy(update={"actors": actors})) as session, page_server(18240) as server:
-        tour = GoalSequence(session, make_executive("move_base", session.navigator))
-        page = LivePage(server, session, tour, LiveControls(session, tour), LiveLog())
+        sequence = GoalSequence(session, make_executive("move_base", session.navigator))
+        page = LivePage(server, session, sequence, LiveControls(session, sequence), LiveLog())
         shown = []
         for time in (1.0, 2.0):
             session.clock.sleep(1.0)
@@ -116,7 +116,7 @@ def test_only_a_planner_with_a_field_has_one_to_show_and_it_leads_to_the_goal(me
 
 
 def test_a_costmap_server_shows_both_maps_where_they_are():
-    with Session("indoor", "costmap") as session:
+    with Session("indoor", SessionOptions(backend="costmap")) as session:
         server, robot = session.navigator.server, session.simulation.robot.pose()
         whole, local = (server.map_view(name) for name in server.map_views)
 

@@ -3,6 +3,7 @@
 import asyncio
 import math
 import threading
+from functools import partial
 
 import msgspec
 import pytest
@@ -51,12 +52,12 @@ def test_a_command_that_fails_is_noted_and_the_run_goes_on(steered):
 def test_what_a_client_sends_neither_raises_nor_stops_a_run_that_ends_in_order(meadow, tmp_path):
     """Every control of the page gets values it cannot have, from a client that has the right address."""
     with Session(meadow) as session:
-        tour = GoalSequence(session, make_executive("move_base", session.navigator), stay=True)
-        with LiveSession(session, tour, ViewOptions(port=18600, speed=0.0)) as live:
+        sequence = GoalSequence(session, make_executive("move_base", session.navigator), stay=True)
+        with LiveSession(session, sequence, ViewOptions(port=18600, speed=0.0)) as live:
             controls = list(live._page._server.gui._gui_input_handle_from_uuid)
             attacker = threading.Thread(target=lambda: asyncio.run(attack(live, controls)))
             attacker.start()
-            result = tour.visit_goals()
+            result = sequence.visit_goals()
             attacker.join()
         events = session.memory.events
 
@@ -86,11 +87,10 @@ async def attack(session, controls):
 def served(meadow, folder, **view):
     """Serve a run; returns the page's address and what else was said of the page."""
     addresses, notes = [], []
-    options = ViewOptions(speed=0.0, stay=False, **view)
-    run_scenario(
-        meadow, RunOptions(folder, draw=False, view=options, on_page=addresses.append, on_note=notes.append)
-    )  # fmt: skip
-    return addresses, [note for note in notes if not note.startswith("note: ")]  # those are of the map
+    options = ViewOptions(speed=0.0, **view)
+    watch = partial(LiveSession, options=options, on_page=addresses.append, on_note=notes.append)
+    run_scenario(meadow, RunOptions(folder, watch=watch))
+    return addresses, notes
 
 
 def test_who_serves_a_page_is_told_an_address_to_steer_and_one_to_watch(meadow, tmp_path):

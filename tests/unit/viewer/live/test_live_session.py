@@ -3,6 +3,7 @@
 import os
 import signal
 import urllib.request
+from functools import partial
 
 import pytest
 
@@ -11,21 +12,25 @@ from mbf_abstract.time.clock import WallClock
 from terrain.session.executives import EXECUTIVES, make_executive
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.runner import RunOptions, run_scenario
-from terrain.session.session import Session
+from terrain.session.session import Session, SessionOptions
 from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.session import LiveSession
 from terrain.viewer.pictures.picture import ViewerMissing
 
 
+def page(on_page=lambda address: None, **options):
+    return partial(LiveSession, options=ViewOptions(**options), on_page=on_page)
+
+
 def run(meadow, folder, **options):
-    return run_scenario(meadow, RunOptions(folder, draw=False, **options))
+    return run_scenario(meadow, RunOptions(folder, **options))
 
 
 def test_a_run_that_is_served_and_a_run_that_is_not_write_the_same_events(meadow, tmp_path):
     addresses = []
     run(meadow, tmp_path / "plain")
     run(
-        meadow, tmp_path / "served", view=ViewOptions(port=18180, speed=0.0, stay=False), on_page=addresses.append
+        meadow, tmp_path / "served", watch=page(port=18180, speed=0.0, on_page=addresses.append)
     )  # fmt: skip
 
     logs = [(tmp_path / name / "events.jsonl").read_bytes() for name in ("plain", "served")]
@@ -35,8 +40,8 @@ def test_a_run_that_is_served_and_a_run_that_is_not_write_the_same_events(meadow
 
 def test_the_page_answers_while_the_run_goes_on_and_is_gone_afterwards(meadow):
     with Session(meadow) as session:
-        tour = GoalSequence(session, make_executive("move_base", session.navigator))
-        with LiveSession(session, tour, ViewOptions(port=18190, speed=0.0)) as live:
+        sequence = GoalSequence(session, make_executive("move_base", session.navigator))
+        with LiveSession(session, sequence, ViewOptions(port=18190, speed=0.0)) as live:
             address = live.address
             with urllib.request.urlopen(address, timeout=10.0) as answer:
                 assert b"<html" in answer.read().lower()
@@ -52,8 +57,7 @@ def test_ctrl_c_ends_a_run_that_waits_for_goals_and_its_results_are_written(mead
             pressed.append(progress.time)
             os.kill(os.getpid(), signal.SIGINT)
 
-    view = ViewOptions(port=18200, speed=0.0, stay=True)
-    result = run(meadow, tmp_path, view=view, on_progress=press)
+    result = run(meadow, tmp_path, watch=page(port=18200, speed=0.0), stay=True, on_progress=press)
 
     assert result.success and pressed
     assert (tmp_path / "metrics.json").is_file()
@@ -63,18 +67,18 @@ def test_ctrl_c_ends_a_run_that_waits_for_goals_and_its_results_are_written(mead
 
 def test_a_page_that_breaks_down_is_reported_once_and_the_run_goes_on(meadow):
     with Session(meadow) as session:
-        tour = GoalSequence(session, make_executive("move_base", session.navigator))
-        with LiveSession(session, tour, ViewOptions(port=18210, speed=0.0)) as live:
+        sequence = GoalSequence(session, make_executive("move_base", session.navigator))
+        with LiveSession(session, sequence, ViewOptions(port=18210, speed=0.0)) as live:
             del live._history
-            session.loop.on_tick.append(lambda time: tour.end("done") if tour.is_waiting else None)
-            assert tour.visit_goals().success
+            session.loop.on_tick.append(lambda time: sequence.end("done") if sequence.is_waiting else None)
+            assert sequence.visit_goals().success
         faults = [event for event in session.memory.of_kind(EventKind.FAULT) if event.source == "live_view"]
         assert len(faults) == 1
 
 
 def test_an_interface_that_does_not_exist_is_told_in_one_line(meadow, tmp_path):
     with pytest.raises(ViewerMissing, match=r"203\.0\.113\.1"):
-        run(meadow, tmp_path, view=ViewOptions(host="203.0.113.1"))
+        run(meadow, tmp_path, watch=page(host="203.0.113.1"))
 
 
 @pytest.mark.parametrize("executive", EXECUTIVES)
@@ -89,7 +93,7 @@ def test_every_executive_drives_a_run_or_plans_it(meadow, tmp_path, executive):
 
 
 def test_in_real_time_the_world_is_closed_after_the_step_that_is_under_way(meadow):
-    session, begun, done = Session(meadow, wall_clock=True), [], []
+    session, begun, done = Session(meadow, SessionOptions(wall_clock=True)), [], []
 
     def look_slowly(time):
         begun.append(time)

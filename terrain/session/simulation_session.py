@@ -1,0 +1,141 @@
+"""A simulation and the navigation of its robot on one clock: what scenarios and experiments have in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from mbf_abstract.events import EventBus, EventSink, MemorySink
+from mbf_abstract.geometry import Command, Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.navigator import Navigator
+from mbf_abstract.server.factory import read_config
+from mbf_abstract.time.clock import Clock, WallClock
+from mbf_abstract.time.sim_clock import SimClock
+from terrain.physics.simulation import Simulation
+from terrain.recording.run_digest import RunDigest
+from terrain.sensors.proprioception import Localization
+from terrain.session.drive_loop import DEFAULT_RATES, ClockedRobot, DriveLoop
+
+S = TypeVar("S", bound="SimulationSession")
+
+SENSE_FIRST = 0.5  # s; by then every sensor has measured and every map has been updated
+TIME_TO_END = 1.0  # s of simulated time for threads to end; it passes only while somebody waits for it
+
+
+@dataclass(frozen=True)
+class SessionOptions:
+    """How a session is built.
+
+    Attributes
+    ----------
+    folder : Path, optional
+        Where the world's map files and ``navigation.yaml`` are written; a temporary folder without it.
+    backend : str, optional
+        Map backend instead of the scenario's own.
+    seed : int, optional
+        Instead of the scenario's own.
+    wall_clock : bool
+        Real time instead of lockstep simulated time.
+    settings : mapping of str to str
+        Changes of the scenario's world and navigation, see ``terrain.scenarios.settings``.
+    sinks : tuple of EventSink
+        Where events go, beside the session's memory.
+    on_step : callable
+        Called with the name of each step of the preparation that may take a while.
+    """
+
+    folder: Path | None = None
+    backend: str | None = None
+    seed: int | None = None
+    wall_clock: bool = False
+    settings: Mapping[str, str] = field(default_factory=dict)
+    sinks: tuple[EventSink, ...] = ()
+    on_step: Callable[[str], None] = lambda text: None
+
+
+class SimulationSession(ABC):
+    """Wires simulation, server and navigator on one clock; a context manager in which time passes.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    localization : Localization
+        Gives the server its pose.
+    config_file : Path
+        Of the navigation.
+    options : SessionOptions
+        Clock, seed (0 if none is given), sinks and ``on_step``; the rest belongs to scenarios.
+    send : callable, optional
+        Takes the robot's commands instead of its motors.
+
+    Attributes
+    ----------
+    clock : Clock
+    navigator : Navigator
+    events : EventBus
+    memory : MemorySink
+        Its events so far.
+    digest : RunDigest
+        Of every pose, command and event.
+    loop : DriveLoop
+
+    Raises
+    ------
+    ConfigError
+        The configuration is wrong; all findings.
+    """
+
+    max_events = 200_000
+    rates = DEFAULT_RATES
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        localization: Localization,
+        config_file: Path,
+        options: SessionOptions,
+        send: Callable[[Command], None] | None = None,
+    ) -> None:
+        server_class, config = read_config(config_file)
+        self.simulation = simulation
+        self.clock: Clock = WallClock() if options.wall_clock else SimClock()
+        self.memory = MemorySink(maxlen=self.max_events)
+        self.digest = RunDigest(self.clock.now)
+        self.events = EventBus(self.clock.now, [self.memory, self.digest, *options.sinks])
+        robot = ClockedRobot(simulation, send or simulation.robot.send_command, self.digest)
+        options.on_step("building the map")
+        server = server_class(config, robot, self.clock, TransformBuffer(), self.events, options.seed or 0)
+        self.navigator = Navigator(server)
+        self.loop = DriveLoop(simulation, robot, localization, server, self.digest, self.rates)
+        self.loop.publish()
+        options.on_step("compiling kernels (first run only)")
+        server.warm_up(simulation.robot.pose(), self.goals[0], options.on_step)
+
+    @property
+    @abstractmethod
+    def goals(self) -> list[Pose]:
+        """Where the robot shall go, in order."""
+
+    def run(self) -> None:
+        """Let time pass: start stepping the simulator, and wait until sensors and maps are alive."""
+        self.loop.start()
+        self.clock.sleep(SENSE_FIRST)
+
+    def close(self) -> None:
+        """Stop the robot, the server and the simulator."""
+        self.loop.stop()
+        self.navigator.close()
+        if isinstance(self.clock, SimClock):
+            self.clock.sleep(TIME_TO_END)
+        self.events.close()
+
+    def __enter__(self: S) -> S:
+        self.run()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
