@@ -27,7 +27,7 @@ from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.time.ticker import Ticker
-from mbf_mesh_nav.files.mesh_io import known_endings, read_mesh
+from mbf_mesh_nav.files.mesh_io import known_endings, read_mesh, require_packages
 from mbf_mesh_nav.map.layer_graph import LayerGraphError
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -145,8 +145,9 @@ class MeshNavigationServer(AbstractNavigationServer):
         Raises
         ------
         MeshError
-            The file exists or cannot be written; no part of one is left.
+            The file exists or cannot be written, or h5py is not installed; no part of one is left.
         """
+        require_packages(Path(file), ".h5")
         from mbf_mesh_nav.files.lvr2_io import write_lvr2_map  # h5py only for those who use it
 
         write_lvr2_map(self.config.path.parent / file, self.mesh_map, layout=layout)

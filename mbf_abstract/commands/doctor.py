@@ -19,10 +19,8 @@ import typer
 
 from mbf_abstract.commands.reporting import FAILURE
 
-NEEDED = (
-    *("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "h5py"),
-    *("PIL", "lxml", "collada"),
-)
+NEEDED = (*("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "PIL"),)
+MESH_FILES = ("h5py", "lxml", "collada")
 SIMULATION = ("pybullet", "embreex", "matplotlib", "viser", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf")
 DISTRIBUTIONS = {
     "yaml": "pyyaml",
@@ -71,6 +69,8 @@ def examine() -> Iterator[Finding]:
         yield _package(name, "pip install mbf-flex", optional=False)
     for name in SIMULATION:
         yield _package(name, "needed by mbf run and pictures: pip install 'mbf-flex[sim]'", optional=True)
+    for name in MESH_FILES:
+        yield _package(name, "only for meshes in .h5 and .dae files: pip install 'mbf-flex[mesh-files]'", optional=True)
     yield _package("rerun", "only for mbf replay --rrd, Python >= 3.11: pip install 'mbf-flex[rerun]'", optional=True)
     yield _check("plugins", _plugins, "mbf plugins tells which and why")
     yield _check("kernel cache", _kernel_cache, "set NUMBA_CACHE_DIR to a folder that can be written")

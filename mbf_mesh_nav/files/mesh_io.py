@@ -7,6 +7,7 @@ a file's up axis alone.
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 from mbf_mesh_nav.files.elevation_files import elevation_readers, read_elevation
@@ -18,6 +19,8 @@ TRIMESH_FORMATS = frozenset({".ply", ".obj", ".stl", ".off", ".dae", ".gltf", ".
 HDF5_FORMATS = frozenset({".h5", ".hdf5"})
 SPLIT_CORNERS = frozenset({".stl", ".obj", ".dae", ".gltf", ".glb"})
 """Formats whose files, or readers, give faces, materials, parts or seams of a texture corners of their own."""
+EXTRA_PACKAGES = {".h5": ("h5py",), ".hdf5": ("h5py",), ".dae": ("lxml", "collada")}
+"""What an installation without the extra ``mesh-files`` may lack for an ending."""
 MAX_FILE_BYTES = 4 * 2**30
 MAX_FACES = 10_000_000
 
@@ -51,12 +54,13 @@ def read_mesh(
     Raises
     ------
     MeshError
-        Missing, unreadable, cut off, too large, no such part, or no triangle in it.
+        Missing, unreadable, cut off, too large, no such part, no triangle in it, or an extra is not installed.
     """
     path = Path(file)
     ending = path.suffix.lower()
     if ending not in (known := known_endings()):
         raise MeshError(str(path), [f"unknown ending '{ending}', known are: {', '.join(sorted(known))}"])
+    require_packages(path, ending)
     if not path.is_file():
         raise MeshError(str(path), ["there is no such file"])
     if path.stat().st_size > MAX_FILE_BYTES:
@@ -81,6 +85,19 @@ def _read_points(path: Path, part: str, max_faces: int) -> MeshArrays:
 
         return read_lvr2_mesh(path, part, max_faces)
     return read_scene(path, part.strip("/"), max_faces)
+
+
+def require_packages(path: Path, ending: str) -> None:
+    """Check that what reads and writes files of an ending is installed.
+
+    Raises
+    ------
+    MeshError
+        It is not; the text names the extra to install.
+    """
+    if missing := [name for name in EXTRA_PACKAGES.get(ending, ()) if find_spec(name) is None]:
+        text = f"{ending} files need {' and '.join(missing)}: pip install 'mbf-flex[mesh-files]'"
+        raise MeshError(str(path), [text])
 
 
 def known_endings() -> frozenset[str]:

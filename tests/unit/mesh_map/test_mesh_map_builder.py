@@ -1,6 +1,7 @@
 """Building a map from a configuration: all findings at once, cache, coarse-mesh warning, files in and out."""
 
 import importlib
+import re
 import sys
 
 import numpy as np
@@ -348,3 +349,14 @@ def test_too_many_faces_are_refused(tmp_path):
     for path in (file, tmp_path / "mesh.h5"):
         with pytest.raises(MeshError, match="the limit is 10"):
             read_mesh(path, max_faces=10)
+
+
+@pytest.mark.parametrize(("ending", "lacking"), [(".h5", ["h5py"]), (".dae", ["lxml", "collada"])])
+def test_without_the_extra_a_file_that_needs_it_is_refused_with_what_to_install(tmp_path, monkeypatch, ending, lacking):
+    file = tmp_path / f"map{ending}"
+    file.write_bytes(b"")
+    for name in lacking:
+        monkeypatch.setitem(sys.modules, name, None)
+    message = f"{ending} files need {' and '.join(lacking)}: pip install 'mbf-flex[mesh-files]'"
+    with pytest.raises(MeshError, match=re.escape(message)):
+        read_mesh(file)
