@@ -78,9 +78,9 @@ def report_obstacles(mesh_map: MeshMap) -> dict[str, float]:
     rng = np.random.default_rng(2)
     centre = mesh_map.vertices[len(mesh_map.vertices) // 2]
     cloud = centre + rng.normal(0.0, 1.0, (5000, 3)) * [2.0, 2.0, 0.2] + [0.0, 0.0, 0.5]
-    mesh_map.insert_points(cloud, centre, 0.0)
+    mesh_map.insert_points("cloud", cloud, centre, 0.0)
     moved = cloud + np.array([0.3, 0.0, 0.0])
-    shifted = seconds_of(lambda: mesh_map.insert_points(moved, centre, 1.0), 1)
+    shifted = seconds_of(lambda: mesh_map.insert_points("cloud", moved, centre, 1.0), 1)
     anew = seconds_of(mesh_map.layers["inflation"].recompute, 1)
     marked = int(mesh_map.layers["seen"].lethal.sum())
     update, start = f"{shifted * 1e3:.1f} ms", f"{anew * 1e3:.1f} ms"

@@ -233,7 +233,7 @@ class CostmapNavigationServer(AbstractNavigationServer):
         costmap = build_layered_costmap(
             parameters,
             {layer.name: cast(Any, layer.parameters) for layer in section.layers},
-            resolve_layer=layer_classes.__getitem__,
+            load_layer=layer_classes.__getitem__,
             base_folder=config.path.parent,
             transforms=self.runtime.transforms,
         )

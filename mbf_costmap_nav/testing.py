@@ -14,22 +14,23 @@ from pathlib import Path
 import numpy as np
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.layer import LayerParameters
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.testing.contract.report import ContractBroken, Report
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext, LayerParameters, shifted
-from mbf_costmap_nav.map.sensor_data import Observation, SensorLayer
+from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext, shifted
 
 __all__ = ["ContractBroken", "check_layer"]
 
 COST_OF_LATER_LAYERS = 77
 """Stands out of the box, where layers after the checked one have written already."""
 SEEN_AT = 1.0
-"""Time [s] of the updates with observations."""
+"""Time [s] of the updates with scans."""
 REACH = 8
 """Cells this near to a border or an area may take part in what happens there (a layer may inflate)."""
 
-Observations = Sequence[tuple[str, Observation]]
+Scans = Sequence[RangeScan]
 
 
 def check_layer(
@@ -37,13 +38,13 @@ def check_layer(
     *,
     parameters: LayerParameters | None = None,
     background: Costmap | None = None,
-    observations: Observations = (),
+    scans: Scans = (),
     base_folder: Path | str = ".",
 ) -> None:
     """Check a costmap layer against the contract, with and without unknown space.
 
     Writes inside its box only, legal values, two instances that agree, updates that change nothing while nothing has
-    changed, maps and observations left alone, parameters that can be set again, ``reset`` that forgets observations,
+    changed, maps and scans left alone, parameters that can be set again, ``reset`` that forgets scans,
     ``shift`` that keeps what stays in a rolling window and forgets what leaves it, ``clear_area`` that forgets the area
     and nothing else. Cells within 8 of a border or an area are left out of the last two, for layers that spread costs.
 
@@ -54,8 +55,8 @@ def check_layer(
         The class's defaults if not given.
     background : Costmap, optional
         What the layers before it have written, and the map of a static layer; a room of 6 m x 4 m if not given.
-    observations : sequence of (source, Observation)
-        What the sources of a sensor layer see, with stamps around 1 s.
+    scans : sequence of RangeScan
+        What the sources of a sensor layer see, in the frame of the map, with stamps around 1 s.
     base_folder : path
         Where relative file names in the parameters start.
 
@@ -65,7 +66,7 @@ def check_layer(
         With everything that is wrong.
     """
     room = _room() if background is None else background
-    seen = [array for _, observation in observations for array in (observation.ends, observation.hits)]
+    seen = [array for scan in scans for array in (scan.ends, scan.hits)]
     report = Report(layer_class, [room.cells, *seen])
     chosen = layer_class.Parameters() if parameters is None else parameters
     for track_unknown_space in (False, True):
@@ -81,11 +82,11 @@ def check_layer(
             with report.no_exception("updating"):
                 _check_updates(site, twin, report)
             with report.no_exception("sensing"):
-                _check_sensing(site, twin, observations, report)
+                _check_sensing(site, twin, scans, report)
             with report.no_exception("moving the window"):
-                _check_shift(make(rolling=True), make(rolling=True), observations, report)
+                _check_shift(make(rolling=True), make(rolling=True), scans, report)
             with report.no_exception("clearing an area"):
-                _check_clear_area(make, observations, report)
+                _check_clear_area(make, scans, report)
     report.finish()
 
 
@@ -105,15 +106,13 @@ def _check_updates(site: _Site, twin: _Site, report: Report) -> None:
     report.expect(np.array_equal(again, first), "the same parameters, set at run time, gave other cells")
 
 
-def _check_sensing(site: _Site, twin: _Site, observations: Observations, report: Report) -> None:
-    """Hand over observations and reset; the state without sensors must come back."""
+def _check_sensing(site: _Site, twin: _Site, scans: Scans, report: Report) -> None:
+    """Hand over scans and reset; the state without sensors must come back."""
     everything = site.layer.geometry.box
-    unseen = site.update("update without observations", everything, 0.0)
-    seen = site.see(observations)
-    report.expect(
-        np.array_equal(seen, twin.see(observations)), "update with observations: two instances wrote different cells"
-    )
-    whole = site.update("whole update with observations", everything, SEEN_AT)
+    unseen = site.update("update without scans", everything, 0.0)
+    seen = site.see(scans)
+    report.expect(np.array_equal(seen, twin.see(scans)), "update with scans: two instances wrote different cells")
+    whole = site.update("whole update with scans", everything, SEEN_AT)
     report.expect(np.array_equal(whole, seen), "update_bounds returned a box that misses changed cells")
     problem = site.layer.stale_reason(SEEN_AT)
     report.expect(isinstance(problem, str), f"stale_reason returned {type(problem).__name__}, not a text")
@@ -122,10 +121,10 @@ def _check_sensing(site: _Site, twin: _Site, observations: Observations, report:
     report.expect(np.array_equal(reset, unseen), "reset did not bring back the state without sensors")
 
 
-def _check_shift(site: _Site, fresh: _Site, observations: Observations, report: Report) -> None:
+def _check_shift(site: _Site, fresh: _Site, scans: Scans, report: Report) -> None:
     """Move the window a little, then out of sight of everything that was seen."""
     site.update("update of a rolling window", site.layer.geometry.box, 0.0)
-    before = site.see(observations)
+    before = site.see(scans)
     dx, dy = 3, -2
     site.shift(dx, dy)
     after = site.update("update after shift", site.layer.geometry.box, SEEN_AT)
@@ -142,13 +141,13 @@ def _check_shift(site: _Site, fresh: _Site, observations: Observations, report: 
     report.expect(np.array_equal(away, new), "shift: what left the window was not forgotten")
 
 
-def _check_clear_area(make: Callable[[], _Site], observations: Observations, report: Report) -> None:
+def _check_clear_area(make: Callable[[], _Site], scans: Scans, report: Report) -> None:
     """Clear the left half, and all but the left half: one part forgets, the other stays."""
     for inside in (True, False):
         site, name = make(), f"clear_area(inside={inside})"
         grid = site.layer.geometry.box
         unseen = site.update("update before clear_area", grid, 0.0)
-        seen = site.see(observations)
+        seen = site.see(scans)
         half = grid.x1 // 2
         site.layer.clear_area(CellBox(grid.x0 - 5, grid.y0 - 5, half, grid.y1 + 5), inside)  # may reach beyond the grid
         after = site.update(f"update after {name}", grid, SEEN_AT)
@@ -173,12 +172,12 @@ class _Site:
         layer.match_geometry(room.geometry)
         layer.set_footprint(Footprint.circle(0.2))
 
-    def see(self, observations: Observations) -> CellArray:
-        """Hand all observations to a sensor layer and update what it reports."""
-        if isinstance(self.layer, SensorLayer):
-            for source, observation in observations:
-                self.layer.insert(source, observation)
-        return self.update("update with observations", EMPTY_BOX, SEEN_AT)
+    def see(self, scans: Scans) -> CellArray:
+        """Hand all scans to a layer that listens and update what it reports."""
+        for scan in scans:
+            if self.layer.listens_to(scan.source):
+                self.layer.insert_scan(scan)
+        return self.update("update with scans", EMPTY_BOX, SEEN_AT)
 
     def shift(self, dx: int, dy: int) -> None:
         """Move the window as a layered costmap does; free space comes into view."""

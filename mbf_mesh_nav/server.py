@@ -18,6 +18,7 @@ from mbf_abstract.config.configuration import Config
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Path as PlannedPath
+from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.maps.queries import MapQueries
 from mbf_abstract.maps.scan_intake import ScanIntake, ScanTarget
 from mbf_abstract.maps.sensing import RangeScan
@@ -28,7 +29,6 @@ from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.time.ticker import Ticker
 from mbf_mesh_nav.files.mesh_io import known_endings, read_mesh, require_packages
-from mbf_mesh_nav.map.layer_graph import LayerGraphError
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.queries import MeshQueries
@@ -82,8 +82,8 @@ class MeshNavigationServer(AbstractNavigationServer):
         self.mesh_map = self._build_map(config, mesh_file=None)
         target = ScanTarget(  # the map of the moment, which may be swapped
             config.parameters.global_frame,
-            lambda: self.mesh_map.source_names,
-            lambda source: self.mesh_map.listens_to(source),
+            lambda: self.mesh_map.layers.source_names,
+            lambda source: self.mesh_map.layers.listens_to(source),
             lambda scan: self.mesh_map.insert_scan(scan),
         )
         self._scans = ScanIntake(self.runtime, {"mesh_map": target})
@@ -176,8 +176,8 @@ class MeshNavigationServer(AbstractNavigationServer):
                 frame_id=config.parameters.global_frame,
                 load_layer=layer_classes.__getitem__,
             )
-        except LayerGraphError as error:
-            raise LayerGraphError(f"{config.path}: mesh_map: {error}") from error
+        except LayerListError as error:
+            raise LayerListError(f"{config.path}: mesh_map: {error}") from error
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the mesh map."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.transform_buffer import ExtrapolationError, TransformBuffer
@@ -43,6 +44,54 @@ class RangeScan:
     ends: FloatArray
     hits: NDArray[np.bool_]
     stamp: float
+
+    @classmethod
+    def of_rays(
+        cls, source: str, origin: ArrayLike, ends: ArrayLike, hits: ArrayLike, stamp: float, frame_id: str = "map"
+    ) -> RangeScan:
+        """Copy what a driver gives: origin (3,), ends (n, 3), hits (n,), see the attributes; lists will do.
+
+        Raises
+        ------
+        ValueError
+            Wrong shapes.
+        """
+        start = np.array(origin, dtype=np.float64).reshape(-1)
+        points = np.array(ends, dtype=np.float64).reshape(-1, 3)
+        mask = np.array(hits, dtype=np.bool_).reshape(-1)
+        if start.shape != (3,):
+            raise ValueError(f"the origin of a scan must be three numbers, got {start.tolist()}")
+        if len(points) != len(mask):
+            raise ValueError(f"{len(points)} ray ends but {len(mask)} hit flags")
+        return cls(source, frame_id, start, points, mask, float(stamp))
+
+    @classmethod
+    def of_points(
+        cls, source: str, points: ArrayLike, origin: ArrayLike, stamp: float, frame_id: str = "map"
+    ) -> RangeScan:
+        """Take a cloud (n, 3) as a scan in which every ray hit something."""
+        cloud = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        return cls.of_rays(source, origin, cloud, np.ones(len(cloud), dtype=np.bool_), stamp, frame_id)
+
+    def finite(self) -> RangeScan:
+        """The scan without the rays whose end is not finite.
+
+        Raises
+        ------
+        ValueError
+            Origin or stamp are not finite.
+        """
+        if not (np.isfinite(self.origin).all() and math.isfinite(self.stamp)):
+            origin = self.origin.tolist()
+            raise ValueError(f"origin and stamp of a scan must be finite, got {origin} and {self.stamp}")
+        known = np.asarray(np.isfinite(self.ends).all(axis=1))
+        return self if known.all() else replace(self, ends=self.ends[known], hits=self.hits[known])
+
+    def between_heights(self, lowest: float, highest: float) -> RangeScan:
+        """The scan without the rays that end below ``lowest`` or above ``highest`` [m]."""
+        z = self.ends[:, 2]
+        inside = (z >= lowest) & (z <= highest)
+        return self if inside.all() else replace(self, ends=self.ends[inside], hits=self.hits[inside])
 
     def in_frame(self, frame_id: str, transforms: TransformBuffer, tolerance: float = TRANSFORM_TOLERANCE) -> RangeScan:
         """Express the scan in another frame, by the transform of the moment it was measured.

@@ -1,1 +1,1 @@
-"""The layers of a costmap, one a file; ``costmap_config.BUILTIN_LAYERS`` names their types."""
+"""The layers of a costmap, one a file; entry points of the group ``mbf.costmap_layers`` name their types."""

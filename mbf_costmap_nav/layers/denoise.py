@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
-from mbf_costmap_nav.map.layer import CostmapLayer, LayerParameters, shifted
+from mbf_costmap_nav.map.layer import CostmapLayer, shifted
 
 
 class DenoiseLayerParameters(LayerParameters):

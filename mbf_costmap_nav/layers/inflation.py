@@ -20,11 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import FREE, INSCRIBED, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.kernels.map.inflation import LARGEST_RADIUS, inflate
-from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext, LayerParameters
+from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext
 
 
 class InflationLayerParameters(LayerParameters):

@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.files.map_io import load_costmap
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
@@ -22,7 +23,7 @@ from mbf_costmap_nav.grid.placement import Placement
 from mbf_costmap_nav.grid.resampling import sample_costmap
 from mbf_costmap_nav.grid.zones import Zone, load_zones
 from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon
-from mbf_costmap_nav.map.layer import CombinationMethod, CostmapLayer, LayerContext, LayerParameters, combine
+from mbf_costmap_nav.map.layer import CombinationMethod, CostmapLayer, LayerContext, combine
 
 
 class KeepoutLayerParameters(LayerParameters):
@@ -91,7 +92,7 @@ class KeepoutLayer(CostmapLayer):
 
     def stale_reason(self, now: float) -> str:
         """Say that the frame of the areas is unknown."""
-        return f"layer {self.name!r}: {self._placement.problem}" if self._placement.problem else ""
+        return self._placement.problem
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
         """Raise costs to those of the areas."""

@@ -16,13 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.layer import LayerParameters
+from mbf_abstract.maps.layers.source_watch import first_reason
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import FREE, LETHAL, CellArray, CellBox
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays, mark_points
-from mbf_costmap_nav.map.layer import CombinationMethod, GridLayer, LayerContext, LayerParameters, combine
-from mbf_costmap_nav.map.sensor_data import Observation, ObservationBuffer, SensorLayer, SourceParameters
+from mbf_costmap_nav.map.layer import CombinationMethod, GridLayer, LayerContext, combine
+from mbf_costmap_nav.map.sensor_data import ObservationBuffer, SourceParameters
 
 
 class ObstacleLayerParameters(LayerParameters):
@@ -35,7 +38,7 @@ class ObstacleLayerParameters(LayerParameters):
     footprint_clearing_enabled: bool = parameter(True, "Free the cells under the robot.")
 
 
-class ObstacleLayer(GridLayer, SensorLayer):
+class ObstacleLayer(GridLayer):
     """Marks and clears by rays. See the module's text for when to use it."""
 
     Parameters = ObstacleLayerParameters
@@ -51,9 +54,9 @@ class ObstacleLayer(GridLayer, SensorLayer):
         """Names of the configured sources."""
         return tuple(self.buffers)
 
-    def insert(self, source: str, observation: Observation) -> None:
-        """Keep an observation for the next update."""
-        self.buffers[source].insert(observation)
+    def insert_scan(self, scan: RangeScan) -> None:
+        """Keep a scan for the next update."""
+        self.buffers[scan.source].insert(scan)
 
     def set_footprint(self, footprint: Footprint) -> None:
         """Take over the outline under which the map is free."""
@@ -61,8 +64,7 @@ class ObstacleLayer(GridLayer, SensorLayer):
 
     def stale_reason(self, now: float) -> str:
         """Name the source that is late at ``now`` [s]."""
-        problems = (buffer.watch.stale_reason(now) for buffer in self.buffers.values())
-        return next((f"layer {self.name!r}: {problem}" for problem in problems if problem), "")
+        return first_reason(buffer.stale_reason(now) for buffer in self.buffers.values())
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Trace the rays of all observations, mark their hits, free the robot's place; report the touched box."""
@@ -80,13 +82,13 @@ class ObstacleLayer(GridLayer, SensorLayer):
             box = box.union(self._free_polygon(self._in_cells(corners)))
         return box
 
-    def _clear(self, seen: Observation, limits: SourceParameters, touched: NDArray[np.int64]) -> None:
+    def _clear(self, seen: RangeScan, limits: SourceParameters, touched: NDArray[np.int64]) -> None:
         clear_rays(
             self.cells, self._lower_left, self.geometry.resolution, seen.origin, seen.ends,
             limits.raytrace_min_range, limits.raytrace_max_range, FREE, touched,
         )  # fmt: skip
 
-    def _mark(self, seen: Observation, limits: SourceParameters, touched: NDArray[np.int64]) -> None:
+    def _mark(self, seen: RangeScan, limits: SourceParameters, touched: NDArray[np.int64]) -> None:
         mark_points(
             self.cells, self._lower_left, self.geometry.resolution, seen.origin, seen.ends, seen.hits,
             limits.obstacle_min_range, limits.obstacle_max_range, LETHAL, touched,

@@ -18,18 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.layer import LayerParameters
+from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.kernels.map.sonar import update_cone
-from mbf_costmap_nav.map.layer import (
-    CombinationMethod,
-    LayerContext,
-    LayerParameters,
-    clear_cells,
-    combine,
-    shifted,
-)
-from mbf_costmap_nav.map.sensor_data import MAX_OBSERVATIONS, Observation, SensorLayer, SourceTiming, SourceWatch
+from mbf_costmap_nav.map.layer import CombinationMethod, CostmapLayer, LayerContext, clear_cells, combine, shifted
+from mbf_costmap_nav.map.sensor_data import MAX_OBSERVATIONS, SourceTiming
 
 UNDECIDED = 0.5
 TARGET_PROBABILITY = 233.0 / 254.0
@@ -51,7 +47,7 @@ class RangeSensorLayerParameters(LayerParameters):
     clear_threshold: float = parameter(0.2, "A cell believed occupied below this is free.", gt=0.0, lt=0.5)
 
 
-class RangeSensorLayer(SensorLayer):
+class RangeSensorLayer(CostmapLayer):
     """Cones of single readings. See the module's text for when to use it."""
 
     Parameters = RangeSensorLayerParameters
@@ -59,8 +55,8 @@ class RangeSensorLayer(SensorLayer):
 
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
-        self.watches = {name: SourceWatch(name, source) for name, source in self.parameters.sources.items()}
-        self._waiting: deque[tuple[str, Observation]] = deque(maxlen=MAX_OBSERVATIONS)
+        self.watches = {name: SourceWatch(name) for name in self.parameters.sources}
+        self._waiting: deque[RangeScan] = deque(maxlen=MAX_OBSERVATIONS)
 
     def match_geometry(self, geometry: GridGeometry) -> None:
         """Start undecided everywhere."""
@@ -92,22 +88,24 @@ class RangeSensorLayer(SensorLayer):
         """Names of the configured sensors."""
         return tuple(self.watches)
 
-    def insert(self, source: str, observation: Observation) -> None:
+    def insert_scan(self, scan: RangeScan) -> None:
         """Keep a reading for the next update; unlike points, every reading counts once."""
-        self.watches[source].heard(observation.stamp)
-        self._waiting.append((source, observation))
+        self.watches[scan.source].heard(scan.stamp)
+        self._waiting.append(scan)
 
     def stale_reason(self, now: float) -> str:
         """Name the sensor that is late at ``now`` [s]."""
-        problems = (watch.stale_reason(now) for watch in self.watches.values())
-        return next((f"layer {self.name!r}: {problem}" for problem in problems if problem), "")
+        sources = self.parameters.sources
+        return first_reason(
+            watch.stale_reason(now, sources[name].expected_update_rate) for name, watch in self.watches.items()
+        )
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Take the waiting readings into the beliefs."""
         while self._waiting:
-            source, seen = self._waiting.popleft()
-            limits = self.parameters.sources[source]
-            self.watches[source].used()
+            seen = self._waiting.popleft()
+            limits = self.parameters.sources[seen.source]
+            self.watches[seen.source].used()
             for end, hit in zip(seen.ends, seen.hits, strict=True):
                 box = box.union(self._take(seen.origin, end, bool(hit), limits))
         return box

@@ -16,13 +16,14 @@ from typing import Literal
 import numpy as np
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.files.map_description import UNKNOWN_OCCUPANCY
 from mbf_costmap_nav.files.map_io import load_map
 from mbf_costmap_nav.grid.costmap import FREE, CellArray, CellBox, Costmap
 from mbf_costmap_nav.grid.placement import Placement
 from mbf_costmap_nav.grid.zones import Zone, load_zones
-from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext, LayerParameters
+from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext
 
 
 class SpeedLimitLayerParameters(LayerParameters):
@@ -67,7 +68,7 @@ class SpeedLimitLayer(CostmapLayer):
 
     def stale_reason(self, now: float) -> str:
         """Say that the frame of the areas is unknown."""
-        return f"layer {self.name!r}: {self._placement.problem}" if self._placement.problem else ""
+        return self._placement.problem
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
         """Write nothing: a limit is no cost."""

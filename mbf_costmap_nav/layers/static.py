@@ -18,12 +18,13 @@ from pathlib import Path
 import numpy as np
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.files.map_io import load_costmap
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.grid.placement import Placement
 from mbf_costmap_nav.grid.resampling import sample_costmap
-from mbf_costmap_nav.map.layer import CombinationMethod, GridLayer, LayerContext, LayerParameters, combine
+from mbf_costmap_nav.map.layer import CombinationMethod, GridLayer, LayerContext, combine
 
 
 class StaticLayerParameters(LayerParameters):
@@ -111,7 +112,7 @@ class StaticLayer(GridLayer):
 
     def stale_reason(self, now: float) -> str:
         """Say that the map's frame is unknown."""
-        return f"layer {self.name!r}: {self._placement.problem}" if self._placement.problem else ""
+        return self._placement.problem
 
     def reset(self) -> None:
         """Return to the map as loaded, undoing cleared areas."""

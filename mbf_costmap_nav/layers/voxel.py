@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, CellBox, GridGeometry
 from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon
 from mbf_costmap_nav.kernels.map.voxel import clear_voxel_rays, mark_voxels, project_columns
 from mbf_costmap_nav.layers.obstacle import ObstacleLayer, ObstacleLayerParameters
 from mbf_costmap_nav.map.layer import clear_cells, shifted
-from mbf_costmap_nav.map.sensor_data import Observation, SourceParameters
+from mbf_costmap_nav.map.sensor_data import SourceParameters
 
 
 class VoxelLayerParameters(ObstacleLayerParameters):
@@ -79,13 +80,13 @@ class VoxelLayer(ObstacleLayer):
             self.default_value, self.cells, box,
         )  # fmt: skip
 
-    def _clear(self, seen: Observation, limits: SourceParameters, touched: NDArray[np.int64]) -> None:
+    def _clear(self, seen: RangeScan, limits: SourceParameters, touched: NDArray[np.int64]) -> None:
         clear_voxel_rays(
             self.marked, self.seen, self.parameters.z_voxels, self._lower_corner, self._voxel, seen.origin, seen.ends,
             limits.raytrace_min_range, limits.raytrace_max_range, touched,
         )  # fmt: skip
 
-    def _mark(self, seen: Observation, limits: SourceParameters, touched: NDArray[np.int64]) -> None:
+    def _mark(self, seen: RangeScan, limits: SourceParameters, touched: NDArray[np.int64]) -> None:
         mark_voxels(
             self.marked, self.seen, self.parameters.z_voxels, self._lower_corner, self._voxel, seen.origin, seen.ends,
             seen.hits, limits.obstacle_min_range, limits.obstacle_max_range, touched,

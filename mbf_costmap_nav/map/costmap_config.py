@@ -15,41 +15,19 @@ name, the way MBF writes its plugin lists::
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from importlib import import_module
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from pydantic import field_validator, model_validator
 
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.layers.layer_list import LayerBlocks, LayerEntry, layer_loader, plan_layers
 from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE
-from mbf_abstract.parameters import ParameterModel, PluginParameters, parameter
+from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_costmap_nav.grid.costmap import MAX_CELLS, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext, LayerParameters
+from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
-
-BUILTIN_LAYERS = {
-    "static": "mbf_costmap_nav.layers.static:StaticLayer",
-    "obstacle": "mbf_costmap_nav.layers.obstacle:ObstacleLayer",
-    "voxel": "mbf_costmap_nav.layers.voxel:VoxelLayer",
-    "range_sensor": "mbf_costmap_nav.layers.range_sensor:RangeSensorLayer",
-    "denoise": "mbf_costmap_nav.layers.denoise:DenoiseLayer",
-    "inflation": "mbf_costmap_nav.layers.inflation:InflationLayer",
-    "keepout": "mbf_costmap_nav.layers.keepout:KeepoutLayer",
-    "speed_limit": "mbf_costmap_nav.layers.speed_limit:SpeedLimitLayer",
-}
-"""Types of the layers that ship, as "module:Class"."""
-
-LayerResolver = Callable[[str], type[CostmapLayer]]
-
-
-class LayerEntry(ParameterModel):
-    """One line of the layer list."""
-
-    name: str = parameter(..., "Name of the layer; its parameters stand in the block of this name.")
-    type: str = parameter(..., "Type of the layer: a built-in name, an entry point, or module:Class.")
 
 
 class CostmapParameters(ParameterModel):
@@ -126,32 +104,11 @@ class CostmapParameters(ParameterModel):
         return GridGeometry(columns, rows, self.resolution, self.origin_x, self.origin_y)
 
 
-def builtin_layer(type_name: str) -> type[CostmapLayer]:
-    """Class of a built-in layer type, or of "module:Class".
-
-    Raises
-    ------
-    ValueError
-        The type is unknown, cannot be imported, or is no layer.
-    """
-    location = BUILTIN_LAYERS.get(type_name, type_name)
-    module_name, colon, class_name = location.partition(":")
-    if not colon:
-        raise ValueError(f"unknown layer type {type_name!r}; known are {sorted(BUILTIN_LAYERS)}, or module:Class")
-    try:
-        found = getattr(import_module(module_name), class_name)
-    except (ImportError, AttributeError) as error:
-        raise ValueError(f"layer type {type_name!r} cannot be imported: {error}") from error
-    if not (isinstance(found, type) and issubclass(found, CostmapLayer)):
-        raise ValueError(f"layer type {type_name!r} is no CostmapLayer")
-    return found
-
-
 def build_layered_costmap(
     parameters: CostmapParameters,
-    layer_blocks: Mapping[str, Mapping[str, Any] | PluginParameters] | None = None,
+    layer_blocks: LayerBlocks | None = None,
     *,
-    resolve_layer: LayerResolver = builtin_layer,
+    load_layer: Callable[[str], type[CostmapLayer]] | None = None,
     base_folder: Path | str = ".",
     static_map: Costmap | None = None,
     transforms: TransformBuffer | None = None,
@@ -164,8 +121,8 @@ def build_layered_costmap(
         The costmap's block without the blocks of its layers.
     layer_blocks : mapping
         Layer name -> its block, raw or validated already; a layer without one gets its defaults.
-    resolve_layer : callable
-        Class of a layer type; a server hands over its registry's look-up.
+    load_layer : callable, optional
+        Type -> class; without it the installed types.
     base_folder : path
         Where relative file names in layer blocks start.
     static_map : Costmap, optional
@@ -175,38 +132,29 @@ def build_layered_costmap(
 
     Raises
     ------
-    ValueError
-        Unknown layer type, bad layer parameters (pydantic's ValidationError is one), a block no layer has, or two
-        layers of one name.
+    LayerListError
+        Unknown layer types, bad parameters, a block no layer has, layers of one name: all findings.
     MapError
         A layer's map file cannot be used.
     """
-    blocks = dict(layer_blocks or {})
-    layers: list[CostmapLayer] = []
-    for entry in parameters.layers:
-        layer_class = resolve_layer(entry.type)
-        block = blocks.pop(entry.name, {})
-        layer_parameters = block if isinstance(block, LayerParameters) else layer_class.Parameters.model_validate(block)
-        layers.append(
-            layer_class(
-                LayerContext(
-                    name=entry.name,
-                    parameters=layer_parameters,
-                    frame_id=parameters.frame_id,
-                    rolling_window=parameters.rolling_window,
-                    track_unknown_space=parameters.track_unknown_space,
-                    base_folder=Path(base_folder),
-                    confine_images=parameters.confine_images,
-                    static_map=static_map,
-                    transforms=transforms,
-                    max_cells=parameters.max_cells,
-                )
+    plan = plan_layers(parameters.layers, layer_blocks or {}, load_layer or layer_loader("costmap", CostmapLayer))
+    layers = [
+        planned.layer_class(
+            LayerContext(
+                name=planned.entry.name,
+                parameters=planned.parameters,
+                frame_id=parameters.frame_id,
+                rolling_window=parameters.rolling_window,
+                track_unknown_space=parameters.track_unknown_space,
+                base_folder=Path(base_folder),
+                confine_images=parameters.confine_images,
+                static_map=static_map,
+                transforms=transforms,
+                max_cells=parameters.max_cells,
             )
         )
-    if blocks:
-        raise ValueError(
-            f"blocks {sorted(blocks)} belong to no layer, the layers are {[e.name for e in parameters.layers]}"
-        )
+        for planned in plan
+    ]
     return LayeredCostmap(
         parameters.geometry(),
         layers,

@@ -11,7 +11,7 @@ All hooks run while the costmap's lock is held: they must not call back into the
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -22,17 +22,12 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_costmap_nav.grid.costmap import FREE, MAX_CELLS, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 
 CellType = TypeVar("CellType", bound=np.generic)
-
-
-class LayerParameters(PluginParameters):
-    """Parameters every layer has."""
-
-    enabled: bool = parameter(True, "Whether the layer takes part in updates.")
 
 
 class CombinationMethod(str, Enum):
@@ -83,18 +78,16 @@ class LayerContext:
     max_cells: int = MAX_CELLS
 
 
-class CostmapLayer(ABC):
+class CostmapLayer(MapLayer):
     """One source of costs. ``geometry`` is the costmap's grid, set before the first update."""
 
-    Parameters: ClassVar[type[LayerParameters]] = LayerParameters
     contract_check: ClassVar[str] = "mbf_costmap_nav.testing:check_layer"
     clearable: ClassVar[bool] = True
     """Whether clearing an area means this layer although nobody named it; false for what no sensor brings back."""
     geometry: GridGeometry
 
     def __init__(self, context: LayerContext) -> None:
-        self.name = context.name
-        self.parameters = context.parameters
+        super().__init__(context.name, context.parameters)
         self.track_unknown_space = context.track_unknown_space
         self.rolling_window = context.rolling_window
 
@@ -110,14 +103,17 @@ class CostmapLayer(ABC):
         """Take over the grid of a rolling window that moved by (dx, dy) cells; keep the cells of the overlap."""
         self.geometry = geometry
 
-    def set_footprint(self, footprint: Footprint) -> None:  # noqa: B027 - an optional hook
+    def set_footprint(self, footprint: Footprint) -> None:
         """Take over the robot's (padded) footprint."""
 
-    def parameters_changed(self) -> None:  # noqa: B027 - an optional hook
+    def parameters_changed(self) -> None:
         """Take over ``parameters``, which have just been replaced; the next update recomputes the whole map.
 
         Needed only where something was derived from them. May raise ValueError: the old ones are then put back.
         """
+
+    def insert_scan(self, scan: RangeScan) -> None:
+        """Keep a scan of one of its sources, in the costmap's frame and all of it finite, for the next update."""
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Take in new data; return ``box`` grown by the cells that may change (it may reach beyond the grid)."""
@@ -127,24 +123,16 @@ class CostmapLayer(ABC):
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
         """Write this layer's costs into ``cells[box.slices]``; ``box`` lies on the grid."""
 
-    def reset(self) -> None:  # noqa: B027 - an optional hook
+    def reset(self) -> None:
         """Forget everything the layer has gathered; a static layer returns to its map."""
 
-    def clear_area(self, box: CellBox, inside: bool) -> None:  # noqa: B027 - an optional hook
+    def clear_area(self, box: CellBox, inside: bool) -> None:
         """Forget the cells in ``box``, or all cells out of it (``inside`` false)."""
-
-    def stale_reason(self, now: float) -> str:
-        """Why the layer's data is too old at ``now`` [s]; empty while it is current."""
-        return ""
 
     @property
     def lasting(self) -> bool:
         """Whether no sensor has a part in its cells, and no frame moves them: what it forbids stays forbidden."""
         return False
-
-    def configuration_warning(self) -> str:
-        """What is legal but hardly meant in the layer's parameters, given the footprint; empty if nothing is."""
-        return ""
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Allowed speed [m/s] at the point (x, y) [m], at most ``full_speed``."""

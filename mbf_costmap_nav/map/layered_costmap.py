@@ -16,17 +16,19 @@ import threading
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layered_map import LayeredMap
+from mbf_abstract.maps.layers.layer import LayerParameters
+from mbf_abstract.maps.layers.layer_stack import LayerStack
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.map.layer import CostmapLayer, LayerParameters, shifted
+from mbf_costmap_nav.map.layer import CostmapLayer, shifted
 from mbf_costmap_nav.map.layers_in_sum import lasting_map, warnings_about
-from mbf_costmap_nav.map.sensor_data import Observation, SensorLayer
 
 
-class LayeredCostmap:
+class LayeredCostmap(LayeredMap):
     """Layers, the cells they produce, and the questions a server asks.
 
     Parameters
@@ -50,7 +52,7 @@ class LayeredCostmap:
 
     Raises
     ------
-    ValueError
+    LayerListError
         Two layers share a name.
     """
 
@@ -66,15 +68,12 @@ class LayeredCostmap:
         track_unknown_space: bool = False,
         max_age: float = 0.0,
     ) -> None:
-        names = [layer.name for layer in layers]
-        if len(set(names)) != len(names):
-            raise ValueError(f"the layers of a costmap need different names, got {names}")
+        self._layers = LayerStack(layers)
         if not rolling_window:
             geometry = next((own for layer in layers if (own := layer.preferred_geometry())), geometry)
         self.frame_id = frame_id
         self.rolling_window = rolling_window
         self.max_age = max_age
-        self.layers = {layer.name: layer for layer in layers}
         self._lock = threading.Lock()
         self._default_value = UNKNOWN if track_unknown_space else FREE
         self._geometry = geometry
@@ -100,9 +99,9 @@ class LayeredCostmap:
         return self._geometry.resolution
 
     @property
-    def source_names(self) -> tuple[str, ...]:
-        """Names of all observation sources of the layers, sorted."""
-        return tuple(sorted({name for layer in self.layers.values() for name in _sources(layer)}))
+    def layers(self) -> LayerStack[CostmapLayer]:
+        """The layers by name, in order of writing."""
+        return self._layers
 
     @property
     def last_update(self) -> float | None:
@@ -118,12 +117,6 @@ class LayeredCostmap:
     def circumscribed_radius(self) -> float:
         """Distance [m] from the base to the farthest corner of the padded footprint."""
         return self.footprint.circumscribed_radius
-
-    def layer(self, name: str) -> CostmapLayer:
-        """One layer; raises KeyError with the known ones if there is none of that name."""
-        if name not in self.layers:
-            raise KeyError(f"the costmap has no layer {name!r}, only {list(self.layers)}")
-        return self.layers[name]
 
     def snapshot(self) -> Costmap:
         """Read-only copy of the map as of the last update; the same object until the map changes."""
@@ -149,11 +142,7 @@ class LayeredCostmap:
             if self.rolling_window or self._last_update is None:
                 return None
             self._pending = self._geometry.box  # layers may keep notes of the cells they are asked for
-            return lasting_map(list(self._enabled_layers()), self._geometry, self._default_value, self.frame_id)
-
-    def is_current(self, now: float) -> bool:
-        """Whether a command may be computed on this map at ``now`` [s]."""
-        return not self.stale_reason(now)
+            return lasting_map(list(self.layers.enabled), self._geometry, self._default_value, self.frame_id)
 
     def stale_reason(self, now: float) -> str:
         """Why the map is not current at ``now`` [s]: the age of the map, or the silent sensor; empty if it is."""
@@ -163,18 +152,17 @@ class LayeredCostmap:
             age = now - self._last_update
             if 0.0 < self.max_age < age:
                 return f"the last update of the costmap is {age:.2f} s old, allowed are {self.max_age:.2f} s"
-            problems = (layer.stale_reason(now) for layer in self._enabled_layers())
-            return next((problem for problem in problems if problem), "")
+            return self.layers.stale_reason(now)
 
     def configuration_warnings(self) -> list[str]:
         """What is legal but hardly meant in the layers' parameters, e.g. an inflation narrower than the robot."""
         with self._lock:
-            return warnings_about(list(self._enabled_layers()), self.inscribed_radius)
+            return warnings_about(self.layers, self.inscribed_radius)
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Lowest speed [m/s] the layers allow at the point (x, y) [m]; ``full_speed`` where there is no limit."""
         with self._lock:
-            return min((layer.speed_limit(x, y, full_speed) for layer in self._enabled_layers()), default=full_speed)
+            return min((layer.speed_limit(x, y, full_speed) for layer in self.layers.enabled), default=full_speed)
 
     # ----------------------------------------------------------------------------------------------- updating
     def update(self, robot_pose: Pose | None, now: float) -> CellBox:
@@ -198,12 +186,12 @@ class LayeredCostmap:
                 self._follow(robot_pose)
             box = self._pending
             self._pending = self._geometry.box  # stays so if a layer raises: the next update then repairs everything
-            for layer in self._enabled_layers():
+            for layer in self.layers.enabled:
                 box = layer.update_bounds(robot_pose, now, box)
             box = box.clipped(self._geometry.box)
             if not box.empty:
                 self._cells[box.slices] = self._default_value
-                for layer in self._enabled_layers():
+                for layer in self.layers.enabled:
                     layer.update_costs(self._cells, box)
                 self._version += 1
                 self._snapshot = None
@@ -227,9 +215,6 @@ class LayeredCostmap:
         for layer in self.layers.values():
             layer.shift(self._geometry, dx, dy)
         self._pending = self._geometry.box
-
-    def _enabled_layers(self) -> Iterable[CostmapLayer]:
-        return (layer for layer in self.layers.values() if layer.parameters.enabled)
 
     # --------------------------------------------------------------------------------------- changes at run time
     def set_footprint(self, footprint: Footprint, padding: float | None = None) -> None:
@@ -256,7 +241,7 @@ class LayeredCostmap:
             The layer does not take them; the old ones stay.
         """
         with self._lock:
-            layer = self.layer(name)
+            layer = self.layers[name]
             old, layer.parameters = layer.parameters, parameters
             self._pending = self._geometry.box
             try:
@@ -267,73 +252,12 @@ class LayeredCostmap:
                 raise
 
     # ------------------------------------------------------------------------------------------- sensor input
-    def insert_points(self, source: str, points: ArrayLike, sensor_origin: ArrayLike, stamp: float) -> int:
-        """Hand a point cloud to all layers that listen to ``source``; it is used by the next update.
-
-        Parameters
-        ----------
-        source : str
-            Name of an observation source in a layer's parameters.
-        points : (n, 3) float
-            Hits [m] in the costmap's frame. Rows that are not finite are dropped.
-        sensor_origin : (3,) float
-            Position [m] of the sensor in the costmap's frame when it measured.
-        stamp : float
-            Time of the measurement [s].
-
-        Returns
-        -------
-        int
-            Number of layers that took it.
-
-        Raises
-        ------
-        ValueError
-            No layer has such a source.
-        """
-        return self._insert(source, Observation.of_points(points, sensor_origin, stamp))
-
-    def insert_scan(
-        self, source: str, sensor_origin: ArrayLike, ends: ArrayLike, hit_mask: ArrayLike, stamp: float
-    ) -> int:
-        """Hand a scan to all layers that listen to ``source``: rays that clear, and mark where they hit.
-
-        Parameters
-        ----------
-        source : str
-        sensor_origin : (3,) float
-            Position [m] of the sensor in the costmap's frame.
-        ends : (n, 3) float
-            End points [m] of the rays in the costmap's frame; for a miss the point at the sensor's range.
-        hit_mask : (n,) bool
-            Whether the ray hit something at its end.
-        stamp : float
-            Time of the measurement [s].
-
-        Returns
-        -------
-        int
-            Number of layers that took it.
-
-        Raises
-        ------
-        ValueError
-            No layer has such a source.
-        """
-        return self._insert(source, Observation.of_scan(sensor_origin, ends, hit_mask, stamp))
-
-    def _insert(self, source: str, observation: Observation) -> int:
+    def take_in(self, scan: RangeScan) -> None:
+        """Hand a scan to the layers that listen to its source; the next update uses it."""
         with self._lock:
-            listening = [
-                layer
-                for layer in self.layers.values()
-                if isinstance(layer, SensorLayer) and source in layer.source_names
-            ]
-            if not listening:
-                raise ValueError(f"no layer has an observation source {source!r}, known are {list(self.source_names)}")
-            for layer in listening:
-                layer.insert(source, observation)
-        return len(listening)
+            for layer in self.layers.values():
+                if layer.listens_to(scan.source):
+                    layer.insert_scan(scan)
 
     # ----------------------------------------------------------------------------------------------- clearing
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
@@ -347,7 +271,7 @@ class LayeredCostmap:
             A name is no layer of this map.
         """
         with self._lock:
-            chosen = self._chosen(layer_names)
+            chosen = self.layers.chosen(layer_names)
             for layer in chosen:
                 layer.reset()
             self._pending = self._geometry.box
@@ -383,7 +307,7 @@ class LayeredCostmap:
         """
         with self._lock:
             clearable = [name for name, layer in self.layers.items() if layer.clearable]
-            chosen = self._chosen(clearable if layer_names is None else layer_names)
+            chosen = self.layers.chosen(clearable if layer_names is None else layer_names)
             x0, y0 = self._geometry.world_to_cell_unbounded(center_x - size / 2, center_y - size / 2)
             x1, y1 = self._geometry.world_to_cell_unbounded(center_x + size / 2, center_y + size / 2)
             window = CellBox(x0 + 1, y0 + 1, x1, y1)  # costmap_2d's window leaves out its border cells
@@ -391,10 +315,3 @@ class LayeredCostmap:
                 layer.clear_area(window, inside)
             self._pending = self._geometry.box
         return [layer.name for layer in chosen]
-
-    def _chosen(self, layer_names: Iterable[str] | None) -> list[CostmapLayer]:
-        return list(self.layers.values()) if layer_names is None else [self.layer(name) for name in layer_names]
-
-
-def _sources(layer: CostmapLayer) -> tuple[str, ...]:
-    return layer.source_names if isinstance(layer, SensorLayer) else ()

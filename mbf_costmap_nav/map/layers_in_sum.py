@@ -6,14 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_costmap_nav.grid.costmap import Costmap, GridGeometry
 from mbf_costmap_nav.map.layer import CombinationMethod, CostmapLayer
 
 
-def warnings_about(layers: Sequence[CostmapLayer], inscribed_radius: float) -> list[str]:
+def warnings_about(layers: LayerStack[CostmapLayer], inscribed_radius: float) -> list[str]:
     """What is legal but hardly meant, of each layer and of all of them, for a robot of ``inscribed_radius`` [m]."""
-    warnings = [f"layer {layer.name!r}: {warning}" for layer in layers if (warning := layer.configuration_warning())]
-    inflates = any(hasattr(layer.parameters, "inflation_radius") for layer in layers)
+    warnings = layers.configuration_warnings()
+    inflates = any(hasattr(layer.parameters, "inflation_radius") for layer in layers.enabled)
     if layers and not inflates and inscribed_radius > 0.0:
         radius = f"{inscribed_radius:.2f} m"
         warnings.append(f"no inflation layer: grid planners take the robot, of inscribed radius {radius}, for a point")

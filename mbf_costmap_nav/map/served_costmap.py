@@ -54,9 +54,9 @@ class ServedCostmap:
         costmap = self.costmap
         return ScanTarget(
             costmap.frame_id,
-            lambda: costmap.source_names,
-            lambda source: source in costmap.source_names,
-            lambda scan: costmap.insert_scan(scan.source, scan.origin, scan.ends, scan.hits, scan.stamp),
+            lambda: costmap.layers.source_names,
+            costmap.layers.listens_to,
+            costmap.insert_scan,
             self.parameters.transform_tolerance,
         )
 
@@ -89,7 +89,7 @@ class ServedCostmap:
         ValueError
             A value is not legal or cannot change, or the layer does not take it.
         """
-        new = with_changes(self.costmap.layer(layer).parameters, changes)
+        new = with_changes(self.costmap.layers[layer].parameters, changes)
         self.costmap.set_layer_parameters(layer, new)
         self._tell(f"{self.name}.{layer}", changes)
 

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from pydantic import field_validator
 
 from mbf_abstract.geometry.arithmetic import norm
-from mbf_abstract.maps.sensing import MAX_STAMP_LEAD, RangeScan
+from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.map.layer import (
     NOTHING_CHANGED,
@@ -101,12 +102,12 @@ class ObstacleLayer(MeshLayer):
 
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
-        self._last_heard: dict[str, float] = {}  # its order numbers the sensors
+        self._watches: dict[str, SourceWatch] = {}  # its order numbers the sensors
         self._hits = Hits.none()
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost inf and lethal at the corners of the marked faces; forget those of sensors not listened to any more."""
-        unheard = [number for number, name in enumerate(self._last_heard) if not self.listens_to(name)]
+        unheard = [number for number, name in enumerate(self._watches) if not self.listens_to(name)]
         self._hits = self._hits.where(~np.isin(self._hits.sources, unheard))
         lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)
         lethal[self.topology.faces[self._hits.faces]] = True
@@ -116,11 +117,13 @@ class ObstacleLayer(MeshLayer):
         """Mark the faces below what was hit, forget what is too old or seen through."""
         if not self.listens_to(scan.source):
             return NOTHING_CHANGED
-        self._last_heard[scan.source] = scan.stamp
-        sensor = list(self._last_heard).index(scan.source)
+        watch = self._watches.setdefault(scan.source, SourceWatch(scan.source))
+        sensor = list(self._watches).index(scan.source)
         kept = self._hits.where(self._still_valid(scan, sensor))
         faces, points = self._project(scan)
         seen = Hits(faces, points, np.full(len(faces), scan.stamp), np.full(len(faces), sensor, dtype=np.int32))
+        watch.heard(scan.stamp)
+        watch.used()
         return self._change(seen.joined_with(kept))
 
     def expire(self, now: float) -> IntArray:
@@ -131,28 +134,19 @@ class ObstacleLayer(MeshLayer):
         return NOTHING_CHANGED if kept.all() else self._change(self._hits.where(kept))
 
     def clear(self) -> IntArray:
-        """Forget all hits, and that there was a cloud."""
-        self._last_heard = dict.fromkeys(self._last_heard, -np.inf)
+        """Forget all hits; the map is stale until every source has seen it again."""
+        for watch in self._watches.values():
+            watch.cleared()
         return self._change(Hits.none())
 
     def stale_reason(self, now: float) -> str:
-        """Which sensor has not spoken within ``expected_update_rate``, or since the layer was cleared.
-
-        A stamp from the future, but for the difference of two clocks, is no sign of life.
-        """
+        """Which sensor is silent for longer than ``expected_update_rate``, or has sent nothing since a clearing."""
         limit = self.parameters.expected_update_rate
-        sources = self.parameters.sources or self._last_heard
-        if limit == 0.0:
-            return ""
-        for source in sources:
-            age = now - self._last_heard.get(source, -np.inf)
-            if age == np.inf:
-                return f"nothing of observation source {source!r} is in the map yet"
-            if age > limit:
-                return f"observation source {source!r} is silent for {age:.2f} s, expected every {limit:.2f} s"
-            if age < -MAX_STAMP_LEAD:
-                return f"observation source {source!r} has a stamp {-age:.2f} s in the future, is its clock right?"
-        return "" if sources else "no observation source has sent anything yet"
+        sources = self.parameters.sources or tuple(self._watches)
+        if limit > 0.0 and not sources:
+            return "no observation source has sent anything yet"
+        watches = (self._watches.get(source, SourceWatch(source)) for source in sources)
+        return first_reason(watch.stale_reason(now, limit) for watch in watches)
 
     @property
     def source_names(self) -> tuple[str, ...]:

@@ -7,15 +7,16 @@ starting over after a local change override ``update_from_inputs``; layers fed b
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.maps.layers import layer as map_layer
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.mesh.locate import SurfaceLocator
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
@@ -27,8 +28,8 @@ FloatArray = NDArray[np.float64]
 NOTHING_CHANGED: IntArray = np.zeros(0, dtype=np.int32)
 
 
-class LayerParameters(ParameterModel):
-    """Parameters every layer has."""
+class LayerParameters(map_layer.LayerParameters):
+    """Parameters every mesh layer has."""
 
     combination_weight: float = parameter(1.0, "Weight of this layer in a weighted sum or mean.", ge=0.0, le=10.0)
 
@@ -56,7 +57,7 @@ class LayerContext:
     inputs: tuple[MeshLayer, ...] = ()
 
 
-class MeshLayer(ABC):
+class MeshLayer(map_layer.MapLayer):
     """One attribute of the surface: cost (V,) float32 and lethal (V,) bool.
 
     Attributes
@@ -72,13 +73,10 @@ class MeshLayer(ABC):
     """Whether the values depend on mesh and parameters alone and are worth keeping in a file."""
     contract_check: ClassVar[str] = "mbf_mesh_nav.testing:check_layer"
 
-    parameters: Any
-
     def __init__(self, context: LayerContext) -> None:
-        self.name = context.name
+        super().__init__(context.name, context.parameters)
         self.topology = context.topology
         self.locator = context.locator
-        self.parameters = context.parameters
         self.inputs = context.inputs
         self._costs: CostArray = np.zeros(context.topology.vertex_count, dtype=np.float32)
         self._lethal: LethalArray = np.zeros(context.topology.vertex_count, dtype=np.bool_)
@@ -99,8 +97,10 @@ class MeshLayer(ABC):
 
     def recompute(self) -> IntArray:
         """Compute everything anew and return the vertices whose cost or flag changed, ascending."""
-        costs, lethal = self.compute()
-        return self.replace(costs, lethal)
+        if self.parameters.enabled:
+            return self.replace(*self.compute())
+        count = self.topology.vertex_count
+        return self.replace(np.zeros(count, dtype=np.float32), np.zeros(count, dtype=np.bool_))
 
     def replace(self, costs: CostArray, lethal: LethalArray) -> IntArray:
         """Take over new values and return the vertices that changed, ascending.
@@ -136,19 +136,6 @@ class MeshLayer(ABC):
     def clear(self) -> IntArray:
         """Forget everything sensed."""
         return NOTHING_CHANGED
-
-    @property
-    def source_names(self) -> tuple[str, ...]:
-        """Names of the scan sources that the layer asks for; empty if it takes all or none."""
-        return ()
-
-    def listens_to(self, source: str) -> bool:
-        """Whether the layer takes scans of a source; one that overrides ``insert_scan`` takes all unless it says so."""
-        return type(self).insert_scan is not MeshLayer.insert_scan
-
-    def stale_reason(self, now: float) -> str:
-        """Why the layer's sensor data are too old at ``now`` [s]; empty if they are fresh or there are none."""
-        return ""
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:

@@ -11,61 +11,16 @@ are not up to date.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from graphlib import CycleError, TopologicalSorter
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from mbf_abstract.event_values import error_text
+from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerParameters, MeshLayer
 
 
-class LayerGraphError(ValueError):
-    """The layers cannot be ordered: an unknown input, a duplicate name or a cycle. The text names them all."""
-
-
-def dependency_order(inputs: Mapping[str, Sequence[str]]) -> list[str]:
-    """Order layer names so that inputs come first, keeping the configured order where it is free.
-
-    Parameters
-    ----------
-    inputs : mapping
-        For every layer the names of the layers it reads.
-
-    Raises
-    ------
-    LayerGraphError
-        An input is not the name of a layer, or layers wait for each other; every finding is named.
-    """
-    findings = [
-        f"{name} reads unknown layer '{read}'" for name in inputs for read in inputs[name] if read not in inputs
-    ]
-    if findings:
-        findings.append(f"the layers are: {', '.join(inputs)}")
-    known = {name: [read for read in reads if read in inputs] for name, reads in inputs.items()}
-    sorter, order = TopologicalSorter(known), list[str]()
-    try:
-        sorter.prepare()
-    except CycleError as error:
-        findings.append(f"layers read each other in a circle: {' -> '.join(_from_first(error.args[1], list(inputs)))}")
-    if findings:
-        raise LayerGraphError("; ".join(findings))
-    configured = list(inputs).index
-    while sorter.is_active():
-        ready = sorted(sorter.get_ready(), key=configured)
-        order += ready
-        sorter.done(*ready)
-    return order
-
-
-def _from_first(circle: Sequence[str], configured: Sequence[str]) -> list[str]:
-    """Turn a circle of graphlib, which ends as it begins, so that each name reads the next, the first one first."""
-    names = list(reversed(circle))[1:]
-    start = min(range(len(names)), key=lambda place: configured.index(names[place]))
-    return [*names[start:], *names[:start], names[start]]
-
-
-class LayerGraph(Mapping[str, MeshLayer]):
+class LayerGraph(LayerStack[MeshLayer]):
     """The layers by name, ``graph["inflation"].costs``; see the module's text for how changes travel.
 
     Parameters
@@ -80,19 +35,10 @@ class LayerGraph(Mapping[str, MeshLayer]):
     """
 
     def __init__(self, layers: Sequence[MeshLayer] = ()) -> None:
-        self._layers = {layer.name: layer for layer in layers}
+        super().__init__(layers)
         self.problem = ""
         self._interrupted: set[str] = set()  # names of the layers that raised in passes that did not come through
         self._owed: dict[str, IntArray] = {}  # what passes changed that did not come through
-
-    def __getitem__(self, name: str) -> MeshLayer:
-        return self._layers[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._layers)
-
-    def __len__(self) -> int:
-        return len(self._layers)
 
     def apply(self, event: Callable[[MeshLayer], IntArray]) -> dict[str, IntArray]:
         """Give an event to every layer, then let the changes run down once.
@@ -113,7 +59,7 @@ class LayerGraph(Mapping[str, MeshLayer]):
             Whatever a layer raises; see the module's text.
         """
         changed = dict(self._owed)
-        for name, layer in self._layers.items():
+        for name, layer in self.items():
             from_inputs = union_of([changed[read.name] for read in layer.inputs if read.name in changed])
             try:
                 own = union_of([changed.get(name, NOTHING_CHANGED), self._follow(layer, from_inputs), event(layer)])
@@ -132,7 +78,8 @@ class LayerGraph(Mapping[str, MeshLayer]):
         if layer.name in self._interrupted:
             layer.recompute()
             return np.arange(len(layer.costs), dtype=np.int32)
-        return layer.update_from_inputs(from_inputs) if len(from_inputs) else NOTHING_CHANGED
+        follows = layer.parameters.enabled and len(from_inputs)
+        return layer.update_from_inputs(from_inputs) if follows else NOTHING_CHANGED
 
     def set_parameters(self, name: str, parameters: LayerParameters) -> dict[str, IntArray]:
         """Change a layer's parameters at run time and recompute what depends on them; returns what changed.
@@ -147,7 +94,7 @@ class LayerGraph(Mapping[str, MeshLayer]):
         Exception
             Whatever the layer, or one that reads it, raises that cannot compute with them; it keeps the old ones.
         """
-        layer = self._layers[name]
+        layer = self[name]
         old = layer.parameters
         if not isinstance(parameters, type(old)):
             raise TypeError(f"layer '{name}' takes {type(old).__name__}, got {type(parameters).__name__}")

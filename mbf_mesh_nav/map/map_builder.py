@@ -19,56 +19,45 @@ Everything that is wrong with the layers is reported at once, before the mesh is
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import ValidationError, field_validator
+from pydantic import field_validator
 
+from mbf_abstract.maps.layers.layer_list import (
+    LayerBlocks,
+    LayerEntry,
+    LayerListError,
+    PlannedLayer,
+    layer_loader,
+    plan_layers,
+)
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_mesh_nav.files.mesh_io import MAX_FACES, SPLIT_CORNERS, read_mesh
 from mbf_mesh_nav.map.layer import LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_cache import LayerCache
-from mbf_mesh_nav.map.layer_graph import LayerGraph, LayerGraphError, dependency_order
+from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.map_findings import frame_findings, map_findings
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.densify import densify
 from mbf_mesh_nav.mesh.repair import REPAIRS, Finding, checked_mesh
 from mbf_mesh_nav.mesh.topology import build_topology
 
-LAYER_TYPES: dict[str, str] = {
-    "border": "mbf_mesh_nav.layers.border:BorderLayer",
-    "clearance": "mbf_mesh_nav.layers.clearance:ClearanceLayer",
-    "height_diff": "mbf_mesh_nav.layers.height_diff:HeightDiffLayer",
-    "inflation": "mbf_mesh_nav.layers.inflation:InflationLayer",
-    "keepout": "mbf_mesh_nav.layers.keepout:KeepoutLayer",
-    "label": "mbf_mesh_nav.layers.label:LabelLayer",
-    "max_combination": "mbf_mesh_nav.layers.max_combination:MaxCombinationLayer",
-    "mean": "mbf_mesh_nav.layers.mean:MeanLayer",
-    "obstacle": "mbf_mesh_nav.layers.obstacle:ObstacleLayer",
-    "ridge": "mbf_mesh_nav.layers.ridge:RidgeLayer",
-    "roughness": "mbf_mesh_nav.layers.roughness:RoughnessLayer",
-    "steepness": "mbf_mesh_nav.layers.steepness:SteepnessLayer",
-    "tilt": "mbf_mesh_nav.layers.tilt:TiltLayer",
-    "weighted_sum": "mbf_mesh_nav.layers.weighted_sum:WeightedSumLayer",
-}
-"""The layers that come with the package; further ones are found through the ``load_layer`` argument."""
-
 JOIN, KEEP_APART = "duplicate_vertices", "-duplicate_vertices"
 
-LayerLoader = Callable[[str], type[MeshLayer]]
-LayerBlocks = Mapping[str, Mapping[str, Any] | LayerParameters]
 
+class MeshLayerEntry(LayerEntry):
+    """One line of the ``layers`` list of a mesh map."""
 
-class LayerEntry(ParameterModel):
-    """One line of the ``layers`` list."""
-
-    name: str = parameter(..., "Name of the layer; its parameters stand in the block of that name.")
-    type: str = parameter(..., "Type of the layer, or module:Class.")
     inputs: tuple[str, ...] = parameter((), "Names of the layers it reads.")
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Its inputs."""
+        return self.inputs
 
 
 class MeshMapParameters(ParameterModel):
@@ -105,7 +94,7 @@ class MeshMapParameters(ParameterModel):
         dynamic=False,
     )
     densify: float = parameter(0.0, "Split edges longer than this; 0 = off.", unit="m", ge=0.0, dynamic=False)
-    layers: tuple[LayerEntry, ...] = parameter((), "The layers, in any order.", dynamic=False)
+    layers: tuple[MeshLayerEntry, ...] = parameter((), "The layers, in any order.", dynamic=False)
     default_layer: str = parameter("", "The layer planners and controllers see; empty = the last one.", dynamic=False)
     edge_cost_factor: float = parameter(0.0, "How much a cost of 1 lengthens an edge, in lengths.", ge=0.0, le=100.0)
     inscribed_radius: float = parameter(
@@ -135,36 +124,15 @@ class MeshMapParameters(ParameterModel):
         return (*listed, JOIN) if joins and JOIN not in listed else listed
 
 
-def load_builtin_layer(type_name: str) -> type[MeshLayer]:
-    """Class of a type in ``LAYER_TYPES`` or of ``module:Class``.
-
-    Raises
-    ------
-    LayerGraphError
-        No such type, it cannot be imported, or the class is no ``MeshLayer``.
-    """
-    target = LAYER_TYPES.get(type_name, type_name)
-    if ":" not in target:
-        raise LayerGraphError(f"unknown layer type '{type_name}', the types are: {', '.join(LAYER_TYPES)}")
-    module, _, name = target.partition(":")
-    try:
-        layer_class = getattr(importlib.import_module(module), name)
-    except Exception as error:  # whatever the import of a user's module raises
-        raise LayerGraphError(f"layer type '{type_name}' cannot be loaded: {type(error).__name__}: {error}") from error
-    if not (isinstance(layer_class, type) and issubclass(layer_class, MeshLayer)):
-        raise LayerGraphError(f"layer type '{type_name}' is no MeshLayer")
-    return layer_class
-
-
 def default_layers(inscribed_radius: float) -> tuple[MeshMapParameters, dict[str, dict[str, float]]]:
     """Return parameters and layer blocks for a bare mesh and a robot of ``inscribed_radius`` [m].
 
     Border, steepness, roughness and height steps are joined and inflated to twice the radius.
     """
     guards = ("border", "steepness", "roughness", "height_diff")
-    entries = [LayerEntry(name=guard, type=guard) for guard in guards]
-    entries.append(LayerEntry(name="lethal", type="max_combination", inputs=guards))
-    entries.append(LayerEntry(name="inflation", type="inflation", inputs=("lethal",)))
+    entries = [MeshLayerEntry(name=guard, type=guard) for guard in guards]
+    entries.append(MeshLayerEntry(name="lethal", type="max_combination", inputs=guards))
+    entries.append(MeshLayerEntry(name="inflation", type="inflation", inputs=("lethal",)))
     blocks = {
         "steepness": {"threshold": 0.6},
         "roughness": {"threshold": 0.8},
@@ -188,7 +156,7 @@ def build_mesh_map(
     vertices: ArrayLike | None = None,
     faces: ArrayLike | None = None,
     frame_id: str = "map",
-    load_layer: LayerLoader = load_builtin_layer,
+    load_layer: LayerLoader | None = None,
 ) -> MeshMap:
     """Read or take a mesh, check it, build the map and compute its layers.
 
@@ -201,17 +169,17 @@ def build_mesh_map(
         The mesh, instead of ``parameters.mesh_file``.
     frame_id : str
         Frame of the coordinates.
-    load_layer : callable
-        Layer type -> class; a server passes its registry's.
+    load_layer : callable, optional
+        Type -> class; without it the installed types.
 
     Raises
     ------
-    LayerGraphError
-        Unknown or duplicate names, unknown types, wrong parameters, cycles: all findings in one text.
+    LayerListError
+        Unknown or duplicate names, unknown types, wrong parameters, circles: all findings in one text.
     MeshError
         The mesh cannot be read or has defects that may not be repaired.
     """
-    plan = plan_layers(parameters, layer_blocks or {}, load_layer)
+    plan = plan_mesh_layers(parameters, layer_blocks or {}, load_layer)
     file = ""
     if vertices is None or faces is None:
         file = parameters.mesh_file
@@ -231,74 +199,54 @@ def build_mesh_map(
     return mesh_map
 
 
-PlannedLayer = tuple[LayerEntry, type[MeshLayer], LayerParameters]
+LayerLoader = Callable[[str], type[MeshLayer]]
 
 
-def plan_layers(
-    parameters: MeshMapParameters, layer_blocks: LayerBlocks, load_layer: LayerLoader = load_builtin_layer
-) -> list[PlannedLayer]:
-    """Check the layers of a configuration and order them, inputs first; ``LayerGraphError`` has all findings."""
+def plan_mesh_layers(
+    parameters: MeshMapParameters, layer_blocks: LayerBlocks, load_layer: LayerLoader | None = None
+) -> list[PlannedLayer[MeshLayer]]:
+    """Check the layers of a configuration and order them, inputs first; ``LayerListError`` has all findings."""
     names = [entry.name for entry in parameters.layers]
-    findings = [
-        f"layer name '{name}' is used twice" for name in sorted({name for name in names if names.count(name) > 1})
-    ]
-    findings += [f"there are parameters for '{name}', but no such layer" for name in layer_blocks if name not in names]
-    if parameters.default_layer and parameters.default_layer not in names:
-        findings.append(f"default_layer '{parameters.default_layer}' is no layer")
-    planned: dict[str, PlannedLayer] = {}
-    for entry in parameters.layers:
-        try:
-            layer_class = load_layer(entry.type)
-            planned[entry.name] = (entry, layer_class, _validated(layer_class, layer_blocks.get(entry.name, {})))
-            findings += _wrong_inputs(entry, layer_class)
-            findings += _narrower_than_robot(entry, planned[entry.name][2], parameters.inscribed_radius)
-        except ValidationError as error:
-            findings += [f"layer '{entry.name}': {_place(item['loc'])}{item['msg']}" for item in error.errors()]
-        except LayerGraphError as error:
-            findings.append(f"layer '{entry.name}': {error}")
-    order: Sequence[str] = ()
+
+    def check(planned: PlannedLayer[MeshLayer]) -> list[str]:
+        return [*_wrong_inputs(planned), *_narrower_than_robot(planned, parameters.inscribed_radius)]
+
+    unknown_default = bool(parameters.default_layer) and parameters.default_layer not in names
+    findings = [f"default_layer {parameters.default_layer!r} is no layer"] if unknown_default else []
     try:
-        order = dependency_order({entry.name: entry.inputs for entry in parameters.layers})
-    except LayerGraphError as error:
+        plan = plan_layers(parameters.layers, layer_blocks, load_layer or layer_loader("mesh", MeshLayer), check)
+    except LayerListError as error:
         findings.append(str(error))
     if findings:
-        raise LayerGraphError("; ".join(findings))
-    return [planned[name] for name in order]
+        raise LayerListError("; ".join(findings))
+    return plan
 
 
-def _validated(layer_class: type[MeshLayer], block: Mapping[str, Any] | LayerParameters) -> LayerParameters:
-    if isinstance(block, layer_class.Parameters):
-        return block
-    return layer_class.Parameters.model_validate(dict(block))
-
-
-def _narrower_than_robot(entry: LayerEntry, layer: LayerParameters, robot_radius: float) -> list[str]:
-    radius = getattr(layer, "inflation_radius", robot_radius)
+def _narrower_than_robot(planned: PlannedLayer[MeshLayer], robot_radius: float) -> list[str]:
+    radius = getattr(planned.parameters, "inflation_radius", robot_radius)
     if radius >= robot_radius:
         return []
     least = f"inflation_radius of at least the robot's radius (mesh_map.inscribed_radius), {robot_radius:g} m"
-    return [f"layer '{entry.name}': {least}: else ground the robot's body touches would be free, got {radius:g} m"]
+    touched = f"else ground the robot's body touches would be free, got {radius:g} m"
+    return [f"layer {planned.entry.name!r}: {least}: {touched}"]
 
 
-def _wrong_inputs(entry: LayerEntry, layer_class: type[MeshLayer]) -> list[str]:
-    least, most = layer_class.inputs_allowed
-    if least <= len(entry.inputs) <= most:
+def _wrong_inputs(planned: PlannedLayer[MeshLayer]) -> list[str]:
+    entry, (least, most) = planned.entry, planned.layer_class.inputs_allowed
+    if least <= len(entry.reads) <= most:
         return []
     wanted = str(least) if least == most else f"at least {least}"
-    return [f"layer '{entry.name}' of type {entry.type} takes {wanted} inputs, got {len(entry.inputs)}"]
+    return [f"layer {entry.name!r} of type {entry.type} takes {wanted} inputs, got {len(entry.reads)}"]
 
 
-def _place(location: tuple[int | str, ...]) -> str:
-    return ".".join(str(part) for part in location) + ": " if location else ""
-
-
-def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer], cache_dir: str) -> LayerGraph:
+def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer[MeshLayer]], cache_dir: str) -> LayerGraph:
     cache = LayerCache(cache_dir, mesh_map.topology.digest()) if cache_dir else None
     complaint = ""
     layers: dict[str, MeshLayer] = {}
-    for entry, layer_class, settings in plan:
-        inputs = tuple(layers[name] for name in entry.inputs)
-        layer = layer_class(LayerContext(entry.name, mesh_map.topology, mesh_map.locator, settings, inputs))
+    for planned in plan:
+        inputs = tuple(layers[name] for name in planned.entry.reads)
+        name, settings = planned.entry.name, cast(LayerParameters, planned.parameters)
+        layer = planned.layer_class(LayerContext(name, mesh_map.topology, mesh_map.locator, settings, inputs))
         stored = cache.load(layer) if cache and layer.cacheable else None
         if stored is not None:
             layer.replace(*stored)
@@ -306,7 +254,7 @@ def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer], cache_dir: 
             layer.recompute()
             if cache and layer.cacheable and not complaint:
                 complaint = cache.store(layer)
-        layers[entry.name] = layer
+        layers[name] = layer
     if complaint:
         text = f"layers cannot be kept in {cache_dir}: {complaint}; they are computed at every start"
         mesh_map.report.findings.append(Finding("cache", text, np.zeros(0, dtype=np.int64), harmless=True))

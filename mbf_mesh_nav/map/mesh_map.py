@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_mesh_nav.map.layer import IntArray, LayerParameters, MeshLayer
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
 from mbf_mesh_nav.map.snapshot import MeshSnapshot, SnapshotSeries
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
@@ -31,7 +31,7 @@ REMEMBERED_CHANGES = 100
 """Number of changes of the default layer a planner may have missed and still repair its last result."""
 
 
-class MeshMap:
+class MeshMap(LayeredMap):
     """A triangle mesh with layers. Construct it with ``from_arrays``, ``from_heights`` or ``map_builder``.
 
     Attributes
@@ -78,7 +78,6 @@ class MeshMap:
         self.internal_to_input = topology.internal_to_input
         self._snapshots = SnapshotSeries(topology)
         self._changes: dict[int, IntArray] = {}  # version -> vertices that differ from the version before
-        self._overridden: dict[str, tuple[LayerParameters, float]] = {}  # usual parameters, end of the override
         self._lock = threading.RLock()
         self.set_layers(LayerGraph(), None)
 
@@ -198,7 +197,7 @@ class MeshMap:
         count = self.topology.vertex_count
         with self._lock:
             shown = None if default_layer is None else layers[default_layer]
-            self.layers = layers
+            self._layers = layers
             self.default_layer = default_layer
             self.edge_cost_factor = edge_cost_factor
             costs = np.zeros(count, np.float32) if shown is None else shown.costs
@@ -226,91 +225,45 @@ class MeshMap:
         Raises as ``LayerGraph.set_parameters``; nothing has changed then.
         """
         with self._lock:
-            usual = self.usual_parameters(name)
+            usual = self.layers.usual_parameters(name)
             self._publish(self.layers.set_parameters(name, parameters))
-            self._overridden.pop(name, None)
-            if until < np.inf:
-                self._overridden[name] = usual, until
+            self.layers.note_override(name, usual, until)
 
     def usual_parameters(self, name: str) -> LayerParameters:
         """Parameters of a layer apart from a timed override."""
         with self._lock:
-            usual: LayerParameters = self.layers[name].parameters
-            return self._overridden[name][0] if name in self._overridden else usual
-
-    def insert_points(self, points: ArrayLike, sensor_origin: ArrayLike, stamp: float, source: str = "") -> None:
-        """Feed a point cloud to the obstacle layers, as a scan in which every ray hit something.
-
-        Parameters
-        ----------
-        points : (n, 3) float
-            Hits [m] in the map's frame.
-        sensor_origin : (3,) float
-            Where the sensor was [m], for range limits and clearing.
-        stamp : float
-            Time of the measurement [s].
-        source : str
-            Name of the sensor.
-
-        Raises
-        ------
-        ValueError
-            As ``insert_scan``.
-        """
-        cloud = np.array(points, dtype=np.float64).reshape(-1, 3)
-        origin = np.array(sensor_origin, dtype=np.float64).reshape(3)
-        self.insert_scan(RangeScan(source, self.frame_id, origin, cloud, np.ones(len(cloud), dtype=np.bool_), stamp))
+            return cast(LayerParameters, self.layers.usual_parameters(name))
 
     @property
-    def source_names(self) -> tuple[str, ...]:
-        """Names of all scan sources that layers ask for, sorted."""
-        return tuple(sorted({name for layer in self.layers.values() for name in layer.source_names}))
+    def layers(self) -> LayerGraph:
+        """The layers by name, inputs first."""
+        return self._layers
 
-    def listens_to(self, source: str) -> bool:
-        """Whether any layer takes scans of a source."""
-        return any(layer.listens_to(source) for layer in self.layers.values())
+    def take_in(self, scan: RangeScan) -> None:
+        """Hand a scan to the enabled layers that listen to its source; what reads them follows."""
 
-    def insert_scan(self, scan: RangeScan) -> None:
-        """Feed a scan in the map's frame to the obstacle layers.
+        def event(layer: MeshLayer) -> IntArray:
+            listens = layer.parameters.enabled and layer.listens_to(scan.source)
+            return layer.insert_scan(scan) if listens else NOTHING_CHANGED
 
-        Rays with an end that is not finite are left out; a scan that has no others says nothing and is passed over.
-
-        Raises
-        ------
-        ValueError
-            The scan is in another frame, or its origin or stamp is not finite.
-        """
-        if scan.frame_id != self.frame_id:
-            raise ValueError(f"the scan is in the frame '{scan.frame_id}', the map in '{self.frame_id}'")
-        if not (np.isfinite(scan.origin).all() and np.isfinite(scan.stamp)):
-            raise ValueError(f"origin and stamp of a scan must be finite, got {scan.origin.tolist()} and {scan.stamp}")
-        known = np.asarray(np.isfinite(scan.ends).all(axis=1))
-        if len(known) and not known.any():
-            return
-        seen = scan if known.all() else replace(scan, ends=scan.ends[known], hits=scan.hits[known])
-        self.apply(lambda layer: layer.insert_scan(seen))
+        self.apply(event)
 
     def update(self, now: float) -> None:
         """Forget obstacles that are too old at ``now`` [s], end overrides of parameters that are over."""
         with self._lock:
-            for name in [name for name, (_, until) in self._overridden.items() if until <= now]:
-                self.set_layer_parameters(name, self.usual_parameters(name))
-        self.apply(lambda layer: layer.expire(now))
+            for name, usual in self.layers.overrides_over(now).items():
+                self.set_layer_parameters(name, cast(LayerParameters, usual))
+        self.apply(lambda layer: layer.expire(now) if layer.parameters.enabled else NOTHING_CHANGED)
 
     def clear(self) -> None:
         """Forget all sensed obstacles."""
         self.apply(lambda layer: layer.clear())
 
-    def is_current(self, now: float) -> bool:
-        """Whether a command may be computed on this map at ``now`` [s]."""
-        return not self.stale_reason(now)
-
     def stale_reason(self, now: float) -> str:
         """Why the map is not current at ``now`` [s]: a layer that raised, or a silent sensor; empty if it is."""
         if self.layers.problem:
             return f"the mesh map is not up to date: {self.layers.problem}"
-        reasons = ((name, layer.stale_reason(now)) for name, layer in self.layers.items())
-        return next((f"layer {name!r}: {reason}" for name, reason in reasons if reason), "")
+        return self.layers.stale_reason(now)
 
     def apply(self, event: Callable[[MeshLayer], IntArray]) -> None:
         """Give an event to every layer, see ``LayerGraph.apply``, and show plugins the map that follows."""

@@ -6,7 +6,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
-from mbf_mesh_nav.map.layer_graph import LayerGraphError
+from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 
@@ -84,5 +84,5 @@ def test_a_mesh_whose_inflation_is_made_for_a_narrower_robot_is_refused():
         layers=[{"name": "border", "type": "border"}, {"name": "inflation", "type": "inflation", "inputs": ["border"]}],
     )
     text = r"'inflation': inflation_radius of at least the robot's radius \(mesh_map.inscribed_radius\), 1.5 m"
-    with pytest.raises(LayerGraphError, match=text):
+    with pytest.raises(LayerListError, match=text):
         build_mesh_map(parameters, {"inflation": {"inflation_radius": 0.6}}, vertices=vertices, faces=faces)

@@ -170,7 +170,7 @@ def test_f020_combination_with_an_unknown_map(build, seeing, method, unknown):
 
 
 def sonar(costmap, x, y, reading, hit=True):
-    costmap.insert_scan("sonar", (x, y, 0.0), [(x + reading, y, 0.0)], [hit], 0.0)
+    costmap.insert_scan(RangeScan.of_rays("sonar", (x, y, 0.0), [(x + reading, y, 0.0)], [hit], 0.0)
     costmap.update(None, 0.0)
 
 
@@ -289,7 +289,7 @@ def test_a_source_clears_from_its_least_to_its_largest_distance(build, seeing):
     costmap.insert_points("laser", wall, (0.5, 5.5, 0.0), 0.0)
     costmap.update(None, 0.0)
     before = set(map(int, np.flatnonzero(costmap.snapshot().cells[0] == 254)))
-    costmap.insert_scan("laser", (0.5, 0.5, 0.0), [(9.5, 0.5, 0.0)], [False], 20.0)
+    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 0.5, 0.0), [(9.5, 0.5, 0.0)], [False], 20.0)
     costmap.update(None, 20.0)
     after = set(map(int, np.flatnonzero(costmap.snapshot().cells[0] == 254)))
     assert (before, after) == ({1, 2, 3, 4, 5, 6, 7}, {1, 5, 6, 7})

@@ -9,7 +9,8 @@ from mbf_mesh_nav.layers.max_combination import MaxCombinationLayer
 from mbf_mesh_nav.layers.mean import MeanLayer
 from mbf_mesh_nav.layers.weighted_sum import WeightedSumLayer
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerContext, LayerParameters, MeshLayer
-from mbf_mesh_nav.map.layer_graph import LayerGraph, LayerGraphError, dependency_order
+from mbf_abstract.maps.layers.layer_list import LayerListError, dependency_order
+from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 MESH = MeshMap.from_heights(np.zeros((4, 5)), 1.0, 1.0)
@@ -66,12 +67,12 @@ def test_inputs_come_first_in_the_order():
 
 
 def test_all_unknown_inputs_are_named():
-    with pytest.raises(LayerGraphError, match=r"a reads unknown layer 'x'; b reads unknown layer 'y'.*a, b"):
+    with pytest.raises(LayerListError, match=r"a reads unknown layer 'x'; b reads unknown layer 'y'.*a, b"):
         dependency_order({"a": ["x"], "b": ["y", "a"]})
 
 
 def test_a_circle_is_named_beside_unknown_inputs():
-    with pytest.raises(LayerGraphError, match=r"a reads unknown layer 'x'.*circle: b -> c -> b"):
+    with pytest.raises(LayerListError, match=r"a reads unknown layer 'x'.*circle: b -> c -> b"):
         dependency_order({"a": ["x"], "b": ["c"], "c": ["b", "a"]})
 
 
@@ -84,7 +85,7 @@ def test_a_circle_is_named_beside_unknown_inputs():
     ],
 )
 def test_circle_is_refused_and_spelled_out(inputs, circle):
-    with pytest.raises(LayerGraphError, match=circle):
+    with pytest.raises(LayerListError, match=circle):
         dependency_order(inputs)
 
 

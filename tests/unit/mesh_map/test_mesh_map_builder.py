@@ -14,8 +14,8 @@ from pydantic import ValidationError
 from mbf_mesh_nav.files.lvr2_io import write_lvr2_mesh
 from mbf_mesh_nav.files.mesh_io import read_mesh
 from mbf_mesh_nav.layers.roughness import RoughnessLayer
+from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_mesh_nav.map.map_builder import (
-    LayerGraphError,
     MeshMapParameters,
     build_mesh_map,
     default_layers,
@@ -51,7 +51,7 @@ def test_every_mistake_in_the_layers_is_reported_at_once():
         default_layer="final",
     )
 
-    with pytest.raises(LayerGraphError) as error:
+    with pytest.raises(LayerListError) as error:
         build_mesh_map(parameters, {"d": {"radius": -1.0, "radios": 2}, "e": {}}, vertices=VERTICES, faces=FACES)
 
     for part in (
@@ -143,7 +143,7 @@ def test_layer_class_can_be_named_by_module():
 
     assert isinstance(build_mesh_map(parameters, vertices=VERTICES, faces=FACES).layers["mine"], RoughnessLayer)
     wrong = MeshMapParameters(layers=[{"name": "mine", "type": "pathlib:Path"}])
-    with pytest.raises(LayerGraphError, match="no MeshLayer"):
+    with pytest.raises(LayerListError, match="no MeshLayer"):
         build_mesh_map(wrong, vertices=VERTICES, faces=FACES)
 
 
@@ -151,7 +151,7 @@ def test_layer_class_can_be_named_by_module():
 def test_a_layer_class_that_cannot_be_loaded_is_named_beside_the_other_findings(path):
     parameters = MeshMapParameters(layers=[{"name": "mine", "type": path}], default_layer="other")
 
-    with pytest.raises(LayerGraphError, match="default_layer 'other' is no layer") as error:
+    with pytest.raises(LayerListError, match="default_layer 'other' is no layer") as error:
         build_mesh_map(parameters, vertices=VERTICES, faces=FACES)
     assert f"layer 'mine': layer type '{path}' cannot be loaded" in str(error.value)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_mesh_nav.map.layer_graph import LayerGraphError
+from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.range_image import RangeImage
@@ -37,7 +37,7 @@ def post(x: float, y: float, low: float = 0.1, high: float = 0.9) -> np.ndarray:
 def test_post_makes_the_corners_of_the_face_below_lethal_and_inflates_them():
     mesh = floor_map()
 
-    mesh.insert_points(post(2.05, 2.02), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(2.05, 2.02), SENSOR, 1.0)
 
     snapshot = mesh.snapshot()
     lethal = mesh.vertices[snapshot.lethal]
@@ -52,7 +52,7 @@ def test_snapshot_taken_before_keeps_its_values():
     mesh = floor_map()
     before = mesh.snapshot()
 
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 1.0)
 
     assert mesh.snapshot().version == before.version + 1
     assert not before.lethal.any()
@@ -61,7 +61,7 @@ def test_snapshot_taken_before_keeps_its_values():
 
 def test_edge_weights_follow_costs_and_block_lethal_ends():
     mesh = floor_map()
-    mesh.insert_points(post(2.05, 2.02), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(2.05, 2.02), SENSOR, 1.0)
     snapshot = mesh.snapshot()
 
     for vertex in range(len(mesh.vertices)):
@@ -78,7 +78,7 @@ def test_points_of_the_ground_and_above_the_robot_mark_nothing():
     mesh = floor_map(robot_height=1.0, ground_tolerance=0.05)
     version = mesh.snapshot().version
 
-    mesh.insert_points([[1.0, 1.0, 0.03], [1.0, 1.0, -0.04], [2.0, 2.0, 1.2], [np.nan, 0.0, 0.0]], SENSOR, 1.0)
+    mesh.insert_points("cloud", [[1.0, 1.0, 0.03], [1.0, 1.0, -0.04], [2.0, 2.0, 1.2], [np.nan, 0.0, 0.0]], SENSOR, 1.0)
 
     assert not mesh.layers["seen"].lethal.any()
     assert mesh.snapshot().version == version
@@ -87,7 +87,7 @@ def test_points_of_the_ground_and_above_the_robot_mark_nothing():
 def test_obstacle_stays_on_its_storey():
     mesh = floor_map(storeys=2)
 
-    mesh.insert_points(post(2.0, 2.0, low=2.6, high=3.3), [0.0, 2.0, 3.0], 1.0)
+    mesh.insert_points("cloud", post(2.0, 2.0, low=2.6, high=3.3), [0.0, 2.0, 3.0], 1.0)
 
     assert set(mesh.vertices[mesh.layers["seen"].lethal][:, 2]) == {2.5}
 
@@ -95,7 +95,7 @@ def test_obstacle_stays_on_its_storey():
 def test_points_beyond_the_range_limit_are_ignored():
     mesh = floor_map(max_obstacle_dist=1.5)
 
-    mesh.insert_points(np.vstack([post(1.0, 2.0), post(3.0, 2.0)]), SENSOR, 1.0)
+    mesh.insert_points("cloud", np.vstack([post(1.0, 2.0), post(3.0, 2.0)]), SENSOR, 1.0)
 
     assert (mesh.vertices[mesh.layers["seen"].lethal][:, 0] < 1.5).all()
     assert mesh.layers["seen"].lethal.any()
@@ -104,34 +104,34 @@ def test_points_beyond_the_range_limit_are_ignored():
 def test_points_at_the_sensor_itself_mark_nothing_and_keep_nothing_from_being_cleared():
     mesh = floor_map(decay_time=5.0)
     nothing = np.tile(SENSOR, (20, 1))
-    mesh.insert_points(nothing, SENSOR, 1.0)
+    mesh.insert_points("cloud", nothing, SENSOR, 1.0)
     assert not mesh.snapshot().lethal.any()
 
     hit, origin = np.array([[2.0, 2.0, 0.5]]), np.array(SENSOR)
-    mesh.insert_points(hit, SENSOR, 2.0)
-    mesh.insert_points(np.vstack([nothing, origin + 2.0 * (hit - origin)]), SENSOR, 3.0)
+    mesh.insert_points("cloud", hit, SENSOR, 2.0)
+    mesh.insert_points("cloud", np.vstack([nothing, origin + 2.0 * (hit - origin)]), SENSOR, 3.0)
     assert mesh.vertices[mesh.layers["seen"].lethal][:, 0].min() > 3.5
 
 
 def test_points_of_the_robot_itself_are_ignored_up_to_the_least_distance():
     mesh = floor_map(min_obstacle_dist=0.5)
-    mesh.insert_points(np.vstack([post(0.4, 2.0, 0.4, 0.6), post(2.0, 2.0, 0.4, 0.6)]), SENSOR, 1.0)
+    mesh.insert_points("cloud", np.vstack([post(0.4, 2.0, 0.4, 0.6), post(2.0, 2.0, 0.4, 0.6)]), SENSOR, 1.0)
     assert mesh.vertices[mesh.layers["seen"].lethal][:, 0].min() > 1.5
 
 
 def test_without_decay_only_the_newest_cloud_counts():
     mesh = floor_map()
-    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(1.0, 1.0), SENSOR, 1.0)
 
-    mesh.insert_points(post(3.0, 3.0), SENSOR, 2.0)
+    mesh.insert_points("cloud", post(3.0, 3.0), SENSOR, 2.0)
 
     assert (mesh.vertices[mesh.layers["seen"].lethal][:, 0] > 2.0).all()
 
 
 def test_hits_are_kept_for_the_decay_time():
     mesh = floor_map(decay_time=2.0)
-    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0)
-    mesh.insert_points(post(3.0, 3.0), SENSOR, 2.0)
+    mesh.insert_points("cloud", post(1.0, 1.0), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(3.0, 3.0), SENSOR, 2.0)
     assert len(np.unique(np.round(mesh.vertices[mesh.layers["seen"].lethal][:, 0]))) == 2
 
     mesh.update(3.5)
@@ -144,11 +144,11 @@ def test_hits_are_kept_for_the_decay_time():
 @pytest.mark.parametrize(("clearing", "left"), [(True, False), (False, True)])
 def test_kept_hit_is_cleared_when_rays_pass_through_it(clearing, left):
     mesh = floor_map(decay_time=np.inf, clearing=clearing)
-    mesh.insert_points(post(1.0, 2.0, 0.45, 0.55), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(1.0, 2.0, 0.45, 0.55), SENSOR, 1.0)
     wall_y, wall_z = np.meshgrid(np.linspace(1.0, 3.0, 60), np.linspace(0.2, 0.8, 60))
     wall = np.column_stack([np.full(3600, 3.0), wall_y.ravel(), wall_z.ravel()])
 
-    mesh.insert_points(wall, SENSOR, 2.0)
+    mesh.insert_points("cloud", wall, SENSOR, 2.0)
 
     seen = mesh.vertices[mesh.layers["seen"].lethal]
     assert bool((seen[:, 0] < 2.0).any()) is left
@@ -166,7 +166,7 @@ def test_ray_that_ends_on_the_hit_does_not_clear_it():
 def test_clear_forgets_everything_and_frees_the_edges():
     mesh = floor_map(decay_time=np.inf)
     free = mesh.snapshot()
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 1.0)
 
     mesh.clear()
 
@@ -177,10 +177,10 @@ def test_clear_forgets_everything_and_frees_the_edges():
 def test_points_are_projected_along_the_configured_axis():
     slanted = floor_map(down_axis=(1.0, 0.0, -1.0), robot_height=2.0)
 
-    slanted.insert_points([[2.0, 2.0, 0.6]], SENSOR, 1.0)
+    slanted.insert_points("cloud", [[2.0, 2.0, 0.6]], SENSOR, 1.0)
 
     np.testing.assert_allclose(slanted.vertices[slanted.layers["seen"].lethal][:, 0].mean(), 2.6, atol=0.2)
-    with pytest.raises(LayerGraphError, match="an axis that has a direction"):
+    with pytest.raises(LayerListError, match="an axis that has a direction"):
         floor_map(down_axis=(0.0, 0.0, 0.0))
 
 
@@ -188,7 +188,7 @@ def test_map_is_stale_when_no_cloud_came_within_the_expected_rate():
     mesh = floor_map(expected_update_rate=0.5)
 
     assert not mesh.is_current(0.0)
-    mesh.insert_points(np.zeros((0, 3)), SENSOR, 10.0)
+    mesh.insert_points("cloud", np.zeros((0, 3)), SENSOR, 10.0)
     assert mesh.is_current(10.4)
     assert not mesh.is_current(10.6)
     assert floor_map(expected_update_rate=0.0).is_current(1e9)
@@ -197,31 +197,31 @@ def test_map_is_stale_when_no_cloud_came_within_the_expected_rate():
 
 def test_a_cleared_map_is_not_current_before_it_sees_again():
     mesh = floor_map()
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 10.0)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 10.0)
     assert mesh.is_current(10.1)
 
     mesh.clear()
 
     assert not mesh.is_current(10.1)
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 10.2)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 10.2)
     assert mesh.is_current(10.2)
 
 
 def test_changed_robot_height_applies_to_the_next_cloud():
     mesh = floor_map(robot_height=0.3)
-    mesh.insert_points(post(2.0, 2.0, 0.5, 0.9), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(2.0, 2.0, 0.5, 0.9), SENSOR, 1.0)
     assert not mesh.snapshot().lethal.any()
 
     layer = mesh.layers["seen"]
     mesh.set_layer_parameters("seen", layer.parameters.model_copy(update={"robot_height": 1.0}))
-    mesh.insert_points(post(2.0, 2.0, 0.5, 0.9), SENSOR, 2.0)
+    mesh.insert_points("cloud", post(2.0, 2.0, 0.5, 0.9), SENSOR, 2.0)
 
     assert mesh.snapshot().lethal.any()
 
 
 def test_changed_inflation_radius_reaches_the_snapshot():
     mesh = floor_map()
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 1.0)
     reach = (mesh.snapshot().costs > 0).sum()
 
     layer = mesh.layers["inflation"]
@@ -232,14 +232,14 @@ def test_changed_inflation_radius_reaches_the_snapshot():
 
 def test_parameters_a_layer_cannot_take_leave_it_as_it_was():
     mesh = floor_map()
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 1.0)
     before, layer = mesh.snapshot(), mesh.layers["inflation"]
 
     with pytest.raises(TypeError, match="layer 'inflation' takes InflationParameters, got ObstacleParameters"):
         mesh.set_layer_parameters("inflation", mesh.layers["seen"].parameters, until=5.0)
 
     assert mesh.snapshot() is before and mesh.usual_parameters("inflation") is layer.parameters
-    mesh.insert_points(post(3.0, 3.0), SENSOR, 2.0)
+    mesh.insert_points("cloud", post(3.0, 3.0), SENSOR, 2.0)
     assert (mesh.snapshot().costs > 0).any()
 
 
@@ -251,7 +251,7 @@ def test_an_edge_cost_factor_that_is_none_is_refused(factor):
 
 def test_changed_edge_cost_factor_changes_the_weights():
     mesh = floor_map()
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 1.0)
 
     mesh.set_edge_cost_factor(0.0)
 
@@ -279,11 +279,11 @@ def test_rays_that_hit_nothing_clear_what_they_pass_through():
 
 def test_one_sensor_does_not_make_another_ones_obstacles_forgotten():
     mesh = floor_map()
-    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0, "front")
+    mesh.insert_points("front", post(1.0, 1.0), SENSOR, 1.0)
     seen = mesh.snapshot().lethal.copy()
-    mesh.insert_points(post(3.0, 3.0), SENSOR, 1.01, "rear")
+    mesh.insert_points("rear", post(3.0, 3.0), SENSOR, 1.01)
     assert mesh.snapshot().lethal[seen].all() and mesh.snapshot().lethal.sum() > seen.sum()
-    mesh.insert_points(post(3.0, 3.0), SENSOR, 1.02, "front")
+    mesh.insert_points("front", post(3.0, 3.0), SENSOR, 1.02)
     assert not (mesh.snapshot().lethal & seen).any(), "its own next cloud replaces what it had seen"
 
 
@@ -302,8 +302,8 @@ def test_a_late_scan_does_not_clear_what_another_sensor_saw_after_it():
 
 def test_a_late_cloud_of_the_same_sensor_does_not_make_a_hit_older_than_it_is():
     mesh = floor_map(decay_time=1.0, clearing=False)
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 10.0)
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 9.5)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 10.0)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 9.5)
 
     mesh.update(10.9)
     assert mesh.snapshot().lethal.any()
@@ -326,37 +326,37 @@ def test_obstacles_of_a_sensor_that_is_no_longer_listened_to_are_forgotten():
 
 def test_a_silent_sensor_is_noticed_while_another_speaks():
     mesh = floor_map(expected_update_rate=0.5)
-    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0, "front")
-    mesh.insert_points(post(3.0, 3.0), SENSOR, 1.0, "rear")
-    mesh.insert_points(post(3.0, 3.0), SENSOR, 2.0, "rear")
+    mesh.insert_points("front", post(1.0, 1.0), SENSOR, 1.0)
+    mesh.insert_points("rear", post(3.0, 3.0), SENSOR, 1.0)
+    mesh.insert_points("rear", post(3.0, 3.0), SENSOR, 2.0)
     assert not mesh.is_current(2.0)
-    mesh.insert_points(post(1.0, 1.0), SENSOR, 2.0, "front")
+    mesh.insert_points("front", post(1.0, 1.0), SENSOR, 2.0)
     assert mesh.is_current(2.0)
 
 
 def test_a_layer_listens_to_its_own_sensors_only_and_waits_for_each():
     mesh = floor_map(sources=("front", "rear"))
-    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0, "ceiling")
+    mesh.insert_points("ceiling", post(1.0, 1.0), SENSOR, 1.0)
     assert not mesh.snapshot().lethal.any()
-    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0, "front")
+    mesh.insert_points("front", post(1.0, 1.0), SENSOR, 1.0)
     assert mesh.snapshot().lethal.any() and not mesh.is_current(1.0)
-    mesh.insert_points(post(1.0, 1.0), SENSOR, 1.0, "rear")
+    mesh.insert_points("rear", post(1.0, 1.0), SENSOR, 1.0)
     assert mesh.is_current(1.0)
 
 
 def test_a_cloud_of_nothing_but_unknown_points_says_nothing():
     mesh = floor_map()
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 1.0)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 1.0)
     before = mesh.snapshot()
-    mesh.insert_points(np.full((5, 3), np.nan), SENSOR, 3.0)
+    mesh.insert_points("cloud", np.full((5, 3), np.nan), SENSOR, 3.0)
     assert mesh.snapshot() is before and not mesh.is_current(3.0)
 
 
 def test_a_stamp_from_the_future_is_no_sign_of_life():
     mesh = floor_map()
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 1e6)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 1e6)
     assert not mesh.is_current(2.0)
-    mesh.insert_points(post(2.0, 2.0), SENSOR, 2.1)
+    mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 2.1)
     assert mesh.is_current(2.0), "clocks differ a little"
 
 
@@ -364,7 +364,7 @@ def test_a_stamp_from_the_future_is_no_sign_of_life():
 def test_a_scan_from_nowhere_or_of_no_time_is_refused(origin, stamp):
     mesh = floor_map()
     with pytest.raises(ValueError, match="must be finite"):
-        mesh.insert_points(post(2.0, 2.0), origin, stamp)
+        mesh.insert_points("cloud", post(2.0, 2.0), origin, stamp)
     assert not mesh.snapshot().lethal.any()
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mbf_mesh_nav.layers.tilt import HEADINGS, TiltLayer, TiltParameters, heading_index
 from mbf_mesh_nav.map.layer import LayerContext
-from mbf_mesh_nav.map.layer_graph import LayerGraphError
+from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
@@ -200,5 +200,5 @@ def test_no_robot_stands_over_a_post_however_high_it_is(height):
 def test_a_length_no_robot_has_is_refused_before_the_layer_is_computed(kind, key, value):
     parameters = MeshMapParameters(layers=[{"name": "it", "type": kind}])
     vertices, faces = heightfield_mesh(np.zeros((200, 200)), 0.1, 0.1)
-    with pytest.raises(LayerGraphError, match=rf"layer 'it': {key}: Input should be less than or equal to"):
+    with pytest.raises(LayerListError, match=rf"layer 'it': {key}: Input should be less than or equal to"):
         build_mesh_map(parameters, {"it": {key: value}}, vertices=vertices, faces=faces)

@@ -1,0 +1,57 @@
+"""The base of the layers of every map: a name, typed parameters, the sensors it takes, and how fresh their data are.
+
+What a layer computes depends on its map, so a map derives its own interface from ``MapLayer``: boxes of cells in
+``mbf_costmap_nav.map.layer``, costs and lethal flags of vertices in ``mbf_mesh_nav.map.layer``.
+"""
+
+from __future__ import annotations
+
+from abc import ABC
+from typing import Any, ClassVar
+
+from mbf_abstract.parameters import PluginParameters, parameter
+
+
+class LayerParameters(PluginParameters):
+    """Parameters every layer has."""
+
+    enabled: bool = parameter(True, "Whether the layer takes part in the map; a disabled layer leaves it free.")
+
+
+class MapLayer(ABC):
+    """One source of costs.
+
+    Attributes
+    ----------
+    name : str
+        Name of the instance in the configuration.
+    parameters : LayerParameters
+        Validated instance of the class's ``Parameters``; replaced as a whole when changed at run time.
+    """
+
+    Parameters: ClassVar[type[LayerParameters]] = LayerParameters
+    contract_check: ClassVar[str] = ""
+    """Check of the contract of this map's layers, as ``module:function``."""
+
+    parameters: Any
+
+    def __init__(self, name: str, parameters: LayerParameters) -> None:
+        self.name = name
+        self.parameters = parameters
+
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of the observation sources that the layer asks for."""
+        return ()
+
+    def listens_to(self, source: str) -> bool:
+        """Whether the layer takes scans of a source."""
+        return source in self.source_names
+
+    def stale_reason(self, now: float) -> str:
+        """Why the layer's data are too old at ``now`` [s]; empty while they are fresh, or if it has none."""
+        return ""
+
+    def configuration_warning(self) -> str:
+        """What is legal but hardly meant in the layer's parameters; empty if nothing is."""
+        return ""

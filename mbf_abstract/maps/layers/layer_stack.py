@@ -1,0 +1,87 @@
+"""The layers of one map by name, in their order, and what can be asked of all of them together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Generic, TypeVar
+
+from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
+from mbf_abstract.maps.layers.layer_list import LayerListError
+from mbf_abstract.maps.layers.source_watch import first_reason
+
+Layer_co = TypeVar("Layer_co", bound=MapLayer, covariant=True)
+
+
+class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
+    """Layers by name, ``stack["inflation"]``, in the order in which they are computed.
+
+    Raises
+    ------
+    LayerListError
+        Two layers share a name.
+    """
+
+    def __init__(self, layers: Sequence[Layer_co] = ()) -> None:
+        names = [layer.name for layer in layers]
+        if len(set(names)) != len(names):
+            raise LayerListError(f"the layers of a map need different names, got {names}")
+        self._layers = {layer.name: layer for layer in layers}
+        self._overridden: dict[str, tuple[LayerParameters, float]] = {}  # usual parameters, end of the override [s]
+
+    def __getitem__(self, name: str) -> Layer_co:
+        if name not in self._layers:
+            raise KeyError(f"the map has no layer {name!r}, only {list(self._layers)}")
+        return self._layers[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._layers
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._layers)
+
+    def __len__(self) -> int:
+        return len(self._layers)
+
+    @property
+    def enabled(self) -> Iterator[Layer_co]:
+        """The layers that take part."""
+        return (layer for layer in self.values() if layer.parameters.enabled)
+
+    def chosen(self, names: Iterable[str] | None) -> list[Layer_co]:
+        """All layers, or those of some names; KeyError names the known ones."""
+        return list(self.values()) if names is None else [self[name] for name in names]
+
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of all observation sources that layers ask for, sorted."""
+        return tuple(sorted({name for layer in self.values() for name in layer.source_names}))
+
+    def listens_to(self, source: str) -> bool:
+        """Whether any layer takes scans of a source."""
+        return any(layer.listens_to(source) for layer in self.values())
+
+    def stale_reason(self, now: float) -> str:
+        """Why the first stale layer is so at ``now`` [s]; empty if all are fresh."""
+        reasons = ((layer.name, layer.stale_reason(now)) for layer in self.enabled)
+        return first_reason(f"layer {name!r}: {reason}" for name, reason in reasons if reason)
+
+    def configuration_warnings(self) -> list[str]:
+        """What is legal but hardly meant in the parameters of the layers."""
+        return [f"layer {layer.name!r}: {text}" for layer in self.enabled if (text := layer.configuration_warning())]
+
+    # ------------------------------------------------------------------------------- parameters for a time
+    def usual_parameters(self, name: str) -> LayerParameters:
+        """Parameters of a layer apart from a timed override."""
+        usual: LayerParameters = self[name].parameters
+        return self._overridden[name][0] if name in self._overridden else usual
+
+    def note_override(self, name: str, usual: LayerParameters, until: float) -> None:
+        """Remember what a layer's parameters are to become at the time ``until`` [s]; inf ends an override."""
+        self._overridden.pop(name, None)
+        if until < math.inf:
+            self._overridden[name] = usual, until
+
+    def overrides_over(self, now: float) -> dict[str, LayerParameters]:
+        """The usual parameters of those layers whose override is over at ``now`` [s]."""
+        return {name: usual for name, (usual, until) in self._overridden.items() if until <= now}
