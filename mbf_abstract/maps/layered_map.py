@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import Any
 
 from numpy.typing import ArrayLike
 
-from mbf_abstract.maps.layers.layer import MapLayer
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.sensing import RangeScan
 
@@ -23,11 +23,7 @@ class LayeredMap(ABC):
     """
 
     frame_id: str
-
-    @property
-    @abstractmethod
-    def layers(self) -> LayerStack[MapLayer]:
-        """The layers by name."""
+    layers: LayerStack[Any]
 
     @abstractmethod
     def stale_reason(self, now: float) -> str:
@@ -56,7 +52,7 @@ class LayeredMap(ABC):
         if not self.layers.listens_to(scan.source):
             known = list(self.layers.source_names)
             raise ValueError(f"no layer listens to the source {scan.source!r}, known are {known}")
-        seen = scan.finite()
+        seen = scan.checked()
         if len(seen.ends) or not len(scan.ends):
             self.take_in(seen)
 

@@ -73,19 +73,20 @@ class RangeScan:
         cloud = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         return cls.of_rays(source, origin, cloud, np.ones(len(cloud), dtype=np.bool_), stamp, frame_id)
 
-    def finite(self) -> RangeScan:
-        """The scan without the rays whose end is not finite.
+    def checked(self) -> RangeScan:
+        """A copy as arrays, without the rays whose end is not finite: a driver may use its buffers again.
 
         Raises
         ------
         ValueError
-            Origin or stamp are not finite.
+            Wrong shapes, or origin or stamp are not finite.
         """
-        if not (np.isfinite(self.origin).all() and math.isfinite(self.stamp)):
-            origin = self.origin.tolist()
+        scan = RangeScan.of_rays(self.source, self.origin, self.ends, self.hits, self.stamp, self.frame_id)
+        if not (np.isfinite(scan.origin).all() and math.isfinite(scan.stamp)):
+            origin = scan.origin.tolist()
             raise ValueError(f"origin and stamp of a scan must be finite, got {origin} and {self.stamp}")
-        known = np.asarray(np.isfinite(self.ends).all(axis=1))
-        return self if known.all() else replace(self, ends=self.ends[known], hits=self.hits[known])
+        known = np.asarray(np.isfinite(scan.ends).all(axis=1))
+        return scan if known.all() else replace(scan, ends=scan.ends[known], hits=scan.hits[known])
 
     def between_heights(self, lowest: float, highest: float) -> RangeScan:
         """The scan without the rays that end below ``lowest`` or above ``highest`` [m]."""

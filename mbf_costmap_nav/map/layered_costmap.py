@@ -68,7 +68,7 @@ class LayeredCostmap(LayeredMap):
         track_unknown_space: bool = False,
         max_age: float = 0.0,
     ) -> None:
-        self._layers = LayerStack(layers)
+        self.layers: LayerStack[CostmapLayer] = LayerStack(layers)
         if not rolling_window:
             geometry = next((own for layer in layers if (own := layer.preferred_geometry())), geometry)
         self.frame_id = frame_id
@@ -97,11 +97,6 @@ class LayeredCostmap(LayeredMap):
     def resolution(self) -> float:
         """Side of a cell [m]."""
         return self._geometry.resolution
-
-    @property
-    def layers(self) -> LayerStack[CostmapLayer]:
-        """The layers by name, in order of writing."""
-        return self._layers
 
     @property
     def last_update(self) -> float | None:

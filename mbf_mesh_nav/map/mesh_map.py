@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -50,6 +50,8 @@ class MeshMap(LayeredMap):
         Radius [m] of the disc that stands for the robot when the server is asked where it fits.
     """
 
+    layers: LayerGraph
+
     def __init__(
         self,
         topology: MeshTopology,
@@ -77,6 +79,7 @@ class MeshMap(LayeredMap):
         self.input_to_internal = topology.input_to_internal
         self.internal_to_input = topology.internal_to_input
         self._snapshots = SnapshotSeries(topology)
+        self._overridden: dict[str, tuple[LayerParameters, float]] = {}  # usual parameters, end of the override
         self._changes: dict[int, IntArray] = {}  # version -> vertices that differ from the version before
         self._lock = threading.RLock()
         self.set_layers(LayerGraph(), None)
@@ -197,7 +200,7 @@ class MeshMap(LayeredMap):
         count = self.topology.vertex_count
         with self._lock:
             shown = None if default_layer is None else layers[default_layer]
-            self._layers = layers
+            self.layers = layers
             self.default_layer = default_layer
             self.edge_cost_factor = edge_cost_factor
             costs = np.zeros(count, np.float32) if shown is None else shown.costs
@@ -225,19 +228,17 @@ class MeshMap(LayeredMap):
         Raises as ``LayerGraph.set_parameters``; nothing has changed then.
         """
         with self._lock:
-            usual = self.layers.usual_parameters(name)
+            usual = self.usual_parameters(name)
             self._publish(self.layers.set_parameters(name, parameters))
-            self.layers.note_override(name, usual, until)
+            self._overridden.pop(name, None)
+            if until < np.inf:
+                self._overridden[name] = usual, until
 
     def usual_parameters(self, name: str) -> LayerParameters:
         """Parameters of a layer apart from a timed override."""
         with self._lock:
-            return cast(LayerParameters, self.layers.usual_parameters(name))
-
-    @property
-    def layers(self) -> LayerGraph:
-        """The layers by name, inputs first."""
-        return self._layers
+            usual: LayerParameters = self.layers[name].parameters
+            return self._overridden[name][0] if name in self._overridden else usual
 
     def take_in(self, scan: RangeScan) -> None:
         """Hand a scan to the enabled layers that listen to its source; what reads them follows."""
@@ -251,8 +252,8 @@ class MeshMap(LayeredMap):
     def update(self, now: float) -> None:
         """Forget obstacles that are too old at ``now`` [s], end overrides of parameters that are over."""
         with self._lock:
-            for name, usual in self.layers.overrides_over(now).items():
-                self.set_layer_parameters(name, cast(LayerParameters, usual))
+            for name in [name for name, (_, until) in self._overridden.items() if until <= now]:
+                self.set_layer_parameters(name, self.usual_parameters(name))
         self.apply(lambda layer: layer.expire(now) if layer.parameters.enabled else NOTHING_CHANGED)
 
     def clear(self) -> None:

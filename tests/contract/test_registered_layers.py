@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mbf_abstract.config.registry import PluginRegistry
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.testing.contract import ContractBroken, check_layer
 from mbf_costmap_nav.grid.costmap import CellBox
 from mbf_costmap_nav.map.layer import CombinationMethod, CostmapLayer, GridLayer, combine
-from mbf_costmap_nav.map.sensor_data import Observation, SensorLayer
 from mbf_mesh_nav.layers.border import BorderLayer
 from mbf_mesh_nav.layers.steepness import SteepnessLayer
 from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
@@ -28,7 +28,7 @@ MESH_PARAMETERS = {
     "label": {"regions": [{"polygon": CORNERS, "label": "mud"}], "label_costs": {"mud": 0.4}},
     "obstacle": {"decay_time": 10.0},
 }
-SCAN = Observation.of_scan((3.5, 2.0, 0.3), [(4.5, 2.0, 0.3), (3.5, 3.0, 0.5), (2.5, 2.4, 0.3)], [True] * 3, 0.9)
+SCAN = RangeScan.of_rays("laser", (3.5, 2.0, 0.3), [(4.5, 2.0, 0.3), (3.5, 3.0, 0.5), (2.5, 2.4, 0.3)], [True] * 3, 0.9)
 CLOUD = np.array([(1.5, 1.5, 0.9), (1.6, 1.5, 0.9), (2.2, 0.7, 0.8)])
 
 
@@ -68,7 +68,7 @@ def test_mesh_layer(name, hill):
 def test_costmap_layer(name):
     layer_class = PluginRegistry("costmap").load("costmap_layers", name, CostmapLayer)
     parameters = layer_class.Parameters.model_validate(COSTMAP_PARAMETERS.get(name, {}))
-    check_layer(layer_class, parameters=parameters, observations=[("laser", SCAN)])
+    check_layer(layer_class, parameters=parameters, scans=[SCAN])
 
 
 class GoodMeshLayer(MeshLayer):
@@ -168,14 +168,14 @@ def test_a_mesh_layer_without_its_inputs_is_a_mistake_of_the_caller(hill):
         check_layer(GoodMeshLayer, hill)
 
 
-class GoodCostmapLayer(GridLayer, SensorLayer):
+class GoodCostmapLayer(GridLayer):
     """Raises free cells left of what was seen; each bad layer breaks one rule of it."""
 
     source_names = ("laser",)
     moved = False
 
-    def insert(self, source, observation):
-        columns = int((observation.ends[:, 0].max() - self.geometry.origin_x) / self.geometry.resolution)
+    def insert_scan(self, scan):
+        columns = int((scan.ends[:, 0].max() - self.geometry.origin_x) / self.geometry.resolution)
         self.cells[:, : max(0, columns)] = 50
         self.moved = True
 
@@ -256,13 +256,13 @@ class ClearsTooMuch(GoodCostmapLayer):
 
 
 class MovesTheHits(GoodCostmapLayer):
-    def insert(self, source, observation):
-        super().insert(source, observation)
-        observation.ends[0, 0] += 0.1
+    def insert_scan(self, scan):
+        super().insert_scan(scan)
+        scan.ends[0, 0] += 0.1
 
 
 def test_a_costmap_layer_that_keeps_the_contract_passes():
-    check_layer(GoodCostmapLayer, observations=[("laser", SCAN)])
+    check_layer(GoodCostmapLayer, scans=[SCAN])
 
 
 @pytest.mark.parametrize(
@@ -285,9 +285,9 @@ def test_a_costmap_layer_that_keeps_the_contract_passes():
     ],
 )
 def test_a_bad_costmap_layer_is_caught(layer_class, text):
-    scan = Observation.of_scan(SCAN.origin, SCAN.ends, SCAN.hits, SCAN.stamp)
+    scan = RangeScan.of_rays(SCAN.source, SCAN.origin, SCAN.ends, SCAN.hits, SCAN.stamp)
     with pytest.raises(ContractBroken, match=f"^{layer_class.__name__} breaks") as broken:
-        check_layer(layer_class, observations=[("laser", scan)])
+        check_layer(layer_class, scans=[scan])
     assert text in str(broken.value)
 
 

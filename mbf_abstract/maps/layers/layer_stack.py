@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Generic, TypeVar
 
-from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
+from mbf_abstract.maps.layers.layer import MapLayer
 from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.maps.layers.source_watch import first_reason
 
@@ -27,7 +26,6 @@ class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
         if len(set(names)) != len(names):
             raise LayerListError(f"the layers of a map need different names, got {names}")
         self._layers = {layer.name: layer for layer in layers}
-        self._overridden: dict[str, tuple[LayerParameters, float]] = {}  # usual parameters, end of the override [s]
 
     def __getitem__(self, name: str) -> Layer_co:
         if name not in self._layers:
@@ -69,19 +67,3 @@ class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
     def configuration_warnings(self) -> list[str]:
         """What is legal but hardly meant in the parameters of the layers."""
         return [f"layer {layer.name!r}: {text}" for layer in self.enabled if (text := layer.configuration_warning())]
-
-    # ------------------------------------------------------------------------------- parameters for a time
-    def usual_parameters(self, name: str) -> LayerParameters:
-        """Parameters of a layer apart from a timed override."""
-        usual: LayerParameters = self[name].parameters
-        return self._overridden[name][0] if name in self._overridden else usual
-
-    def note_override(self, name: str, usual: LayerParameters, until: float) -> None:
-        """Remember what a layer's parameters are to become at the time ``until`` [s]; inf ends an override."""
-        self._overridden.pop(name, None)
-        if until < math.inf:
-            self._overridden[name] = usual, until
-
-    def overrides_over(self, now: float) -> dict[str, LayerParameters]:
-        """The usual parameters of those layers whose override is over at ``now`` [s]."""
-        return {name: usual for name, (usual, until) in self._overridden.items() if until <= now}

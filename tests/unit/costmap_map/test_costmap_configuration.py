@@ -10,6 +10,7 @@ from PIL import Image
 from pydantic import ValidationError
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_costmap_nav.files.map_description import MapError, MapMode
 from mbf_costmap_nav.files.map_io import OccupancyMap, save_map
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
@@ -68,13 +69,13 @@ def test_bad_configurations_are_refused():
         return CostmapParameters.model_validate({"layers": list(entries)})
 
     inflation = {"name": "a", "type": "inflation"}
-    with pytest.raises(ValueError, match="need different names"):
+    with pytest.raises(ValueError, match="layer name 'a' is used twice"):
         build_layered_costmap(layers(inflation, inflation))
-    with pytest.raises(ValueError, match="unknown layer type 'inflatoin'"):
+    with pytest.raises(ValueError, match="inflatoin: unknown type; did you mean 'inflation'"):
         build_layered_costmap(layers({"name": "a", "type": "inflatoin"}))
-    with pytest.raises(ValueError, match="belong to no layer"):
+    with pytest.raises(ValueError, match="parameters for 'b', but no such layer"):
         build_layered_costmap(layers(inflation), {"b": {}})
-    with pytest.raises(ValidationError, match="inflation_radius"):
+    with pytest.raises(LayerListError, match="layer 'a': inflation_radius: Input should"):
         build_layered_costmap(layers(inflation), {"a": {"inflation_radius": -1.0}})
     with pytest.raises(ValueError, match="2000 cells"):
         build_layered_costmap(

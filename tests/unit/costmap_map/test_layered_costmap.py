@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_costmap_nav.grid.costmap import FREE, LETHAL, UNKNOWN, CellBox, Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 
@@ -199,7 +200,7 @@ def test_a_stamp_from_the_future_is_told_and_does_not_cover_silence(build, layer
 @pytest.mark.parametrize("stamp", [math.nan, math.inf, -math.inf])
 def test_a_stamp_that_is_no_time_is_refused(build, seeing, stamp):
     costmap = build("obstacle", obstacle=seeing)
-    with pytest.raises(ValueError, match="stamp of an observation must be finite"):
+    with pytest.raises(ValueError, match="origin and stamp of a scan must be finite"):
         costmap.insert_points("laser", [(1.0, 1.0, 0.0)], (0.0, 0.0, 0.0), stamp)
 
 
@@ -209,7 +210,7 @@ def test_an_observation_from_the_future_is_not_kept_until_its_time(build, seeing
         costmap.insert_points("laser", [(x, 5.5, 0.0)], (x, 4.5, 0.0), stamp)
     costmap.update(None, 0.0)
     assert lethal_cells(costmap) == {(1, 5), (3, 5)}, "the last one is used: an obstacle is never ignored"
-    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 5.5, 0.0), [(9.5, 5.5, 0.0)], [False], 20.0)
+    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 5.5, 0.0), [(9.5, 5.5, 0.0)], [False], 20.0))
     costmap.update(None, 20.0)
     assert lethal_cells(costmap) == set()
 
@@ -246,14 +247,18 @@ def test_a_scan_clears_along_misses_and_marks_only_hits(build, seeing):
     costmap = build("obstacle", obstacle=seeing)
     costmap.insert_points("laser", [(3.5, 5.5, 0.0), (3.5, 3.5, 0.0)], (0.5, 5.5, 0.0), 0.0)
     costmap.update(None, 0.0)
-    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 5.5, 0.0), [(9.5, 5.5, 0.0), (0.5, 8.5, 0.0)], [False, True], 1.0)
+    costmap.insert_scan(
+        RangeScan.of_rays("laser", (0.5, 5.5, 0.0), [(9.5, 5.5, 0.0), (0.5, 8.5, 0.0)], [False, True], 1.0)
+    )
     costmap.update(None, 1.0)
     assert lethal_cells(costmap) == {(3, 3), (0, 8)}
 
 
 def test_rays_with_ends_that_are_not_finite_are_dropped(build, seeing):
     costmap = build("obstacle", obstacle=seeing)
-    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 0.5, 0.0), [(np.inf, 0.0, 0.0), (np.nan, 0.0, 0.0)], [True, True], 0.0)
+    costmap.insert_scan(
+        RangeScan.of_rays("laser", (0.5, 0.5, 0.0), [(np.inf, 0.0, 0.0), (np.nan, 0.0, 0.0)], [True, True], 0.0)
+    )
     costmap.update(None, 0.0)
     assert lethal_cells(costmap) == set()
 
@@ -271,7 +276,7 @@ def test_persistent_observations_come_back_after_a_ray_cleared_them(build, seein
     seeing["sources"]["laser"]["observation_persistence"] = 1.0
     costmap = build("obstacle", obstacle=seeing)
     costmap.insert_points("laser", [(3.5, 5.5, 0.0)], (0.5, 5.5, 0.0), 0.0)
-    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 5.5, 0.0), [(9.5, 5.5, 0.0)], [False], 0.5)
+    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 5.5, 0.0), [(9.5, 5.5, 0.0)], [False], 0.5))
     costmap.update(None, 0.5)
     assert lethal_cells(costmap) == {(3, 5)}
     costmap.update(None, 1.2)
@@ -283,10 +288,10 @@ def test_a_voxel_column_keeps_what_a_higher_ray_passes_over(build, seeing):
     costmap = build("voxel", voxel=seeing)
     costmap.insert_points("laser", [(5.5, 5.5, 0.1)], (0.5, 5.5, 0.1), 0.0)
     costmap.update(None, 0.0)
-    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 5.5, 1.5), [(9.5, 5.5, 1.5)], [False], 1.0)
+    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 5.5, 1.5), [(9.5, 5.5, 1.5)], [False], 1.0))
     costmap.update(None, 1.0)
     assert lethal_cells(costmap) == {(5, 5)}
-    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 5.5, 0.1), [(9.5, 5.5, 0.1)], [False], 2.0)
+    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 5.5, 0.1), [(9.5, 5.5, 0.1)], [False], 2.0))
     costmap.update(None, 2.0)
     assert lethal_cells(costmap) == set()
 
@@ -307,7 +312,7 @@ def test_voxels_move_with_the_window_and_are_cleared_by_area(build, seeing):
 def test_a_sonar_that_is_cleared_forgets_its_readings(build):
     block = {"sources": {"sonar": {"field_of_view": math.radians(20.0)}}}
     costmap = build("range_sensor", range_sensor=block)
-    costmap.insert_scan(RangeScan.of_rays("sonar", (2.0, 5.5, 0.0), [(5.5, 5.5, 0.0)], [True], 0.0)
+    costmap.insert_scan(RangeScan.of_rays("sonar", (2.0, 5.5, 0.0), [(5.5, 5.5, 0.0)], [True], 0.0))
     costmap.update(None, 0.0)
     assert lethal_cells(costmap) == {(5, 5)} and costmap.is_current(0.5) and not costmap.is_current(1.5)
     costmap.clear()
@@ -319,7 +324,7 @@ def test_a_sonar_that_is_cleared_forgets_its_readings(build):
 def test_a_reading_on_a_large_map_costs_what_its_box_costs(build, layer):
     costmap = build(layer, **{layer: {"sources": {"eye": {}}}}, width=2000.0, height=2000.0)
     costmap.update(None, 0.0)
-    costmap.insert_scan(RangeScan.of_rays("eye", (1000.5, 1000.5, 0.2), [(1002.5, 1000.5, 0.2)], [True], 0.1)
+    costmap.insert_scan(RangeScan.of_rays("eye", (1000.5, 1000.5, 0.2), [(1002.5, 1000.5, 0.2)], [True], 0.1))
     tracemalloc.start()
     assert not costmap.update(None, 0.1).empty
     _, peak = tracemalloc.get_traced_memory()

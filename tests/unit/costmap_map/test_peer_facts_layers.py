@@ -8,6 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_costmap_nav.grid.costmap import FREE, INSCRIBED, LETHAL, UNKNOWN
 from mbf_costmap_nav.layers.denoise import small_groups
 from mbf_costmap_nav.layers.inflation import cost_table
@@ -170,7 +171,7 @@ def test_f020_combination_with_an_unknown_map(build, seeing, method, unknown):
 
 
 def sonar(costmap, x, y, reading, hit=True):
-    costmap.insert_scan(RangeScan.of_rays("sonar", (x, y, 0.0), [(x + reading, y, 0.0)], [hit], 0.0)
+    costmap.insert_scan(RangeScan.of_rays("sonar", (x, y, 0.0), [(x + reading, y, 0.0)], [hit], 0.0))
     costmap.update(None, 0.0)
 
 
@@ -289,7 +290,7 @@ def test_a_source_clears_from_its_least_to_its_largest_distance(build, seeing):
     costmap.insert_points("laser", wall, (0.5, 5.5, 0.0), 0.0)
     costmap.update(None, 0.0)
     before = set(map(int, np.flatnonzero(costmap.snapshot().cells[0] == 254)))
-    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 0.5, 0.0), [(9.5, 0.5, 0.0)], [False], 20.0)
+    costmap.insert_scan(RangeScan.of_rays("laser", (0.5, 0.5, 0.0), [(9.5, 0.5, 0.0)], [False], 20.0))
     costmap.update(None, 20.0)
     after = set(map(int, np.flatnonzero(costmap.snapshot().cells[0] == 254)))
     assert (before, after) == ({1, 2, 3, 4, 5, 6, 7}, {1, 5, 6, 7})

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from mbf_abstract.execution.oscillation import OscillationDetector
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
@@ -112,7 +113,7 @@ def limit_speed():
         corners = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
         zone = {"name": "slow", "polygon": corners, "speed_limit": percent}
         parameters = SpeedLimitLayer.Parameters(zones=(zone,), limit_type="percent")
-        plugin.costmap.layers = {"slow": SpeedLimitLayer(LayerContext("slow", parameters, "map", False))}
+        plugin.costmap.layers = LayerStack([SpeedLimitLayer(LayerContext("slow", parameters, "map", False))])
 
     return limit
 

@@ -230,7 +230,7 @@ def test_the_decay_of_costs_is_that_of_the_inflation_layer_unless_it_is_given(ma
     costmap = inflated_map(cost_scaling_factor=6.0)
     controller = make_plugin(RegulatedPurePursuitController, FREE_MAP, costmap=costmap)
     assert controller.decay == 6.0
-    layer = costmap.layer("inflation")
+    layer = costmap.layers["inflation"]
     costmap.set_layer_parameters("inflation", layer.parameters.model_copy(update={"cost_scaling_factor": 3.0}))
     assert controller.decay == 3.0
     given = {"inflation_cost_scaling_factor": 8.0}

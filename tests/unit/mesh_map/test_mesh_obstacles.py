@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.layers.layer_list import LayerListError
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.range_image import RangeImage
@@ -336,7 +336,8 @@ def test_a_silent_sensor_is_noticed_while_another_speaks():
 
 def test_a_layer_listens_to_its_own_sensors_only_and_waits_for_each():
     mesh = floor_map(sources=("front", "rear"))
-    mesh.insert_points("ceiling", post(1.0, 1.0), SENSOR, 1.0)
+    with pytest.raises(ValueError, match=r"'ceiling', known are \['front', 'rear'\]"):
+        mesh.insert_points("ceiling", post(1.0, 1.0), SENSOR, 1.0)
     assert not mesh.snapshot().lethal.any()
     mesh.insert_points("front", post(1.0, 1.0), SENSOR, 1.0)
     assert mesh.snapshot().lethal.any() and not mesh.is_current(1.0)
@@ -371,3 +372,17 @@ def test_a_scan_from_nowhere_or_of_no_time_is_refused(origin, stamp):
 def test_a_scan_of_another_frame_is_refused():
     with pytest.raises(ValueError, match="in the frame 'laser', the map in 'map'"):
         floor_map().insert_scan(lidar(np.zeros(0), 1.0, frame_id="laser"))
+
+
+def test_a_disabled_layer_leaves_the_map_free_and_fresh_until_it_is_enabled_again():
+    mesh = floor_map(sources=("front",))
+    mesh.insert_points("front", post(2.0, 2.0), SENSOR, 1.0)
+    seen = mesh.snapshot().lethal.copy()
+    settings = mesh.layers["seen"].parameters
+    mesh.set_layer_parameters("seen", settings.model_copy(update={"enabled": False}))
+    assert seen.any() and not mesh.snapshot().lethal.any() and mesh.is_current(100.0)
+    mesh.insert_points("front", post(1.0, 1.0), SENSOR, 2.0)
+    assert not mesh.snapshot().lethal.any()
+    mesh.set_layer_parameters("seen", settings)
+    assert np.array_equal(mesh.snapshot().lethal, seen)
+    assert "'front' is silent for 1.50 s" in mesh.stale_reason(2.5)

@@ -4,7 +4,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.map.map_builder import LayerEntry, MeshMapParameters, build_mesh_map
+from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
 
@@ -12,7 +12,7 @@ from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
 def build(file, entries, blocks, edge_cost_factor=0.0):
     parameters = MeshMapParameters(
         mesh_file=str(file),
-        layers=tuple(LayerEntry(name=name, type=name, inputs=inputs) for name, inputs in entries.items()),
+        layers=tuple(MeshLayerEntry(name=name, type=name, inputs=inputs) for name, inputs in entries.items()),
         default_layer="inflation",
         edge_cost_factor=edge_cost_factor,
     )
