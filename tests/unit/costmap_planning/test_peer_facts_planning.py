@@ -130,7 +130,7 @@ def test_a_speed_limit_in_percent_holds_until_it_is_lifted(make_plugin, limit_sp
     controller = make_plugin(controller_class, FREE_MAP)
     limit_speed(controller, 30.0)
     slow = first_command(controller, velocity=0.3 * full_speed).vx
-    controller.costmap.layers = {}
+    controller.costmap.layers = LayerStack()
     fast = first_command(controller, velocity=0.9 * full_speed).vx
     assert 0.15 * full_speed < slow <= 0.3 * full_speed + 1e-6
     assert fast > 0.3 * full_speed
