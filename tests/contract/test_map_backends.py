@@ -5,7 +5,6 @@ import pytest
 from mbf_abstract.testing.conformance import SITUATIONS, check_map_backend
 
 KNOWN = {
-    ("costmap", "a_scan_of_nothing_but_nan_says_nothing"): "a scan without a finite ray counts as a sign of life",
     ("mesh", "a_path_is_as_bad_as_its_worst_pose"): "of a path without poses it looks at pose 0",
     ("mesh", "back_up_stops_before_an_obstacle"): "a recovery that is stopped on its way is a success",
 }
