@@ -27,10 +27,11 @@ from mbf_mesh_nav.kernels.mesh.defects import (
     winding_flips,
 )
 from mbf_mesh_nav.kernels.mesh.fans import fans_at_vertices
-from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges, faces_of_vertices
+from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges
 from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh, FloatArray, IntArray
 from mbf_mesh_nav.mesh.mesh_report import Finding, MeshError, MeshReport
 from mbf_mesh_nav.mesh.slivers import without_slivers
+from mbf_mesh_nav.mesh.topology import faces_of_vertices
 from mbf_mesh_nav.mesh.welding import close_rims, rounding_distance, same_position
 
 __all__ = ["REPAIRS", "CheckedMesh", "Finding", "MeshError", "MeshReport", "checked_mesh", "component_labels"]
@@ -199,7 +200,7 @@ class _Check:
         return mesh
 
     def edges(self, mesh: CheckedMesh) -> CheckedMesh:
-        repeated = repeated_faces(mesh.faces, *self.incidence(mesh))
+        repeated = repeated_faces(mesh.faces)
         self.found("duplicate_faces", "{count} faces have the corners of an earlier face", mesh.face_source[repeated])
         mesh = mesh.without_faces(repeated) if repeated.any() else mesh
         surplus = surplus_faces(mesh.faces, *self.incidence(mesh))

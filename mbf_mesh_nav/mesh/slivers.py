@@ -15,8 +15,9 @@ from scipy.sparse.csgraph import connected_components
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_mesh_nav.kernels.mesh.defects import faces_without_area
 from mbf_mesh_nav.kernels.mesh.slivers import flip_slivers
-from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges, faces_of_vertices
+from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges
 from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh, FloatArray, IntArray
+from mbf_mesh_nav.mesh.topology import faces_of_vertices
 
 SAME_POINT_SHARE = 1e-9
 """Corners of a face without area closer than this, in lengths of its longest edge, are one point."""

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from mbf_mesh_nav.kernels.mesh import topology as kernels
@@ -121,12 +121,10 @@ def build_topology(
     sorted_vertices = np.ascontiguousarray(vertices[vertex_order], dtype=np.float64)
     sorted_faces = np.ascontiguousarray(position[faces[face_order]])
 
-    face_offsets, incident = kernels.faces_of_vertices(sorted_faces, len(sorted_vertices))
-    offsets, neighbours = kernels.neighbours_of_vertices(sorted_faces, face_offsets, incident)
+    face_offsets, incident = faces_of_vertices(sorted_faces, len(sorted_vertices))
+    graph = _neighbour_graph(sorted_faces, len(sorted_vertices))
+    offsets, neighbours = graph.indptr, graph.indices
     edges, lengths = kernels.edges_of_neighbours(sorted_vertices, offsets, neighbours)
-    graph = csr_array(
-        (np.ones(len(neighbours), dtype=np.int8), neighbours, offsets), shape=(len(vertices), len(vertices))
-    )
     face_normals = kernels.unit_face_normals(sorted_vertices, sorted_faces)
     identity = np.arange(len(vertices), dtype=np.int32) if input_to_given is None else input_to_given
     return MeshTopology(
@@ -146,6 +144,21 @@ def build_topology(
         internal_to_input=_renumbered(vertex_source, vertex_order),
         internal_to_input_faces=_renumbered(face_source, face_order),
     )
+
+
+def faces_of_vertices(faces: IntArray, vertex_count: int) -> tuple[IntArray, IntArray]:
+    """Incident faces of every vertex as CSR: offsets (V+1,), faces (3F,), ascending within a vertex."""
+    corners_of_faces = np.arange(0, faces.size + 1, 3, dtype=np.int32)
+    marks = np.ones(faces.size, dtype=np.int8)
+    table = csr_array((marks, faces.ravel(), corners_of_faces), shape=(len(faces), vertex_count)).tocsc()
+    return table.indptr, table.indices
+
+
+def _neighbour_graph(faces: IntArray, vertex_count: int) -> csr_array:
+    """Square matrix whose row of a vertex names its neighbours over mesh edges, ascending and without repetition."""
+    starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    pairs = np.concatenate([starts, ends]), np.concatenate([ends, starts])
+    return coo_array((np.ones(2 * faces.size, dtype=np.int8), pairs), shape=(vertex_count, vertex_count)).tocsr()
 
 
 def _renumbered(source: IntArray | None, order: NDArray[np.int64]) -> IntArray:

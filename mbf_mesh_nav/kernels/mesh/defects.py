@@ -37,24 +37,12 @@ def faces_without_area(vertices: FloatArray, faces: IntArray, tolerance: float) 
     return np.asarray(2.0 * shapes[:, 3] <= tolerance * shapes[:, 4])
 
 
-@kernel
-def repeated_faces(faces: IntArray, face_offsets: IntArray, incident: IntArray) -> BoolArray:
+def repeated_faces(faces: IntArray) -> BoolArray:
     """Mask (F,) of faces with the same three corners, in any order, as a face of smaller number."""
-    repeated = np.zeros(faces.shape[0], dtype=np.bool_)
-    for face in range(faces.shape[0]):
-        first = faces[face, 0]
-        for position in range(face_offsets[first], face_offsets[first + 1]):
-            other = incident[position]
-            if other >= face:
-                break
-            shared = 0
-            for corner in range(3):
-                vertex = faces[face, corner]
-                if faces[other, 0] == vertex or faces[other, 1] == vertex or faces[other, 2] == vertex:
-                    shared += 1
-            if shared == 3:
-                repeated[face] = True
-                break
+    corners = np.sort(faces, axis=1)
+    order = np.lexsort(corners.T)
+    repeated = np.zeros(len(faces), dtype=np.bool_)
+    repeated[order[1:]] = (corners[order[1:]] == corners[order[:-1]]).all(axis=1)
     return repeated
 
 

@@ -1,4 +1,4 @@
-"""Building the flat neighbour arrays of a triangle mesh by counting sorts, in time linear in the faces."""
+"""Edges, normals and neighbours across edges of a triangle mesh, in time linear in the faces."""
 
 from __future__ import annotations
 
@@ -10,56 +10,6 @@ from mbf_mesh_nav.kernels.mesh.vectors import cross, difference, norm, row, set_
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
-
-
-@kernel
-def faces_of_vertices(faces: IntArray, vertex_count: int) -> tuple[IntArray, IntArray]:
-    """Incident faces of every vertex as CSR: offsets (V+1,), faces (3F,), ascending within a vertex."""
-    offsets = np.zeros(vertex_count + 1, dtype=np.int32)
-    for face in range(faces.shape[0]):
-        for corner in range(3):
-            offsets[faces[face, corner] + 1] += 1
-    for vertex in range(vertex_count):
-        offsets[vertex + 1] += offsets[vertex]
-    cursor = np.empty(vertex_count, dtype=np.int32)
-    for vertex in range(vertex_count):
-        cursor[vertex] = offsets[vertex]
-    incident = np.empty(3 * faces.shape[0], dtype=np.int32)
-    for face in range(faces.shape[0]):
-        for corner in range(3):
-            vertex = faces[face, corner]
-            incident[cursor[vertex]] = face
-            cursor[vertex] += 1
-    return offsets, incident
-
-
-@kernel
-def neighbours_of_vertices(faces: IntArray, face_offsets: IntArray, incident: IntArray) -> tuple[IntArray, IntArray]:
-    """Neighbours of every vertex over mesh edges as CSR, ascending and without repetition."""
-    vertex_count = face_offsets.shape[0] - 1
-    offsets = np.zeros(vertex_count + 1, dtype=np.int32)
-    neighbours = np.empty(2 * incident.shape[0], dtype=np.int32)
-    filled = 0
-    for vertex in range(vertex_count):
-        first = filled
-        for position in range(face_offsets[vertex], face_offsets[vertex + 1]):
-            face = incident[position]
-            for corner in range(3):
-                other = faces[face, corner]
-                if other == vertex:
-                    continue
-                # Insertion into the short sorted list of this vertex, dropping what is there already.
-                place = filled
-                while place > first and neighbours[place - 1] > other:
-                    place -= 1
-                if place > first and neighbours[place - 1] == other:
-                    continue
-                for moved in range(filled, place, -1):
-                    neighbours[moved] = neighbours[moved - 1]
-                neighbours[place] = other
-                filled += 1
-        offsets[vertex + 1] = filled
-    return offsets, neighbours[:filled].copy()
 
 
 @kernel
