@@ -22,47 +22,21 @@ _BRANCHES: Any = Index(BRANCHES)
 STACK_SIZE = 128
 
 
-@kernel
 def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """Boxes (N, 6) as min x y z, max x y z, leaves first, and the start of every level (levels + 1,)."""
-    counts = np.zeros(32, dtype=np.int32)
-    levels = 0
-    size = faces.shape[0]
-    while True:
-        size = (size + BRANCHES - 1) // BRANCHES
-        counts[levels] = size
-        levels += 1
-        if size <= 1:
-            break
-    starts = np.zeros(levels + 1, dtype=np.int32)
-    for level in range(levels):
-        starts[level + 1] = starts[level] + counts[level]
-    node_count = Count(starts[levels])
-    boxes = np.empty((node_count, 6), dtype=np.float64)
-    for node in range(node_count):
-        for axis in range(3):
-            boxes[node, axis] = np.inf
-            boxes[node, axis + 3] = -np.inf
-    # Boxes are a hair larger than their faces, so that rounding loses no ray that runs along the side of one.
-    greatest = 0.0
-    for vertex in range(vertices.shape[0]):
-        for axis in range(3):
-            greatest = max(greatest, abs(vertices[vertex, axis]))
-    hair = 1e-12 * greatest
-    for face in range(faces.shape[0]):
-        leaf = face // BRANCHES
-        for corner in range(3):
-            for axis in range(3):
-                value = vertices[faces[face, corner], axis]
-                boxes[leaf, axis] = min(boxes[leaf, axis], value - hair)
-                boxes[leaf, axis + 3] = max(boxes[leaf, axis + 3], value + hair)
-    for level in range(1, levels):
-        for child in range(counts[level - 1]):
-            parent = starts[level] + child // BRANCHES
-            for axis in range(3):
-                boxes[parent, axis] = min(boxes[parent, axis], boxes[starts[level - 1] + child, axis])
-                boxes[parent, axis + 3] = max(boxes[parent, axis + 3], boxes[starts[level - 1] + child, axis + 3])
-    return boxes, starts
+    # Boxes are slightly larger than their faces, so that rounding loses no ray that runs along the side of one.
+    margin = 1e-12 * np.abs(vertices).max(initial=0.0)
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    low = np.minimum(np.minimum(a, b), c) - margin
+    high = np.maximum(np.maximum(a, b), c) + margin
+    boxes: list[FloatArray] = []
+    starts = [0]
+    while len(boxes) == 0 or len(low) > 1:
+        first = np.arange(0, len(low), BRANCHES)
+        low, high = np.minimum.reduceat(low, first), np.maximum.reduceat(high, first)
+        boxes.append(np.hstack([low, high]))
+        starts.append(starts[-1] + len(low))
+    return np.concatenate(boxes), np.array(starts, dtype=np.int32)
 
 
 @inner_kernel
