@@ -57,7 +57,7 @@ def embree_distances(terrain: Heightfield, origins: np.ndarray, directions: np.n
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 
-    vertices, faces = terrain.triangles()
+    vertices, faces = terrain.surface()
     scene, middle = EmbreeScene(), vertices.mean(axis=0)
     TriangleMesh(scene, (vertices - middle).astype(np.float32), faces.astype(np.int32))
     starts, aims = (origins - middle).astype(np.float32), directions.astype(np.float32)
@@ -70,7 +70,7 @@ def ray_ratios(terrain: Heightfield, rays: StaticRays, scans: int) -> tuple[floa
     x, y = (0.5 * (low + high) for low, high in ((terrain.x0, terrain.x_max), (terrain.y0, terrain.y_max)))
     origins = np.tile([x, y, float(terrain.height_at(x, y)) + 1.0], (len(directions), 1))
     with BulletWorld() as world:
-        world.add_mesh(*terrain.triangles())
+        world.add_mesh(*terrain.surface())
         bullet = cpu_seconds(
             lambda: [world.cast_rays(origins, origins + RANGE * directions, STATIC) for _ in range(scans)]
         )
@@ -84,7 +84,7 @@ def ray_ratios(terrain: Heightfield, rays: StaticRays, scans: int) -> tuple[floa
 
 def measure(seconds: float, scans: int) -> dict[str, float]:
     terrain = jacksboro(100.0, spacing=0.3, roughness=0.015, rng=np.random.default_rng(0))
-    rays = StaticRays(*terrain.triangles())
+    rays = StaticRays(*terrain.surface())
     start = terrain.pose_at(20.0, 20.0, 0.8)
     with BulletWorld() as world:
         world.add_heightfield(terrain)

@@ -24,12 +24,11 @@ from terrain.physics.robot_models import RobotSpec
 from terrain.physics.world import BulletWorld
 from terrain.recording.recording import RobotShape
 from terrain.worlds.occupancy import OccupancyGrid
-from terrain.worlds.solids import box_triangles, cylinder_triangles, joined
+from terrain.worlds.surface import Surface, box, cylinder, joined
 
 FloatArray = NDArray[np.float64]
 
 AnyWorld = BulletWorld | KinematicWorld
-Triangles = tuple[FloatArray, NDArray[np.int32]]
 
 PERSON_RADIUS: float = 0.25  # m
 PERSON_HEIGHT: float = 1.7  # m
@@ -43,12 +42,12 @@ class Actor(Protocol):
     Attributes
     ----------
     thing : Thing
-    looks : (V, 3) float64, (F, 3) int32
-        Triangles in the actor's own frame [m].
+    looks : Surface
+        In the actor's own frame.
     """
 
     thing: Thing
-    looks: Triangles
+    looks: Surface
 
     def pose(self) -> Pose:
         """Pose of the actor's frame now."""
@@ -74,13 +73,13 @@ class Body:
     size : (2,) or (3,) float
         Radius and height of an upright cylinder, or length, width and height of a box [m].
     thing : Thing
-    looks : triangles, optional
+    looks : Surface, optional
         In the frame of its middle; those of the cylinder or box where absent.
     """
 
     size: Sequence[float] = (PERSON_RADIUS, PERSON_HEIGHT)
     thing: Thing = Thing.PERSON
-    looks: Triangles | None = None
+    looks: Surface | None = None
 
 
 PERSON = Body()
@@ -130,10 +129,10 @@ class RouteWalker:
         if len(size) == 2:
             radius, height = size
             self.body = world.add_cylinder(self.pose(), radius, height, moving=True)
-            self.looks = body.looks or cylinder_triangles(radius, height)
+            self.looks = body.looks or cylinder(radius, height)
         else:
             self.body = world.add_box(self.pose(), size, moving=True)
-            self.looks = body.looks or box_triangles(size)
+            self.looks = body.looks or box(size)
         world.things[self.body] = body.thing
         world.before_step(self._move)
 
@@ -190,7 +189,7 @@ class SlidingDoor:
         self._orientation = closed.orientation
         self._closes_at = closes_at
         self._duration = duration
-        self.thing, self.looks = Thing.DOOR, box_triangles(size)
+        self.thing, self.looks = Thing.DOOR, box(size)
         self.body = world.add_box(opened, size, moving=True)
         world.things[self.body] = self.thing
         world.before_step(self._move)
@@ -215,17 +214,17 @@ def other_robot(
     return RouteWalker(world, route, speed, start, body, gives_way)
 
 
-def _robot_looks(spec: RobotSpec, size: tuple[float, float, float]) -> Triangles:
+def _robot_looks(spec: RobotSpec, size: tuple[float, float, float]) -> Surface:
     """A narrower body above the axles, and the wheels, in the frame of the middle of the box of ``size``."""
     length, width, height = size
     radius = spec.wheel_radius
-    body, body_faces = box_triangles((length, 0.7 * width, height - radius))
-    drum, drum_faces = cylinder_triangles(radius, 0.64 * radius)
+    body, body_faces = box((length, 0.7 * width, height - radius))
+    drum, drum_faces = cylinder(radius, 0.64 * radius)
     drum = drum[:, [0, 2, 1]] * (1.0, -1.0, 1.0)  # a quarter turn about x lays its axis along y
     middle = 0.5 * (spec.footprint_array().min(axis=0) + spec.footprint_array().max(axis=0))  # base_link may be off it
     wheels = RobotShape.of(spec).wheels - np.array([*middle, 0.5 * height])
-    raised = body + np.array([0.0, 0.0, 0.5 * radius])
-    return joined([(raised, body_faces), *((drum + wheel, drum_faces) for wheel in wheels)])
+    raised = Surface(body + np.array([0.0, 0.0, 0.5 * radius]), body_faces)
+    return joined([raised, *(Surface(drum + wheel, drum_faces) for wheel in wheels)])
 
 
 def random_route(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from terrain.physics.world import BulletWorld
-from terrain.worlds.occupancy import OccupancyGrid, wall_triangles
+from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 
 WALL_HEIGHT = 2.0
 
@@ -21,4 +21,4 @@ def add_building(world: BulletWorld, grid: OccupancyGrid, wall_height: float = W
     """
     world.add_ground_plane(*grid.bounds)
     if grid.occupied.any():
-        world.add_mesh(*wall_triangles(grid, wall_height), ground=False)
+        world.add_mesh(*wall_surface(grid, wall_height), ground=False)

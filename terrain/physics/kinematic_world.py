@@ -14,8 +14,8 @@ from mbf_abstract.geometry import Pose
 from terrain.physics.contact_depth import depth_in_cells, placed
 from terrain.physics.incidents import Thing
 from terrain.worlds.heightfield import Heightfield
-from terrain.worlds.occupancy import OccupancyGrid, wall_triangles
-from terrain.worlds.solids import joined
+from terrain.worlds.occupancy import OccupancyGrid, wall_surface
+from terrain.worlds.surface import Surface, joined
 from terrain.worlds.upright_solids import UprightSolid
 
 FloatArray = NDArray[np.float64]
@@ -162,17 +162,14 @@ class KinematicWorld:
         """Pose on the ground; on a heightfield tilted with it. Raises ValueError off the terrain."""
         return Pose.planar(x, y, yaw) if self.terrain is None else self.terrain.pose_at(x, y, yaw)
 
-    def static_triangles(self) -> tuple[FloatArray, NDArray[np.int32]]:
-        """All that sensors can see as one mesh: vertices (n, 3) float64 [m], faces (m, 3) int32."""
-        return joined([self._ground_triangles(), *(solid.triangles() for solid in self.solids if not solid.moving)])
+    def static_surface(self) -> Surface:
+        """All that sensors can see and that does not move, as one mesh."""
+        return joined([*self._ground(), *(solid.surface() for solid in self.solids if not solid.moving)])
 
-    def _ground_triangles(self) -> tuple[FloatArray, NDArray[np.int32]]:
-        """The ground with the walls of the building."""
+    def _ground(self) -> list[Surface]:
+        """The ground, and the walls of the building."""
         if self.terrain is not None:
-            return self.terrain.triangles()
-        floor = FLOOR * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)
-        floor_faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
-        if self.building is None:
-            return floor, floor_faces
-        vertices, faces = wall_triangles(self.building)
-        return np.concatenate([floor, vertices]), np.concatenate([floor_faces, faces + np.int32(4)])
+            return [self.terrain.surface()]
+        corners = FLOOR * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)
+        floor = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32))
+        return [floor] if self.building is None else [floor, wall_surface(self.building)]

@@ -4,7 +4,7 @@ Use it where contact matters: slopes, bumps, wheels that slip, doors that push. 
 matter take ``terrain.physics.kinematic_robot`` instead, which is some thirty times faster.
 
 Two ways to put ground in. ``add_heightfield`` is Bullet's own heightfield; the planner's mesh from
-``Heightfield.triangles`` is the same surface to a fraction of a millimetre. ``add_mesh`` is a concave triangle mesh:
+``Heightfield.surface`` is the same surface to a fraction of a millimetre. ``add_mesh`` is a concave triangle mesh:
 overhangs are possible, rays are faster. Bullet's heightfield has two traps that are guarded here: more than 2**21
 samples are cut off silently, and slanted rays miss it where raw heights are positive, so heights are shifted to <= 0
 (Bullet 3.25, ``btHeightfieldTerrainShape`` skips chunks by the wrong component). Long lidar rays should still be cast
@@ -22,11 +22,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.arithmetic import rotated
 from terrain.physics.bullet import load_pybullet, quiet_native_output
 from terrain.physics.incidents import Thing
 from terrain.worlds.heightfield import Heightfield
-from terrain.worlds.solids import box_triangles, cylinder_triangles
+from terrain.worlds.surface import Surface, box, cylinder, joined
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -81,7 +80,7 @@ class BulletWorld:
         self.ground_bodies: set[int] = set()
         self.things: dict[int, Thing] = {}
         self.has_moving_bodies = False
-        self._static: list[tuple[FloatArray, IntArray]] = []
+        self._static: list[Surface] = []
         self._folder = tempfile.TemporaryDirectory(prefix="mbf_world_")
         self._before_step: list[Callable[[], None]] = []
         self._closed = False
@@ -157,7 +156,7 @@ class BulletWorld:
         )
         middle = 0.5 * (float(raw.min()) + float(raw.max()))  # Bullet centres z on the middle of the range
         centre = [terrain.x0 + terrain.size[0] / 2, terrain.y0 + terrain.size[1] / 2, middle + shift]
-        self._static.append(terrain.triangles())
+        self._static.append(terrain.surface())
         return self._add_static_body(shape, centre, friction, ground=True)
 
     def add_mesh(self, vertices: ArrayLike, faces: ArrayLike, friction: float = 1.0, ground: bool = True) -> int:
@@ -185,13 +184,13 @@ class BulletWorld:
                 flags=self.bullet.GEOM_FORCE_CONCAVE_TRIMESH,
                 physicsClientId=self.client,
             )
-        self._static.append((vertices, faces))
+        self._static.append(Surface(vertices, faces))
         return self._add_static_body(shape, [0.0, 0.0, 0.0], friction, ground)
 
     def add_ground_plane(self, x_min: float, x_max: float, y_min: float, y_max: float, friction: float = 1.0) -> int:
         """Put a level floor in at z = 0; it is endless for wheels and as large as given [m] for lidar rays."""
         corners = np.array([[x_min, y_min, 0], [x_max, y_min, 0], [x_max, y_max, 0], [x_min, y_max, 0]], dtype=float)
-        self._static.append((corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)))
+        self._static.append(Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)))
         shape = self.bullet.createCollisionShape(
             self.bullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=self.client
         )
@@ -209,22 +208,20 @@ class BulletWorld:
         """
         half = [0.5 * length for length in size]
         shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
-        return self._add_solid(shape, pose, mass, moving, *box_triangles(size))
+        return self._add_solid(shape, pose, mass, moving, box(size))
 
     def add_cylinder(self, pose: Pose, radius: float, height: float, mass: float = 0.0, moving: bool = False) -> int:
         """Put an upright cylinder in, centred at ``pose``; parameters as for ``add_box``."""
         shape = self.bullet.createCollisionShape(
             self.bullet.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self.client
         )
-        return self._add_solid(shape, pose, mass, moving, *cylinder_triangles(radius, height))
+        return self._add_solid(shape, pose, mass, moving, cylinder(radius, height))
 
-    def _add_solid(
-        self, shape: int, pose: Pose, mass: float, moving: bool, vertices: FloatArray, faces: IntArray
-    ) -> int:
+    def _add_solid(self, shape: int, pose: Pose, mass: float, moving: bool, surface: Surface) -> int:
         group = MOVING if moving or mass > 0.0 else STATIC
         self.has_moving_bodies |= group == MOVING
         if group == STATIC:
-            self._static.append((rotated(pose.rotation, vertices) + pose.position, faces))
+            self._static.append(surface.at(pose))
         body: int = self.bullet.createMultiBody(
             mass, shape, basePosition=pose.position, baseOrientation=pose.orientation, physicsClientId=self.client
         )
@@ -251,13 +248,9 @@ class BulletWorld:
         for link in range(-1, self.bullet.getNumJoints(body, physicsClientId=self.client)):
             self.bullet.setCollisionFilterGroupMask(body, link, group, collides_with, physicsClientId=self.client)
 
-    def static_triangles(self) -> tuple[FloatArray, IntArray]:
-        """All that is fixed as one mesh: vertices (n, 3) float64 [m], faces (m, 3) int32."""
-        if not self._static:
-            return np.zeros((0, 3)), np.zeros((0, 3), np.int32)
-        starts = np.cumsum([0] + [len(vertices) for vertices, _ in self._static[:-1]]).astype(np.int32)
-        faces = [part + start for (_, part), start in zip(self._static, starts, strict=True)]
-        return np.concatenate([vertices for vertices, _ in self._static]), np.concatenate(faces)
+    def static_surface(self) -> Surface:
+        """All that is fixed as one mesh."""
+        return joined(self._static)
 
     def cast_rays(self, starts: ArrayLike, ends: ArrayLike, groups: int = STATIC | MOVING) -> RayHits:
         """Cast rays from ``starts`` to ``ends``, each (n, 3) [m], at the bodies of ``groups``."""
@@ -275,7 +268,7 @@ class BulletWorld:
     def vertical_rays(self, xy: ArrayLike) -> FloatArray:
         """Height [m] of the highest fixed thing at each position ``xy`` (n, 2); nan where there is none."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
-        vertices, _ = self.static_triangles()
+        vertices = self.static_surface().vertices
         top = float(vertices[:, 2].max(initial=0.0)) + RAY_MARGIN
         bottom = float(vertices[:, 2].min(initial=0.0)) - RAY_MARGIN
         starts = np.column_stack([xy, np.full(len(xy), top)])

@@ -21,8 +21,9 @@ from terrain.physics.actors import Actor
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorded_grid import RecordedGrid
 from terrain.recording.recorded_mesh import RecordedMesh, add_if_changed
-from terrain.recording.recording import Recording, RobotShape, StampedPoints, Surface
+from terrain.recording.recording import Recording, RobotShape, StampedPoints
 from terrain.recording.verdict import UNFINISHED, Verdict
+from terrain.worlds.surface import Surface
 
 MAP_PERIOD = 5.0  # s at least between two looks at the map
 MAX_GRID_CELLS = 4_000_000  # larger maps are not recorded

@@ -26,6 +26,7 @@ from terrain.recording.recorded_grid import RecordedGrid, grid_arrays, grids_fro
 from terrain.recording.recorded_mesh import RecordedMesh, mesh_arrays, meshes_from
 from terrain.recording.verdict import Verdict
 from terrain.recording.whole_files import replacing
+from terrain.worlds.surface import Surface
 
 FloatArray = NDArray[np.float64]
 StampedPoints = tuple[float, FloatArray]
@@ -36,24 +37,6 @@ MAX_BYTES = 4 * 2**30
 
 class RecordingError(Exception):
     """A recording file cannot be read; the text names the file and the reason."""
-
-
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """A triangle mesh to look at.
-
-    Attributes
-    ----------
-    vertices : (V, 3) float64
-        [m]
-    faces : (F, 3) int32
-    colours : (V, 3) uint8, optional
-        sRGB colour of each vertex; the viewer chooses its own where None.
-    """
-
-    vertices: FloatArray
-    faces: NDArray[np.int32]
-    colours: NDArray[np.uint8] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,16 +181,13 @@ def _pose(row: FloatArray, frame_id: str) -> Pose:
 
 
 def _surface_arrays(name: str, surface: Surface | None) -> dict[str, Any]:
-    if surface is None:
-        return {}
-    arrays: dict[str, Any] = {f"{name}_vertices": surface.vertices, f"{name}_faces": surface.faces}
-    return arrays if surface.colours is None else {**arrays, f"{name}_colours": surface.colours}
+    return {} if surface is None else {f"{name}_vertices": surface.vertices, f"{name}_faces": surface.faces}
 
 
 def _surface(name: str, arrays: dict[str, Any]) -> Surface | None:
     if f"{name}_vertices" not in arrays:
         return None
-    return Surface(arrays[f"{name}_vertices"], arrays[f"{name}_faces"], arrays.get(f"{name}_colours"))
+    return Surface(arrays[f"{name}_vertices"], arrays[f"{name}_faces"])
 
 
 def _stamped_arrays(name: str, items: list[StampedPoints]) -> dict[str, Any]:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from terrain.recording.recording import Surface
 from terrain.scenarios.actors import add_actors
 from terrain.scenarios.obstacles import add_obstacles
 from terrain.scenarios.places import coordinates
 from terrain.scenarios.scenario import Scenario
 from terrain.scenarios.world import ScenarioWorld, build_world
 from terrain.worlds.map_files import MapFiles
+from terrain.worlds.surface import Surface
 
 WORLD_STREAM, FOREST_STREAM, ACTOR_STREAM, MAP_STREAM = 1, 2, 3, 4  # each part draws from its own generator
 

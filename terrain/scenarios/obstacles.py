@@ -9,11 +9,9 @@ from typing import Literal
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose
-from mbf_abstract.geometry.arithmetic import rotated
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.physics.actors import AnyWorld
-from terrain.recording.recording import Surface
-from terrain.worlds.solids import box_triangles, cylinder_triangles, joined
+from terrain.worlds.surface import Surface, box, cylinder, joined
 
 DRAWS_PER_POST = 100
 
@@ -62,9 +60,9 @@ def add_obstacles(
         pose = Pose.planar(obstacle.x, obstacle.y, obstacle.yaw, height_at(obstacle.x, obstacle.y) + 0.5 * height)
         if obstacle.shape == "box":
             world.add_box(pose, obstacle.size)
-            corners, triangles = box_triangles(obstacle.size)
+            surface = box(obstacle.size)
         else:
             world.add_cylinder(pose, 0.5 * length, height)
-            corners, triangles = cylinder_triangles(0.5 * length, height)
-        parts.append((rotated(pose.rotation, corners) + pose.position, triangles))
-    return Surface(*joined(parts)) if parts else None
+            surface = cylinder(0.5 * length, height)
+        parts.append(surface.at(pose))
+    return joined(parts) if parts else None

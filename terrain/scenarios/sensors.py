@@ -28,7 +28,7 @@ def make_sensors(
 ) -> dict[str, Lidar]:
     """Make the lidars of a scenario, by name; each draws its noise from a generator of its own."""
     physics = world.physics
-    casters: list[RayCaster] = [StaticRays(*physics.static_triangles())]
+    casters: list[RayCaster] = [StaticRays(*physics.static_surface())]
     if physics.has_moving_bodies:
         casters.append(MovingRays(physics) if isinstance(physics, BulletWorld) else SolidRays(physics.solids))
     return {sensor.name: _lidar(sensor, robot, casters, seed) for sensor in sensors}

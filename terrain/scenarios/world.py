@@ -19,14 +19,14 @@ from terrain.physics.actors import Actor, AnyWorld, RouteWalker, VisibleRobot
 from terrain.physics.indoor import add_building
 from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.world import TIME_STEP, BulletWorld
-from terrain.recording.recording import Surface
 from terrain.scenarios.places import Place
 from terrain.scenarios.world_types import BuildingWorld, LevelsWorld, TerrainWorld
 from terrain.worlds.geodesics import free_floor
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.map_files import MapFiles
-from terrain.worlds.occupancy import OccupancyGrid, wall_triangles
+from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.slope_map import slope_grid
+from terrain.worlds.surface import Surface
 
 Physics = TypeVar("Physics", BulletWorld, AnyWorld)
 HeightAt = Callable[[float, float], float]
@@ -130,7 +130,7 @@ def _built(physics: Physics, build: Callable[[Physics], ScenarioWorld]) -> Scena
 def _build_terrain(terrain: Heightfield, lethal_slope: float, files: MapFiles, physics: AnyWorld) -> ScenarioWorld:
     if isinstance(physics, BulletWorld):
         physics.add_heightfield(terrain)
-    ground, resolution = Surface(*terrain.triangles()), min(terrain.dx, terrain.dy)
+    ground, resolution = terrain.surface(), min(terrain.dx, terrain.dy)
     written = files.of_terrain(terrain, lethal_slope)
     grid = slope_grid(terrain, resolution, lethal_slope)
     return ScenarioWorld(physics, written, lambda x, y: float(terrain.height_at(x, y)), ground, None, grid)
@@ -139,7 +139,7 @@ def _build_terrain(terrain: Heightfield, lethal_slope: float, files: MapFiles, p
 def _build_building(world: BuildingWorld, grid: OccupancyGrid, files: MapFiles, physics: AnyWorld) -> ScenarioWorld:
     if isinstance(physics, BulletWorld):
         add_building(physics, grid)
-    walls = Surface(*wall_triangles(grid)) if grid.occupied.any() else None
+    walls = wall_surface(grid) if grid.occupied.any() else None
     return ScenarioWorld(
         physics, files.of_building(grid), lambda x, y: 0.0, _floor_surface(grid), walls, grid, world.places()
     )
@@ -147,16 +147,14 @@ def _build_building(world: BuildingWorld, grid: OccupancyGrid, files: MapFiles, 
 
 def _build_levels(world: LevelsWorld, files: MapFiles, physics: BulletWorld) -> ScenarioWorld:
     levels = world.levels()
-    physics.add_mesh(levels.ground.vertices, levels.ground.faces)
-    ground, walls = Surface(levels.ground.vertices, levels.ground.faces), None
-    if len(levels.walls.faces):
-        physics.add_mesh(levels.walls.vertices, levels.walls.faces, ground=False)
-        walls = Surface(levels.walls.vertices, levels.walls.faces)
+    levels.add_to(physics)
+    walls = levels.walls if len(levels.walls.faces) else None
 
     def height_at(x: float, y: float) -> float:
         return float(physics.vertical_rays([(x, y)])[0])
 
-    return ScenarioWorld(physics, files.of_levels(ground), height_at, ground, walls, places=levels.places)
+    files_of_map = files.of_levels(levels.ground)
+    return ScenarioWorld(physics, files_of_map, height_at, levels.ground, walls, places=levels.places)
 
 
 def _floor_surface(grid: OccupancyGrid) -> Surface:

@@ -26,7 +26,7 @@ from terrain.worlds.mesh_world import read_mesh_world
 from terrain.worlds.multi_level import MultiLevelWorld, bridge_over_road, parking_garage
 from terrain.worlds.occupancy import OccupancyGrid, read_occupancy
 from terrain.worlds.slope_map import LETHAL_SLOPE
-from terrain.worlds.surface_patches import TriangleMesh
+from terrain.worlds.surface import NO_SURFACE
 
 FARTHEST = 10_000.0
 """Coordinates [m] at which the physics, in single precision, still tells a millimetre."""
@@ -186,8 +186,7 @@ class MeshWorld(LevelsWorld):
 
     def levels(self) -> MultiLevelWorld:
         """Read the file."""
-        nothing = TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32))
-        return MultiLevelWorld(read_mesh_world(self.file, self.up_axis, self.unit), nothing, {})
+        return MultiLevelWorld(read_mesh_world(self.file, self.up_axis, self.unit), NO_SURFACE, {})
 
 
 World = Annotated[

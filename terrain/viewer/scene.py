@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from terrain.recording.actor_track import ActorTrack
-from terrain.recording.recording import Recording, RobotShape, Surface
+from terrain.recording.recording import Recording, RobotShape
 from terrain.viewer.pictures.colours import (
     ACTORS,
     BODY,
@@ -29,8 +29,9 @@ from terrain.viewer.pictures.colours import (
     Colour,
     linear_for_viewer,
 )
-from terrain.viewer.pictures.shading import LIGHT, vertex_colours
+from terrain.viewer.pictures.shading import LIGHT, Colours, vertex_colours
 from terrain.viewer.pictures.shapes import cut_walls, prism
+from terrain.worlds.surface import Surface
 
 FloatArray = NDArray[np.float64]
 Scene = Any  # viser.SceneApi; viser is imported only where a server is started
@@ -74,12 +75,12 @@ def _add_light(scene: Scene) -> None:
     scene.add_light_directional("/light/sun", color=(255, 250, 240), intensity=3.2, position=tuple(100.0 * LIGHT))
 
 
-def add_ground(scene: Scene, ground: Surface, name: str = "/ground") -> Any:
-    """Add a surface in its own colours or by its slope, smooth in the light."""
+def add_ground(scene: Scene, ground: Surface, colours: Colours | None = None, name: str = "/ground") -> Any:
+    """Add a surface in the colours (V, 3) of its vertices, or by its slope, smooth in the light."""
     import trimesh
 
-    colours = linear_for_viewer(vertex_colours(ground))
-    mesh = trimesh.Trimesh(ground.vertices, ground.faces, vertex_colors=colours, process=False)
+    linear = linear_for_viewer(vertex_colours(ground) if colours is None else colours)
+    mesh = trimesh.Trimesh(ground.vertices, ground.faces, vertex_colors=linear, process=False)
     mesh.vertex_normals  # noqa: B018 - computing them makes the export carry them, else the viewer shades it flat
     return scene.add_mesh_trimesh(name, mesh, cast_shadow=False, receive_shadow=False)
 

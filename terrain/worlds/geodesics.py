@@ -18,8 +18,8 @@ from scipy.sparse.csgraph import dijkstra
 from trimesh.triangles import closest_point
 
 from mbf_abstract.geometry.arithmetic import norm
-from terrain.recording.recording import Surface
 from terrain.worlds.occupancy import OccupancyGrid
+from terrain.worlds.surface import Surface, height_grid
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -60,13 +60,8 @@ def free_floor(grid: OccupancyGrid) -> Surface:
     ny, nx = (size // step for size in grid.free.shape)
     free = grid.free[: ny * step, : nx * step].reshape(ny, step, nx, step).all(axis=(1, 3))
     width = step * grid.resolution
-    x, y = np.meshgrid(grid.origin_x + width * np.arange(nx + 1), grid.origin_y + width * np.arange(ny + 1))
-    iy, ix = np.nonzero(free)
-    corner = iy * (nx + 1) + ix
-    lower = np.column_stack([corner, corner + 1, corner + nx + 1])
-    upper = np.column_stack([corner + 1, corner + nx + 2, corner + nx + 1])
-    vertices = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-    return Surface(vertices, np.concatenate([lower, upper]).astype(np.int32))
+    x, y = grid.origin_x + width * np.arange(nx + 1), grid.origin_y + width * np.arange(ny + 1)
+    return height_grid(x, y, np.zeros((ny + 1, nx + 1)), free)
 
 
 def _graph(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, IntArray, IntArray]:

@@ -2,7 +2,7 @@
 
 Use it for any outdoor world without overhangs; a bridge, a ramp over a road or a building needs a mesh. Every cell is
 split into two triangles along its anti-diagonal, from ``(ix + 1, iy)`` to ``(ix, iy + 1)``, because that is how Bullet
-splits its heightfields: ``height_at`` and ``triangles`` are that surface and not a smooth interpolation of it.
+splits its heightfields: ``height_at`` and ``surface`` are that surface and not a smooth interpolation of it.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from scipy.interpolate import RectBivariateSpline
 from mbf_abstract.geometry import Pose, quaternion_from_yaw, quaternion_multiply
 from mbf_abstract.geometry.arithmetic import arctan, norm
 from terrain.worlds.smoothing import smoothed
+from terrain.worlds.surface import Surface, height_grid
 
 FloatArray = NDArray[np.float64]
 
@@ -202,22 +203,10 @@ class Heightfield:
         turn = quaternion_from_yaw(math.atan2(along_y, along_x))
         return Pose((x, y, height), quaternion_multiply(tilt, turn))
 
-    def triangles(self) -> tuple[FloatArray, NDArray[np.int32]]:
-        """Build the surface as a mesh.
-
-        Returns
-        -------
-        vertices : (ny * nx, 3) float64
-            Sample ``[iy, ix]`` is vertex ``iy * nx + ix``.
-        faces : (2 * (ny - 1) * (nx - 1), 3) int32
-            Counter-clockwise seen from above.
-        """
-        x, y = np.meshgrid(self.x0 + self.dx * np.arange(self.nx), self.y0 + self.dy * np.arange(self.ny))
-        vertices = np.column_stack([x.ravel(), y.ravel(), self.heights.ravel().astype(np.float64)])
-        i = (np.arange(self.ny - 1)[:, None] * self.nx + np.arange(self.nx - 1)).astype(np.int32)
-        lower = np.stack([i, i + 1, i + self.nx], axis=-1)
-        upper = np.stack([i + 1, i + self.nx + 1, i + self.nx], axis=-1)
-        return vertices, np.stack([lower, upper], axis=2).reshape(-1, 3)
+    def surface(self) -> Surface:
+        """Return the terrain as a mesh; sample ``[iy, ix]`` is vertex ``iy * nx + ix``."""
+        x, y = self.x0 + self.dx * np.arange(self.nx), self.y0 + self.dy * np.arange(self.ny)
+        return height_grid(x, y, self.heights)
 
     def crop(self, x_min: float, x_max: float, y_min: float, y_max: float) -> Heightfield:
         """Keep the samples inside a rectangle [m], borders included; raises ValueError if under 2 x 2 are left."""
@@ -254,7 +243,7 @@ class Heightfield:
         return replace(self, heights=np.asarray(heights, dtype=np.float32))
 
     def slopes(self) -> FloatArray:
-        """Slope [degrees] of each triangle, float64, in the order of ``triangles``."""
+        """Slope [degrees] of each triangle, float64, in the order of the faces of ``surface``."""
         h = self.heights.astype(np.float64)
         along_x, along_y = np.diff(h, axis=1) / self.dx, np.diff(h, axis=0) / self.dy
         lower = np.hypot(along_x[:-1], along_y[:, :-1])

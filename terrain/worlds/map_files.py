@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray
-from terrain.recording.recording import Surface
 from terrain.scenarios.noise import MapNoise
 from terrain.worlds.floor_plan import write_map
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid
 from terrain.worlds.slope_map import write_slope_map
+from terrain.worlds.surface import Surface
 
 STOREY = 1.0  # m; height of the walls in the mesh of a building
 MESH_CELL = 0.1  # m; edge length of that mesh
@@ -48,13 +48,13 @@ class MapFiles:
         mapped = self.noise.on_terrain(terrain, self.rng)
         resolution = min(terrain.dx, terrain.dy)
         slope_map = write_slope_map(mapped, self.folder, "world", resolution, lethal_slope)
-        return {"$WORLD_MESH": self._write_mesh(Surface(*mapped.triangles())), "$WORLD_MAP": slope_map}
+        return {"$WORLD_MESH": self._write_mesh(mapped.surface()), "$WORLD_MAP": slope_map}
 
     def of_building(self, grid: OccupancyGrid) -> Files:
         """Write a floor as mesh and as grid."""
         mapped = self.noise.on_grid(grid, self.rng)
         heights = self.noise.on_heights(storey_heights(mapped), self.rng)
-        mesh = self._write_mesh(Surface(*heights.triangles()))
+        mesh = self._write_mesh(heights.surface())
         return {"$WORLD_MESH": mesh, "$WORLD_MAP": write_map(mapped, self.folder, "world")}
 
     def of_levels(self, ground: Surface) -> Files:

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.config.registry import PluginError, PluginRegistry
-from terrain.worlds.surface_patches import TriangleMesh
+from terrain.worlds.surface import Surface
 
 
 class MeshFileError(Exception):
     """A mesh file cannot be used as a world; the text names the file and the reason."""
 
 
-def read_mesh_world(path: str | Path, up_axis: str = "", unit: float = 0.0) -> TriangleMesh:
+def read_mesh_world(path: str | Path, up_axis: str = "", unit: float = 0.0) -> Surface:
     """Read the triangles of a mesh file in any format that the mesh server reads.
 
     Parameters
@@ -41,4 +41,4 @@ def read_mesh_world(path: str | Path, up_axis: str = "", unit: float = 0.0) -> T
         raise MeshFileError(str(error)) from error
     if not np.isfinite(vertices).all():
         raise MeshFileError(f"{path}: vertex {int(np.argwhere(~np.isfinite(vertices))[0, 0])} is not finite")
-    return TriangleMesh(vertices, faces.astype(np.int32))
+    return Surface(vertices, faces.astype(np.int32))

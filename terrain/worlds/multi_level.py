@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from terrain.physics.world import BulletWorld
-from terrain.worlds.surface_patches import TriangleMesh, box_between, join_sheets, sheet, stack_meshes
+from terrain.worlds.surface import Surface, box_between, height_grid, joined, merged
 
 FloatArray = NDArray[np.float64]
 
-CELL = 0.5  # m; edge length of all sheets
+CELL = 0.5  # m; edge length of all cells
 WALL = 0.1  # m; thickness of parapets
 PARAPET = 1.0  # m; height of parapets
 
@@ -40,19 +40,20 @@ class MultiLevelWorld:
 
     Attributes
     ----------
-    ground, walls : TriangleMesh
+    ground, walls : Surface
     places : mapping of str to Pose
         Named poses on the ground.
     """
 
-    ground: TriangleMesh
-    walls: TriangleMesh
+    ground: Surface
+    walls: Surface
     places: Mapping[str, Pose]
 
     def add_to(self, world: BulletWorld) -> None:
-        """Put ground and walls into a PyBullet world."""
-        world.add_mesh(self.ground.vertices, self.ground.faces)
-        world.add_mesh(self.walls.vertices, self.walls.faces, ground=False)
+        """Put ground and walls, if there are any, into a PyBullet world."""
+        world.add_mesh(*self.ground)
+        if len(self.walls.faces):
+            world.add_mesh(*self.walls, ground=False)
 
 
 def parking_garage(levels: int = 4) -> MultiLevelWorld:
@@ -77,7 +78,7 @@ def parking_garage(levels: int = 4) -> MultiLevelWorld:
         walls += _garage_furniture(level, levels)
     names = ["entrance", *(f"level_{level}" for level in range(1, levels - 1)), "roof"]
     places = {name: Pose.planar(3.0, 12.0, 0.0, level * STOREY) for level, name in enumerate(names)}
-    return MultiLevelWorld(join_sheets(ground), stack_meshes(walls), places)
+    return MultiLevelWorld(merged(ground), joined(walls), places)
 
 
 def _lines(start: float, end: float) -> FloatArray:
@@ -99,7 +100,7 @@ def _cells(
     return np.asarray(in_y[:, None] & in_x[None, :])
 
 
-def _garage_floor(x: FloatArray, y: FloatArray, level: int, levels: int) -> TriangleMesh:
+def _garage_floor(x: FloatArray, y: FloatArray, level: int, levels: int) -> Surface:
     """One floor; open where the ramp from below arrives and where the ramp upwards begins, and under pillars."""
     keep = np.ones((len(y) - 1, len(x) - 1), dtype=bool)
     ramps = [ramp for ramp in (level - 1, level) if 0 <= ramp < levels - 1]
@@ -107,16 +108,16 @@ def _garage_floor(x: FloatArray, y: FloatArray, level: int, levels: int) -> Tria
         keep &= ~_cells(x, y, (RAMP_START, RAMP_END), _ramp_lane(ramp))
     for low, high in _furniture_footprints(level, levels):
         keep &= ~_cells(x, y, (low[0], high[0]), (low[1], high[1]))
-    return sheet(x, y, np.full((len(y), len(x)), level * STOREY), keep)
+    return height_grid(x, y, np.full((len(y), len(x)), level * STOREY), keep)
 
 
-def _ramp(level: int) -> TriangleMesh:
+def _ramp(level: int) -> Surface:
     x, y = _lines(RAMP_START, RAMP_END), _lines(*_ramp_lane(level))
     rise = STOREY * (x - RAMP_START) / (RAMP_END - RAMP_START)
-    return sheet(x, y, np.tile(level * STOREY + rise, (len(y), 1)))
+    return height_grid(x, y, np.tile(level * STOREY + rise, (len(y), 1)))
 
 
-def _ramp_parapets(level: int) -> list[TriangleMesh]:
+def _ramp_parapets(level: int) -> list[Surface]:
     """Walls inside the ramp's lane: beside it on both floors, below its upper end, above its lower end."""
     south, north = _ramp_lane(level)
     floor, above = level * STOREY, (level + 1) * STOREY
@@ -133,7 +134,7 @@ def _furniture_footprints(level: int, levels: int) -> list[tuple[tuple[float, fl
     return footprints + [((x, y), (x + 2.0, y + 2.0)) for x, y in PARKED[level % 2 :: 2]]
 
 
-def _garage_furniture(level: int, levels: int) -> list[TriangleMesh]:
+def _garage_furniture(level: int, levels: int) -> list[Surface]:
     """Pillars that end just below the next floor, so that its traffic does not touch them, and parked boxes."""
     floor = level * STOREY
     boxes = []
@@ -143,7 +144,7 @@ def _garage_furniture(level: int, levels: int) -> list[TriangleMesh]:
     return boxes
 
 
-def _outer_walls(length: float, width: float, height: float) -> list[TriangleMesh]:
+def _outer_walls(length: float, width: float, height: float) -> list[Surface]:
     return [
         box_between((-WALL, -WALL, 0.0), (length + WALL, 0.0, height)),
         box_between((-WALL, width, 0.0), (length + WALL, width + WALL, height)),
@@ -167,13 +168,13 @@ def bridge_over_road() -> MultiLevelWorld:
     lane = (LANE_SOUTH, LANE_NORTH)
     for abutment in ((ABUTMENT_WEST, ABUTMENT_WEST + CELL), (ABUTMENT_EAST - CELL, ABUTMENT_EAST)):
         keep &= ~_cells(x, y, abutment, lane)
-    terrain = sheet(x, y, DECK * (west + east) * across[:, None], keep)
+    terrain = height_grid(x, y, DECK * (west + east) * across[:, None], keep)
     deck_x, deck_y = _lines(ABUTMENT_WEST, ABUTMENT_EAST), _lines(*lane)
-    deck = sheet(deck_x, deck_y, np.full((len(deck_y), len(deck_x)), DECK))
-    return MultiLevelWorld(join_sheets([terrain, deck]), stack_meshes(_bridge_walls()), _bridge_places())
+    deck = height_grid(deck_x, deck_y, np.full((len(deck_y), len(deck_x)), DECK))
+    return MultiLevelWorld(merged([terrain, deck]), joined(_bridge_walls()), _bridge_places())
 
 
-def _bridge_walls() -> list[TriangleMesh]:
+def _bridge_walls() -> list[Surface]:
     """Abutments up to just below the deck, parapets beside it on its outside, and a wall around the world."""
     walls = _outer_walls(BRIDGE_LENGTH, BRIDGE_WIDTH, PARAPET)
     for start in (ABUTMENT_WEST, ABUTMENT_EAST - CELL):
@@ -193,6 +194,3 @@ def _bridge_places() -> dict[str, Pose]:
         "south": Pose.planar(middle_x, 2.0, 0.5 * np.pi),
         "north": Pose.planar(middle_x, BRIDGE_WIDTH - 2.0, 0.5 * np.pi),
     }
-
-
-MULTI_LEVEL_WORLDS = {"garage": parking_garage, "bridge": bridge_over_road}

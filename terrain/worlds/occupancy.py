@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.maps.view import OCCUPIED, UNKNOWN_OCCUPANCY
 from mbf_abstract.server.factory import read_floor
-from terrain.worlds.solids import BOX_CORNERS, BOX_FACES
+from terrain.worlds.surface import BOX_CORNERS, BOX_FACES, Surface
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -100,16 +100,10 @@ def merge_rectangles(occupied: NDArray[np.bool_]) -> IntArray:
     return np.array(rectangles, dtype=np.int32).reshape(-1, 4)
 
 
-def wall_triangles(grid: OccupancyGrid, height: float = 2.0) -> tuple[FloatArray, IntArray]:
+def wall_surface(grid: OccupancyGrid, height: float = 2.0) -> Surface:
     """Extrude the occupied cells into one mesh of boxes from z = 0 to ``height`` [m].
 
     One mesh with all walls steps three times as fast in Bullet as a body per box.
-
-    Returns
-    -------
-    vertices : (8 n, 3) float64
-        [m]
-    faces : (12 n, 3) int32
     """
     rectangles = merge_rectangles(grid.occupied).astype(np.float64)
     low = np.array([grid.origin_x, grid.origin_y]) + rectangles[:, :2] * grid.resolution
@@ -119,4 +113,4 @@ def wall_triangles(grid: OccupancyGrid, height: float = 2.0) -> tuple[FloatArray
     sizes = np.column_stack([high - low, np.full(count, height)])
     vertices = (centres[:, None, :] + BOX_CORNERS * sizes[:, None, :]).reshape(-1, 3)
     faces = (BOX_FACES + 8 * np.arange(count, dtype=np.int32)[:, None, None]).reshape(-1, 3)
-    return vertices, faces
+    return Surface(vertices, faces)

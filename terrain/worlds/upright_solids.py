@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.arithmetic import rotated
 from terrain.physics.contact_depth import depth_in_circle, depth_in_polygon, placed
-from terrain.worlds.solids import box_triangles, cylinder_triangles
+from terrain.worlds.surface import Surface, box, cylinder
 
 FloatArray = NDArray[np.float64]
 
@@ -69,13 +68,10 @@ class UprightSolid:
         leaves = np.min([span[1] for span in spans], axis=0)
         return np.where((enters <= leaves) & (enters > 0.0), enters, np.inf)
 
-    def triangles(self) -> tuple[FloatArray, NDArray[np.int32]]:
+    def surface(self) -> Surface:
         """Its surface in the map."""
-        if len(self.size) == 2:
-            vertices, faces = cylinder_triangles(self.size[0], self.size[1])
-        else:
-            vertices, faces = box_triangles(self.size)
-        return rotated(self.pose.rotation, vertices) + self.pose.position, faces
+        own = cylinder(self.size[0], self.size[1]) if len(self.size) == 2 else box(self.size)
+        return own.at(self.pose)
 
     def _in_own_frame(self, dx: NDArray[np.float64] | float, dy: NDArray[np.float64] | float) -> tuple[float, float]:
         """Turn horizontal differences into ahead and left of the solid's heading."""

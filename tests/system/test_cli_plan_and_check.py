@@ -30,7 +30,7 @@ def hill(tmp_path_factory):
     """A mesh file of a hill, up to two metres high."""
     x, y = np.meshgrid(np.linspace(0.0, 12.0, 41), np.linspace(0.0, 12.0, 41))
     heights = 2.0 * np.exp(-((x - 6.0) ** 2 + (y - 6.0) ** 2) / 12.0)
-    vertices, faces = Heightfield(heights.astype(np.float32), 0.3, 0.3).triangles()
+    vertices, faces = Heightfield(heights.astype(np.float32), 0.3, 0.3).surface()
     file = tmp_path_factory.mktemp("meshes") / "hill.ply"
     trimesh.Trimesh(vertices, faces, process=False).export(file)
     return file

@@ -26,7 +26,7 @@ def test_a_thousand_vertical_rays_meet_the_triangles(make_terrain: type[Heightfi
     terrain = make_terrain()
     rng = np.random.default_rng(11)
     xy = np.column_stack([rng.uniform(terrain.x0, terrain.x_max, 1000), rng.uniform(terrain.y0, terrain.y_max, 1000)])
-    mesh = trimesh.Trimesh(*terrain.triangles(), process=False)
+    mesh = trimesh.Trimesh(*terrain.surface(), process=False)
 
     with BulletWorld() as world:
         world.add_heightfield(terrain)
@@ -64,7 +64,7 @@ def test_the_sign_trap_is_avoided_slanted_rays_hit_ground_high_above_the_sea() -
         world.add_heightfield(terrain)
         on_heightfield = world.cast_rays(starts, ends)
     with BulletWorld() as world:
-        world.add_mesh(*terrain.triangles())
+        world.add_mesh(*terrain.surface())
         on_mesh = world.cast_rays(starts, ends)
     assert on_mesh.hit.sum() > 100
     assert np.array_equal(on_heightfield.hit, on_mesh.hit)

@@ -106,8 +106,7 @@ class LiveControls:
     # -----------------------------------------------------------------------------------------------------
     def _where_it_hits(self, origin: FloatArray, direction: FloatArray) -> FloatArray | None:
         if self._ground is None:
-            ground = self._session.world.ground
-            self._ground = StaticRays(ground.vertices, ground.faces)
+            self._ground = StaticRays(*self._session.world.ground)
         direction = direction / np.linalg.norm(direction)
         distance = float(self._ground.distances(origin[None], direction[None], MAX_RANGE)[0])
         return origin + distance * direction if math.isfinite(distance) else None

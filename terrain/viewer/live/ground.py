@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from mbf_abstract.maps.view import GridView, MapView, MeshView
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
-from terrain.recording.recording import Surface
 from terrain.viewer.live.overlay import Overlay
 from terrain.viewer.pictures.colours import FLOOR, SLOPE_COLOURS, WALL, cost_colours_up_to
 from terrain.viewer.pictures.plan_picture import COSTLY, cost_colours
 from terrain.viewer.pictures.shading import FLAT_GROUND, vertex_colours
 from terrain.viewer.scene import add_ground
+from terrain.worlds.surface import Surface
 
 FloatArray = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ class Ground:
         finite = view.costs[np.isfinite(view.costs)]
         top = float(finite.max(initial=0.0)) or 1.0
         self._legend.content = legend_html(SLOPE_COLOURS, "0", f"{top:.3g}")
-        return add_ground(self._scene, Surface(view.vertices, view.faces, cost_colours_up_to(top, view.costs)))
+        return add_ground(self._scene, Surface(view.vertices, view.faces), cost_colours_up_to(top, view.costs))
 
     def _draw_grid(self, view: GridView, name: str, lift: float = 0.0) -> Any:
         if not self._is_level:
@@ -114,7 +114,7 @@ class Ground:
         if lift > 0.0:
             used, faces = _used(faces[inside[faces].all(axis=1)])
             vertices, colours = vertices[used] + np.array([0.0, 0.0, lift]), colours[used]
-        return add_ground(self._scene, Surface(vertices, faces, colours), name) if len(faces) else None
+        return add_ground(self._scene, Surface(vertices, faces), colours, name) if len(faces) else None
 
     def _show_local(self) -> None:
         if self._local is None:

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from terrain.recording.actor_track import ActorTrack
-from terrain.recording.recording import Recording, RobotShape, Surface
+from terrain.recording.recording import Recording, RobotShape
 from terrain.viewer.logs.foxglove_messages import colour, points, pose, timestamp, triangles
 from terrain.viewer.pictures.colours import ACTORS, BODY, DRIVEN, GOAL, OBSTACLE, START, WALL, WHEEL, Colour
 from terrain.viewer.pictures.shading import vertex_colours
 from terrain.viewer.pictures.shapes import cut_walls, prism
+from terrain.worlds.surface import Surface
 
 FloatArray = NDArray[np.float64]
 

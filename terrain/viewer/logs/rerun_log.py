@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrain.recording.recording import Recording, Surface
+from terrain.recording.recording import Recording
 from terrain.recording.whole_files import replacing
 from terrain.viewer.pictures.colours import BODY, DRIVEN, GOAL, OBSTACLE, PLANNED, SCAN, START, WALL, Colour
 from terrain.viewer.pictures.picture import ViewerMissing
 from terrain.viewer.pictures.shading import vertex_colours
 from terrain.viewer.pictures.shapes import cut_walls, prism
 from terrain.viewer.reports.event_text import words
+from terrain.worlds.surface import Surface
 
 TIMELINE = "run"
 LINE = 0.06  # m

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from mbf_abstract.geometry import Pose
-from terrain.recording.recording import Recording, Surface
+from terrain.recording.recording import Recording
 from terrain.recording.whole_files import replacing
 from terrain.viewer.pictures.colours import BODY, DRIVEN, GOAL, OBSTACLE, PLANNED, SCAN, START, WALL, Colour
 from terrain.viewer.pictures.picture import ViewerMissing
@@ -23,6 +23,7 @@ from terrain.viewer.pictures.shading import AMBIENT, LIGHT, face_colours, face_n
 from terrain.viewer.pictures.shapes import cut_walls, prism
 from terrain.viewer.replay import status_text
 from terrain.viewer.scene import look_at_route
+from terrain.worlds.surface import Surface
 
 FloatArray = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ def legend_of(recording: Recording) -> list[Entry]:
         entries.append(("on no map", OBSTACLE))
     entries += [(thing, ACTORS[thing]) for thing in sorted({track.thing for track in recording.actors})]
     ground = recording.ground
-    if ground is not None and ground.colours is None and np.ptp(ground.vertices[:, 2]) >= FLAT_GROUND:
+    if ground is not None and np.ptp(ground.vertices[:, 2]) >= FLAT_GROUND:
         entries += [(f"slope {angle}", colour) for angle, colour in slope_legend()]
     return entries
 

@@ -10,11 +10,11 @@ import numpy as np
 from mbf_abstract.geometry import Path as PlannedPath
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.view import GridView, MapView, MeshView
-from terrain.recording.recording import Surface
 from terrain.recording.whole_files import write_whole
 from terrain.viewer.pictures.colours import FLOOR, WALL
 from terrain.viewer.pictures.picture import draw_marks, draw_paths, draw_triangles, new_figure, png_bytes
 from terrain.viewer.pictures.shading import shaded_triangles
+from terrain.worlds.surface import Surface
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +34,7 @@ def write_plan_picture(
         _draw_grid(axes, view)
     elif isinstance(view, MeshView):
         colours = cost_colours(view.costs).astype(np.uint8)
-        draw_triangles(axes, *shaded_triangles(Surface(view.vertices, view.faces, colours)))
+        draw_triangles(axes, *shaded_triangles(Surface(view.vertices, view.faces), colours))
     if path is not None:
         draw_paths(axes, [(0.0, path.positions)])
     draw_marks(axes, start, (goal,))

@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from terrain.recording.recording import Surface
 from terrain.viewer.pictures.colours import FLOOR, slope_colours
+from terrain.worlds.surface import Surface
 
 FloatArray = NDArray[np.float64]
+Colours = NDArray[np.uint8]
 
 LIGHT = np.array([-1.0, 1.0, 1.4]) / np.linalg.norm([-1.0, 1.0, 1.4])
 AMBIENT = 0.45
@@ -28,28 +29,33 @@ def face_normals(surface: Surface) -> FloatArray:
     return np.asarray(normals * np.where(normals[:, 2:] < 0.0, -1.0, 1.0))
 
 
-def shaded_triangles(surface: Surface) -> tuple[FloatArray, FloatArray]:
+def shaded_triangles(surface: Surface, colours: Colours | None = None) -> tuple[FloatArray, FloatArray]:
     """Triangles of a ground seen from above, lowest first, with their colours.
+
+    Parameters
+    ----------
+    colours : (V, 3) uint8, optional
+        sRGB colour of each vertex, instead of one by slope.
 
     Returns
     -------
     corners : (F, 3, 2) float64
         x and y [m], to be painted in this order so that bridges cover what is under them.
     colours : (F, 3) float64
-        0..1, by slope and light.
+        0..1, in the light.
     """
     normals = face_normals(surface)
     order = np.argsort(surface.vertices[surface.faces, 2].mean(axis=1), kind="stable")
-    colours = face_colours(surface, normals) / 255.0
+    unlit = face_colours(surface, normals, colours) / 255.0
     brightness = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ LIGHT, 0.0, 1.0) / LIGHT[2]
-    shaded = np.clip(colours * brightness[:, None], 0.0, 1.0)
+    shaded = np.clip(unlit * brightness[:, None], 0.0, 1.0)
     return surface.vertices[surface.faces][order][:, :, :2], shaded[order]
 
 
-def face_colours(surface: Surface, normals: FloatArray) -> FloatArray:
-    """Colours (F, 3) 0..255 without light: the surface's own, a floor's grey, or by slope."""
-    if surface.colours is not None:
-        return np.asarray(surface.colours[surface.faces].mean(axis=1), dtype=np.float64)
+def face_colours(surface: Surface, normals: FloatArray, colours: Colours | None = None) -> FloatArray:
+    """Colours (F, 3) 0..255 without light: those of the vertices, if given; a floor's grey; or by slope."""
+    if colours is not None:
+        return np.asarray(colours[surface.faces].mean(axis=1), dtype=np.float64)
     if np.ptp(surface.vertices[:, 2]) < FLAT_GROUND:
         return np.tile(np.array(FLOOR, dtype=np.float64), (len(surface.faces), 1))
     return slope_colours(np.degrees(np.arccos(np.clip(normals[:, 2], -1.0, 1.0))))
@@ -57,8 +63,6 @@ def face_colours(surface: Surface, normals: FloatArray) -> FloatArray:
 
 def vertex_colours(surface: Surface) -> NDArray[np.uint8]:
     """Colours (V, 3) uint8 sRGB of the vertices, the mean of their faces."""
-    if surface.colours is not None:
-        return surface.colours
     of_faces = face_colours(surface, face_normals(surface))
     sums, counts = np.zeros((len(surface.vertices), 3)), np.zeros(len(surface.vertices))
     for corner in range(3):

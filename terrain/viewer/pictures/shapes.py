@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from terrain.recording.recording import Surface
+from terrain.worlds.surface import Surface
 
 FloatArray = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from terrain.recording.recording import Surface
 from terrain.worlds.geodesics import free_floor, geodesic_length
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid
+from terrain.worlds.surface import Surface
 
 LONGEST = 1.03
 
@@ -26,7 +26,7 @@ def test_on_a_slanted_plane_it_is_the_straight_line(angle):
     x, y = 1.03 + 6.0 * math.cos(angle), 1.11 + 6.0 * math.sin(angle)
     places = [(px, py, float(terrain.height_at(px, py))) for px, py in ((1.03, 1.11), (x, y))]
     straight = math.dist(*places)
-    assert straight * (1.0 - 1e-9) <= geodesic_length(Surface(*terrain.triangles()), places) <= LONGEST * straight
+    assert straight * (1.0 - 1e-9) <= geodesic_length(terrain.surface(), places) <= LONGEST * straight
 
 
 def test_it_is_close_to_the_exact_geodesics_of_real_ground(shared_data):
@@ -42,7 +42,7 @@ def test_it_is_close_to_the_exact_geodesics_of_real_ground(shared_data):
 
 
 def test_legs_over_several_places_add_up():
-    surface, places = Surface(*plane(0.0).triangles()), [(1.0, 1.0, 0.0), (4.0, 1.0, 0.0), (4.0, 3.0, 0.0)]
+    surface, places = plane(0.0).surface(), [(1.0, 1.0, 0.0), (4.0, 1.0, 0.0), (4.0, 3.0, 0.0)]
     assert geodesic_length(surface, places) == pytest.approx(5.0)
 
 
@@ -55,7 +55,7 @@ def test_in_a_building_it_leads_through_the_door_and_not_through_a_wall():
 
 
 def test_there_is_no_way_to_where_no_surface_is():
-    surface = Surface(*plane(0.0).triangles())
+    surface = plane(0.0).surface()
     assert geodesic_length(surface, [(1.0, 1.0, 0.0), (1.0, 1.0, 9.0)]) == math.inf
     occupied = np.zeros((20, 20), dtype=bool)
     occupied[:, 8:12] = True

@@ -15,7 +15,7 @@ def random_field(seed: int = 0, ny: int = 7, nx: int = 11) -> Heightfield:
 
 def height_by_triangle_search(field: Heightfield, x: float, y: float) -> float:
     """Look at every triangle until one contains (x, y): the slow twin of ``height_at``."""
-    vertices, faces = field.triangles()
+    vertices, faces = field.surface()
     for a, b, c in vertices[faces]:
         basis = np.column_stack([b[:2] - a[:2], c[:2] - a[:2]])
         s, t = np.linalg.solve(basis, np.array([x, y]) - a[:2])
@@ -34,7 +34,7 @@ def test_height_at_equals_a_search_through_all_triangles(seed: int, u: float, v:
 
 def test_samples_are_kept_exactly_and_outside_is_nan() -> None:
     field = random_field()
-    vertices, _ = field.triangles()
+    vertices, _ = field.surface()
     assert np.allclose(field.height_at(vertices[:, 0], vertices[:, 1]), vertices[:, 2], atol=1e-6)
     assert np.isnan(field.height_at([field.x0 - 0.01, field.x_max + 0.01, np.nan], [6.0, 6.0, 6.0])).all()
 
@@ -46,7 +46,7 @@ def test_the_cell_is_split_along_the_anti_diagonal() -> None:
 
 def test_faces_look_up_and_cover_the_rectangle() -> None:
     field = random_field()
-    vertices, faces = field.triangles()
+    vertices, faces = field.surface()
     a, b, c = (vertices[faces[:, k], :2] for k in range(3))
     doubled_areas = np.cross(np.c_[b - a, np.zeros(len(a))], np.c_[c - a, np.zeros(len(a))])[:, 2]
     assert (doubled_areas > 0).all()

@@ -11,7 +11,9 @@ from terrain.physics.robot_models import HUSKY
 from terrain.physics.robots import WheeledRobot
 from terrain.physics.simulation import Simulation
 from terrain.physics.world import BulletWorld
-from terrain.worlds.multi_level import MULTI_LEVEL_WORLDS, MultiLevelWorld, parking_garage
+from terrain.worlds.multi_level import MultiLevelWorld, bridge_over_road, parking_garage
+
+MULTI_LEVEL_WORLDS = {"garage": parking_garage, "bridge": bridge_over_road}
 
 
 def ground_of(world: MultiLevelWorld) -> trimesh.Trimesh:

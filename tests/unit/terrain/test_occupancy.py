@@ -23,7 +23,7 @@ from terrain.worlds.floor_plan import (
     write_map,
     write_office_map,
 )
-from terrain.worlds.occupancy import OccupancyGrid, merge_rectangles, read_occupancy, wall_triangles
+from terrain.worlds.occupancy import OccupancyGrid, merge_rectangles, read_occupancy, wall_surface
 
 
 @settings(max_examples=80, deadline=None)
@@ -44,7 +44,7 @@ def test_a_wall_of_many_cells_is_one_rectangle() -> None:
 def test_walls_stand_where_the_map_has_them() -> None:
     occupied = np.zeros((4, 6), dtype=bool)
     occupied[1:3, 2:5] = True
-    vertices, faces = wall_triangles(OccupancyGrid(occupied, ~occupied, 0.5, -1.0, 2.0), 1.5)
+    vertices, faces = wall_surface(OccupancyGrid(occupied, ~occupied, 0.5, -1.0, 2.0), 1.5)
     assert vertices.min(axis=0).tolist() == [0.0, 2.5, 0.0]
     assert vertices.max(axis=0).tolist() == [1.5, 3.5, 1.5]
     a, b, c = (vertices[faces[:, k]] for k in range(3))

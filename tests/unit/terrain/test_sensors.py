@@ -44,7 +44,7 @@ def boxed_world() -> BulletWorld:
 
 
 def planar_lidar(world: BulletWorld, pose: Pose, **options: float) -> Lidar:
-    casters = [StaticRays(*world.static_triangles()), MovingRays(world)]
+    casters = [StaticRays(*world.static_surface()), MovingRays(world)]
     options = {"noise": 0.0, "max_range": 8.0} | options
     model = LidarModel((0.0, 0.0, 0.4), planar_directions(), 10.0, **options)
     return Lidar(PosedRobot(pose), "scan", casters, model, rng())
@@ -75,9 +75,9 @@ def test_the_ray_tree_and_bullet_agree_on_rough_ground() -> None:
     directions = ring_directions()
     origins = np.tile([10.0, 10.0, float(hills.height_at(10.0, 10.0)) + 1.0], (len(directions), 1))
     with BulletWorld() as world:
-        world.add_mesh(*hills.triangles())
+        world.add_mesh(*hills.surface())
         bullet = world.cast_rays(origins, origins + 15.0 * directions)
-        tree = StaticRays(*world.static_triangles()).distances(origins, directions, 15.0)
+        tree = StaticRays(*world.static_surface()).distances(origins, directions, 15.0)
     both = bullet.hit & np.isfinite(tree)
     assert both.sum() > 1000 and (bullet.hit != np.isfinite(tree)).mean() < 0.002
     assert np.abs(np.linalg.norm(bullet.points - origins, axis=1) - tree)[both].max() < 2e-3
@@ -111,7 +111,7 @@ def test_a_lidar_can_be_silent_stale_or_wrong() -> None:
 def test_rays_into_an_empty_world_hit_nothing() -> None:
     empty = StaticRays(np.zeros((0, 3)), np.zeros((0, 3), np.int32))
     assert np.isinf(empty.distances(np.zeros((4, 3)), np.tile([1.0, 0.0, 0.0], (4, 1)), 10.0)).all()
-    vertices, faces = KinematicWorld().static_triangles()
+    vertices, faces = KinematicWorld().static_surface()
     down = StaticRays(vertices, faces).distances(np.array([[0.3, 0.2, 1.0]]), np.array([[0.0, 0.0, -1.0]]), 5.0)
     assert down[0] == pytest.approx(1.0)
 

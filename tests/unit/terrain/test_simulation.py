@@ -32,7 +32,7 @@ def office_run(seed: int) -> tuple[list[Pose], list[RangeScan]]:
         RouteWalker(world, random_route(grid, np.random.default_rng(seed)), 1.0)
         robot = WheeledRobot(world, TURTLEBOT, Pose.planar(2.0, 9.7))
         robot.settle()
-        casters = [StaticRays(*world.static_triangles()), MovingRays(world)]
+        casters = [StaticRays(*world.static_surface()), MovingRays(world)]
         lidar_rng, odometry_rng = np.random.default_rng([seed, 1]), np.random.default_rng([seed, 2])
         model = LidarModel(TURTLEBOT.lidar_position, planar_directions(180), 10.0)
         lidar = Lidar(robot, "scan", casters, model, lidar_rng)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose
 from terrain.sensors.rays import StaticRays
-from terrain.worlds.solids import cylinder_triangles
+from terrain.worlds.surface import cylinder
 from terrain.worlds.upright_solids import SolidRays, UprightSolid
 
 SIZES = {"box": (1.2, 0.5, 1.6), "cylinder": (0.4, 1.6)}
@@ -21,9 +21,9 @@ def test_rays_meet_a_solid_where_they_meet_its_triangles(name: str, seed: int, y
     solid = UprightSolid(Pose.planar(1.0, -2.0, yaw, 0.8), SIZES[name], moving=True)
     starts = np.array([1.0, -2.0, 0.8]) + 4.0 * _unit(rng.normal(size=(300, 3)))
     aims = _unit(np.array([1.0, -2.0, 0.8]) + 0.6 * rng.normal(size=(300, 3)) - starts)
-    vertices, faces = solid.triangles()
+    vertices, faces = solid.surface()
     if name == "cylinder":  # the prism of 24 sides lies up to 1 % of its radius inside
-        vertices, faces = cylinder_triangles(*SIZES[name], sides=720)
+        vertices, faces = cylinder(*SIZES[name], sides=720)
         vertices = vertices + np.array([1.0, -2.0, 0.8])
 
     ours = SolidRays([solid]).distances(starts, aims, 10.0)

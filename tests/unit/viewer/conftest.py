@@ -9,13 +9,13 @@ from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose, Twist
 from terrain.physics.robot_models import HUSKY, TURTLEBOT
 from terrain.recording.recorder import Recorder
-from terrain.recording.recording import Recording, RobotShape, Surface
+from terrain.recording.recording import Recording, RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.scenarios.scenario import PlanarPose, Scenario, Sensor, load_scenario
 from terrain.scenarios.world_types import GeneratedWorld
 from terrain.worlds.heightfield import Heightfield
-from terrain.worlds.occupancy import OccupancyGrid, wall_triangles
-from terrain.worlds.solids import box_triangles
+from terrain.worlds.occupancy import OccupancyGrid, wall_surface
+from terrain.worlds.surface import Surface, box
 
 RATE = 10.0
 
@@ -52,7 +52,7 @@ def make_hill_recording() -> Recording:
     xs, ys = 4.0 + 30.0 * along, 5.0 + 18.0 * along + 3.0 * np.sin(6.0 * along)
     yaws = np.arctan2(np.gradient(ys), np.gradient(xs))
     poses = [field.pose_at(px, py, yaw) for px, py, yaw in zip(xs, ys, yaws, strict=True)]
-    recorder = Recorder("hill", "mesh", RobotShape.of(HUSKY), poses[0], [poses[-1]], ground=Surface(*field.triangles()))
+    recorder = Recorder("hill", "mesh", RobotShape.of(HUSKY), poses[0], [poses[-1]], ground=field.surface())
     recorder.path(0.4, np.column_stack([xs, ys + 0.3 * np.sin(20 * along), field.height_at(xs, ys)]))
     drive(recorder, poses, speed=1.2)
     events = life_of_a_goal(30.4, 0, "goal reached")
@@ -68,12 +68,10 @@ def make_office_recording() -> Recording:
     floor = Surface(
         np.array([[0, 0, 0], [16, 0, 0], [16, 12, 0], [0, 12, 0]], float), np.array([[0, 1, 2], [0, 2, 3]], np.int32)
     )
-    box_vertices, box_faces = box_triangles([0.6, 0.6, 1.0])
-    box = Surface(box_vertices + np.array([11.0, 6.5, 0.5]), box_faces)
     poses = [Pose.planar(2.0 + 8.0 * t, 3.0 + 3.0 * math.sin(1.5 * t), 0.4) for t in np.linspace(0.0, 1.0, 150)]
     recorder = Recorder(
         "office", "costmap", RobotShape.of(TURTLEBOT), poses[0], [Pose.planar(14.0, 9.0)],
-        ground=floor, walls=Surface(*wall_triangles(grid, 2.0)), obstacles=box,
+        ground=floor, walls=wall_surface(grid, 2.0), obstacles=box([0.6, 0.6, 1.0]).at(Pose.planar(11.0, 6.5, z=0.5)),
     )  # fmt: skip
     recorder.path(0.4, [[2, 3, 0], [8, 6, 0], [14, 9, 0]])
     angles = np.linspace(-2.0, 2.0, 180)

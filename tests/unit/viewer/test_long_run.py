@@ -8,7 +8,7 @@ import pytest
 from mbf_abstract.geometry import Twist
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.recorder import Recorder
-from terrain.recording.recording import RobotShape, Surface
+from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.logs.mcap_log import write_mcap
 from terrain.viewer.replay import write_replay
@@ -25,7 +25,7 @@ def long_run():
     angles = np.linspace(0.0, 5.0, round(DURATION * RATE))
     poses = [hills.pose_at(90 + 60 * math.cos(a), 90 + 60 * math.sin(a), a + math.pi / 2) for a in angles]
     way = np.array([pose.position for pose in poses])
-    ground = Surface(*hills.triangles())
+    ground = hills.surface()
     recorder = Recorder("long", "mesh", RobotShape.of(HUSKY), poses[0], [poses[-1]], ground=ground)
     for index, pose in enumerate(poses):
         recorder.sample(index / RATE, pose, Twist.planar(1.0), Twist.planar(1.0))

@@ -11,11 +11,12 @@ from mbf_abstract.geometry import Pose
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorder import Recorder
-from terrain.recording.recording import RobotShape, Surface
+from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, WALL, linear_for_viewer, slope_colours
 from terrain.viewer.pictures.picture import picture_png, write_picture
-from terrain.viewer.pictures.shading import shaded_triangles, vertex_colours
+from terrain.viewer.pictures.shading import face_colours, face_normals, shaded_triangles, vertex_colours
+from terrain.worlds.surface import Surface
 
 
 def pixels_of(png):
@@ -88,10 +89,10 @@ def test_steeper_ground_is_darker_and_redder():
 
 def test_vertex_colours_of_a_floor_are_one_grey_and_own_colours_are_kept():
     floor = Surface(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float), np.array([[0, 1, 2]], np.int32))
-    painted = Surface(floor.vertices, floor.faces, np.full((3, 3), 77, np.uint8))
+    painted = face_colours(floor, face_normals(floor), np.full((3, 3), 77, np.uint8))
 
     assert len(np.unique(vertex_colours(floor), axis=0)) == 1
-    assert (vertex_colours(painted) == 77).all()
+    assert (painted == 77).all()
 
 
 @pytest.mark.parametrize(("srgb", "linear"), [(0, 0), (255, 255), (128, 56)])

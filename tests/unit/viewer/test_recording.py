@@ -13,7 +13,7 @@ from terrain.physics.robot_models import CAR, HUSKY, TURTLEBOT
 from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, Recorder
 from terrain.recording.recording import Recording, RecordingError, RobotShape
 from terrain.recording.verdict import Verdict
-from terrain.worlds.solids import cylinder_triangles
+from terrain.worlds.surface import cylinder
 
 
 @pytest.mark.parametrize("name", ["hill_recording", "office_recording"])
@@ -147,7 +147,7 @@ class Pacer:
     """An actor that takes a step with every look at it."""
 
     thing = Thing.PERSON
-    looks = cylinder_triangles(0.25, 1.7)
+    looks = cylinder(0.25, 1.7)
 
     def __init__(self) -> None:
         self.steps = 0

@@ -17,7 +17,7 @@ from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.replay import FRAME_RATE, MAX_FRAMES, frame_indices, replay_html, status_text, write_replay
 from terrain.viewer.scene import wheel_angles
-from terrain.worlds.solids import cylinder_triangles
+from terrain.worlds.surface import cylinder
 
 
 def test_frames_come_at_the_frame_rate_with_first_and_last():
@@ -75,7 +75,7 @@ def test_people_doors_and_other_robots_move_through_the_replay(hill_recording):
     count = len(hill_recording.times)
     poses = np.tile([0.0, 5.0, 0.85, 0.0, 0.0, 0.0, 1.0], (count, 1))
     poses[:, 0] = np.linspace(1.0, 9.0, count)
-    person = ActorTrack("person", *cylinder_triangles(0.25, 1.7), poses)
+    person = ActorTrack("person", *cylinder(0.25, 1.7), poses)
 
     messages = messages_of(replay_html(replace(hill_recording, actors=[person])))
 

@@ -27,7 +27,7 @@ from terrain.sensors.rays import StaticRays
 from terrain.session.drive_loop import LoopRates
 from terrain.session.simulation_session import SessionOptions, SimulationSession
 from terrain.worlds.floor_plan import write_map
-from terrain.worlds.occupancy import wall_triangles
+from terrain.worlds.occupancy import wall_surface
 
 NAVIGATION = Path(__file__).with_name("navigation.yaml")
 LIDAR_RATE, LIDAR_RANGE, LIDAR_RAYS, LIDAR_NOISE = 10.0, 8.0, 360, 0.01  # Hz, m, -, m
@@ -60,7 +60,7 @@ class WarehouseEnvironment(SimulationSession):
         lidar = Lidar(
             self.robot,
             "lidar",
-            [StaticRays(*wall_triangles(grid)), TrafficRays(traffic)],
+            [StaticRays(*wall_surface(grid)), TrafficRays(traffic)],
             LidarModel(CARRIER.lidar_position, planar_directions(LIDAR_RAYS), LIDAR_RATE, LIDAR_RANGE, LIDAR_NOISE),
             np.random.default_rng([seed, LIDAR_STREAM]),
         )
