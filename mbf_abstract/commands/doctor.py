@@ -21,7 +21,7 @@ from mbf_abstract.commands.reporting import FAILURE
 
 NEEDED = (*("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "PIL"),)
 MESH_FILES = ("h5py", "lxml", "collada")
-SIMULATION = ("pybullet", "embreex", "matplotlib", "viser", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf")
+SIMULATION = ("pybullet", "matplotlib", "viser", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf")
 DISTRIBUTIONS = {
     "yaml": "pyyaml",
     "PIL": "pillow",

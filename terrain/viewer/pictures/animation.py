@@ -1,7 +1,7 @@
 """A run as a small moving picture (GIF), seen slantwise from above: for READMEs and issues, where no script may run.
 
-The world is drawn once, by casting a ray through each pixel; plan, track, scan and robot are painted over it, frame by
-frame. For turning, zooming and stopping see ``terrain.viewer.replay``.
+The world is painted once, far faces first; plan, track, scan and robot are painted over it, frame by frame. For
+turning, zooming and stopping see ``terrain.viewer.replay``.
 """
 
 from __future__ import annotations
@@ -13,24 +13,25 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
+from trimesh.remesh import subdivide_to_size
 
 from mbf_abstract.geometry import Pose
 from terrain.recording.recording import Recording
 from terrain.recording.whole_files import replacing
 from terrain.viewer.pictures.colours import BODY, DRIVEN, GOAL, OBSTACLE, PLANNED, SCAN, START, WALL, Colour
-from terrain.viewer.pictures.picture import ViewerMissing
 from terrain.viewer.pictures.shading import AMBIENT, LIGHT, face_colours, face_normals
 from terrain.viewer.pictures.shapes import cut_walls, prism
 from terrain.viewer.replay import status_text
 from terrain.viewer.scene import look_at_route
-from terrain.worlds.surface import Surface
+from terrain.worlds.surface import NO_SURFACE, Surface, joined
 
 FloatArray = NDArray[np.float64]
 
 SIZE = (800, 450)  # pixels
 FRAMES = 72
 FRAME_TIME, LAST_FRAME_TIME = 90, 2500  # ms
-RAYS_PER_PIXEL = 2  # in each direction
+SMOOTHING = 2  # the world is drawn so many times as large
+LARGEST_FACE = 1.0  # m; longer edges are cut, so that the middles of faces tell which one is nearer
 SKY = (232, 238, 244)
 COLOURS = 96
 LEAST_ROBOT = 0.024  # of the picture's width; smaller robots are drawn larger than they are
@@ -39,10 +40,11 @@ ZOOM = 1.3  # the replay's first view leaves room for its buttons
 TEXT: Colour = (30, 30, 30)
 PAINTED = (PLANNED, DRIVEN, START, GOAL, SCAN, BODY, TEXT)
 SWATCH = 20  # rows of pixels
+NO_LEAD = np.zeros(1)
 
 
 def write_animation(file: str | Path, recording: Recording) -> None:
-    """Write a recording as GIF; raises ViewerMissing without embreex."""
+    """Write a recording as GIF."""
     frames = list(_frames(recording))
     palette = _palette(frames[0])
     small = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
@@ -93,48 +95,45 @@ class Camera:
         """Size of a metre at a point (3,) [m]."""
         return float(self._focal / max(float((point - self.position) @ self._axes[2]), 1e-3))
 
-    def rays(self, per_pixel: int) -> FloatArray:
-        """Unit vectors (n, 3) through the pixels, row by row, ``per_pixel`` squared of them for each."""
-        width, height = (per_pixel * length for length in self._size)
-        x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-        across = np.column_stack([(x.ravel() - 0.5 * width), (y.ravel() - 0.5 * height)]) / (per_pixel * self._focal)
-        rays = across @ self._axes[:2] + self._axes[2]
-        return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
-
-def draw_world(recording: Recording, camera: Camera) -> Image.Image:
-    """Draw what does not move; raises ViewerMissing without embreex."""
-    try:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-    except ImportError as error:
-        raise ViewerMissing(f"animations need embreex: pip install 'mbf-flex[sim]' ({error})") from error
-    vertices, faces, colours = _world(recording)
-    rays = camera.rays(RAYS_PER_PIXEL).astype(np.float32)
-    hit = np.full(len(rays), -1)
-    if len(faces):
-        scene = EmbreeScene()
-        TriangleMesh(scene, (vertices - camera.position).astype(np.float32), faces)
-        hit = scene.run(np.zeros_like(rays), rays, query="INTERSECT")
-    painted = np.vstack([colours, SKY])[hit]  # -1, no hit, is the last row
-    rows, columns = SIZE[1] * RAYS_PER_PIXEL, SIZE[0] * RAYS_PER_PIXEL
-    pixels = painted.reshape(rows, columns, 3).round().astype(np.uint8)
-    return Image.fromarray(pixels).resize(SIZE, Image.Resampling.BOX)
-
-
-def _world(recording: Recording) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:
-    """All surfaces as one: vertices (V, 3), faces (F, 3), and a shaded colour (F, 3) 0..255 for each face."""
+def draw_world(recording: Recording) -> Image.Image:
+    """Draw what does not move, with smooth edges."""
+    fine = SMOOTHING * SIZE[0], SMOOTHING * SIZE[1]
+    image = Image.new("RGB", fine, SKY)
     walls = None if recording.walls is None else cut_walls(recording.walls)
-    parts = [(recording.ground, None), (walls, WALL), (recording.obstacles, OBSTACLE)]
-    vertices, faces, colours, offset = [np.zeros((0, 3))], [np.zeros((0, 3), np.int32)], [np.zeros((0, 3))], 0
-    for surface, paint in parts:
-        if surface is None:
-            continue
-        vertices.append(surface.vertices)
-        faces.append((surface.faces + offset).astype(np.int32))
-        colours.append(_shaded(surface, paint))
-        offset += len(surface.vertices)
-    return np.concatenate(vertices), np.concatenate(faces), np.concatenate(colours)
+    parts = [(recording.ground, None, 0.0), (walls, WALL, LARGEST_FACE), (recording.obstacles, OBSTACLE, LARGEST_FACE)]
+    surfaces, colours, nearer = [NO_SURFACE], [np.zeros((0, 3))], [np.zeros(0)]
+    for surface, paint, lead in parts:
+        if surface is not None and len(surface.faces):
+            small, of_face = _cut_small(surface)
+            surfaces.append(small)
+            colours.append(_shaded(surface, paint)[of_face])
+            nearer.append(np.full(len(of_face), lead))
+    painter, camera = ImageDraw.Draw(image), Camera(recording, fine)
+    _paint_faces(painter, camera, joined(surfaces), np.concatenate(colours), np.concatenate(nearer))
+    return image.resize(SIZE, Image.Resampling.BOX)
+
+
+def _cut_small(surface: Surface) -> tuple[Surface, NDArray[np.intp]]:
+    """Cut faces until no edge is longer than ``LARGEST_FACE``; each with the index of the face that it is a part of."""
+    vertices, faces, of_face = subdivide_to_size(*surface, LARGEST_FACE, max_iter=20, return_index=True)
+    return Surface(vertices, faces), of_face
+
+
+def _paint_faces(
+    painter: ImageDraw.ImageDraw,
+    camera: Camera,
+    surface: Surface,
+    colours: FloatArray,
+    nearer: FloatArray | float = 0.0,
+) -> None:
+    """Paint faces in colours (F, 3), far ones first; each counts as ``nearer`` [m] than it is."""
+    corners = surface.vertices[surface.faces]
+    distances = np.linalg.norm(corners.mean(axis=1) - camera.position, axis=1) - nearer
+    pixels = camera.project(surface.vertices)[surface.faces].reshape(-1, 6).tolist()
+    fills = list(map(tuple, colours.astype(int).tolist()))
+    for face in np.argsort(-distances, kind="stable").tolist():
+        painter.polygon(pixels[face], fill=fills[face])
 
 
 def _shaded(surface: Surface, paint: Colour | None) -> FloatArray:
@@ -146,7 +145,7 @@ def _shaded(surface: Surface, paint: Colour | None) -> FloatArray:
 
 def _frames(recording: Recording) -> Iterator[Image.Image]:
     camera = Camera(recording, SIZE)
-    world = draw_world(recording, camera)
+    world = draw_world(recording)
     for index in np.linspace(0, max(len(recording.times) - 1, 0), FRAMES).astype(int).tolist():
         frame = world.copy()
         painter = ImageDraw.Draw(frame)
@@ -183,13 +182,8 @@ def _paint_robot(painter: ImageDraw.ImageDraw, camera: Camera, recording: Record
     body = prism(shape.footprint, 0.0, shape.height)
     turned = Pose((0.0, 0.0, 0.0), tuple(row[3:].tolist())).rotation
     vertices = scale * body.vertices @ turned.T + row[:3]
-    colours = _shaded(Surface(vertices, body.faces), BODY)
-    corners = vertices[body.faces]
-    far_first = np.argsort(-np.linalg.norm(corners.mean(axis=1) - camera.position, axis=1))
-    pixels = camera.project(vertices)[body.faces]
-    for face in far_first:
-        fill = tuple(colours[face].astype(int).tolist())
-        painter.polygon(list(map(tuple, pixels[face].tolist())), fill=fill)
+    placed = Surface(vertices, body.faces)
+    _paint_faces(painter, camera, placed, _shaded(placed, BODY))
 
 
 def _disc(painter: ImageDraw.ImageDraw, centre: FloatArray, radius: int, colour: Colour) -> None:
