@@ -143,7 +143,7 @@ def planner_results(worlds: Mapping[str, World]) -> dict[str, float]:
         costmap = GivenMap(grid)
         parameters = ThetaStarPlanner.Parameters(cost_factor=0.0)
         rng = np.random.default_rng(0)
-        context = CostmapContext("barn", parameters, SimClock(), rng, None, costmap, costmap, costmap)
+        context = CostmapContext("barn", parameters, SimClock(), rng, None, costmap)
         plan = ThetaStarPlanner(context).make_plan(PlanRequest(START, GOAL))
         if plan.success:
             found += 1

@@ -87,7 +87,7 @@ def main() -> None:
     for controller_class in (MppiController, DwaController, RegulatedPurePursuitController):
         parameters = controller_class.Parameters()
         rng = np.random.default_rng(0)
-        context = CostmapContext("benchmark", parameters, StandingClock(), rng, None, costmap, costmap, costmap)
+        context = CostmapContext("benchmark", parameters, StandingClock(), rng, None, costmap)
         controller = controller_class(context)
         controller.set_plan(path)
         times = []

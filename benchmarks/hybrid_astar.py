@@ -111,9 +111,7 @@ def planner_on(costmap: LayeredCostmap) -> HybridAStarPlanner:
     """The planner with its defaults but for the car."""
     parameters = HybridAStarPlanner.Parameters(min_turning_radius=RADIUS, allow_unknown=False)
     rng = np.random.default_rng(0)
-    return HybridAStarPlanner(
-        CostmapContext("benchmark", parameters, StandingClock(), rng, None, costmap, costmap, costmap)
-    )
+    return HybridAStarPlanner(CostmapContext("benchmark", parameters, StandingClock(), rng, None, costmap))
 
 
 def random_pose(costmap: Costmap, rng: np.random.Generator) -> np.ndarray:

@@ -7,59 +7,31 @@ update changes under you, and taking it costs nothing while the map does not cha
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.plugins import (
-    AbstractController,
-    AbstractPlanner,
-    AbstractRecovery,
-    AbstractRefiner,
-    PluginContext,
-)
+from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
+from mbf_abstract.plugins import AbstractController, AbstractPlanner, AbstractRecovery, AbstractRefiner
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 
 
 @dataclass(frozen=True)
-class CostmapContext(PluginContext):
+class CostmapContext(MapContext[LayeredCostmap]):
     """What a costmap plugin is constructed with.
 
-    Attributes
-    ----------
-    global_costmap, local_costmap : LayeredCostmap
-        The two shared maps of the server.
-    costmap : LayeredCostmap
-        The one this plugin is bound to: planners and refiners the global one, controllers and recoveries the local
-        one, unless the plugin's block says ``costmap: local`` or ``costmap: global``.
-    transforms : TransformBuffer
-        The frames of the maps; a local map may be in another one than goals, paths and robot poses.
+    Planners and refiners are bound to the global costmap, controllers and recoveries to the local one, unless the
+    plugin's block says ``costmap: local`` or ``costmap: global``. ``maps`` has both, under these names; without them
+    the one costmap is both.
     """
 
-    global_costmap: LayeredCostmap
-    local_costmap: LayeredCostmap
-    costmap: LayeredCostmap
-    transforms: TransformBuffer = field(default_factory=TransformBuffer, kw_only=True)
 
-
-class _OnCostmaps:
-    """Keeps the maps of the context; mixed into the four interfaces."""
-
-    global_costmap: LayeredCostmap
-    local_costmap: LayeredCostmap
-    costmap: LayeredCostmap
-    transforms: TransformBuffer
+class _OnCostmaps(MapPlugin):
+    """Keeps the maps of the context by their types; mixed into the four interfaces."""
 
     def __init__(self, context: CostmapContext) -> None:
-        super().__init__(context)  # type: ignore[call-arg]  # the abstract interface follows in the base list
-        self.global_costmap = context.global_costmap
-        self.local_costmap = context.local_costmap
-        self.costmap = context.costmap
-        self.transforms = context.transforms
-
-    def on_map(self, pose: Pose, costmap: LayeredCostmap | None = None) -> Pose:
-        """Express a pose in the frame of a costmap, the plugin's own if none is given; raises TransformError."""
-        return self.transforms.transform_pose(pose, (costmap or self.costmap).frame_id)
+        super().__init__(context)
+        self.costmap = context.navigation_map
+        self.global_costmap = context.maps.get("global", self.costmap)
+        self.local_costmap = context.maps.get("local", self.costmap)
 
 
 class CostmapPlanner(_OnCostmaps, AbstractPlanner):

@@ -103,9 +103,8 @@ class CostmapNavigationServer(AbstractNavigationServer):
             raise ValueError(f"plans are made in the frame {frame!r}, but its costmap is in {bound.frame_id!r}")
         return CostmapContext(
             **vars(base),
-            global_costmap=self.global_costmap,
-            local_costmap=self.local_costmap,
-            costmap=bound,
+            navigation_map=bound,
+            maps={"local": self.local_costmap, "global": self.global_costmap},
             transforms=self.runtime.transforms,
         )
 

@@ -8,38 +8,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mbf_abstract.plugins import (
-    AbstractController,
-    AbstractPlanner,
-    AbstractRecovery,
-    AbstractRefiner,
-    Plugin,
-    PluginContext,
-)
+from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
+from mbf_abstract.plugins import AbstractController, AbstractPlanner, AbstractRecovery, AbstractRefiner
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 
 @dataclass(frozen=True)
-class MeshContext(PluginContext):
-    """What every plugin of the mesh server is constructed with.
-
-    Attributes
-    ----------
-    mesh_map : MeshMap
-        The one map of the server, shared by all its plugins.
-    """
-
-    mesh_map: MeshMap
+class MeshContext(MapContext[MeshMap]):
+    """What every plugin of the mesh server is constructed with; all share the one map."""
 
 
-class MeshPlugin(Plugin):
-    """Common part of the mesh interfaces: keeps the map of the context."""
-
-    mesh_map: MeshMap
+class MeshPlugin(MapPlugin):
+    """Common part of the mesh interfaces: keeps the map of the context by its type."""
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
-        self.mesh_map = context.mesh_map
+        self.mesh_map = context.navigation_map
 
 
 class MeshPlanner(MeshPlugin, AbstractPlanner):

@@ -89,7 +89,9 @@ class MeshNavigationServer(AbstractNavigationServer):
         self._scans = ScanIntake(self.runtime, {"mesh_map": target})
         self._tell_findings()
         clock, events = self.runtime.clock, self.runtime.events
-        self._decay = Ticker(clock, events, lambda: self.mesh_map.update(clock.now()), DECAY_PERIOD, "mesh map decay")
+        self._decay = Ticker(
+            clock, events, lambda: self.mesh_map.update(None, clock.now()), DECAY_PERIOD, "mesh map decay"
+        )
 
     def swap_mesh(self, mesh_file: Path | str) -> None:
         """Drive on another mesh from now on, e.g. after the lift; its layers are those of the configuration.
@@ -181,7 +183,7 @@ class MeshNavigationServer(AbstractNavigationServer):
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the mesh map."""
-        return MeshContext(**vars(base), mesh_map=self.mesh_map)
+        return MeshContext(**vars(base), navigation_map=self.mesh_map, transforms=self.runtime.transforms)
 
     @property
     def queries(self) -> MapQueries:

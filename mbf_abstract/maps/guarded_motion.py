@@ -1,7 +1,7 @@
 """Moving the robot inside a recovery, the same on every map: slowly, cancelable, stopped at the end.
 
-``GuardedRecovery`` is the base of the recoveries that move. A map says two things: why its data are too old to drive on
-(``stale_reason``), and what the robot would touch along a motion (``obstacle_ahead``). The loop does the rest:
+``GuardedRecovery`` is the base of the recoveries that move. The map says two things: why its data are too old to drive
+on, and what the robot would touch along a motion. The loop does the rest:
 
 =================================  =====================================================================
 what happens                       how the behaviour ends
@@ -27,6 +27,7 @@ from collections.abc import Callable
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.maps.navigation_map import MapPlugin
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractRecovery, RecoveryRequest, RecoveryResult
@@ -39,10 +40,11 @@ class GuardedMotionParameters(PluginParameters):
     """Parameters every moving recovery has."""
 
     control_period: float = parameter(0.05, "Time between two commands.", unit="s", gt=0.0, le=1.0)
+    check_ahead_time: float = parameter(0.6, "How far ahead each motion must be free.", unit="s", gt=0.0, le=10.0)
     time_limit: float = parameter(15.0, "Give up after this time.", unit="s", gt=0.0, le=600.0)
 
 
-class GuardedRecovery(AbstractRecovery):
+class GuardedRecovery(MapPlugin, AbstractRecovery):
     """Base of the recoveries that move the robot: write ``recover`` and use ``drive``."""
 
     parameters: GuardedMotionParameters
@@ -51,16 +53,9 @@ class GuardedRecovery(AbstractRecovery):
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Do the behaviour's work; the robot is stopped afterwards in any case."""
 
-    @abstractmethod
-    def stale_reason(self) -> str:
-        """Why the map is too old to drive on; empty if it is fresh."""
-
     def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
-        """What the robot would touch if it moved on with ``command``, and where; empty if the motion is free.
-
-        Empty for every command unless the map overrides it: then the steps of its recoveries look ahead themselves.
-        """
-        return ""
+        """What the robot would touch if it moved on with ``command``, and where; empty if the motion is free."""
+        return self.navigation_map.obstacle_ahead(self.on_map(pose), command, self.parameters.check_ahead_time)
 
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
         """Run ``recover``, report a lost pose as TF_ERROR, and send zero velocity at the end, whatever it was."""
@@ -88,7 +83,7 @@ class GuardedRecovery(AbstractRecovery):
             pose = motion.pose()
             if finished(pose):
                 return RecoveryResult(RecoveryOutcome.SUCCESS)
-            stale = self.stale_reason()
+            stale = self.navigation_map.stale_reason(self.clock.now())
             if self.clock.now() >= deadline:
                 text = f"not done after {limit:g} s{f': {stale}' if stale else ''}"
                 return RecoveryResult(RecoveryOutcome.PAT_EXCEEDED, text)

@@ -1,17 +1,20 @@
-"""The base of a map made of layers: what sensors bring in, and how fresh it is, the same on every backend."""
+"""The base of a map made of layers: what sensors bring in, and parameters for a while, the same on every backend."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+import math
+import threading
+from abc import abstractmethod
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from mbf_abstract.maps.layers.layer_stack import LayerStack
+from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.sensing import RangeScan
 
 
-class LayeredMap(ABC):
+class LayeredMap(NavigationMap):
     """A map with layers.
 
     Attributes
@@ -22,20 +25,15 @@ class LayeredMap(ABC):
         The layers by name.
     """
 
-    frame_id: str
     layers: LayerStack[Any]
 
-    @abstractmethod
-    def stale_reason(self, now: float) -> str:
-        """Why no command may be computed on this map at ``now`` [s]; empty if it is fresh."""
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._overridden: dict[str, tuple[Any, float]] = {}  # usual parameters of a layer, end of the override [s]
 
     @abstractmethod
     def take_in(self, scan: RangeScan) -> None:
         """Hand a checked scan in the frame of the map to the layers that listen to its source."""
-
-    def is_current(self, now: float) -> bool:
-        """Whether a command may be computed on this map at ``now`` [s]."""
-        return not self.stale_reason(now)
 
     def insert_scan(self, scan: RangeScan) -> None:
         """Hand a scan to the layers that listen to its source. Rays whose end is not finite are left out.
@@ -76,3 +74,37 @@ class LayeredMap(ABC):
             As ``insert_scan``.
         """
         self.insert_scan(RangeScan.of_points(source, points, sensor_origin, stamp, self.frame_id))
+
+    def set_layer_parameters(self, name: str, parameters: Any, until: float = math.inf) -> None:
+        """Replace the parameters of one layer, all or none.
+
+        With a time ``until`` [s] this is an override: the first ``update`` from then on restores the usual parameters.
+
+        Raises
+        ------
+        KeyError
+            There is no such layer.
+        Exception
+            Whatever the layer raises that cannot use them; the old ones stay.
+        """
+        with self._lock:
+            usual = self.usual_parameters(name)
+            self._replace_parameters(name, parameters)
+            self._overridden.pop(name, None)
+            if until < math.inf:
+                self._overridden[name] = usual, until
+
+    def usual_parameters(self, name: str) -> Any:
+        """Parameters of a layer apart from an override; raises KeyError if there is none of that name."""
+        with self._lock:
+            return self._overridden[name][0] if name in self._overridden else self.layers[name].parameters
+
+    def end_overrides(self, now: float) -> None:
+        """Restore the usual parameters of layers whose override is over at ``now`` [s]."""
+        with self._lock:
+            for name in [name for name, (_, until) in self._overridden.items() if until <= now]:
+                self.set_layer_parameters(name, self.usual_parameters(name))
+
+    @abstractmethod
+    def _replace_parameters(self, name: str, parameters: Any) -> None:
+        """Give a layer its parameters, all or none; called under the lock of the map."""

@@ -8,7 +8,6 @@ sensors or layers writes ``obstacle_ahead`` and ``nearest_obstacle`` and inherit
 from __future__ import annotations
 
 import math
-import threading
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ from typing import Any, Generic, TypeVar
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.plugins import PluginContext
+from mbf_abstract.plugins import Plugin, PluginContext
 
 
 class NavigationMap(ABC):
@@ -28,17 +27,15 @@ class NavigationMap(ABC):
     frame_id : str
     layers : mapping of name to layer
         Each layer has its ``parameters``.
-    inscribed_radius : float
-        Radius [m] of the largest disc inside the robot's outline; 0 = unknown.
     """
 
     frame_id: str
     layers: Mapping[str, Any] = MappingProxyType({})
-    inscribed_radius: float = 0.0
 
-    def __init__(self) -> None:
-        self._lock = threading.RLock()
-        self._overridden: dict[str, tuple[Any, float]] = {}  # usual parameters of a layer, end of the override [s]
+    @property
+    def inscribed_radius(self) -> float:
+        """Radius [m] of the largest disc inside the robot's outline; 0 = unknown."""
+        return 0.0
 
     # ----------------------------------------------------------------------------------------------- freshness
     def stale_reason(self, now: float) -> str:
@@ -54,7 +51,6 @@ class NavigationMap(ABC):
 
         ``robot_pose`` is None while it is unknown.
         """
-        self.end_overrides(now)
         return None
 
     # -------------------------------------------------------------------------------------------------- motion
@@ -74,18 +70,12 @@ class NavigationMap(ABC):
         """
 
     # -------------------------------------------------------------------------------------------------- layers
-    def layer(self, name: str) -> Any:
-        """One layer; raises KeyError with the known ones if there is none of that name."""
-        if name not in self.layers:
-            raise KeyError(f"the map has no layer {name!r}, only {list(self.layers)}")
-        return self.layers[name]
-
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
         """Forget what sensors have marked in layers, in all by default; return the names of those cleared.
 
         Visible after the next ``update``. Raises KeyError where a name is no layer.
         """
-        return [self.layer(name).name for name in layer_names or ()]
+        return []
 
     def clear_area(
         self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
@@ -94,41 +84,15 @@ class NavigationMap(ABC):
 
         By default these are the layers that sensors fill again.
         """
-        return [self.layer(name).name for name in layer_names or ()]
-
-    def set_layer_parameters(self, name: str, parameters: Any, until: float = math.inf) -> None:
-        """Replace the parameters of one layer, all or none.
-
-        With a time ``until`` [s] this is an override: the first ``update`` from then on restores the usual parameters.
-
-        Raises
-        ------
-        KeyError
-            There is no such layer.
-        Exception
-            Whatever the layer raises that cannot use them; the old ones stay.
-        """
-        with self._lock:
-            usual = self.usual_parameters(name)
-            self._replace_parameters(name, parameters)
-            self._overridden.pop(name, None)
-            if until < math.inf:
-                self._overridden[name] = usual, until
+        return []
 
     def usual_parameters(self, name: str) -> Any:
         """Parameters of a layer apart from an override; raises KeyError if there is none of that name."""
-        with self._lock:
-            return self._overridden[name][0] if name in self._overridden else self.layer(name).parameters
+        return self.layers[name].parameters
 
-    def end_overrides(self, now: float) -> None:
-        """Restore the usual parameters of layers whose override is over at ``now`` [s]."""
-        with self._lock:
-            for name in [name for name, (_, until) in self._overridden.items() if until <= now]:
-                self.set_layer_parameters(name, self.usual_parameters(name))
-
-    def _replace_parameters(self, name: str, parameters: Any) -> None:
-        """Give a layer its parameters; called under the lock of the map."""
-        raise ValueError(f"the layer {name!r} has no parameters that can be changed")
+    def set_layer_parameters(self, name: str, parameters: Any, until: float = math.inf) -> None:
+        """Replace the parameters of one layer, up to a time ``until`` [s] if it is given; see ``LayeredMap``."""
+        raise KeyError(f"the map has no layer {name!r} whose parameters could be changed")
 
 
 M = TypeVar("M", bound=NavigationMap)
@@ -151,3 +115,17 @@ class MapContext(PluginContext, Generic[M]):
     navigation_map: M
     maps: Mapping[str, M] = field(default_factory=dict, kw_only=True)
     transforms: TransformBuffer = field(default_factory=TransformBuffer, kw_only=True)
+
+
+class MapPlugin(Plugin):
+    """Keeps the maps of the context; mixed into the plugin interfaces."""
+
+    def __init__(self, context: MapContext[Any]) -> None:
+        super().__init__(context)
+        self.navigation_map: NavigationMap = context.navigation_map
+        self.maps: Mapping[str, NavigationMap] = context.maps
+        self.transforms = context.transforms
+
+    def on_map(self, pose: Pose, navigation_map: NavigationMap | None = None) -> Pose:
+        """Express a pose in the frame of a map, the plugin's own if none is given; raises TransformError."""
+        return self.transforms.transform_pose(pose, (navigation_map or self.navigation_map).frame_id)

@@ -58,6 +58,10 @@ class FootprintCheck:
         points = rotated(plane_rotation(yaw), self.samples) + np.array([x, y])
         return int(np.count_nonzero(~costmap.world_to_cells(points)[1]))
 
+    def touched(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
+        """Number of covering points on lethal cells or off the map."""
+        return self.lethal_count(costmap, x, y, yaw) + self.outside_count(costmap, x, y, yaw)
+
     def first_collision(self, costmap: Costmap, poses: FloatArray) -> int:
         """Index of the first colliding pose of (n, 3) poses (x, y, yaw), or -1."""
         return int(

@@ -48,8 +48,6 @@ class InflationLayer(CostmapLayer):
         super().__init__(context)
         self._inscribed_radius = 0.0
         self._radius = 0
-        self._relief = (1.0, -math.inf)
-        self._factor = 1.0
         self._cost_of_square: NDArray[np.uint8] = np.array([LETHAL], dtype=np.uint8)
         self._seeds: NDArray[np.uint8] = np.zeros((0, 0), dtype=np.uint8)
 
@@ -68,14 +66,6 @@ class InflationLayer(CostmapLayer):
         """Make the cost table for the new radius and decay."""
         self._tabulate()
 
-    def relax(self, factor: float, until: float) -> None:
-        """Let the next updates up to the time ``until`` [s] keep ``factor`` of the radius, and decay faster by as much.
-
-        The first update after it restores the configured values. What the robot's inscribed circle touches stays 253
-        as far as it was configured: relaxing opens no passage that the robot does not fit through.
-        """
-        self._relief = (factor, until)
-
     @property
     def lasting(self) -> bool:
         """It is as lasting as what it inflates; unknown cells are not."""
@@ -92,8 +82,7 @@ class InflationLayer(CostmapLayer):
         )
 
     def _tabulate(self) -> None:
-        configured = self.parameters.inflation_radius
-        radius = max(configured * self._factor, self._inscribed_radius)
+        radius = max(self.parameters.inflation_radius, self._inscribed_radius)
         self._radius = math.ceil(radius / self.geometry.resolution)
         if self._radius > LARGEST_RADIUS:
             raise ValueError(
@@ -104,17 +93,11 @@ class InflationLayer(CostmapLayer):
             self._radius,
             self.geometry.resolution,
             self._inscribed_radius,
-            self.parameters.cost_scaling_factor / self._factor,
+            self.parameters.cost_scaling_factor,
         )
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
-        """Grow the box by the radius: a new obstacle changes costs that far away, another radius those of all cells."""
-        factor, until = self._relief
-        factor = factor if now < until else 1.0
-        if factor != self._factor:
-            self._factor = factor
-            self._tabulate()
-            return self.geometry.box
+        """Grow the box by the radius: a new obstacle changes costs that far away."""
         return box.grown(self._radius)
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:

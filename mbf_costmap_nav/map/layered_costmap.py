@@ -12,18 +12,18 @@ The order of work, bounds and the combination rules are those of costmap_2d.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.grid.motion_check import nearest_lethal, obstacle_ahead
 from mbf_costmap_nav.map.layer import CostmapLayer, shifted
 from mbf_costmap_nav.map.layers_in_sum import lasting_map, warnings_about
 
@@ -68,13 +68,13 @@ class LayeredCostmap(LayeredMap):
         track_unknown_space: bool = False,
         max_age: float = 0.0,
     ) -> None:
+        super().__init__()
         self.layers: LayerStack[CostmapLayer] = LayerStack(layers)
         if not rolling_window:
             geometry = next((own for layer in layers if (own := layer.preferred_geometry())), geometry)
         self.frame_id = frame_id
         self.rolling_window = rolling_window
         self.max_age = max_age
-        self._lock = threading.Lock()
         self._default_value = UNKNOWN if track_unknown_space else FREE
         self._geometry = geometry
         self._cells: CellArray = np.full((geometry.height, geometry.width), self._default_value, dtype=np.uint8)
@@ -159,6 +159,15 @@ class LayeredCostmap(LayeredMap):
         with self._lock:
             return min((layer.speed_limit(x, y, full_speed) for layer in self.layers.enabled), default=full_speed)
 
+    # ------------------------------------------------------------------------------------------------- motion
+    def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
+        """Where the footprint would touch more than now if the robot kept ``command`` for ``duration`` [s]."""
+        return obstacle_ahead(self.snapshot(), self.footprint, pose, command, duration)
+
+    def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
+        """Offset [m] to the centre of the nearest lethal cell; None if none is ``within`` [m]."""
+        return nearest_lethal(self.snapshot(), pose, within)
+
     # ----------------------------------------------------------------------------------------------- updating
     def update(self, robot_pose: Pose | None, now: float) -> CellBox:
         """Bring the map up to ``now`` [s] and return the box of cells that were recomputed.
@@ -177,6 +186,7 @@ class LayeredCostmap(LayeredMap):
         if robot_pose is not None and robot_pose.frame_id != self.frame_id:
             raise ValueError(f"robot pose is in frame {robot_pose.frame_id!r}, the costmap in {self.frame_id!r}")
         with self._lock:
+            self.end_overrides(now)
             if self.rolling_window and robot_pose is not None:
                 self._follow(robot_pose)
             box = self._pending
@@ -225,26 +235,17 @@ class LayeredCostmap(LayeredMap):
                 layer.set_footprint(self.footprint)
             self._pending = self._geometry.box
 
-    def set_layer_parameters(self, name: str, parameters: LayerParameters) -> None:
-        """Replace the parameters of a layer; the effect is visible after the next update, which recomputes everything.
-
-        Raises
-        ------
-        KeyError
-            There is no such layer.
-        ValueError
-            The layer does not take them; the old ones stay.
-        """
-        with self._lock:
-            layer = self.layers[name]
-            old, layer.parameters = layer.parameters, parameters
-            self._pending = self._geometry.box
-            try:
-                layer.parameters_changed()
-            except BaseException:
-                layer.parameters = old
-                layer.parameters_changed()
-                raise
+    def _replace_parameters(self, name: str, parameters: LayerParameters) -> None:
+        """Give a layer its parameters; the effect is visible after the next update, which recomputes everything."""
+        layer = self.layers[name]
+        old, layer.parameters = layer.parameters, parameters
+        self._pending = self._geometry.box
+        try:
+            layer.parameters_changed()
+        except BaseException:
+            layer.parameters = old
+            layer.parameters_changed()
+            raise
 
     # ------------------------------------------------------------------------------------------- sensor input
     def take_in(self, scan: RangeScan) -> None:
@@ -273,23 +274,17 @@ class LayeredCostmap(LayeredMap):
         return [layer.name for layer in chosen]
 
     def clear_area(
-        self,
-        center_x: float,
-        center_y: float,
-        size: float,
-        *,
-        layer_names: Iterable[str] | None = None,
-        inside: bool = False,
+        self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
     ) -> list[str]:
-        """Clear layers outside, or inside, a square window around a point; return their names.
+        """Clear layers inside, or outside, a square window around a pose; return their names.
 
         By default these are the layers that sensors fill again (``CostmapLayer.clearable``), not the floor plan. A
         static layer that is named loses the area until ``clear``.
 
         Parameters
         ----------
-        center_x, center_y : float
-            Middle of the window [m] in the map's frame, usually the robot.
+        center : Pose
+            Middle of the window in the map's frame, usually the robot's pose.
         size : float
             Side of the window [m].
         inside : bool
@@ -303,8 +298,8 @@ class LayeredCostmap(LayeredMap):
         with self._lock:
             clearable = [name for name, layer in self.layers.items() if layer.clearable]
             chosen = self.layers.chosen(clearable if layer_names is None else layer_names)
-            x0, y0 = self._geometry.world_to_cell_unbounded(center_x - size / 2, center_y - size / 2)
-            x1, y1 = self._geometry.world_to_cell_unbounded(center_x + size / 2, center_y + size / 2)
+            x0, y0 = self._geometry.world_to_cell_unbounded(center.x - size / 2, center.y - size / 2)
+            x1, y1 = self._geometry.world_to_cell_unbounded(center.x + size / 2, center.y + size / 2)
             window = CellBox(x0 + 1, y0 + 1, x1, y1)  # costmap_2d's window leaves out its border cells
             for layer in chosen:
                 layer.clear_area(window, inside)

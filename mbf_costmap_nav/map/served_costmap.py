@@ -89,7 +89,7 @@ class ServedCostmap:
         ValueError
             A value is not legal or cannot change, or the layer does not take it.
         """
-        new = with_changes(self.costmap.layers[layer].parameters, changes)
+        new = with_changes(self.costmap.usual_parameters(layer), changes)
         self.costmap.set_layer_parameters(layer, new)
         self._tell(f"{self.name}.{layer}", changes)
 

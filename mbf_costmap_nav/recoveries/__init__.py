@@ -1,1 +1,1 @@
-"""Recovery behaviours on costmaps, one a file; those that move share ``mbf_costmap_nav.control.guarded_motion``."""
+"""Recovery behaviours that are a matter of the costmap; the others stand in ``mbf_abstract.maps.recoveries``."""

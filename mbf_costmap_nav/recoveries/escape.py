@@ -14,12 +14,14 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_costmap_nav.control.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_costmap_nav.grid.costmap import UNKNOWN
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck, arc_poses
+from mbf_costmap_nav.grid.motion_check import obstacle_ahead
+from mbf_costmap_nav.plugins import CostmapRecovery
 
 OFF_MAP = 256
 """Cost of a centre outside the map: more than that of any cell."""
@@ -29,18 +31,16 @@ class EscapeParameters(GuardedMotionParameters):
     """Parameters of ``costmap.escape``."""
 
     speed: float = parameter(0.05, "How fast to creep.", unit="m/s", gt=0.0, le=0.5)
-    turn_speed: float = parameter(0.2, "How fast to turn; 0 = only forward and back.", unit="rad/s", ge=0.0, le=2.0)
+    yaw_rate: float = parameter(0.2, "How fast to turn; 0 = only forward and back.", unit="rad/s", ge=0.0, le=2.0)
     probe_distance: float = parameter(0.15, "How far ahead each motion is judged.", unit="m", gt=0.0, le=2.0)
     free_cost: int = parameter(253, "Free once the centre's cost is below this and nothing is touched.", ge=1, le=254)
 
 
-class EscapeRecovery(GuardedRecovery):
+class EscapeRecovery(CostmapRecovery, GuardedRecovery):
     """Creeps out of a collision."""
 
     Parameters: ClassVar[type[PluginParameters]] = EscapeParameters
     parameters: EscapeParameters
-
-    leaves_collisions = True
 
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Creep down the cost until the robot is free."""
@@ -67,11 +67,17 @@ class EscapeRecovery(GuardedRecovery):
             return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
         return RecoveryResult(result.outcome, f"{result.message or 'free'}, moved {moved:.2f} m")
 
+    def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
+        """As of all recoveries, but the motion may begin in a collision of any depth: it was chosen to lead out."""
+        costmap, duration = self.costmap.snapshot(), self.parameters.check_ahead_time
+        there = self.on_map(pose)
+        return obstacle_ahead(costmap, self.costmap.footprint, there, command, duration, leaves_collisions=True)
+
     def _motions(self) -> list[Twist]:
         p = self.parameters
         motions = [Twist.planar(vx=-p.speed), Twist.planar(vx=p.speed)]
-        if p.turn_speed > 0.0:
-            motions += [Twist.planar(wz=p.turn_speed), Twist.planar(wz=-p.turn_speed)]
+        if p.yaw_rate > 0.0:
+            motions += [Twist.planar(wz=p.yaw_rate), Twist.planar(wz=-p.yaw_rate)]
         return motions
 
     def _badness(self, pose: Pose, motion: Twist) -> tuple[int, int]:
@@ -80,7 +86,7 @@ class EscapeRecovery(GuardedRecovery):
         check = FootprintCheck(self.costmap.footprint, costmap.resolution)
         duration = self.parameters.probe_distance / self.parameters.speed if motion != Twist() else 1e-3
         x, y, yaw = arc_poses((pose.x, pose.y, pose.yaw), motion.vx, 0.0, motion.wz, duration, duration)[-1].tolist()
-        touched = check.lethal_count(costmap, x, y, yaw) + check.outside_count(costmap, x, y, yaw)
+        touched = check.touched(costmap, x, y, yaw)
         cost = costmap.cost_at(x, y)
         if cost == UNKNOWN:
             return touched, self.parameters.free_cost - 1

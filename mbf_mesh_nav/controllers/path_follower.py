@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.pursuit import arc_to, in_robot_frame
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
@@ -23,11 +24,9 @@ from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS, may_e
 from mbf_mesh_nav.mesh.surface_point import beyond_border
 from mbf_mesh_nav.motion.goal_approach import (
     GoalApproach,
-    arc_to,
     braking_speed,
     clamp,
     heading_error,
-    in_robot_frame,
     missed_path,
     tracker_on_surface,
 )

@@ -135,9 +135,17 @@ class ObstacleLayer(MeshLayer):
 
     def clear(self) -> IntArray:
         """Forget all hits; the map is stale until every source has seen it again."""
+        return self._keep_only(Hits.none())
+
+    def clear_area(self, center: FloatArray, size: float, inside: bool) -> IntArray:
+        """Forget the hits in, or out of, a cube; as stale then as when all are forgotten."""
+        within = (np.abs(self._hits.points - center) <= size / 2.0).all(axis=1)
+        return self._keep_only(self._hits.where(within != inside))
+
+    def _keep_only(self, hits: Hits) -> IntArray:
         for watch in self._watches.values():
             watch.cleared()
-        return self._change(Hits.none())
+        return self._change(hits)
 
     def stale_reason(self, now: float) -> str:
         """Which sensor is silent for longer than ``expected_update_rate``, or has sent nothing since a clearing."""

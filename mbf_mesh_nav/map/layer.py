@@ -137,6 +137,10 @@ class MeshLayer(map_layer.MapLayer):
         """Forget everything sensed."""
         return NOTHING_CHANGED
 
+    def clear_area(self, center: FloatArray, size: float, inside: bool) -> IntArray:
+        """Forget what was sensed in, or out of, a cube of edge ``size`` [m] around ``center`` (3,) [m]."""
+        return NOTHING_CHANGED
+
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:
     view = array.view()

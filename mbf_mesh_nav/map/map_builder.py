@@ -103,6 +103,9 @@ class MeshMapParameters(ParameterModel):
         unit="m",
         ge=0.0,
     )
+    max_turning_slope: float = parameter(
+        0.35, "Steeper ground is not turned on in a recovery.", unit="rad", gt=0.0, le=1.5, dynamic=False
+    )
     cache_dir: str = parameter(
         "", "Folder for computed layers, relative to the configuration; empty = no cache.", dynamic=False
     )
@@ -191,6 +194,7 @@ def build_mesh_map(
         mesh = densify(mesh, parameters.densify, file=file or "arrays")
     topology = build_topology(mesh.vertices, mesh.faces, mesh.vertex_source, mesh.face_source, mesh.input_to_vertex)
     mesh_map = MeshMap(topology, frame_id, report, parameters.inscribed_radius)
+    mesh_map.max_turning_slope = parameters.max_turning_slope
     if plan:
         graph = _compute_layers(mesh_map, plan, parameters.cache_dir)
         default = parameters.default_layer or parameters.layers[-1].name

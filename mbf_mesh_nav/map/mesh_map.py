@@ -7,13 +7,13 @@ call and works on that.
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerParameters, MeshLayer
@@ -21,12 +21,15 @@ from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
 from mbf_mesh_nav.map.snapshot import MeshSnapshot, SnapshotSeries
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
+from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE, UNKNOWN_RADIUS, forbidden_ahead, nearest_of, slope_at
 from mbf_mesh_nav.mesh.repair import MeshReport, checked_mesh
 from mbf_mesh_nav.mesh.topology import MeshTopology, build_topology
 
 if TYPE_CHECKING:
     import networkx
 
+FORBIDDEN_COST = 1.0
+"""Ground whose cost reaches this is not driven onto in a recovery."""
 REMEMBERED_CHANGES = 100
 """Number of changes of the default layer a planner may have missed and still repair its last result."""
 
@@ -48,9 +51,13 @@ class MeshMap(LayeredMap):
         Frame of all coordinates.
     inscribed_radius : float
         Radius [m] of the disc that stands for the robot when the server is asked where it fits.
+    max_turning_slope : float
+        Steeper ground [rad] is not turned on in a recovery.
     """
 
     layers: LayerGraph
+    inscribed_radius: float = 0.0
+    max_turning_slope: float = 0.35
 
     def __init__(
         self,
@@ -59,6 +66,7 @@ class MeshMap(LayeredMap):
         report: MeshReport | None = None,
         inscribed_radius: float = 0.0,
     ) -> None:
+        super().__init__()
         self.topology = topology
         self.frame_id = frame_id
         self.inscribed_radius = inscribed_radius
@@ -79,9 +87,7 @@ class MeshMap(LayeredMap):
         self.input_to_internal = topology.input_to_internal
         self.internal_to_input = topology.internal_to_input
         self._snapshots = SnapshotSeries(topology)
-        self._overridden: dict[str, tuple[LayerParameters, float]] = {}  # usual parameters, end of the override
         self._changes: dict[int, IntArray] = {}  # version -> vertices that differ from the version before
-        self._lock = threading.RLock()
         self.set_layers(LayerGraph(), None)
 
     @classmethod
@@ -221,24 +227,9 @@ class MeshMap(LayeredMap):
             raise ValueError(f"edge_cost_factor must be a finite number of at least 0, got {edge_cost_factor}")
         self.set_layers(self.layers, self.default_layer, edge_cost_factor)
 
-    def set_layer_parameters(self, name: str, parameters: LayerParameters, until: float = np.inf) -> None:
-        """Change the parameters of one layer at run time; everything that depends on them follows.
-
-        With a time ``until`` [s] the change is an override: ``update`` restores the usual parameters once it is over.
-        Raises as ``LayerGraph.set_parameters``; nothing has changed then.
-        """
-        with self._lock:
-            usual = self.usual_parameters(name)
-            self._publish(self.layers.set_parameters(name, parameters))
-            self._overridden.pop(name, None)
-            if until < np.inf:
-                self._overridden[name] = usual, until
-
-    def usual_parameters(self, name: str) -> LayerParameters:
-        """Parameters of a layer apart from a timed override."""
-        with self._lock:
-            usual: LayerParameters = self.layers[name].parameters
-            return self._overridden[name][0] if name in self._overridden else usual
+    def _replace_parameters(self, name: str, parameters: LayerParameters) -> None:
+        """Give a layer its parameters; everything that depends on them follows. Raises as ``LayerGraph``'s."""
+        self._publish(self.layers.set_parameters(name, parameters))
 
     def take_in(self, scan: RangeScan) -> None:
         """Hand a scan to the enabled layers that listen to its source; what reads them follows."""
@@ -249,16 +240,56 @@ class MeshMap(LayeredMap):
 
         self.apply(event)
 
-    def update(self, now: float) -> None:
+    def update(self, robot_pose: Pose | None, now: float) -> None:
         """Forget obstacles that are too old at ``now`` [s], end overrides of parameters that are over."""
-        with self._lock:
-            for name in [name for name, (_, until) in self._overridden.items() if until <= now]:
-                self.set_layer_parameters(name, self.usual_parameters(name))
+        self.end_overrides(now)
         self.apply(lambda layer: layer.expire(now) if layer.parameters.enabled else NOTHING_CHANGED)
 
-    def clear(self) -> None:
-        """Forget all sensed obstacles."""
-        self.apply(lambda layer: layer.clear())
+    def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
+        """Forget all sensed obstacles, or those in some layers, at once; return the names of the layers."""
+        chosen = self._sensing(layer_names)
+        self.apply(lambda layer: layer.clear() if layer.name in chosen else NOTHING_CHANGED)
+        return chosen
+
+    def clear_area(
+        self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
+    ) -> list[str]:
+        """Forget obstacles sensed inside, or outside, a cube of edge ``size`` [m] around a pose, as ``clear``."""
+        chosen, middle = self._sensing(layer_names), np.asarray(center.position)
+
+        def forget(layer: MeshLayer) -> IntArray:
+            return layer.clear_area(middle, size, inside) if layer.name in chosen else NOTHING_CHANGED
+
+        self.apply(forget)
+        return chosen
+
+    def _sensing(self, layer_names: Iterable[str] | None) -> list[str]:
+        """Names of the given layers, or of all that forget when they are cleared; KeyError if one is no layer."""
+        if layer_names is not None:
+            return [layer.name for layer in self.layers.chosen(layer_names)]
+        return [name for name, layer in self.layers.items() if type(layer).clear is not MeshLayer.clear]
+
+    # -------------------------------------------------------------------------------------------------- motion
+    def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
+        """Where the robot would come onto forbidden ground or past a border, or that it is too steep to turn."""
+        place = self.locate_one(pose.position, SURFACE_DISTANCE)
+        if place is None:
+            return f"the robot is more than {SURFACE_DISTANCE:g} m from the surface"
+        turns = command.speed == 0.0 and command.wz != 0.0
+        if turns and (slope := slope_at(self.topology, place)) > self.max_turning_slope:
+            return f"the ground slopes {slope:.2f} rad, turning is allowed up to {self.max_turning_slope:g} rad"
+        hardness = self.snapshot().hardness(FORBIDDEN_COST)
+        radius = self.inscribed_radius or UNKNOWN_RADIUS
+        return forbidden_ahead(self.topology, hardness, place, pose, command, duration, radius)
+
+    def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
+        """Offset [m] to the nearest lethal vertex of the robot's storey; None if none is ``within`` [m]."""
+        place = self.locate_one(pose.position, SURFACE_DISTANCE)
+        if place is None:
+            return None
+        snapshot = self.snapshot()
+        lethal = np.asarray(snapshot.lethal | np.isposinf(snapshot.costs))
+        return nearest_of(self.topology, place, pose, within, lethal)
 
     def stale_reason(self, now: float) -> str:
         """Why the map is not current at ``now`` [s]: a layer that raised, or a silent sensor; empty if it is."""

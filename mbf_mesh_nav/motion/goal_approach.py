@@ -6,27 +6,16 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.arithmetic import rotated_back
+from mbf_abstract.geometry.pursuit import in_robot_frame
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 _SAME_STOREY = 0.5  # [m]
-
-
-def in_robot_frame(pose: Pose, point: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Coordinates (3,) of a global point in the robot's frame: x ahead, y left, both in its tangent plane."""
-    return rotated_back(pose.rotation, point - np.asarray(pose.position))
-
-
-def arc_to(pose: Pose, point: NDArray[np.float64]) -> tuple[float, float]:
-    """Bearing [rad] of a point, and curvature [1/m] of the arc tangent to the robot's heading through it (left > 0)."""
-    x, y, _ = in_robot_frame(pose, point)
-    return math.atan2(y, x), 2.0 * float(y) / max(float(x * x + y * y), 1e-6)
 
 
 def heading_error(pose: Pose, other: Pose) -> float:

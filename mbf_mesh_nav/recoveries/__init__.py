@@ -1,1 +1,1 @@
-"""Recovery plugins for meshes."""
+"""Recovery behaviours that are a matter of the mesh; the others stand in ``mbf_abstract.maps.recoveries``."""

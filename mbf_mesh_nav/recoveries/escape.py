@@ -3,7 +3,7 @@
 For a robot that stands in an inflated or lethal area (a new obstacle, a pushed robot), where every planner answers
 BLOCKED_START. It crosses costly ground on purpose, so it is slow, short (``max_distance``) and measures distance on the
 surface, never across a gap or to another storey. Lethal ground it crosses only where the robot stands on it, and does
-not know what that really is: order it after ``mesh.clear`` and ``mesh.back_up``. Where something appears on its
+not know what that really is: order it after ``clear`` and ``back_up``. Where something appears on its
 way while it drives, or the end of the way is safe no more, it looks for another way and stops if there is none.
 """
 
@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.maps.guarded_motion import GuardedMotionParameters
+from mbf_abstract.geometry.pursuit import arc_to
+from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
@@ -25,8 +26,8 @@ from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors, propagate_
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.surface_point import nearest_corner
-from mbf_mesh_nav.motion.goal_approach import arc_to, clamp, ground_distance
-from mbf_mesh_nav.motion.guarded_motion import GuardedRecovery
+from mbf_mesh_nav.motion.goal_approach import clamp, ground_distance
+from mbf_mesh_nav.plugins import MeshRecovery
 from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, seeded_arrays, threshold_step
 
 
@@ -62,7 +63,7 @@ class EscapePath:
         return not (lethal[ahead].any() or blocked[self.vertices[-1]])
 
 
-class EscapeRecovery(GuardedRecovery):
+class EscapeRecovery(MeshRecovery, GuardedRecovery):
     """Drives to the nearest safe ground."""
 
     Parameters = EscapeParameters
@@ -94,6 +95,10 @@ class EscapeRecovery(GuardedRecovery):
             return self._drive(pose, way.tracker)
 
         return self.drive(request, velocity)
+
+    def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
+        """Nothing: it looks along its path itself, which leads over forbidden ground on purpose."""
+        return ""
 
     def _drive(self, pose: Pose, tracker: PathTracker) -> Twist | RecoveryResult:
         """Pursue the way, or say that its end is reached."""

@@ -60,7 +60,7 @@ class SurfacePlanner(MeshPlanner):
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
-        self._blocked_vertices = BlockedVertices(context.mesh_map)
+        self._blocked_vertices = BlockedVertices(context.navigation_map)
 
     @abstractmethod
     def find_leg(self, query: LegQuery) -> Leg | None:

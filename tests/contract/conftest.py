@@ -1,4 +1,4 @@
-"""One room as a costmap and one field as a mesh, with a wall that has a gap and a place that cannot be reached."""
+"""The same places as a costmap and as a mesh: walls where a test wants them, and layers that sensors fill."""
 
 from types import SimpleNamespace
 
@@ -10,11 +10,16 @@ from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.plugins import CostmapContext
+from mbf_mesh_nav.layers.inflation import InflationLayer
+from mbf_mesh_nav.layers.max_combination import MaxCombinationLayer
+from mbf_mesh_nav.layers.obstacle import ObstacleLayer
 from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.plugins import MeshContext
+
+RADIUS = 0.2  # m, of the robot
 
 
 def is_wall(x, y):
@@ -24,45 +29,107 @@ def is_wall(x, y):
     return wall | ((from_closet > 0.55) & (from_closet < 0.8))
 
 
-@pytest.fixture(scope="session")
-def costmap_site():
-    """A room of 8 m x 6 m with a robot of 0.2 m radius."""
+def costmap_of(lethal, **layers):
+    """A room of 8 m x 6 m; ``layers`` are blocks by the types that are their names."""
     x, y = np.meshgrid((np.arange(160) + 0.5) * 0.05, (np.arange(120) + 0.5) * 0.05)
-    cells = np.where(is_wall(x, y), 254, 0).astype(np.uint8)
+    cells = np.where(lethal(x, y), 254, 0).astype(np.uint8)
     cells[[0, -1], :] = cells[:, [0, -1]] = 254
-    layers = ({"name": "walls", "type": "static"}, {"name": "inflation", "type": "inflation"})
-    parameters = CostmapParameters(resolution=0.05, robot_radius=0.2, max_age=0.0, layers=layers)
-
-    def make_map():
-        costmap = build_layered_costmap(parameters, static_map=Costmap(cells.copy(), 0.05))
-        costmap.update(Pose.planar(1.0, 1.0), 0.0)
-        return costmap
-
-    def make_context(base):
-        costmap = make_map()
-        return CostmapContext(**vars(base), global_costmap=costmap, local_costmap=costmap, costmap=costmap)
-
-    return SimpleNamespace(make_context=make_context, watched=[])
+    entries = [{"name": name, "type": {"walls": "static"}.get(name, name)} for name in ("walls", *layers)]
+    parameters = CostmapParameters(resolution=0.05, robot_radius=RADIUS, max_age=0.0, layers=tuple(entries))
+    costmap = build_layered_costmap(parameters, layers, static_map=Costmap(cells, 0.05))
+    costmap.update(Pose.planar(1.0, 1.0), 0.0)
+    return costmap
 
 
 class PaintedLayer(MeshLayer):
     """Lethal where the wall is."""
 
+    lethal_at = staticmethod(is_wall)
+
     def compute(self):
-        lethal = is_wall(*self.topology.vertices[:, :2].T)
+        lethal = self.lethal_at(*self.topology.vertices[:, :2].T)
         return np.where(lethal, np.inf, 0.0).astype(np.float32), lethal
+
+
+def mesh_of(lethal, **layers):
+    """The same walls painted on a flat field of triangles of 0.1 m; ``obstacle`` and ``inflation`` come on top."""
+    mesh_map = MeshMap.from_heights(np.zeros((61, 81)), 0.1, 0.1)
+    mesh_map.inscribed_radius = RADIUS
+    made = []
+
+    def add(layer_class, name, block, *inputs):
+        parameters = layer_class.Parameters.model_validate(block)
+        made.append(layer_class(LayerContext(name, mesh_map.topology, mesh_map.locator, parameters, inputs)))
+        if name == "walls":
+            made[-1].lethal_at = lethal
+        made[-1].recompute()
+        return made[-1]
+
+    shown = add(PaintedLayer, "walls", {})
+    if "obstacle" in layers:
+        shown = add(MaxCombinationLayer, "both", {}, shown, add(ObstacleLayer, "obstacle", layers["obstacle"]))
+    if "inflation" in layers:
+        shown = add(InflationLayer, "inflation", {"inscribed_radius": RADIUS, **layers["inflation"]}, shown)
+    mesh_map.set_layers(LayerGraph(made), shown.name, 0.0)
+    return mesh_map
+
+
+@pytest.fixture(scope="session")
+def costmap_site():
+    """A room of 8 m x 6 m with a robot of 0.2 m radius."""
+
+    def make_context(base):
+        return CostmapContext(**vars(base), navigation_map=costmap_of(is_wall, inflation={}))
+
+    return SimpleNamespace(make_context=make_context, watched=[])
 
 
 @pytest.fixture(scope="session")
 def mesh_site():
     """The same walls painted on a flat field of triangles of 0.1 m."""
-    mesh_map = MeshMap.from_heights(np.zeros((61, 81)), 0.1, 0.1)
-    layer = PaintedLayer(LayerContext("walls", mesh_map.topology, mesh_map.locator, PaintedLayer.Parameters()))
-    layer.recompute()
-    mesh_map.set_layers(LayerGraph([layer]), "walls", 0.0)
+    mesh_map = mesh_of(is_wall)
     snapshot = mesh_map.snapshot()
     watched = [snapshot.costs, snapshot.lethal, snapshot.edge_weights, mesh_map.vertices]
-    return SimpleNamespace(make_context=lambda base: MeshContext(**vars(base), mesh_map=mesh_map), watched=watched)
+
+    def make_context(base):
+        return MeshContext(**vars(base), navigation_map=mesh_map)
+
+    return SimpleNamespace(make_context=make_context, watched=watched)
+
+
+@pytest.fixture(params=["costmap", "mesh"])
+def world(request):
+    """One map after the other: ``world.map_of(lethal)``, ``world.sensing(rate)``, ``world.see(map, x, y)``."""
+    costmap = request.param == "costmap"
+    make = costmap_of if costmap else mesh_of
+
+    def map_of(lethal):
+        return make(lethal)
+
+    def sensing(rate=0.0):
+        """A map without walls whose layer ``obstacle`` listens to the sensor ``scan``, inflated to 0.8 m."""
+        source = {"expected_update_rate": rate}
+        block = {"sources": {"scan": source}} if costmap else {"sources": ["scan"], **source}
+        return make(lambda x, y: x < -1.0, obstacle=block, inflation={"inflation_radius": 0.8})
+
+    def see(navigation_map, *places, stamp=0.0):
+        """Let the sensor see something at places (x, y) [m], and the map take it in."""
+        navigation_map.insert_points("scan", [(x, y, 0.3) for x, y in places], (3.0, 3.0, 0.3), stamp)
+        navigation_map.update(Pose.planar(3.0, 3.0), stamp)
+
+    def cost_at(navigation_map, x, y):
+        """Cost at a place, inf where it is lethal."""
+        if costmap:
+            cost = navigation_map.snapshot().cost_at(x, y)
+            return np.inf if cost == 254 else float(cost)
+        place, snapshot = navigation_map.locate_one((x, y, 0.0)), navigation_map.snapshot()
+        vertex = navigation_map.faces[place.face][np.argmax(place.barycentric)]
+        return np.inf if snapshot.lethal[vertex] else float(snapshot.costs[vertex])
+
+    context = CostmapContext if costmap else MeshContext
+    return SimpleNamespace(
+        backend=request.param, map_of=map_of, sensing=sensing, see=see, cost_at=cost_at, context=context
+    )
 
 
 PLUGINS = """

@@ -6,7 +6,6 @@ from mbf_abstract.testing.conformance import SITUATIONS, check_map_backend
 
 KNOWN = {
     ("mesh", "a_path_is_as_bad_as_its_worst_pose"): "of a path without poses it looks at pose 0",
-    ("mesh", "back_up_stops_before_an_obstacle"): "a recovery that is stopped on its way is a success",
 }
 """Deviations that are to be mended, and are expected until then."""
 

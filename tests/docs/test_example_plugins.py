@@ -82,7 +82,7 @@ def on_mesh():
     vertices, faces = ground()
     parameters = MeshMapParameters(layers=({"name": "water", "type": "flooded_ground:FloodedGround"},))
     mesh_map = build_mesh_map(parameters, vertices=vertices, faces=faces)
-    return lambda base: MeshContext(**vars(base), mesh_map=mesh_map)
+    return lambda base: MeshContext(**vars(base), navigation_map=mesh_map)
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def on_costmap():
     parameters = CostmapParameters(max_age=0.0, layers=({"name": "walls", "type": "static"},))
     room = build_layered_costmap(parameters, static_map=walls)
     room.update(None, 0.0)
-    return lambda base: CostmapContext(**vars(base), global_costmap=room, local_costmap=room, costmap=room)
+    return lambda base: CostmapContext(**vars(base), navigation_map=room)
 
 
 @pytest.fixture
@@ -130,7 +130,7 @@ def test_the_networkx_planner_drives_on_a_densified_map_and_refuses_goals_off_it
     mesh_map = build_mesh_map(coarse, vertices=square, faces=np.array([[0, 1, 2], [0, 2, 3]]))
     planner_class = load("networkx_planner:NetworkxPlanner")
     base = PluginContext("graph", planner_class.Parameters(), SimClock(), np.random.default_rng(0), robot=None)
-    planner = planner_class(MeshContext(**vars(base), mesh_map=mesh_map))
+    planner = planner_class(MeshContext(**vars(base), navigation_map=mesh_map))
 
     result = planner.make_plan(PlanRequest(Pose.planar(1.0, 1.0), Pose.planar(6.0, 5.0)))
 

@@ -68,7 +68,7 @@ def plan_on_mesh(name, goal, scale=1.0, offset=(0.0, 0.0, 0.0)):
         return Pose.planar(x * scale + offset[0], y * scale + offset[1], 0.3, z * scale + offset[2])
 
     def make_context(base):
-        return MeshContext(**vars(base), mesh_map=mesh_map)
+        return MeshContext(**vars(base), navigation_map=mesh_map)
 
     with rig(planner_class, make_context, in_unit(planner_class.Parameters, scale), pose(*START)) as made:
         result = made.plugin.make_plan(PlanRequest(pose(*START), pose(*goal)))
@@ -114,7 +114,7 @@ def plan_on_costmap(name, cells, origin):
     costmap.update(None, 0.0)
 
     def make_context(base):
-        return CostmapContext(**vars(base), global_costmap=costmap, local_costmap=costmap, costmap=costmap)
+        return CostmapContext(**vars(base), navigation_map=costmap)
 
     start, goal = (Pose.planar(x + origin[0], y + origin[1], 0.7) for x, y in ((0.62, 0.62), (4.37, 4.12)))
     with rig(planner_class, make_context, None, start) as made:

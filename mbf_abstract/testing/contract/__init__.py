@@ -1,7 +1,8 @@
 """The plugin contract as checks that any plugin author can call from their own tests.
 
 >>> def test_my_planner_keeps_the_contract():
-...     check_planner(MyPlanner, [(start, goal)], make_context=lambda base: MeshContext(**vars(base), mesh_map=mesh))
+...     on_my_map = lambda base: MapContext(**vars(base), navigation_map=my_map)
+...     check_planner(MyPlanner, [(start, goal)], make_context=on_my_map)
 
 Each check runs the plugin through many situations and raises one ``ContractBroken`` with everything it found: results
 that are not legal, runs that differ although the seed is the same, a cancel that is ignored, inputs that were changed,

@@ -216,7 +216,7 @@ def test_an_observation_from_the_future_is_not_kept_until_its_time(build, seeing
 
 
 @pytest.mark.parametrize("layer", ["obstacle", "voxel", "range_sensor"])
-@pytest.mark.parametrize("clear", [lambda m: m.clear(), lambda m: m.clear_area(5, 5, 4)], ids=["all", "area"])
+@pytest.mark.parametrize("clear", [lambda m: m.clear(), lambda m: m.clear_area(HERE, 4)], ids=["all", "area"])
 def test_a_cleared_map_is_not_current_before_it_sees_again(build, layer, clear):
     costmap = build(layer, **{layer: {"sources": {"laser": {}}}}, width=10, height=10)
 
@@ -304,7 +304,7 @@ def test_voxels_move_with_the_window_and_are_cleared_by_area(build, seeing):
     costmap.insert_points("laser", np.zeros((0, 3)), (2.0, 0.0, 0.5), 1.0)
     costmap.update(Pose.planar(2.0, 0.0), 1.0)
     assert costmap.snapshot().cost_at(2.5, 1.5) == LETHAL
-    costmap.clear_area(2.5, 1.5, 6.0, inside=True)
+    costmap.clear_area(Pose.planar(2.5, 1.5), 6.0, inside=True)
     costmap.update(Pose.planar(2.0, 0.0), 2.0)
     assert lethal_cells(costmap) == set()
 
@@ -342,7 +342,7 @@ def test_clearing_an_area_forgets_what_was_seen_but_not_the_floor_plan(build, se
     costmap.insert_points("laser", [(1.5, 5.5, 0.0)], (0.5, 5.5, 0.0), 0.0)
     costmap.update(None, 0.0)
     assert lethal_cells(costmap) == walls | {(1, 5)}
-    assert costmap.clear_area(5.0 if inside else 99.0, 5.0, 30.0, inside=inside) == ["obstacle"]
+    assert costmap.clear_area(Pose.planar(5.0 if inside else 99.0, 5.0), 30.0, inside=inside) == ["obstacle"]
     costmap.update(None, 0.1)
     assert walls and lethal_cells(costmap) == walls
 
@@ -353,7 +353,7 @@ def test_clearing_everything_returns_to_the_static_map(build, seeing):
     walls = lethal_cells(costmap)
     costmap.insert_points("laser", [(1.5, 5.5, 0.0)], (0.5, 5.5, 0.0), 0.0)
     costmap.update(None, 0.0)
-    costmap.clear_area(5.0, 5.0, 30.0, layer_names=["static", "obstacle"], inside=True)
+    costmap.clear_area(Pose.planar(5.0, 5.0), 30.0, layer_names=["static", "obstacle"], inside=True)
     costmap.update(None, 0.1)
     assert lethal_cells(costmap) == set(), "a static layer that is named loses the area"
     assert costmap.clear() == ["static", "obstacle"]

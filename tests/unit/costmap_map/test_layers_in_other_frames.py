@@ -103,7 +103,7 @@ def test_clearing_returns_to_the_placed_map():
     costmap, _ = place(odom=odom_at(0.3, -0.2, 0.7))
     costmap.update(None, 0.0)
     before = costmap.snapshot().cells
-    costmap.clear_area(2.0, 1.0, 2.0, layer_names=["walls"], inside=True)
+    costmap.clear_area(Pose.planar(2.0, 1.0), 2.0, layer_names=["walls"], inside=True)
     costmap.update(None, 0.1)
     assert not np.array_equal(costmap.snapshot().cells, before)
     costmap.clear()

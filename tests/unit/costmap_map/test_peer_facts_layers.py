@@ -247,7 +247,7 @@ def test_clearing_outside_a_window_around_the_robot(build, seeing, layers, size,
     seeing["sources"]["laser"]["clearing"] = False
     costmap = build("static", "obstacle", obstacle=seeing)
     see(costmap, (5.0, 0.0), (0.0, 5.0))
-    costmap.clear_area(0.0, 0.0, size, layer_names=layers)
+    costmap.clear_area(Pose.planar(0.0, 0.0), size, layers, inside=False)
     costmap.update(None, 0.1)
     assert count(costmap, LETHAL) == lethal
 

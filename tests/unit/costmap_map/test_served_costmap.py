@@ -77,9 +77,12 @@ def test_all_plugins_share_the_two_maps_and_work_on_the_one_they_are_bound_to(st
     navigator, _ = start()
     server = navigator.server
     plugins = {plugin.name: plugin.instance for kind in PluginKind for plugin in server.plugins.all_of(kind)}
-    assert all(plugin.global_costmap is server.global_costmap for plugin in plugins.values())
-    assert all(plugin.local_costmap is server.local_costmap for plugin in plugins.values())
-    bound = {name: "global" if plugin.costmap is server.global_costmap else "local" for name, plugin in plugins.items()}
+    both = {"local": server.local_costmap, "global": server.global_costmap}
+    assert all(plugin.maps == both for plugin in plugins.values())
+    bound = {
+        name: "global" if plugin.navigation_map is server.global_costmap else "local"
+        for name, plugin in plugins.items()
+    }
     assert bound == {"astar": "global", "pursuit": "local", "far_sighted": "global", "back_up": "local"}
 
 

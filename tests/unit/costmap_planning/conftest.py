@@ -35,7 +35,7 @@ class FixedCostmap(LayeredCostmap):
         self.cleared.append("all")
         return []
 
-    def clear_area(self, center_x, center_y, size, *, layer_names=None, inside=False):
+    def clear_area(self, center, size, layer_names=None, *, inside=True):
         self.cleared.append(f"area {size:g}")
         return []
 
@@ -63,6 +63,9 @@ class StandingRobot:
     def velocity(self) -> Twist:
         return self.velocity_now
 
+    def recent_track(self):
+        return np.zeros((0, 3))
+
 
 @pytest.fixture
 def make_plugin() -> Callable[..., Any]:
@@ -89,8 +92,7 @@ def make_plugin() -> Callable[..., Any]:
             np.random.default_rng(seed),
             StandingRobot(),
             costmap,
-            costmap,
-            costmap,
+            maps={"local": costmap, "global": costmap},
             transforms=transforms or TransformBuffer(),
             min_turning_radius=turning_radius,
         )

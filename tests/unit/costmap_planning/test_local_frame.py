@@ -7,6 +7,9 @@ import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist, quaternion_from_yaw
 from mbf_abstract.geometry.transform_buffer import Transform, TransformBuffer
+from mbf_abstract.maps.recoveries.back_up import BackUpRecovery
+from mbf_abstract.maps.recoveries.clear import ClearRecovery
+from mbf_abstract.maps.recoveries.move_away import MoveAwayRecovery
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import ControlRequest, RecoveryRequest
@@ -18,10 +21,7 @@ from mbf_costmap_nav.controllers.mppi import MppiController
 from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePursuitController
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
 from mbf_costmap_nav.grid.costmap import Costmap
-from mbf_costmap_nav.recoveries.back_up import BackUpRecovery
-from mbf_costmap_nav.recoveries.clear import ClearRecovery
 from mbf_costmap_nav.recoveries.escape import EscapeRecovery
-from mbf_costmap_nav.recoveries.move_away import MoveAwayRecovery
 
 T_map_odom = Transform((2.0, 1.0, 0.0), quaternion_from_yaw(math.pi / 2), "map", "odom", static=True)
 CONTROLLERS = [RegulatedPurePursuitController, DwaController, MppiController, RotationShimController]

@@ -5,19 +5,19 @@ import math
 import numpy as np
 import pytest
 
+from mbf_abstract.maps.recoveries.back_up import BackUpRecovery
+from mbf_abstract.maps.recoveries.clear import ClearRecovery
+from mbf_abstract.maps.recoveries.drive_on_heading import DriveOnHeadingRecovery
+from mbf_abstract.maps.recoveries.move_away import MoveAwayRecovery
+from mbf_abstract.maps.recoveries.relax import RelaxRecovery
+from mbf_abstract.maps.recoveries.rotate import RotateRecovery
 from mbf_abstract.maps.recoveries.wait import WaitRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
-from mbf_costmap_nav.recoveries.back_up import BackUpRecovery
-from mbf_costmap_nav.recoveries.clear import ClearRecovery
-from mbf_costmap_nav.recoveries.drive_on_heading import DriveOnHeadingRecovery
 from mbf_costmap_nav.recoveries.escape import EscapeRecovery
-from mbf_costmap_nav.recoveries.move_away import MoveAwayRecovery
-from mbf_costmap_nav.recoveries.relax import RelaxRecovery
-from mbf_costmap_nav.recoveries.rotate import RotateRecovery
 
 MOVING = [RotateRecovery, BackUpRecovery, DriveOnHeadingRecovery, EscapeRecovery, MoveAwayRecovery]
 
@@ -132,7 +132,7 @@ def test_cancel_while_moving_stops_the_robot(run, recovery):
 def test_no_recovery_drives_into_what_stands_in_its_way(run, closed_loop, recovery, boxes):
     world = around(*boxes)
     _, robot, plugin = run(recovery, world)
-    touched = FootprintCheck(plugin.costmap.footprint, world.resolution).lethal_count
+    touched = FootprintCheck(plugin.navigation_map.footprint, world.resolution).lethal_count
     deepest = max(touched(world, *state) for state in robot.trace)
     assert deepest <= touched(world, 0.0, 0.0, 0.0)
 
@@ -152,12 +152,12 @@ def test_wait_takes_its_time(run):
 
 def test_clear_resets_both_maps(run):
     result, _, plugin = run(ClearRecovery)
-    assert result.success and plugin.costmap.cleared == ["all", "all"]
+    assert result.success and plugin.navigation_map.cleared == ["all", "all"]
 
 
 def test_clear_around_the_robot_on_one_map(run):
     result, _, plugin = run(ClearRecovery, costmaps="local", radius=1.5)
-    assert result.success and plugin.costmap.cleared == ["area 3"]
+    assert result.success and plugin.navigation_map.cleared == ["area 3"]
 
 
 def test_drive_on_heading_goes_the_distance_along_the_heading(run):

@@ -134,10 +134,10 @@ def test_hits_are_kept_for_the_decay_time():
     mesh.insert_points("cloud", post(3.0, 3.0), SENSOR, 2.0)
     assert len(np.unique(np.round(mesh.vertices[mesh.layers["seen"].lethal][:, 0]))) == 2
 
-    mesh.update(3.5)
+    mesh.update(None, 3.5)
 
     assert (mesh.vertices[mesh.layers["seen"].lethal][:, 0] > 2.0).all()
-    mesh.update(4.5)
+    mesh.update(None, 4.5)
     assert not mesh.snapshot().lethal.any()
 
 
@@ -305,9 +305,9 @@ def test_a_late_cloud_of_the_same_sensor_does_not_make_a_hit_older_than_it_is():
     mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 10.0)
     mesh.insert_points("cloud", post(2.0, 2.0), SENSOR, 9.5)
 
-    mesh.update(10.9)
+    mesh.update(None, 10.9)
     assert mesh.snapshot().lethal.any()
-    mesh.update(11.1)
+    mesh.update(None, 11.1)
     assert not mesh.snapshot().lethal.any()
 
 

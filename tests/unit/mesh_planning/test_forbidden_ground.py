@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from mbf_abstract.geometry import AckermannCommand, Path, Pose, Twist
 from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_abstract.maps.recoveries.back_up import BackUpRecovery
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest, RecoveryRequest
 from mbf_abstract.time.cancel import CancelToken
@@ -23,7 +24,6 @@ from mbf_mesh_nav.planners.cvp import CVPPlanner
 from mbf_mesh_nav.planners.dijkstra import DijkstraPlanner
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
 from mbf_mesh_nav.planners.repairing import RepairingPlanner
-from mbf_mesh_nav.recoveries.back_up import BackUpRecovery
 from mbf_mesh_nav.recoveries.escape import EscapeRecovery
 
 PLANNERS = (DijkstraPlanner, AStarPlanner, CVPPlanner, AnyAnglePlanner, HeadingAStarPlanner, RepairingPlanner)
@@ -104,10 +104,11 @@ def test_a_robot_in_the_ring_may_drive_away_from_the_obstacle(make_plugin, walle
 
 def test_backing_up_ends_before_an_obstacle_behind_the_forbidden_ring(make_plugin, walled):
     robot = Robot(WALL_BACK + 0.2, 3.0)
-    recovery = make_plugin(BackUpRecovery, walled, robot=robot, clearance=0.05)
+    walled.inscribed_radius = 0.05
+    recovery = make_plugin(BackUpRecovery, walled, robot=robot)
     result = recovery.run_behavior(RecoveryRequest(robot, CancelToken()))
     assert not robot.was_in_the_block()
-    assert "blocked" in result.message
+    assert "an obstacle is in the way" in result.message
 
 
 def test_escape_does_not_cross_a_lethal_wall(make_plugin, paint):

@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.maps.recoveries.wait import WaitRecovery
-from mbf_abstract.maps.relaxation import NO_SLACK, Slack
+from mbf_abstract.geometry import Twist
+from mbf_abstract.maps.recoveries.back_up import BackUpRecovery
+from mbf_abstract.maps.recoveries.clear import ClearRecovery
+from mbf_abstract.maps.recoveries.relax import RelaxRecovery
+from mbf_abstract.maps.recoveries.rotate import RotateRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
 from mbf_abstract.time.cancel import CancelToken
@@ -16,11 +18,7 @@ from mbf_mesh_nav.layers.inflation import InflationLayer
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerContext
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.recoveries.back_up import BackUpRecovery
-from mbf_mesh_nav.recoveries.clear import ClearRecovery
 from mbf_mesh_nav.recoveries.escape import EscapeRecovery
-from mbf_mesh_nav.recoveries.relax import RelaxRecovery
-from mbf_mesh_nav.recoveries.rotate import RotateRecovery
 
 
 class SimulatedMotion:
@@ -85,9 +83,6 @@ def run(make_plugin, pose_on):
     return run_it
 
 
-MOVING = [BackUpRecovery, RotateRecovery, WaitRecovery]
-
-
 def test_backing_up_drives_the_distance_straight_back(run, plain):
     result, motion = run(BackUpRecovery, plain(), distance=0.6)
     assert result.success, result.message
@@ -116,36 +111,28 @@ def test_backing_up_stops_before_a_border_and_before_lethal_ground(run, plain, p
     mesh_map = plain()
     if ground == "lethal":
         paint(mesh_map, lambda v: np.where(v[:, 0] < 2.05, np.inf, 0.0))
-    start = 0.7 if ground == "border" else 2.9
-    result, motion = run(BackUpRecovery, mesh_map, (start, 3.0, 0.0), distance=2.0, clearance=0.3)
-    assert result.success and "blocked" in result.message
+    start, reason = (0.9, "the surface ends") if ground == "border" else (2.9, "an obstacle is in the way")
+    result, motion = run(BackUpRecovery, mesh_map, (start, 3.0, 0.0), distance=2.0)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE and reason in result.message
     assert 0.3 < start - motion.current.x < 0.75
-    result, motion = run(BackUpRecovery, mesh_map, tuple(motion.current.position), distance=2.0, clearance=0.3)
-    assert result.outcome == RecoveryOutcome.IMPASSABLE
 
 
 def test_rotating_turns_once_around_on_level_ground_but_not_on_a_slope(run, plain, pose_on):
     result, motion = run(RotateRecovery, plain())
     assert result.success
-    assert motion.clock.time == pytest.approx(2 * math.pi / 0.6, abs=0.2)
+    assert motion.clock.time == pytest.approx(2 * math.pi / 0.8, abs=0.5)
     ramp = MeshMap.from_heights(np.tile(0.6 * np.arange(31) * 0.2, (31, 1)), 0.2, 0.2)
     result, motion = run(RotateRecovery, ramp, (3.0, 3.0, 1.8), (0, 1, 0))
     assert result.outcome == RecoveryOutcome.IMPASSABLE and "slopes 0.54" in result.message
     assert all(command == Twist() for command in motion.commands)
 
 
-def test_waiting_lasts_as_long_as_told(run, plain):
-    result, motion = run(WaitRecovery, plain(), duration=2.0)
-    assert result.success and motion.clock.time == pytest.approx(2.0, abs=0.06)
-
-
 def test_clearing_layers_frees_what_was_sensed(run, plain, paint, monkeypatch):
     mesh_map = paint(plain(), lambda v: np.where(v[:, 0] > 5, np.inf, 0.0))
     layer = mesh_map.layers["painted"]
     monkeypatch.setattr(layer, "clear", lambda: layer.replace(np.zeros_like(layer.costs), np.zeros_like(layer.lethal)))
-    lethal = int(mesh_map.snapshot().lethal.sum())
-    result, _ = run(ClearRecovery, mesh_map)
-    assert result.success and f"{lethal} vertices" in result.message
+    result, _ = run(ClearRecovery, mesh_map, layers=("painted",))
+    assert result.success and result.message == "cleared painted"
     assert not mesh_map.snapshot().lethal.any()
     assert layer.update_from_inputs(NOTHING_CHANGED) is NOTHING_CHANGED
 
@@ -160,29 +147,13 @@ def test_relaxed_inflation_comes_back_by_itself(run, plain, paint, make_plugin):
     usual = mesh_map.snapshot().costs
     for _ in range(2):  # the second run relaxes the usual radii again, not the relaxed ones
         result, _ = run(RelaxRecovery, mesh_map, inflation_factor=0.5, duration=20.0)
-        assert result.success and "inflation_radius 0.5 m" in result.message
+        assert result.success and "inflation at 0.5 m" in result.message
     relaxed = mesh_map.snapshot().costs
     assert np.count_nonzero(relaxed) < np.count_nonzero(usual)
-    mesh_map.update(19.9)
+    mesh_map.update(None, 19.9)
     np.testing.assert_array_equal(mesh_map.snapshot().costs, relaxed)
-    mesh_map.update(20.0)
+    mesh_map.update(None, 20.0)
     np.testing.assert_array_equal(mesh_map.snapshot().costs, usual)
-
-
-def test_relaxing_grants_slack_to_planning_and_arrival_until_its_end(make_plugin, plain):
-    recovery = make_plugin(RelaxRecovery, plain(), layer="", planner_tolerance=0.4, angle_tolerance=0.5, duration=20.0)
-    result = recovery.run_behavior(RecoveryRequest(motion=None))
-    assert result.success and "path ends within 0.4 m" in result.message
-    assert recovery.relaxation.slack(19.9) == Slack(plan_distance=0.4, arrival_distance=0.2, arrival_angle=0.5)
-    assert recovery.relaxation.slack(20.0) == NO_SLACK
-
-
-def test_relaxing_a_layer_that_is_not_there_names_those_that_are(run, plain, paint):
-    mesh_map = paint(plain(), lambda v: np.zeros(len(v)))
-    result, _ = run(RelaxRecovery, mesh_map)
-    assert result.outcome == RecoveryOutcome.FAILURE and "its layers are: painted" in result.message
-    result, _ = run(RelaxRecovery, mesh_map, layer="painted")
-    assert result.outcome == RecoveryOutcome.FAILURE and "no radius" in result.message
 
 
 def test_escaping_leaves_a_lethal_disc_by_the_shortest_way(run, plain, paint):
@@ -257,32 +228,3 @@ def test_a_robot_whose_frame_is_above_the_ground_ends_its_escape_at_safe_ground(
     result, motion = run(EscapeRecovery, mesh_map, (2.6, 3.0, 0.0), motion_class=HighFrame)
     assert result.success, result.message
     assert 1.9 < motion.current.x < 2.25
-
-
-@pytest.mark.parametrize("recovery_class", MOVING)
-def test_cancel_a_closed_gate_and_an_end_signal_stop_the_robot(run, plain, recovery_class):
-    token = CancelToken()
-    token.cancel("enough")
-    assert run(recovery_class, plain(), token=token)[0].outcome == RecoveryOutcome.CANCELED
-    assert run(recovery_class, plain(), motion={"gate_open": False})[0].outcome == RecoveryOutcome.STOPPED
-    assert run(recovery_class, plain(), motion={"stop_after": 1})[0].outcome == RecoveryOutcome.STOPPED
-
-
-def test_a_robot_that_does_not_move_runs_into_the_time_limit(make_plugin, plain):
-    class StuckMotion:
-        commands = ()
-
-        def pose(self):
-            return Pose.planar(3.0, 3.0)
-
-        def send(self, command):
-            self.commands += (command,)
-            return True
-
-        def sleep(self, seconds):
-            recovery.clock.time += seconds
-            return True
-
-    recovery, motion = make_plugin(BackUpRecovery, plain(), robot=TrackedRobot(), time_limit=2.0), StuckMotion()
-    result = recovery.run_behavior(RecoveryRequest(motion))
-    assert result.outcome == RecoveryOutcome.PAT_EXCEEDED and motion.commands[-1] == Twist()

@@ -10,13 +10,13 @@ import math
 from typing import ClassVar
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_costmap_nav.control.guarded_motion import GuardedMotionParameters, GuardedRecovery
 
 
 class DriveOnHeadingParameters(GuardedMotionParameters):
-    """Parameters of ``costmap.drive_on_heading``."""
+    """Parameters of ``drive_on_heading``."""
 
     distance: float = parameter(0.5, "How far to drive; negative = backward.", unit="m", ge=-20.0, le=20.0)
     speed: float = parameter(0.15, "How fast.", unit="m/s", gt=0.0, le=2.0)
@@ -30,13 +30,12 @@ class DriveOnHeadingRecovery(GuardedRecovery):
 
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
         """Drive until the distance is covered."""
-        start = request.motion.pose()
+        start, distance = request.motion.pose(), abs(self.parameters.distance)
         command = Twist.planar(vx=math.copysign(self.parameters.speed, self.parameters.distance))
 
         def finished(pose: Pose) -> bool:
-            return start.distance_to(pose) >= abs(self.parameters.distance)
+            return start.distance_to(pose) >= distance
 
         result = self.drive(request, lambda _: command, finished)
         covered = start.distance_to(request.motion.pose())
-        text = f"{result.message or 'done'}, {covered:.2f} of {abs(self.parameters.distance):.2f} m"
-        return RecoveryResult(result.outcome, text)
+        return RecoveryResult(result.outcome, f"{result.message or 'done'}, {covered:.2f} of {distance:.2f} m")

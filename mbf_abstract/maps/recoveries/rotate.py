@@ -1,7 +1,8 @@
 """Turn in place, to let the sensors see all around.
 
-When to use: after clearing, for a robot with a narrow field of view that can turn in place. When not: car-like robots
-and long ones in narrow places (it ends with IMPASSABLE before the footprint would sweep an obstacle).
+When to use: after clearing, for a robot with a narrow field of view that can turn in place. When not: car-like robots,
+long ones in narrow places (it ends with IMPASSABLE before the footprint would sweep an obstacle), and slopes on which
+turning could tip or slide the robot (IMPASSABLE above ``max_turning_slope`` of the mesh map).
 
 The angle is summed up from the measured poses, so turns beyond one revolution work.
 """
@@ -12,19 +13,20 @@ import math
 from typing import ClassVar
 
 from mbf_abstract.geometry import Pose, Twist, normalize_angle
+from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
-from mbf_costmap_nav.control.guarded_motion import GuardedMotionParameters, GuardedRecovery
 
 
 class RotateParameters(GuardedMotionParameters):
-    """Parameters of ``costmap.rotate``."""
+    """Parameters of ``rotate``."""
 
     angle: float = parameter(2.0 * math.pi, "Angle to turn, left positive.", unit="rad", ge=-31.5, le=31.5)
-    speed: float = parameter(0.8, "Largest yaw rate.", unit="rad/s", gt=0.0, le=10.0)
-    min_speed: float = parameter(0.2, "Least yaw rate while braking.", unit="rad/s", gt=0.0, le=10.0)
-    acceleration: float = parameter(1.6, "Braking of the turn.", unit="rad/s^2", gt=0.0, le=100.0)
+    yaw_rate: float = parameter(0.8, "Largest yaw rate.", unit="rad/s", gt=0.0, le=10.0)
+    min_yaw_rate: float = parameter(0.2, "Least yaw rate while braking.", unit="rad/s", gt=0.0, le=10.0)
+    acc_lim_theta: float = parameter(1.6, "Braking of the turn.", unit="rad/s^2", gt=0.0, le=100.0)
     tolerance: float = parameter(0.05, "Allowed rest of the angle.", unit="rad", gt=0.0, le=1.0)
+    time_limit: float = parameter(30.0, "Give up after this time.", unit="s", gt=0.0, le=600.0)
 
 
 class RotateRecovery(GuardedRecovery):
@@ -46,8 +48,8 @@ class RotateRecovery(GuardedRecovery):
             return abs(p.angle - turned) <= p.tolerance or abs(turned) >= abs(p.angle)
 
         def velocity(_: Pose) -> Twist:
-            braking = math.sqrt(2.0 * p.acceleration * abs(p.angle - turned))
-            return Twist.planar(wz=math.copysign(max(min(p.speed, braking), p.min_speed), p.angle))
+            braking = math.sqrt(2.0 * p.acc_lim_theta * abs(p.angle - turned))
+            return Twist.planar(wz=math.copysign(max(min(p.yaw_rate, braking), p.min_yaw_rate), p.angle))
 
         result = self.drive(request, velocity, finished)
         return RecoveryResult(result.outcome, f"{result.message or 'done'}, turned {turned:.2f} of {p.angle:.2f} rad")

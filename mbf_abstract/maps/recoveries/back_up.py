@@ -1,0 +1,71 @@
+"""Drive back the way the robot came, over ground that was free a moment ago: the simplest way out of a dead end.
+
+Follows the driven track by pure pursuit in reverse; where the track ends, is unknown or does not lie behind the robot
+(it turned on the spot since) it backs up straight. Ends (IMPASSABLE) before what the robot would touch behind it.
+
+When to use: the robot stands too close to something in front to turn. When not: it is hemmed in;
+what came up behind it unseen is not in the map.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.geometry.pursuit import arc_to, in_robot_frame
+from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+
+LOOKAHEAD = 0.3
+"""Distance [m] to the point of the track that is steered to."""
+TRACK_GAP = 0.5
+"""A track whose newest point is farther than this [m] from the robot is not the way it came."""
+
+
+class BackUpParameters(GuardedMotionParameters):
+    """Parameters of ``back_up``."""
+
+    distance: float = parameter(0.5, "How far to back up.", unit="m", gt=0.0, le=10.0)
+    speed: float = parameter(0.2, "Backward speed.", unit="m/s", gt=0.0, le=2.0)
+    yaw_rate: float = parameter(0.6, "Yaw rate limit.", unit="rad/s", gt=0.0, le=3.0)
+
+
+class BackUpRecovery(GuardedRecovery):
+    """Backs up along the driven track."""
+
+    Parameters: ClassVar[type[PluginParameters]] = BackUpParameters
+    parameters: BackUpParameters
+
+    def recover(self, request: RecoveryRequest) -> RecoveryResult:
+        """Back up until the distance is driven or something lies behind."""
+        p = self.parameters
+        begin = request.motion.pose()
+        tracker = PathTracker(Path.from_points(self._track_back(begin), frame_id=begin.frame_id))
+
+        def finished(pose: Pose) -> bool:
+            tracker.update(pose.position)
+            return tracker.progress >= p.distance
+
+        def velocity(pose: Pose) -> Twist:
+            _, curvature = arc_to(pose, tracker.point_at(tracker.progress + LOOKAHEAD))
+            return Twist.planar(vx=-p.speed, wz=max(-p.yaw_rate, min(p.yaw_rate, -p.speed * curvature)))
+
+        result = self.drive(request, velocity, finished)
+        return RecoveryResult(result.outcome, f"{result.message or 'done'}, backed up {tracker.progress:.2f} m")
+
+    def _track_back(self, pose: Pose) -> NDArray[np.float64]:
+        """Points (n, 3) behind the robot: its track from the newest point on, then straight on for ``distance``."""
+        beyond, position = self.parameters.distance + LOOKAHEAD, np.asarray(pose.position)
+        track = self.robot.recent_track()[::-1]
+        far_enough = norm(track - position) >= LOOKAHEAD / 2.0
+        track = track[np.argmax(far_enough) :] if far_enough.any() else track[:0]
+        if len(track) == 0 or norm(track[0] - position) > TRACK_GAP or in_robot_frame(pose, track[0])[0] >= 0:
+            return np.array([position, position - pose.rotation[:, 0] * beyond])
+        last = track[-1] - (track[-2] if len(track) > 1 else position)
+        return np.concatenate([[position], track, [track[-1] + last / norm(last) * beyond]])

@@ -1,0 +1,60 @@
+"""Forget what the sensors have marked: all of it, or around the robot, on one map or all of a server.
+
+When to use: ghosts of moved obstacles block the way. When not: real obstacles; they come back with the next scan, but
+until then a planner may plan through them, so clear small areas first (a list with two instances does that).
+
+With a radius, what no sensor would bring back stays: floor plan, keep-out areas. A static layer loses the area only if
+``layers`` names it. Without a radius it returns to its map. No controller drives before a sensor that must speak has
+seen again: what was forgotten may still be there.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.maps.navigation_map import NavigationMap
+from mbf_abstract.maps.recoveries.chosen_maps import ChosenMapsParameters, ChosenMapsRecovery, described
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+
+
+class ClearParameters(ChosenMapsParameters):
+    """Parameters of ``clear``."""
+
+    layers: tuple[str, ...] = parameter((), "Names of the layers to clear, on each map that has them; empty = all.")
+    radius: float = parameter(0.0, "Half the side of the square to clear; 0 = all.", unit="m", ge=0.0)
+    keep_inside: bool = parameter(False, "Clear all but the square, as move_base's clear_costmap_recovery.")
+
+
+class ClearRecovery(ChosenMapsRecovery):
+    """Clears layers and updates the maps, so that the next plan sees the result."""
+
+    Parameters: ClassVar[type[PluginParameters]] = ClearParameters
+    parameters: ClearParameters
+
+    def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
+        """Clear; moves nothing."""
+        if request.cancel_token.cancelled:
+            return RecoveryResult(RecoveryOutcome.CANCELED, request.cancel_token.reason)
+        if unknown := self.unknown_layer(self.parameters.layers):
+            return RecoveryResult(RecoveryOutcome.FAILURE, f"nothing to clear: {unknown}")
+        try:
+            cleared = {name: self._clear(one, request) for name, one in self.chosen_maps().items()}
+        except (RobotStateError, TransformError) as error:
+            return RecoveryResult(RecoveryOutcome.TF_ERROR, str(error))
+        for one in self.chosen_maps().values():
+            self.update(one, request)
+        text = described(cleared, "nothing, as no layer holds what is sensed")
+        return RecoveryResult(RecoveryOutcome.SUCCESS, f"cleared {text}")
+
+    def _clear(self, navigation_map: NavigationMap, request: RecoveryRequest) -> list[str]:
+        """Clear what there is of the chosen layers, and return their names."""
+        p = self.parameters
+        names = [name for name in p.layers if name in navigation_map.layers] if p.layers else None
+        if p.radius == 0.0:
+            return navigation_map.clear(names)
+        center = self.on_map(request.motion.pose(), navigation_map)
+        return navigation_map.clear_area(center, 2.0 * p.radius, names, inside=not p.keep_inside)

@@ -1,0 +1,115 @@
+"""Be less strict for a while: smaller inflation, wider tolerances of planner and arrival, wider controller limits.
+
+When to use: NO_PATH_FOUND or NO_VALID_CMD in a passage that the robot really fits through (inflation), a goal that is
+just occupied (planner tolerance), a controller that cannot reach its goal or its path exactly (arrival, controller
+factor). Two instances with different parameters make the "relax planner" and "relax controller" of the Move Base Flex
+paper. When not: on stale obstacles, for which ``clear`` is the cure. The inflation never gets narrower than the robot's
+inscribed circle as the map knows it, so nothing becomes passable that the robot would hit.
+
+The behaviour returns at once. What it changes ends by the clock, not by this plugin: the inflation with the map's first
+update after ``duration``, the tolerances at that very time, also if the goal was canceled or the plugin unloaded
+meanwhile. Running it again while relaxed only prolongs it. Cost: the layers are computed twice.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from mbf_abstract.maps.navigation_map import NavigationMap
+from mbf_abstract.maps.recoveries.chosen_maps import ChosenMapsParameters, ChosenMapsRecovery, described
+from mbf_abstract.maps.relaxation import Slack
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+
+
+class RelaxParameters(ChosenMapsParameters):
+    """Parameters of ``relax``."""
+
+    layers: tuple[str, ...] = parameter(
+        (), "Names of the inflation layers to relax, on each map that has them; empty = all."
+    )
+    inflation_factor: float = parameter(
+        0.5,
+        "What is left of the inflation radius (at least the inscribed one), and what divides its decay; 1 = unchanged.",
+        gt=0.0,
+        le=1.0,
+    )
+    planner_tolerance: float = parameter(
+        0.2, "Paths may end at least this far from the goal; 0 = unchanged.", unit="m", ge=0.0, le=100.0
+    )
+    dist_tolerance: float = parameter(
+        0.2, "This near to the goal counts as arrived; 0 = unchanged.", unit="m", ge=0.0, le=100.0
+    )
+    angle_tolerance: float = parameter(0.35, "The same for the heading; 0 = unchanged.", unit="rad", ge=0.0, le=3.2)
+    controller_factor: float = parameter(
+        2.0,
+        "Factor on the allowed distance from the path, divisor of the time ahead that must be free; 1 = unchanged.",
+        ge=1.0,
+        le=100.0,
+    )
+    duration: float = parameter(20.0, "How long.", unit="s", gt=0.0, le=3600.0)
+
+
+class RelaxRecovery(ChosenMapsRecovery):
+    """Shrinks the radii of inflation layers and grants slack to planning and driving for a time."""
+
+    Parameters: ClassVar[type[PluginParameters]] = RelaxParameters
+    parameters: RelaxParameters
+
+    def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
+        """Relax the inflation and the tolerances, or hold them longer if they are relaxed; moves nothing."""
+        p = self.parameters
+        if request.cancel_token.cancelled:
+            return RecoveryResult(RecoveryOutcome.CANCELED, request.cancel_token.reason)
+        if problem := self.unknown_layer(p.layers) or self._layer_without_radius():
+            return RecoveryResult(RecoveryOutcome.FAILURE, f"nothing to relax: {problem}")
+        until = self.clock.now() + p.duration
+        relaxed = {name: self._relax(one, until, request) for name, one in self.chosen_maps().items()}
+        slack = Slack(p.planner_tolerance, p.dist_tolerance, p.angle_tolerance, p.controller_factor)
+        self.relaxation.grant(self.name, slack, until)
+        text = (
+            f"for {p.duration:g} s: inflation {described(relaxed, 'as usual')}, "
+            f"path ends within {p.planner_tolerance:g} m, "
+            f"arrival within {p.dist_tolerance:g} m and {p.angle_tolerance:g} rad, "
+            f"controller limits x {p.controller_factor:g}"
+        )
+        return RecoveryResult(RecoveryOutcome.SUCCESS, text)
+
+    def _layer_without_radius(self) -> str:
+        """Say which of the named layers is no inflation layer; empty if all are."""
+        for navigation_map in self.chosen_maps().values():
+            for name in self.parameters.layers:
+                if name in navigation_map.layers and not _is_inflation(navigation_map.usual_parameters(name)):
+                    return f"the layer {name!r} has no inflation radius"
+        return ""
+
+    def _relax(self, navigation_map: NavigationMap, until: float, request: RecoveryRequest) -> list[str]:
+        """Relax the inflation layers of a map until a time [s]; return what each of them is relaxed to."""
+        factor, relaxed = self.parameters.inflation_factor, []
+        for name in [] if factor == 1.0 else self.parameters.layers or navigation_map.layers:
+            usual = navigation_map.usual_parameters(name) if name in navigation_map.layers else None
+            if _is_inflation(usual):
+                parameters = relaxed_inflation(usual, factor, navigation_map.inscribed_radius)
+                navigation_map.set_layer_parameters(name, parameters, until)
+                relaxed.append(f"{name} at {parameters.inflation_radius:.3g} m")
+        if relaxed:
+            self.update(navigation_map, request)
+        return relaxed
+
+
+def _is_inflation(parameters: Any) -> bool:
+    return hasattr(parameters, "inflation_radius")
+
+
+def relaxed_inflation(usual: Any, factor: float, robot_radius: float) -> Any:
+    """Parameters of an inflation layer with smaller radii [m] and faster decay, no narrower than the robot."""
+    inscribed = getattr(usual, "inscribed_radius", robot_radius)  # a mesh layer has one of its own, wider if need be
+    inscribed = min(inscribed, max(factor * inscribed, robot_radius or inscribed))
+    changes = {
+        "inflation_radius": max(factor * usual.inflation_radius, inscribed),
+        "cost_scaling_factor": usual.cost_scaling_factor / factor,
+    }
+    if hasattr(usual, "inscribed_radius"):
+        changes["inscribed_radius"] = inscribed
+    return usual.model_copy(update=changes)

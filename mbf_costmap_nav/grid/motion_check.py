@@ -1,0 +1,65 @@
+"""What a footprint would touch along a motion on a costmap, and where the nearest obstacle lies.
+
+A robot that already touches an obstacle may move as long as it touches no more than before, so backing out of a
+collision works and driving deeper into it does not. Where the whole footprint lies on obstacles no direction is known
+to lead out, and only ``escape`` moves.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbf_abstract.geometry import Pose, Twist
+from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck, arc_poses
+
+
+def obstacle_ahead(
+    costmap: Costmap,
+    footprint: Footprint,
+    pose: Pose,
+    command: Twist,
+    duration: float,
+    *,
+    leaves_collisions: bool = False,
+) -> str:
+    """Say where moving on would touch more of obstacles and the end of the map than now; empty: the motion is free.
+
+    Parameters
+    ----------
+    pose : Pose
+        Of the base, in the frame of the costmap.
+    command : Twist
+        What is kept for ``duration`` [s].
+    leaves_collisions : bool
+        Whether the motion was chosen to lead out of a collision, however deep it is.
+    """
+    check = FootprintCheck(footprint, costmap.resolution)
+    allowed = check.touched(costmap, pose.x, pose.y, pose.yaw)
+    if not leaves_collisions:
+        allowed = min(allowed, len(check.samples) - 1)
+    outline_speed = command.speed + abs(command.wz) * footprint.circumscribed_radius
+    step = float(np.clip(0.5 * costmap.resolution / max(outline_speed, 1e-6), duration / 100.0, duration))
+    ahead = arc_poses((pose.x, pose.y, pose.yaw), command.vx, command.vy, command.wz, duration, step)
+    for x, y, yaw in ahead.tolist():
+        if check.touched(costmap, x, y, yaw) > allowed:
+            return f"an obstacle is in the way: the footprint would touch it at ({x:.2f}, {y:.2f}, {yaw:.2f} rad)"
+    return ""
+
+
+def nearest_lethal(costmap: Costmap, pose: Pose, within: float) -> tuple[float, float, float] | None:
+    """Offset [m] of the nearest lethal cell's centre, along the axes of the map; None if none is ``within`` [m]."""
+    reach = math.ceil(within / costmap.resolution) + 1
+    ix, iy = costmap.world_to_cell_clamped(pose.x, pose.y)
+    x0, y0 = max(ix - reach, 0), max(iy - reach, 0)
+    rows, columns = np.nonzero(costmap.cells[y0 : iy + reach + 1, x0 : ix + reach + 1] == LETHAL)
+    if rows.size == 0:
+        return None
+    offsets = costmap.cells_to_world(np.column_stack([columns + x0, rows + y0])) - (pose.x, pose.y)
+    distances = np.hypot(*offsets.T)
+    nearest = int(np.argmin(distances))
+    dx, dy = offsets[nearest].tolist()
+    return (dx, dy, 0.0) if distances[nearest] <= within else None

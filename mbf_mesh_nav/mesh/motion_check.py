@@ -1,0 +1,106 @@
+"""What a robot on a mesh would touch along a motion, and where the nearest obstacle lies.
+
+The robot's centre is walked over the surface along the arc of its command, and on by its radius in the direction it
+then has. Ground that is forbidden ends the motion, and so does the end of the surface; a robot that stands on forbidden
+ground may leave it, see ``kernels.search.forbidden_surface``. What its sides would touch is in the costs: on a map that
+is not inflated only what lies straight ahead counts. Turning on the spot tips or slides a robot on a steep slope.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
+from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned, walk
+from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS, hardness_at, may_enter
+from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.mesh.topology import MeshTopology
+
+SURFACE_DISTANCE = 1.0
+"""How far [m] a robot's frame may be off the surface it stands on."""
+UNKNOWN_RADIUS = 0.3
+"""Radius [m] of a robot whose inscribed radius the map does not know."""
+STRIDE = 0.05
+"""Length [m] of the steps of a walk."""
+
+
+def slope_at(mesh: MeshTopology, place: SurfacePoint) -> float:
+    """Inclination [rad] of the face at a place; 0 = level."""
+    return math.acos(min(max(float(mesh.face_normals[place.face, 2]), -1.0), 1.0))
+
+
+def forbidden_ahead(
+    mesh: MeshTopology,
+    hardness: NDArray[np.float32],
+    place: SurfacePoint,
+    pose: Pose,
+    command: Twist,
+    duration: float,
+    radius: float,
+) -> str:
+    """Say where the motion would lead onto forbidden ground or past a border; empty: the motion is free.
+
+    Parameters
+    ----------
+    hardness : (V,) float32
+        How forbidden the vertices are, see ``MeshSnapshot.hardness``.
+    place : SurfacePoint
+        Where the robot stands, at ``pose``.
+    command : Twist
+        What is kept for ``duration`` [s].
+    radius : float
+        How far [m] the robot reaches beyond its centre.
+    """
+    face, point = place.face, (float(place.point[0]), float(place.point[1]), float(place.point[2]))
+    stands_on = hardness_at(mesh.vertices, mesh.faces, hardness, face, point)
+    if command.speed == 0.0:
+        blocked = command.wz != 0.0 and stands_on >= LETHAL_HARDNESS
+        return f"the robot stands on an obstacle at {_text(point)}" if blocked else ""
+    ahead = pose.rotation[:, 0] * command.vx + pose.rotation[:, 1] * command.vy
+    normal = mesh.face_normals[face]
+    direction = tangent(
+        (float(ahead[0]), float(ahead[1]), float(ahead[2])), (float(normal[0]), float(normal[1]), float(normal[2]))
+    )
+    on_arc, total, walked = command.speed * duration, command.speed * duration + radius, 0.0
+    while walked < total:
+        stride = min(STRIDE, total - walked)
+        face, point, direction, done = walk(
+            mesh.vertices, mesh.faces, mesh.face_neighbours, mesh.face_normals, face, point, direction, stride
+        )
+        if done < stride - 1e-6:
+            return f"the surface ends at {_text(point)}"
+        comes_to = hardness_at(mesh.vertices, mesh.faces, hardness, face, point)
+        if not may_enter(stands_on, comes_to):
+            return f"an obstacle is in the way: the robot would touch it at {_text(point)}"
+        stands_on, walked = comes_to, walked + stride
+        if command.wz != 0.0 and walked < on_arc:
+            normal = mesh.face_normals[face]
+            up = (float(normal[0]), float(normal[1]), float(normal[2]))
+            direction = turned(direction, up, command.wz * stride / command.speed)
+    return ""
+
+
+def nearest_of(
+    mesh: MeshTopology, place: SurfacePoint, pose: Pose, within: float, forbidden: NDArray[np.bool_]
+) -> tuple[float, float, float] | None:
+    """Offset [m] from a pose to the nearest ``forbidden`` (V,) vertex of its storey; None if none is ``within`` [m]."""
+    graph = (mesh.vertices, mesh.neighbour_offsets, mesh.neighbours)
+    start = int(mesh.faces[place.face, np.argmax(place.barycentric)])
+    near = vertices_in_disc(*graph, start, place.point, float(within))
+    near = near[forbidden[near]]
+    if len(near) == 0:
+        return None
+    offsets = mesh.vertices[near] - np.asarray(pose.position)
+    distances = norm(offsets)
+    nearest = int(np.argmin(distances))
+    x, y, z = offsets[nearest].tolist()
+    return (x, y, z) if distances[nearest] <= within else None
+
+
+def _text(point: tuple[float, float, float]) -> str:
+    return f"({point[0]:.2f}, {point[1]:.2f}, {point[2]:.2f})"
