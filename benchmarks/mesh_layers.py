@@ -18,6 +18,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 import scipy.sparse
+from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 from terrain_meshes import fractal_terrain
@@ -74,13 +75,18 @@ def report_layers(mesh_map: MeshMap, unit: float) -> dict[str, float]:
     return {**figures, "eight_layers_over_scipy": total}
 
 
+def _see(mesh_map: MeshMap, cloud: NDArray[np.float64], origin: NDArray[np.float64], stamp: float) -> None:
+    mesh_map.insert_points("cloud", cloud, origin, stamp)
+    mesh_map.update(None, stamp)
+
+
 def report_obstacles(mesh_map: MeshMap) -> dict[str, float]:
     rng = np.random.default_rng(2)
     centre = mesh_map.vertices[len(mesh_map.vertices) // 2]
     cloud = centre + rng.normal(0.0, 1.0, (5000, 3)) * [2.0, 2.0, 0.2] + [0.0, 0.0, 0.5]
-    mesh_map.insert_points("cloud", cloud, centre, 0.0)
+    _see(mesh_map, cloud, centre, 0.0)
     moved = cloud + np.array([0.3, 0.0, 0.0])
-    shifted = seconds_of(lambda: mesh_map.insert_points("cloud", moved, centre, 1.0), 1)
+    shifted = seconds_of(lambda: _see(mesh_map, moved, centre, 1.0), 1)
     anew = seconds_of(mesh_map.layers["inflation"].recompute, 1)
     marked = int(mesh_map.layers["seen"].lethal.sum())
     update, start = f"{shifted * 1e3:.1f} ms", f"{anew * 1e3:.1f} ms"

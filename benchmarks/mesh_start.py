@@ -58,6 +58,7 @@ def run_chain() -> None:
         planner = plugin(planner_class, mesh_map)
         planner.make_plan(request)
         mesh_map.insert_points("cloud", mesh_map.vertices.mean(axis=0) + np.array([0.0, 0.0, 0.3]), ends[0] + 1.0, 0.0)
+        mesh_map.update(None, 0.0)
         result = planner.make_plan(request)
         if not result.success:
             raise RuntimeError(f"{planner_class.__name__}: {result.message}")

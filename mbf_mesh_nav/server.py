@@ -37,8 +37,6 @@ from mbf_mesh_nav.mesh.mesh_report import SHOWN_INDICES
 from mbf_mesh_nav.motion.vector_field import VectorField
 from mbf_mesh_nav.plugins import MeshContext
 
-DECAY_PERIOD = 0.5  # s; how often obstacles are checked for their age
-
 BARE_MESH = """\
 backend: mesh
 planner_max_retries: 0
@@ -89,9 +87,9 @@ class MeshNavigationServer(AbstractNavigationServer):
         self._scans = ScanIntake(self.runtime, {"mesh_map": target})
         self._tell_findings()
         clock, events = self.runtime.clock, self.runtime.events
-        self._decay = Ticker(
-            clock, events, lambda: self.mesh_map.update(None, clock.now()), DECAY_PERIOD, "mesh map decay"
-        )
+        parameters = cast(MeshMapParameters, config.sections["mesh_map"].parameters)
+        period = 1.0 / parameters.update_frequency
+        self._ticker = Ticker(clock, events, lambda: self.mesh_map.update(None, clock.now()), period, "mesh_map")
 
     def swap_mesh(self, mesh_file: Path | str) -> None:
         """Drive on another mesh from now on, e.g. after the lift; its layers are those of the configuration.
@@ -188,7 +186,7 @@ class MeshNavigationServer(AbstractNavigationServer):
     @property
     def queries(self) -> MapQueries:
         """The map-independent questions on the mesh."""
-        return MeshQueries(self.mesh_map, self.runtime.robot, self.runtime.transforms)
+        return MeshQueries(self.mesh_map, self.runtime.robot, self.runtime.transforms, self.runtime.clock)
 
     def take_scan(self, scan: RangeScan) -> None:
         """Feed a scan to every layer that listens to its source, as ``ScanIntake.take``, whose errors it raises."""
@@ -258,8 +256,8 @@ class MeshNavigationServer(AbstractNavigationServer):
 
     def close_map(self) -> None:
         """End the map's own thread."""
-        if hasattr(self, "_decay"):
-            self._decay.stop()
+        if hasattr(self, "_ticker"):
+            self._ticker.stop()
 
     @classmethod
     def config_for_map(cls, file: Path, unknown_is_free: bool = True) -> str | None:

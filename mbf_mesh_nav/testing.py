@@ -102,11 +102,14 @@ class _LayerCheck:
         """Hand over a cloud, let it grow old, forget it; the state without sensors must come back."""
         unseen = _values(self.layer)
         scan = RangeScan("sensor", "map", origin, points, np.ones(len(points), dtype=np.bool_), 1.0)
-        self._event("insert_scan", lambda layer: layer.insert_scan(scan))
+        for layer in (self.layer, self.twin):
+            layer.insert_scan(scan)
+        self._expect_same(unseen, "insert_scan changed the values before an update")
+        self._event("update", lambda layer: layer.update(1.0))
         seen = _values(self.layer)
-        self._event("recompute after insert_scan", lambda layer: layer.recompute())
-        self._expect_same(seen, "recompute lost what insert_scan had changed")
-        self._event("expire", lambda layer: layer.expire(2.0))
+        self._event("recompute after update", lambda layer: layer.recompute())
+        self._expect_same(seen, "recompute lost what update had changed")
+        self._event("second update", lambda layer: layer.update(2.0))
         self._event("clear", lambda layer: layer.clear())
         self._expect_same(unseen, "clear did not bring back the state without sensors")
         self.report.expect(isinstance(self.layer.stale_reason(2.0), str), "stale_reason returned no text")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-from abc import abstractmethod
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -31,14 +30,11 @@ class LayeredMap(NavigationMap):
         self._lock = threading.RLock()
         self._overridden: dict[str, tuple[Any, float]] = {}  # usual parameters of a layer, end of the override [s]
 
-    @abstractmethod
-    def take_in(self, scan: RangeScan) -> None:
-        """Hand a checked scan in the frame of the map to the layers that listen to its source."""
-
     def insert_scan(self, scan: RangeScan) -> None:
-        """Hand a scan to the layers that listen to its source. Rays whose end is not finite are left out.
+        """Hand a scan to the layers that listen to its source; the next update takes it into the map.
 
-        A scan that has only such rays says nothing and is passed over.
+        Never waits for an update. Rays whose end is not finite are left out; a scan that has only such rays says
+        nothing and is passed over.
 
         Raises
         ------
@@ -47,12 +43,14 @@ class LayeredMap(NavigationMap):
         """
         if scan.frame_id != self.frame_id:
             raise ValueError(f"the scan is in the frame {scan.frame_id!r}, the map in {self.frame_id!r}")
-        if not self.layers.listens_to(scan.source):
+        listening = [layer for layer in self.layers.values() if layer.listens_to(scan.source)]
+        if not listening:
             known = list(self.layers.source_names)
             raise ValueError(f"no layer listens to the source {scan.source!r}, known are {known}")
         seen = scan.checked()
         if len(seen.ends) or not len(scan.ends):
-            self.take_in(seen)
+            for layer in listening:
+                layer.insert_scan(seen)
 
     def insert_points(self, source: str, points: ArrayLike, sensor_origin: ArrayLike, stamp: float) -> None:
         """Insert a point cloud: a scan in which every ray hit something.

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
-from mbf_abstract.maps.sensing import RangeScan
 from mbf_costmap_nav.grid.costmap import FREE, MAX_CELLS, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 
@@ -111,9 +110,6 @@ class CostmapLayer(MapLayer):
 
         Needed only where something was derived from them. May raise ValueError: the old ones are then put back.
         """
-
-    def insert_scan(self, scan: RangeScan) -> None:
-        """Keep a scan of one of its sources, in the costmap's frame and all of it finite, for the next update."""
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Take in new data; return ``box`` grown by the cells that may change (it may reach beyond the grid)."""

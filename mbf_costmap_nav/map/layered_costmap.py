@@ -20,7 +20,6 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.maps.layers.layer_stack import LayerStack
-from mbf_abstract.maps.sensing import RangeScan
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.motion_check import nearest_lethal, obstacle_ahead
@@ -246,14 +245,6 @@ class LayeredCostmap(LayeredMap):
             layer.parameters = old
             layer.parameters_changed()
             raise
-
-    # ------------------------------------------------------------------------------------------- sensor input
-    def take_in(self, scan: RangeScan) -> None:
-        """Hand a scan to the layers that listen to its source; the next update uses it."""
-        with self._lock:
-            for layer in self.layers.values():
-                if layer.listens_to(scan.source):
-                    layer.insert_scan(scan)
 
     # ----------------------------------------------------------------------------------------------- clearing
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 
 from mbf_abstract.maps.layers.source_watch import SourceWatch
@@ -49,13 +50,16 @@ class ObservationBuffer:
     def __init__(self, name: str, parameters: SourceParameters) -> None:
         self.parameters = parameters
         self.watch = SourceWatch(name)
+        self._lock = threading.Lock()  # the sensor does not wait for an update of the whole map
         kept = 1 if parameters.observation_persistence == 0.0 else MAX_OBSERVATIONS
         self._observations: deque[RangeScan] = deque(maxlen=kept)
 
     def insert(self, scan: RangeScan) -> None:
-        """Keep a scan; without persistence it replaces the one before."""
+        """Keep a scan; without persistence it replaces the one before. Called on the thread of the sensor."""
         limits = self.parameters
-        self._observations.append(scan.between_heights(limits.min_obstacle_height, limits.max_obstacle_height))
+        seen = scan.between_heights(limits.min_obstacle_height, limits.max_obstacle_height)
+        with self._lock:
+            self._observations.append(seen)
         self.watch.heard(scan.stamp)
 
     def current(self, now: float) -> list[RangeScan]:
@@ -63,18 +67,20 @@ class ObservationBuffer:
 
         One from the future is used only as the last one that came, or it would stay until its time.
         """
-        persistence = self.parameters.observation_persistence
-        if persistence > 0.0 and self._observations:
-            last = self._observations[-1]
-            kept = [
-                seen
-                for seen in self._observations
-                if now - persistence <= seen.stamp and (seen is last or seen.stamp <= now + MAX_STAMP_LEAD)
-            ]
-            self._observations = deque(kept, maxlen=MAX_OBSERVATIONS)
-        if self._observations:
+        with self._lock:
+            seen = list(self._observations)
+            if self.parameters.observation_persistence > 0.0:
+                seen = self._in_time(seen, now)
+                self._observations = deque(seen, maxlen=MAX_OBSERVATIONS)
+        if seen:
             self.watch.used()
-        return list(self._observations)
+        return seen
+
+    def _in_time(self, seen: list[RangeScan], now: float) -> list[RangeScan]:
+        earliest = now - self.parameters.observation_persistence
+        return [
+            scan for scan in seen if earliest <= scan.stamp and (scan is seen[-1] or scan.stamp <= now + MAX_STAMP_LEAD)
+        ]
 
     def stale_reason(self, now: float) -> str:
         """Why the source is stale at ``now`` [s]; empty while it is fresh."""
@@ -82,5 +88,6 @@ class ObservationBuffer:
 
     def forget(self) -> None:
         """Drop the kept observations, e.g. because the map is cleared."""
-        self._observations.clear()
+        with self._lock:
+            self._observations.clear()
         self.watch.cleared()

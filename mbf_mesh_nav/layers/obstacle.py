@@ -14,6 +14,7 @@ Cost: two tree queries a point, about 2 microseconds.
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +36,9 @@ from mbf_mesh_nav.map.layer import (
     MeshLayer,
 )
 from mbf_mesh_nav.map.range_image import NO_RANGE, RangeImage
+
+MAX_WAITING = 256
+"""Scans that may wait for an update; older ones are dropped."""
 
 
 class ObstacleParameters(LayerParameters):
@@ -103,6 +107,7 @@ class ObstacleLayer(MeshLayer):
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
         self._watches: dict[str, SourceWatch] = {}  # its order numbers the sensors
+        self._waiting: deque[RangeScan] = deque(maxlen=MAX_WAITING)
         self._hits = Hits.none()
 
     def compute(self) -> tuple[CostArray, LethalArray]:
@@ -113,25 +118,33 @@ class ObstacleLayer(MeshLayer):
         lethal[self.topology.faces[self._hits.faces]] = True
         return np.where(lethal, np.inf, 0.0).astype(np.float32), lethal
 
-    def insert_scan(self, scan: RangeScan) -> IntArray:
-        """Mark the faces below what was hit, forget what is too old or seen through."""
-        if not self.listens_to(scan.source):
-            return NOTHING_CHANGED
-        watch = self._watches.setdefault(scan.source, SourceWatch(scan.source))
+    def insert_scan(self, scan: RangeScan) -> None:
+        """Keep a scan for the next update."""
+        self._watches.setdefault(scan.source, SourceWatch(scan.source)).heard(scan.stamp)
+        self._waiting.append(scan)
+
+    def update(self, now: float) -> IntArray:
+        """Mark the faces below what was hit, forget what is too old or seen through.
+
+        With a ``decay_time`` of 0 hits stay until the next cloud.
+        """
+        hits = self._hits
+        while self._waiting:
+            scan = self._waiting.popleft()
+            if self.listens_to(scan.source):
+                hits = self._with_scan(hits, scan)
+                self._watches[scan.source].used()
+        if self.parameters.decay_time > 0.0:
+            kept = now - hits.stamps <= self.parameters.decay_time
+            hits = hits if kept.all() else hits.where(kept)
+        return NOTHING_CHANGED if hits is self._hits else self._change(hits)
+
+    def _with_scan(self, hits: Hits, scan: RangeScan) -> Hits:
+        """The hits that are known after a scan."""
         sensor = list(self._watches).index(scan.source)
-        kept = self._hits.where(self._still_valid(scan, sensor))
         faces, points = self._project(scan)
         seen = Hits(faces, points, np.full(len(faces), scan.stamp), np.full(len(faces), sensor, dtype=np.int32))
-        watch.heard(scan.stamp)
-        watch.used()
-        return self._change(seen.joined_with(kept))
-
-    def expire(self, now: float) -> IntArray:
-        """Forget hits older than ``decay_time``; with 0 they stay until the next cloud."""
-        if self.parameters.decay_time == 0.0:
-            return NOTHING_CHANGED
-        kept = now - self._hits.stamps <= self.parameters.decay_time
-        return NOTHING_CHANGED if kept.all() else self._change(self._hits.where(kept))
+        return seen.joined_with(hits.where(self._still_valid(hits, scan, sensor)))
 
     def clear(self) -> IntArray:
         """Forget all hits; the map is stale until every source has seen it again."""
@@ -143,6 +156,7 @@ class ObstacleLayer(MeshLayer):
         return self._keep_only(self._hits.where(within != inside))
 
     def _keep_only(self, hits: Hits) -> IntArray:
+        self._waiting.clear()
         for watch in self._watches.values():
             watch.cleared()
         return self._change(hits)
@@ -176,15 +190,15 @@ class ObstacleLayer(MeshLayer):
         faces, _ = self.locator.cast_rays(near, down, settings.robot_height)
         return faces[faces >= 0], near[faces >= 0]
 
-    def _still_valid(self, scan: RangeScan, sensor: int) -> NDArray[np.bool_]:
+    def _still_valid(self, hits: Hits, scan: RangeScan, sensor: int) -> NDArray[np.bool_]:
         """Mask of the kept hits that this scan neither outdates nor sees through.
 
         A scan that comes late, from a slow sensor, knows nothing of what another saw after its stamp.
         """
-        valid = (scan.stamp - self._hits.stamps < self.parameters.decay_time) | (self._hits.sources != sensor)
+        valid = (scan.stamp - hits.stamps < self.parameters.decay_time) | (hits.sources != sensor)
         if self.parameters.clearing and len(scan.ends) and valid.any():
-            seen_through = RangeImage(scan.ends, scan.origin).sees_through(self._hits.points)
-            valid &= ~(seen_through & (self._hits.stamps <= scan.stamp))
+            seen_through = RangeImage(scan.ends, scan.origin).sees_through(hits.points)
+            valid &= ~(seen_through & (hits.stamps <= scan.stamp))
         return np.asarray(valid, dtype=np.bool_)
 
     def _change(self, hits: Hits) -> IntArray:

@@ -2,7 +2,7 @@
 
 A new layer derives ``MeshLayer``, declares ``Parameters`` and writes ``compute``. Layers that can do better than
 starting over after a local change override ``update_from_inputs``; layers fed by a sensor override ``insert_scan``,
-``expire``, ``clear`` and ``stale_reason``. A layer never calls another layer: the layer graph hands changes on.
+``update``, ``clear`` and ``stale_reason``. A layer never calls another layer: the layer graph hands changes on.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.maps.layers import layer as map_layer
-from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.mesh.locate import SurfaceLocator
 from mbf_mesh_nav.mesh.topology import MeshTopology
@@ -122,15 +121,8 @@ class MeshLayer(map_layer.MapLayer):
         """React to changed vertices of the inputs; return the own vertices that changed."""
         return self.recompute() if len(changed) else NOTHING_CHANGED
 
-    def insert_scan(self, scan: RangeScan) -> IntArray:
-        """Take in what a sensor saw, in the map's frame, all of it finite; return the vertices that changed.
-
-        ``scan.source`` names the sensor: one layer may be fed by several.
-        """
-        return NOTHING_CHANGED
-
-    def expire(self, now: float) -> IntArray:
-        """Forget what is too old at ``now`` [s]."""
+    def update(self, now: float) -> IntArray:
+        """Take in the scans since the last update, forget what is too old at ``now`` [s]; return what changed."""
         return NOTHING_CHANGED
 
     def clear(self) -> IntArray:

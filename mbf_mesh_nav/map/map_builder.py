@@ -106,6 +106,9 @@ class MeshMapParameters(ParameterModel):
     max_turning_slope: float = parameter(
         0.35, "Steeper ground is not turned on in a recovery.", unit="rad", gt=0.0, le=1.5, dynamic=False
     )
+    update_frequency: float = parameter(
+        10.0, "How often the server updates the map.", unit="Hz", gt=0.0, le=1000.0, dynamic=False
+    )
     cache_dir: str = parameter(
         "", "Folder for computed layers, relative to the configuration; empty = no cache.", dynamic=False
     )

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
-from mbf_abstract.maps.sensing import RangeScan
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
 from mbf_mesh_nav.map.snapshot import MeshSnapshot, SnapshotSeries
@@ -231,19 +230,13 @@ class MeshMap(LayeredMap):
         """Give a layer its parameters; everything that depends on them follows. Raises as ``LayerGraph``'s."""
         self._publish(self.layers.set_parameters(name, parameters))
 
-    def take_in(self, scan: RangeScan) -> None:
-        """Hand a scan to the enabled layers that listen to its source; what reads them follows."""
-
-        def event(layer: MeshLayer) -> IntArray:
-            listens = layer.parameters.enabled and layer.listens_to(scan.source)
-            return layer.insert_scan(scan) if listens else NOTHING_CHANGED
-
-        self.apply(event)
-
     def update(self, robot_pose: Pose | None, now: float) -> None:
-        """Forget obstacles that are too old at ``now`` [s], end overrides of parameters that are over."""
+        """Take in what sensors have seen since the last update, forget what is too old at ``now`` [s].
+
+        Overrides of parameters that are over end.
+        """
         self.end_overrides(now)
-        self.apply(lambda layer: layer.expire(now) if layer.parameters.enabled else NOTHING_CHANGED)
+        self.apply(lambda layer: layer.update(now) if layer.parameters.enabled else NOTHING_CHANGED)
 
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
         """Forget all sensed obstacles, or those in some layers, at once; return the names of the layers."""

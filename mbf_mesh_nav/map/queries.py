@@ -6,6 +6,7 @@ from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.time.clock import Clock
 from mbf_mesh_nav.map import pose_checks
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
@@ -22,9 +23,11 @@ class MeshQueries:
         Where the robot is, for questions without a pose.
     transforms : TransformBuffer
         Takes poses and paths into the frame of the map.
+    clock : Clock
     """
 
-    def __init__(self, mesh_map: MeshMap, robot: RobotInformation, transforms: TransformBuffer) -> None:
+    def __init__(self, mesh_map: MeshMap, robot: RobotInformation, transforms: TransformBuffer, clock: Clock) -> None:
+        self._clock = clock
         self._map = mesh_map
         self._robot = robot
         self._transforms = transforms
@@ -60,7 +63,8 @@ class MeshQueries:
         self._map.clear()
 
     def update_map(self) -> None:
-        """Do nothing: every point cloud updates the layers at once, so the snapshot is always up to date."""
+        """Take in what sensors have seen since the last update."""
+        self._map.update(None, self._clock.now())
 
     def _there(self, pose: Pose | None) -> Pose:
         return self._transforms.transform_pose(pose or self._robot.pose(), self._map.frame_id)

@@ -76,16 +76,20 @@ class GoodMeshLayer(MeshLayer):
 
     inputs_allowed = (1, 1)
     seen = False
+    waiting = None
 
     def compute(self):
         return np.full_like(self._costs, 1.0 if self.seen else 0.5), np.zeros_like(self._lethal)
 
     def insert_scan(self, scan):
-        self.seen = scan.hits.any()
+        self.waiting = scan
+
+    def update(self, now):
+        self.seen = self.waiting is not None and self.waiting.hits.any()
         return self.recompute()
 
     def clear(self):
-        self.seen = False
+        self.seen, self.waiting = False, None
         return self.recompute()
 
 

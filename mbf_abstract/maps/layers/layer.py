@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC
 from typing import Any, ClassVar
 
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import PluginParameters, parameter
 
 
@@ -47,6 +48,12 @@ class MapLayer(ABC):
     def listens_to(self, source: str) -> bool:
         """Whether the layer takes scans of a source."""
         return source in self.source_names
+
+    def insert_scan(self, scan: RangeScan) -> None:  # noqa: B027 - for layers that name sources
+        """Keep a scan of one of its sources, in the frame of the map and all of it finite, for the next update.
+
+        Called on the thread of the sensor, also while the map is being updated; must be quick.
+        """
 
     def stale_reason(self, now: float) -> str:
         """Why the layer's data are too old at ``now`` [s]; empty while they are fresh, or if it has none."""

@@ -6,6 +6,7 @@ import pytest
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_abstract.time.clock import WallClock
 from mbf_mesh_nav.map.layer import MeshLayer
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -42,7 +43,7 @@ def walled_map() -> MeshMap:
 
 @pytest.fixture
 def queries(walled_map: MeshMap) -> MeshQueries:
-    return MeshQueries(walled_map, StandingRobot(Pose.planar(1.0, 1.0)), TransformBuffer())
+    return MeshQueries(walled_map, StandingRobot(Pose.planar(1.0, 1.0)), TransformBuffer(), WallClock())
 
 
 @pytest.mark.parametrize(
@@ -131,7 +132,7 @@ def test_ground_of_unknown_cost_is_no_place_for_a_robot():
     vertices, faces = heightfield_mesh(np.zeros((21, 21)), 0.1, 0.1)
     parameters = MeshMapParameters(layers=[{"name": "partly", "type": "partly"}], inscribed_radius=0.25)
     mesh = build_mesh_map(parameters, vertices=vertices, faces=faces, load_layer=lambda _: PartlyUnknownGround)
-    queries = MeshQueries(mesh, StandingRobot(Pose.planar(0.5, 0.5)), TransformBuffer())
+    queries = MeshQueries(mesh, StandingRobot(Pose.planar(0.5, 0.5)), TransformBuffer(), WallClock())
 
     assert queries.check_point(Pose.planar(1.0, 1.0)).state == CellState.LETHAL
     assert queries.check_pose(Pose.planar(1.2, 1.0)).state == CellState.LETHAL

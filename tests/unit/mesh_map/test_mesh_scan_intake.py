@@ -53,6 +53,8 @@ def scan(source="lidar", frame="map", stamp=0.0):
 def test_a_scan_of_a_known_source_marks_the_surface(make_site):
     server, reported = make_site("lidar")
     server.take_scan(scan())
+    assert not server.mesh_map.snapshot().lethal.any()  # the map changes when it is updated, not under the sensor
+    server.queries.update_map()
     assert server.mesh_map.snapshot().lethal.any() and reported() == []
 
 
@@ -60,6 +62,7 @@ def test_a_source_that_no_layer_listens_to_is_reported_once_and_marks_nothing(ma
     server, reported = make_site("lidar")
     for _ in range(3):
         server.take_scan(scan(source="lidra", frame="nowhere"))
+    server.queries.update_map()
     assert reported() == ["no layer listens to the source 'lidra', known are ['lidar']"]
     assert not server.mesh_map.snapshot().lethal.any()
 
@@ -67,6 +70,7 @@ def test_a_source_that_no_layer_listens_to_is_reported_once_and_marks_nothing(ma
 def test_a_layer_without_a_list_of_sources_takes_all(make_site):
     server, reported = make_site("")
     server.take_scan(scan(source="anything"))
+    server.queries.update_map()
     assert server.mesh_map.snapshot().lethal.any() and reported() == []
 
 
