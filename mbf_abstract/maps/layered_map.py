@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from abc import abstractmethod
 from typing import Any
 
 from numpy.typing import ArrayLike
