@@ -81,16 +81,9 @@ class TiltLayer(MeshLayer):
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = share of the limits that the best headings use, as many as needed; 1 and lethal where too few can."""
-        mesh, settings = self.topology, self.parameters
+        settings = self.parameters
         self.roll, self.pitch, bump = settle_footprints(
-            mesh.vertices,
-            mesh.faces,
-            mesh.face_normals,
-            mesh.face_neighbours,
-            mesh.vertex_face_offsets,
-            mesh.vertex_faces,
-            mesh.neighbour_offsets,
-            mesh.neighbours,
+            self.topology.surface,
             *wheel_directions(HEADINGS, settings.wheelbase, settings.track),
             settings.wheelbase,
             settings.track,

@@ -17,6 +17,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from mbf_mesh_nav.kernels.mesh import topology as kernels
+from mbf_mesh_nav.kernels.mesh.surface import Surface
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -88,6 +89,11 @@ class MeshTopology:
         border = np.zeros(len(self.vertices), dtype=np.bool_)
         border[self.faces[face, corner]] = border[self.faces[face, (corner + 1) % 3]] = True
         return border
+
+    @cached_property
+    def surface(self) -> Surface:
+        """Those of the arrays that kernels take as one argument."""
+        return Surface(*(getattr(self, name) for name in Surface._fields))
 
     def digest(self) -> str:
         """Hexadecimal SHA-256 of vertices and faces: the identity of the mesh in caches."""

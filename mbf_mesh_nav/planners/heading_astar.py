@@ -25,7 +25,7 @@ from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.search.end_stretches import EndStretches, headings_within
-from mbf_mesh_nav.search.heading_limits import FootprintLimits, HeadingLimits, NormalLimits, ground_of
+from mbf_mesh_nav.search.heading_limits import FootprintLimits, HeadingLimits, NormalLimits
 from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, Leg, LegQuery, straight_leg
 from mbf_mesh_nav.search.surface_planner import SurfacePlanner, SurfacePlannerParameters
 
@@ -120,9 +120,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         seeds, offsets = from_start
         distances[seeds] = offsets
         best, cost = search_with_heading(
-            mesh_map.vertices,
-            mesh_map.neighbour_offsets,
-            mesh_map.neighbours,
+            mesh_map.topology.surface,
             query.snapshot.edge_weights,
             self._edge_headings,
             query.blocked,
@@ -136,7 +134,6 @@ class HeadingAStarPlanner(SurfacePlanner):
             *to_goal,
             query.goal.point,
             limits.edges,
-            ground_of(mesh_map),
             limits.chassis,
             scratch_for(len(mesh_map.vertices)),
             query.cancel_flag,

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, Ground, greatest_use, scratch_for
+from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, greatest_use, scratch_for
 from mbf_mesh_nav.kernels.mesh.slopes import slopes_of_edges, tilt_of_normals
 from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN, HEADING_STEP, HEADINGS
 from mbf_mesh_nav.layers.tilt import TiltLayer
@@ -58,7 +58,7 @@ class FootprintLimits:
         roll, up, down = (math.tan(limit) for limit in layer.limits())
         measures = settings.wheelbase, settings.track, settings.rigid
         self.chassis = Chassis(*measures, roll, up, down, settings.ground_clearance)
-        self._ground = ground_of(mesh_map)
+        self._surface = mesh_map.topology.surface
         self._vertex_count = len(mesh_map.vertices)
 
     def standing(self, place: SurfacePoint, yaw: float) -> float:
@@ -74,7 +74,7 @@ class FootprintLimits:
     def _use(self, face: int, start: FloatArray, end: FloatArray, cosine: float, sine: float) -> float:
         points = tuple(start.tolist()), tuple(end.tolist())
         scratch = scratch_for(self._vertex_count)
-        return float(greatest_use(self._ground, self.chassis, scratch, int(face), *points, cosine, sine))
+        return float(greatest_use(self._surface, self.chassis, scratch, int(face), *points, cosine, sine))
 
 
 class NormalLimits:
@@ -105,18 +105,3 @@ class NormalLimits:
         up *= math.sqrt(ahead_x * ahead_x + ahead_y * ahead_y)
         roll, pitch = math.atan2(y * ahead_x - x * ahead_y, up), math.atan2(x * ahead_x + y * ahead_y, up)
         return max(abs(roll) / self.angles[0], abs(pitch) / self.angles[1])
-
-
-def ground_of(mesh_map: MeshMap) -> Ground:
-    """The arrays of a map that footprints stand on."""
-    mesh = mesh_map.topology
-    return Ground(
-        mesh.vertices,
-        mesh.faces,
-        mesh.face_normals,
-        mesh.face_neighbours,
-        mesh.vertex_face_offsets,
-        mesh.vertex_faces,
-        mesh.neighbour_offsets,
-        mesh.neighbours,
-    )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_mesh_nav.kernels.mesh.corners import build_corner_ends, write_corner_weights
 from mbf_mesh_nav.kernels.wave.cvp import ALONG_EDGE, propagate_wave
-from mbf_mesh_nav.kernels.wave.descent import trace_descent
+from mbf_mesh_nav.kernels.wave.descent import Field, trace_descent
 from mbf_mesh_nav.kernels.wave.directions import wave_directions
 from mbf_mesh_nav.kernels.wave.fronts import NO_BEND
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -150,19 +150,10 @@ class WaveSearch:
 
     def _trace(self, query: LegQuery, wave: Wave, along_edges: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Way down the field, see ``kernels.descent``."""
-        mesh_map, start, goal = self._mesh_map, query.start, query.goal
+        start, goal = query.start, query.goal
         return trace_descent(
-            mesh_map.vertices,
-            mesh_map.faces,
-            mesh_map.face_neighbours,
-            mesh_map.vertex_face_offsets,
-            mesh_map.vertex_faces,
-            mesh_map.neighbour_offsets,
-            mesh_map.neighbours,
-            query.snapshot.edge_weights,
-            wave.distances,
-            wave.predecessors,
-            wave.bends,
+            self._mesh_map.topology.surface,
+            Field(query.snapshot.edge_weights, wave.distances, wave.predecessors, wave.bends),
             start.face,
             tuple(start.point.tolist()),
             goal.face,

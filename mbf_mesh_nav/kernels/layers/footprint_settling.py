@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
+from mbf_mesh_nav.kernels.mesh.surface import Surface
 
 IntArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
@@ -23,20 +24,18 @@ LEAST_UPWARD = 0.05
 
 
 @inner_kernel
-def face_below(
-    vertices: FloatArray, faces: IntArray, normals: FloatArray, face_neighbours: IntArray, face: int, x: float, y: float
-) -> int:
+def face_below(surface: Surface, face: int, x: float, y: float) -> int:
     """Face whose outline seen from above holds (x, y), reached from ``face``; -1 beyond a border or at a wall."""
     for _ in range(MAX_STEPS):
-        if face < 0 or normals[face, 2] < LEAST_UPWARD:
+        if face < 0 or surface.face_normals[face, 2] < LEAST_UPWARD:
             return -1
-        following = face
+        following, vertices = face, surface.vertices
         for corner in range(3):
-            a, b = faces[face, corner], faces[face, (corner + 1) % 3]
+            a, b = surface.faces[face, corner], surface.faces[face, (corner + 1) % 3]
             across = (vertices[b, 0] - vertices[a, 0]) * (y - vertices[a, 1])
             across -= (vertices[b, 1] - vertices[a, 1]) * (x - vertices[a, 0])
             if across < 0.0:
-                following = face_neighbours[face, corner]
+                following = surface.face_neighbours[face, corner]
                 break
         if following == face:
             return face
@@ -46,10 +45,7 @@ def face_below(
 
 @inner_kernel
 def wheel_heights(
-    vertices: FloatArray,
-    faces: IntArray,
-    normals: FloatArray,
-    face_neighbours: IntArray,
+    surface: Surface,
     start_face: int,
     centre: FloatArray,
     angles: FloatArray,
@@ -57,30 +53,31 @@ def wheel_heights(
     heights: FloatArray,
 ) -> None:
     """Write the surface's z [m] at ``radius`` around ``centre`` in the ascending directions ``angles``; NaN = none."""
-    face = start_face
+    face, vertices, normals = start_face, surface.vertices, surface.face_normals
     for index in range(angles.shape[0]):
         x = centre[0] + radius * np.cos(angles[index])
         y = centre[1] + radius * np.sin(angles[index])
-        found = face_below(vertices, faces, normals, face_neighbours, face, x, y)
+        found = face_below(surface, face, x, y)
         if found < 0 and face != start_face:
-            found = face_below(vertices, faces, normals, face_neighbours, start_face, x, y)
+            found = face_below(surface, start_face, x, y)
         if found < 0:
             heights[index] = np.nan
             face = start_face
             continue
         face = found
-        a = faces[face, 0]
+        a = surface.faces[face, 0]
         slope = normals[face, 0] * (x - vertices[a, 0]) + normals[face, 1] * (y - vertices[a, 1])
         heights[index] = vertices[a, 2] - slope / normals[face, 2]
 
 
 @inner_kernel
-def upward_face(normals: FloatArray, offsets: IntArray, incident: IntArray, vertex: int) -> int:
+def upward_face(surface: Surface, vertex: int) -> int:
     """Face around a vertex that looks up most, -1 if it has none that carries a wheel."""
     best, best_z = -1, LEAST_UPWARD
-    for position in range(offsets[vertex], offsets[vertex + 1]):
-        if normals[incident[position], 2] >= best_z:
-            best, best_z = incident[position], normals[incident[position], 2]
+    for position in range(surface.vertex_face_offsets[vertex], surface.vertex_face_offsets[vertex + 1]):
+        face = surface.vertex_faces[position]
+        if surface.face_normals[face, 2] >= best_z:
+            best, best_z = face, surface.face_normals[face, 2]
     return best
 
 
@@ -102,21 +99,14 @@ def wheel_directions(heading_count: int, wheelbase: float, track: float) -> tupl
 
 
 @inner_kernel
-def vertices_below_the_belly(
-    vertices: FloatArray,
-    offsets: IntArray,
-    neighbours: IntArray,
-    centre: int,
-    radius: float,
-    seen: IntArray,
-    members: IntArray,
-) -> int:
+def vertices_below_the_belly(surface: Surface, centre: int, radius: float, seen: IntArray, members: IntArray) -> int:
     """Write the vertices the belly could touch into ``members`` and return their number.
 
     They lie within ``radius`` of the centre, seen from above, and are connected there by vertices at most so much
     higher or lower. The top of a post is one of them, however high; the storey it may carry is not. ``seen`` (V,) holds
     the last centre that saw a vertex.
     """
+    vertices, offsets = surface.vertices, surface.neighbour_offsets
     seen[centre] = centre
     size = Count(0)
     reader = Count(-1)
@@ -126,7 +116,7 @@ def vertices_below_the_belly(
         if abs(vertices[vertex, 2] - vertices[centre, 2]) > radius:
             continue
         for entry in range(offsets[vertex], offsets[vertex + 1]):
-            other = Count(neighbours[entry])
+            other = Count(surface.neighbours[entry])
             if seen[other] == centre:
                 continue
             seen[other] = centre
@@ -145,14 +135,7 @@ def steeper(one: float, other: float) -> float:
 
 @kernel
 def settle_footprints(
-    vertices: FloatArray,
-    faces: IntArray,
-    face_normals: FloatArray,
-    face_neighbours: IntArray,
-    face_offsets: IntArray,
-    incident: IntArray,
-    offsets: IntArray,
-    neighbours: IntArray,
+    surface: Surface,
     wheel_angles: FloatArray,
     wheel_order: NDArray[np.int64],
     wheelbase: float,
@@ -175,7 +158,7 @@ def settle_footprints(
     bump : (V, heading_count) float32
         How far [m] the surface inside the footprint rises above the plane of the wheels; inf likewise.
     """
-    count = vertices.shape[0]
+    vertices, count = surface.vertices, surface.vertices.shape[0]
     heading_count = len(wheel_order) // 4
     roll = np.empty((count, heading_count), dtype=np.float32)
     pitch = np.empty((count, heading_count), dtype=np.float32)
@@ -188,14 +171,14 @@ def settle_footprints(
     for vertex in range(count):
         for heading in range(heading_count):
             roll[vertex, heading] = pitch[vertex, heading] = bump[vertex, heading] = np.inf
-        start_face = upward_face(face_normals, face_offsets, incident, vertex)
+        start_face = upward_face(surface, vertex)
         if start_face < 0:
             continue
         centre = vertices[vertex]
-        wheel_heights(vertices, faces, face_normals, face_neighbours, start_face, centre, wheel_angles, radius, ring)
+        wheel_heights(surface, start_face, centre, wheel_angles, radius, ring)
         for index in range(len(wheel_order)):
             wheels[wheel_order[index]] = ring[index]
-        size = vertices_below_the_belly(vertices, offsets, neighbours, vertex, radius, seen, members)
+        size = vertices_below_the_belly(surface, vertex, radius, seen, members)
         for heading in range(heading_count):
             front_left, rear_left = wheels[4 * heading], wheels[4 * heading + 1]
             rear_right, front_right = wheels[4 * heading + 2], wheels[4 * heading + 3]

@@ -14,21 +14,9 @@ import numpy as np
 
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.layers.footprint_settling import LEAST_UPWARD, MAX_STEPS, face_below
+from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, row
 from mbf_mesh_nav.kernels.search.dijkstra import Int32Array
-
-
-class Ground(NamedTuple):
-    """Arrays of a ``MeshTopology``."""
-
-    vertices: Float64Array
-    faces: Int32Array
-    face_normals: Float64Array
-    face_neighbours: Int32Array
-    vertex_face_offsets: Int32Array
-    vertex_faces: Int32Array
-    neighbour_offsets: Int32Array
-    neighbours: Int32Array
 
 
 class Chassis(NamedTuple):
@@ -65,7 +53,7 @@ def scratch_for(vertex_count: int) -> Scratch:
 
 @kernel
 def greatest_use(
-    ground: Ground,
+    surface: Surface,
     chassis: Chassis,
     scratch: Scratch,
     face: int,
@@ -74,7 +62,7 @@ def greatest_use(
     cosine: float,
     sine: float,
 ) -> float:
-    """Greatest share of a limit anywhere between two points [m] of a face; inf where a wheel has no ground.
+    """Greatest share of a limit anywhere between two points [m] of a face; inf where a wheel has no surface.
 
     Parameters
     ----------
@@ -90,10 +78,7 @@ def greatest_use(
         scratch.wheels[wheel, 0] = start[0] + cosine * forward - sine * left
         scratch.wheels[wheel, 1] = start[1] + sine * forward + cosine * left
         below = face_below(
-            ground.vertices,
-            ground.faces,
-            ground.face_normals,
-            ground.face_neighbours,
+            surface,
             face,
             scratch.wheels[wheel, 0],
             scratch.wheels[wheel, 1],
@@ -101,64 +86,64 @@ def greatest_use(
         if below < 0:
             return np.inf
         scratch.wheel_faces[wheel] = below
-    size = _gather_below(ground, chassis, scratch, face, start, end)
+    size = _gather_below(surface, chassis, scratch, face, start, end)
     worst, now, stalled = 0.0, 0.0, 0
     while True:
         # 1. Until when does every wheel stay on its face?
         until, leaving, side = 1.0, Count(-1), Count(-1)
         for wheel in range(4):
-            moment, corner = _leaves_face(ground, scratch, wheel, x, y)
+            moment, corner = _leaves_face(surface, scratch, wheel, x, y)
             if moment < until:
                 until, leaving, side = moment, Count(wheel), Count(corner)
         until = max(until, now)
         # 2. The slopes at the begin and at the end of that, and the belly in between.
-        first = _plane(ground, chassis, scratch, now, x, y)
-        last = _plane(ground, chassis, scratch, until, x, y)
+        first = _plane(surface, chassis, scratch, now, x, y)
+        last = _plane(surface, chassis, scratch, until, x, y)
         worst = max(worst, first[3], last[3])
         if chassis.clearance < np.inf:
             middle = max(
                 start[2] + now * (end[2] - start[2]) - first[0], start[2] + until * (end[2] - start[2]) - last[0]
             )
-            bump = max(middle, _highest_below(ground, chassis, scratch, size, start, x, y, cosine, sine, now, until))
+            bump = max(middle, _highest_below(surface, chassis, scratch, size, start, x, y, cosine, sine, now, until))
             worst = max(worst, bump / chassis.clearance)
         # 3. On to the next face.
         if leaving < 0:
             return worst
-        following = Count(ground.face_neighbours[scratch.wheel_faces[leaving], side])
+        following = Count(surface.face_neighbours[scratch.wheel_faces[leaving], side])
         stalled = stalled + 1 if until <= now else 0
-        if following < 0 or ground.face_normals[following, 2] < LEAST_UPWARD or stalled > MAX_STEPS:
+        if following < 0 or surface.face_normals[following, 2] < LEAST_UPWARD or stalled > MAX_STEPS:
             return np.inf
         scratch.wheel_faces[leaving] = following
         now = until
 
 
 @inner_kernel
-def edge_use(ground: Ground, chassis: Chassis, scratch: Scratch, begin: int, end: int) -> float:
+def edge_use(surface: Surface, chassis: Chassis, scratch: Scratch, begin: int, end: int) -> float:
     """``greatest_use`` from one vertex to its neighbour; inf where no face beside the edge carries a wheel."""
     best, best_z = Count(-1), LEAST_UPWARD
-    for position in range(ground.vertex_face_offsets[begin], ground.vertex_face_offsets[begin + 1]):
-        face = Count(ground.vertex_faces[position])
-        corners = ground.faces[face]
+    for position in range(surface.vertex_face_offsets[begin], surface.vertex_face_offsets[begin + 1]):
+        face = Count(surface.vertex_faces[position])
+        corners = surface.faces[face]
         beside = corners[0] == end or corners[1] == end or corners[2] == end
-        if beside and ground.face_normals[face, 2] >= best_z:
-            best, best_z = face, ground.face_normals[face, 2]
-    start, goal = row(ground.vertices, Count(begin)), row(ground.vertices, Count(end))
+        if beside and surface.face_normals[face, 2] >= best_z:
+            best, best_z = face, surface.face_normals[face, 2]
+    start, goal = row(surface.vertices, Count(begin)), row(surface.vertices, Count(end))
     x, y = goal[0] - start[0], goal[1] - start[1]
     length = math.sqrt(x * x + y * y)
     if best < 0 or length == 0.0:
         return np.inf
-    return greatest_use(ground, chassis, scratch, best, start, goal, x / length, y / length)
+    return greatest_use(surface, chassis, scratch, best, start, goal, x / length, y / length)
 
 
 @inner_kernel
-def _leaves_face(ground: Ground, scratch: Scratch, wheel: int, x: float, y: float) -> tuple[float, int]:
+def _leaves_face(surface: Surface, scratch: Scratch, wheel: int, x: float, y: float) -> tuple[float, int]:
     """When (share of the drive) a wheel leaves its face, and over which side; inf if it never does."""
     face = scratch.wheel_faces[wheel]
     leaves, side = np.inf, Count(-1)
     for corner in range(3):
-        a, b = ground.faces[face, corner], ground.faces[face, (corner + 1) % 3]
-        ax, ay = ground.vertices[a, 0], ground.vertices[a, 1]
-        bx, by = ground.vertices[b, 0] - ax, ground.vertices[b, 1] - ay
+        a, b = surface.faces[face, corner], surface.faces[face, (corner + 1) % 3]
+        ax, ay = surface.vertices[a, 0], surface.vertices[a, 1]
+        bx, by = surface.vertices[b, 0] - ax, surface.vertices[b, 1] - ay
         inside = bx * (scratch.wheels[wheel, 1] - ay) - by * (scratch.wheels[wheel, 0] - ax)
         rate = bx * y - by * x
         if rate < 0.0 and -inside / rate < leaves:
@@ -168,13 +153,13 @@ def _leaves_face(ground: Ground, scratch: Scratch, wheel: int, x: float, y: floa
 
 @inner_kernel
 def _plane(
-    ground: Ground, chassis: Chassis, scratch: Scratch, moment: float, x: float, y: float
+    surface: Surface, chassis: Chassis, scratch: Scratch, moment: float, x: float, y: float
 ) -> tuple[float, float, float, float]:
     """Height of the middle of the wheels, slopes forward and to the left, and the greatest share of a slope's limit."""
-    front_left = _height(ground, scratch, 0, moment, x, y)
-    rear_left = _height(ground, scratch, 1, moment, x, y)
-    rear_right = _height(ground, scratch, 2, moment, x, y)
-    front_right = _height(ground, scratch, 3, moment, x, y)
+    front_left = _height(surface, scratch, 0, moment, x, y)
+    rear_left = _height(surface, scratch, 1, moment, x, y)
+    rear_right = _height(surface, scratch, 2, moment, x, y)
+    front_right = _height(surface, scratch, 3, moment, x, y)
     left, right = (front_left - rear_left) / chassis.wheelbase, (front_right - rear_right) / chassis.wheelbase
     front, rear = (front_left - front_right) / chassis.track, (rear_left - rear_right) / chassis.track
     forward, leftward = 0.5 * (left + right), 0.5 * (front + rear)
@@ -186,18 +171,18 @@ def _plane(
 
 
 @inner_kernel
-def _height(ground: Ground, scratch: Scratch, wheel: int, moment: float, x: float, y: float) -> float:
+def _height(surface: Surface, scratch: Scratch, wheel: int, moment: float, x: float, y: float) -> float:
     """Height [m] below a wheel at a share of the drive, on the plane of its face."""
     face = scratch.wheel_faces[wheel]
-    a = ground.faces[face, 0]
-    right = scratch.wheels[wheel, 0] + moment * x - ground.vertices[a, 0]
-    ahead = scratch.wheels[wheel, 1] + moment * y - ground.vertices[a, 1]
-    slope = ground.face_normals[face, 0] * right + ground.face_normals[face, 1] * ahead
-    return float(ground.vertices[a, 2] - slope / ground.face_normals[face, 2])
+    a = surface.faces[face, 0]
+    right = scratch.wheels[wheel, 0] + moment * x - surface.vertices[a, 0]
+    ahead = scratch.wheels[wheel, 1] + moment * y - surface.vertices[a, 1]
+    slope = surface.face_normals[face, 0] * right + surface.face_normals[face, 1] * ahead
+    return float(surface.vertices[a, 2] - slope / surface.face_normals[face, 2])
 
 
 @inner_kernel
-def _gather_below(ground: Ground, chassis: Chassis, scratch: Scratch, face: int, start: Vector, end: Vector) -> int:
+def _gather_below(surface: Surface, chassis: Chassis, scratch: Scratch, face: int, start: Vector, end: Vector) -> int:
     """Write the vertices the belly could touch into ``members`` and return their number.
 
     As in ``footprint_settling``, with the line of the drive instead of one vertex: within a radius of it, and
@@ -207,7 +192,7 @@ def _gather_below(ground: Ground, chassis: Chassis, scratch: Scratch, face: int,
     scratch.mark[0] += 1
     mark, size, reader = scratch.mark[0], Count(0), Count(0)
     for corner in range(3):
-        vertex = Count(ground.faces[face, corner])
+        vertex = Count(surface.faces[face, corner])
         scratch.seen[vertex] = mark
         scratch.members[size] = vertex
         size += 1
@@ -216,17 +201,17 @@ def _gather_below(ground: Ground, chassis: Chassis, scratch: Scratch, face: int,
     while reader < size:
         vertex = Count(scratch.members[reader])
         reader += 1
-        share = _share_beside(ground.vertices, vertex, start, x, y, squared)
-        if abs(ground.vertices[vertex, 2] - start[2] - share * z) > radius:
+        share = _share_beside(surface.vertices, vertex, start, x, y, squared)
+        if abs(surface.vertices[vertex, 2] - start[2] - share * z) > radius:
             continue
-        for entry in range(ground.neighbour_offsets[vertex], ground.neighbour_offsets[vertex + 1]):
-            other = Count(ground.neighbours[entry])
+        for entry in range(surface.neighbour_offsets[vertex], surface.neighbour_offsets[vertex + 1]):
+            other = Count(surface.neighbours[entry])
             if scratch.seen[other] == mark:
                 continue
             scratch.seen[other] = mark
-            share = _share_beside(ground.vertices, other, start, x, y, squared)
-            dx = ground.vertices[other, 0] - start[0] - share * x
-            dy = ground.vertices[other, 1] - start[1] - share * y
+            share = _share_beside(surface.vertices, other, start, x, y, squared)
+            dx = surface.vertices[other, 0] - start[0] - share * x
+            dy = surface.vertices[other, 1] - start[1] - share * y
             if dx * dx + dy * dy < radius * radius:
                 scratch.members[size] = other
                 size += 1
@@ -244,7 +229,7 @@ def _share_beside(vertices: Float64Array, vertex: int, start: Vector, x: float, 
 
 @inner_kernel
 def _highest_below(
-    ground: Ground,
+    surface: Surface,
     chassis: Chassis,
     scratch: Scratch,
     size: int,
@@ -260,7 +245,7 @@ def _highest_below(
     highest, length = -math.inf, cosine * x + sine * y
     for index in range(size):
         vertex = scratch.members[index]
-        dx, dy = ground.vertices[vertex, 0] - start[0], ground.vertices[vertex, 1] - start[1]
+        dx, dy = surface.vertices[vertex, 0] - start[0], surface.vertices[vertex, 1] - start[1]
         forward, left = cosine * dx + sine * dy, cosine * dy - sine * dx
         if abs(left) > 0.5 * chassis.track:
             continue
@@ -275,11 +260,11 @@ def _highest_below(
             continue
         if begin > end:
             continue
-        z, half = ground.vertices[vertex, 2], 0.5 * (begin + end)
+        z, half = surface.vertices[vertex, 2], 0.5 * (begin + end)
         first, middle, last = (
-            z - _plane_at(ground, chassis, scratch, begin, x, y, forward - begin * length, left),
-            z - _plane_at(ground, chassis, scratch, half, x, y, forward - half * length, left),
-            z - _plane_at(ground, chassis, scratch, end, x, y, forward - end * length, left),
+            z - _plane_at(surface, chassis, scratch, begin, x, y, forward - begin * length, left),
+            z - _plane_at(surface, chassis, scratch, half, x, y, forward - half * length, left),
+            z - _plane_at(surface, chassis, scratch, end, x, y, forward - end * length, left),
         )
         highest = max(highest, first, last)
         # The parabola through the three, over shares of the interval: its top may lie between them.
@@ -292,7 +277,7 @@ def _highest_below(
 
 @inner_kernel
 def _plane_at(
-    ground: Ground,
+    surface: Surface,
     chassis: Chassis,
     scratch: Scratch,
     moment: float,
@@ -302,5 +287,5 @@ def _plane_at(
     left: float,
 ) -> float:
     """Height [m] of the plane of the wheels at a place of the body."""
-    middle, rise_forward, rise_left, _ = _plane(ground, chassis, scratch, moment, x, y)
+    middle, rise_forward, rise_left, _ = _plane(surface, chassis, scratch, moment, x, y)
     return float(middle + rise_forward * forward + rise_left * left)

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
-from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, Ground, Scratch, edge_use
+from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, Scratch, edge_use
+from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.search.astar import straight_line_bound
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
 from mbf_mesh_nav.kernels.search.indexed_heap import push_or_decrease, remove_top, top_item, top_key
@@ -27,9 +28,7 @@ UNKNOWN, DRIVABLE, FORBIDDEN = 0, 1, 2
 
 @kernel
 def search_with_heading(
-    vertices: NDArray[np.float64],
-    neighbour_offsets: Int32Array,
-    neighbours: Int32Array,
+    surface: Surface,
     edge_weights: Float32Array,
     edge_headings: NDArray[np.uint8],
     blocked: BoolArray,
@@ -45,7 +44,6 @@ def search_with_heading(
     target_headings: Int32Array,
     goal: NDArray[np.float64],
     edges: NDArray[np.uint8],
-    ground: Ground,
     chassis: Chassis,
     scratch: Scratch,
     cancel_flag: FlagArray,
@@ -54,7 +52,7 @@ def search_with_heading(
 
     Parameters
     ----------
-    vertices, neighbour_offsets, neighbours, edge_weights, blocked
+    surface, edge_weights, blocked
         The graph, as in ``dijkstra.propagate_distances``.
     edge_headings : (2E,) uint8
         Heading of each directed edge, 0 to 15.
@@ -73,8 +71,8 @@ def search_with_heading(
     goal : (3,) float64 [m]
     edges : (2E,) uint8
         Whether a directed edge may be driven; what is ``UNKNOWN`` is found out and written here.
-    ground, chassis, scratch
-        The surface, the robot and its limits, see ``footprint_sweep``.
+    chassis, scratch
+        The robot and its limits, and memory, see ``footprint_sweep``.
     cancel_flag : (1,) uint8
 
     Returns
@@ -84,6 +82,7 @@ def search_with_heading(
     total : float
         What the way there costs [m], the rest to the goal and the last turn included.
     """
+    vertices, neighbour_offsets, neighbours = surface.vertices, surface.neighbour_offsets, surface.neighbours
     state_count = len(distances)
     heap = np.empty(state_count, dtype=np.uint64)
     positions = np.full(state_count, -1, dtype=np.int32)
@@ -118,7 +117,7 @@ def search_with_heading(
             following = neighbour * HEADINGS + new_heading
             if candidate < distances[following]:
                 if edges[slot] == UNKNOWN:
-                    use = edge_use(ground, chassis, scratch, Count(vertex), Count(neighbour))
+                    use = edge_use(surface, chassis, scratch, Count(vertex), Count(neighbour))
                     edges[slot] = DRIVABLE if use <= 1.0 else FORBIDDEN
                 if edges[slot] == FORBIDDEN:
                     continue

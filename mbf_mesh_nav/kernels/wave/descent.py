@@ -11,11 +11,13 @@ every reached point gets a path.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.corners import slot_of
+from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, between, cross, difference, dot, norm, row, set_row
 from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Float32Array, Int32Array
 from mbf_mesh_nav.kernels.wave.fronts import NO_BEND, SLACK
@@ -24,19 +26,19 @@ _ON_VERTEX = 1e-6  # a crossing this near (as a share of the edge) to a vertex i
 _NO_SIDE = -1
 
 
+class Field(NamedTuple):
+    """Weights (2E,) of the edges [m] and what the wave made of them, see ``cvp.propagate_wave``."""
+
+    edge_weights: Float32Array
+    distances: Float32Array
+    predecessors: Int32Array
+    bends: Int32Array
+
+
 @kernel
 def trace_descent(
-    vertices: Float64Array,
-    faces: Int32Array,
-    face_neighbours: Int32Array,
-    vertex_face_offsets: Int32Array,
-    vertex_faces: Int32Array,
-    neighbour_offsets: Int32Array,
-    neighbours: Int32Array,
-    edge_weights: Float32Array,
-    distances: Float32Array,
-    predecessors: Int32Array,
-    bends: Int32Array,
+    surface: Surface,
+    field: Field,
     start_face: int,
     start: Vector,
     goal_face: int,
@@ -47,11 +49,9 @@ def trace_descent(
 
     Parameters
     ----------
-    vertices, faces, face_neighbours, vertex_face_offsets, vertex_faces, neighbour_offsets, neighbours
-        The mesh; (V, 3) float64 [m], (F, 3), (F, 3), (V+1,), (3F,), (V+1,), (2E,) int32.
-    edge_weights : (2E,) float32
-        Of the wave [m], aligned with ``neighbours``.
-    distances, predecessors, bends : (V,) float32 [m], (V,) int32, (V,) int32
+    surface : Surface
+        The mesh.
+    field : Field
         The wave's result; at least one corner of ``start_face`` is reached.
     start_face, goal_face : int
         Different faces.
@@ -70,7 +70,7 @@ def trace_descent(
     capacity = Count(256)
     points = np.empty((capacity, 3), dtype=np.float64)
     point_faces = np.empty(capacity, dtype=np.int32)
-    graph = (neighbour_offsets, neighbours, edge_weights)
+    vertices, faces = surface.vertices, surface.faces
     passed = np.zeros(len(faces), dtype=np.bool_)
     face, vertex = Count(start_face), Count(-1)
     place = _barycentric(vertices, faces[face], start)
@@ -88,14 +88,9 @@ def trace_descent(
             points, point_faces = _grown(points, point_faces, capacity)
         # 2. Which way on is the shortest: through one of the sides to a face not passed yet, or over a corner?
         if vertex >= 0:
-            face, side, share, vertex = _way_from_vertex(
-                vertices, faces, face_neighbours, vertex_face_offsets, vertex_faces, graph, distances, predecessors,
-                bends, goal_face, passed, vertex, along_edges,
-            )  # fmt: skip
+            face, side, share, vertex = _way_from_vertex(surface, field, goal_face, passed, vertex, along_edges)
         else:
-            _, side, share, vertex = _way_through(
-                vertices, faces, face_neighbours, graph, distances, bends, goal_face, passed, face, place, along_edges
-            )
+            _, side, share, vertex = _way_through(surface, field, goal_face, passed, face, place, along_edges)
         # 3. Note where it leads, and go on there.
         if vertex < 0:
             left, right = Count(faces[face, side]), Count(faces[face, (side + 1) % 3])
@@ -107,7 +102,7 @@ def trace_descent(
             set_row(points, count, row(vertices, vertex))
         else:
             set_row(points, count, between(row(vertices, left), row(vertices, right), share))
-            face = Count(face_neighbours[face, side])
+            face = Count(surface.face_neighbours[face, side])
             place = _on_side(_side_of(faces[face], right), 1.0 - share)
         count += 1
 
@@ -154,22 +149,19 @@ def _barycentric(vertices: Float64Array, corners: Int32Array, point: Vector) -> 
 
 
 @inner_kernel
-def _side_weights(
-    vertices: Float64Array, corners: Int32Array, graph: tuple[Int32Array, Int32Array, Float32Array]
-) -> Vector:
+def _side_weights(surface: Surface, edge_weights: Float32Array, corners: Int32Array) -> Vector:
     """Weights [m] of the sides of a face, that from corner k to the next at k; the length at a blocked corner."""
     return (
-        _weight(vertices, Count(corners[0]), Count(corners[1]), graph),
-        _weight(vertices, Count(corners[1]), Count(corners[2]), graph),
-        _weight(vertices, Count(corners[2]), Count(corners[0]), graph),
+        _weight(surface, edge_weights, Count(corners[0]), Count(corners[1])),
+        _weight(surface, edge_weights, Count(corners[1]), Count(corners[2])),
+        _weight(surface, edge_weights, Count(corners[2]), Count(corners[0])),
     )
 
 
 @inner_kernel
-def _weight(vertices: Float64Array, a: int, b: int, graph: tuple[Int32Array, Int32Array, Float32Array]) -> float:
-    offsets, neighbours, weights = graph
-    weight = float(weights[slot_of(offsets, neighbours, a, b)])
-    return weight if weight < np.inf else norm(difference(row(vertices, a), row(vertices, b)))
+def _weight(surface: Surface, edge_weights: Float32Array, a: int, b: int) -> float:
+    weight = float(edge_weights[slot_of(surface.neighbour_offsets, surface.neighbours, a, b)])
+    return weight if weight < np.inf else norm(difference(row(surface.vertices, a), row(surface.vertices, b)))
 
 
 @inner_kernel
@@ -185,12 +177,8 @@ def _weighted_length(sides: Vector, step: Vector) -> float:
 
 @inner_kernel
 def _way_through(
-    vertices: Float64Array,
-    faces: Int32Array,
-    face_neighbours: Int32Array,
-    graph: tuple[Int32Array, Int32Array, Float32Array],
-    distances: Float32Array,
-    bends: Int32Array,
+    surface: Surface,
+    field: Field,
     goal_face: int,
     passed: BoolArray,
     face: int,
@@ -202,8 +190,8 @@ def _way_through(
     It goes to no face that has been ``passed`` (F,), or to a corner in any case (``over_corner``). Where one is not
     reached, only the others count.
     """
-    corners = faces[face]
-    sides = _side_weights(vertices, corners, graph)
+    corners, distances = surface.faces[face], field.distances
+    sides = _side_weights(surface, field.edge_weights, corners)
     best, best_side, best_share, best_vertex = np.inf, Count(_NO_SIDE), 0.0, Count(-1)
     lengths = (
         _weighted_length(sides, (place[0] - 1.0, place[1], place[2])),
@@ -215,10 +203,10 @@ def _way_through(
         if total < best:
             best, best_vertex = total, Count(corners[corner])
     for side in range(0 if over_corner else 3):
-        if not _leads_on(faces, face_neighbours[face, side], distances, goal_face, passed):
+        if not _leads_on(surface.faces, surface.face_neighbours[face, side], distances, goal_face, passed):
             continue
         left, right = Count(corners[side]), Count(corners[(side + 1) % 3])
-        total, share = _over_side(distances, bends, left, right, sides[side], lengths[side], lengths[(side + 1) % 3])
+        total, share = _over_side(field, left, right, sides[side], lengths[side], lengths[(side + 1) % 3])
         if total < best:
             best, best_side, best_share, best_vertex = total, Count(side), share, Count(-1)
     return best, best_side, best_share, best_vertex
@@ -238,16 +226,14 @@ def _leads_on(faces: Int32Array, following: int, distances: Float32Array, goal_f
 
 
 @inner_kernel
-def _over_side(
-    distances: Float32Array, bends: Int32Array, left: int, right: int, c: float, b: float, a: float
-) -> tuple[float, float]:
+def _over_side(field: Field, left: int, right: int, c: float, b: float, a: float) -> tuple[float, float]:
     """Length of the straight way through a side to the centre of the front, and where it crosses the side.
 
     ``c``, ``b``, ``a`` are the side and the lengths from the point to its left and right end. The length is inf where
     the way would not cross the side; the crossing is a share of the side from its left end.
     """
-    bend = bends[left]
-    to_bend = float(distances[bend]) if bend == bends[right] and bend != NO_BEND else 0.0
+    distances, bend = field.distances, field.bends[left]
+    to_bend = float(distances[bend]) if bend == field.bends[right] and bend != NO_BEND else 0.0
     u1, u2 = float(distances[left]) - to_bend, float(distances[right]) - to_bend
     # The left end is the origin, the x axis runs to the right one; the point lies above, the virtual source below.
     source_x = (c * c + (u1 - u2) * (u1 + u2)) / (2.0 * c)
@@ -265,48 +251,38 @@ def _over_side(
 
 @inner_kernel
 def _way_from_vertex(
-    vertices: Float64Array,
-    faces: Int32Array,
-    face_neighbours: Int32Array,
-    vertex_face_offsets: Int32Array,
-    vertex_faces: Int32Array,
-    graph: tuple[Int32Array, Int32Array, Float32Array],
-    distances: Float32Array,
-    predecessors: Int32Array,
-    bends: Int32Array,
-    goal_face: int,
-    passed: BoolArray,
-    vertex: int,
-    to_predecessor: bool,
+    surface: Surface, field: Field, goal_face: int, passed: BoolArray, vertex: int, to_predecessor: bool
 ) -> tuple[int, int, float, int]:
     """Choose the way on from a vertex: (face, side, share, -1) through a face, or (face, -1, 0, next vertex)."""
     best, best_face, best_side, best_share = np.inf, Count(-1), Count(_NO_SIDE), 0.0
-    best_vertex = Count(predecessors[vertex])
-    for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
-        face = Count(vertex_faces[record])
-        corners = faces[face]
+    best_vertex, distances = Count(field.predecessors[vertex]), field.distances
+    records = range(surface.vertex_face_offsets[vertex], surface.vertex_face_offsets[vertex + 1])
+    for record in records:
+        face = Count(surface.vertex_faces[record])
+        corners = surface.faces[face]
         # A side of a free face is told of as that, it may have a blocked face on the other side.
         if _has_corner(corners, best_vertex) and (best_face < 0 or _is_reached(corners, distances)):
             best_face = face
     if to_predecessor:
         return best_face, best_side, best_share, best_vertex
-    for record in range(vertex_face_offsets[vertex], vertex_face_offsets[vertex + 1]):
-        face = Count(vertex_faces[record])
-        corners = faces[face]
+    for record in records:
+        face = Count(surface.vertex_faces[record])
+        corners = surface.faces[face]
         if not _is_reached(corners, distances):
             continue
         own = _side_of(corners, vertex)
-        sides = _side_weights(vertices, corners, graph)
+        sides = _side_weights(surface, field.edge_weights, corners)
         for step in range(1, 3):
             other = Count(corners[(own + step) % 3])
             total = distances[other] + (sides[own] if step == 1 else sides[(own + 2) % 3])
             if distances[other] < distances[vertex] and total < best:
                 best, best_face, best_side, best_share, best_vertex = total, face, Count(_NO_SIDE), 0.0, other
         opposite = (own + 1) % 3
-        if passed[face] or not _leads_on(faces, face_neighbours[face, opposite], distances, goal_face, passed):
+        following = surface.face_neighbours[face, opposite]
+        if passed[face] or not _leads_on(surface.faces, following, distances, goal_face, passed):
             continue
         left, right = Count(corners[opposite]), Count(corners[(opposite + 1) % 3])
-        total, share = _over_side(distances, bends, left, right, sides[opposite], sides[own], sides[(own + 2) % 3])
+        total, share = _over_side(field, left, right, sides[opposite], sides[own], sides[(own + 2) % 3])
         if total < best:
             best, best_face, best_side, best_share, best_vertex = total, face, Count(opposite), share, Count(-1)
     return best_face, best_side, best_share, best_vertex

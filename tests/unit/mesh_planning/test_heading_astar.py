@@ -14,7 +14,7 @@ from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for
 from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, HEADING_STEP, HEADINGS, search_with_heading
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner, may_turn_to
-from mbf_mesh_nav.search.heading_limits import NO_CHASSIS, ground_of
+from mbf_mesh_nav.search.heading_limits import NO_CHASSIS
 
 
 def passed_headings(heading, new):
@@ -60,11 +60,11 @@ def test_the_search_finds_the_cost_of_the_naive_one(make_plugin, seed):
     distances, predecessors = np.full(16 * count, np.inf, np.float32), np.full(16 * count, -1, np.int32)
     distances[start * HEADINGS + 2] = 0.0
     state, total = search_with_heading(
-        mesh_map.vertices, mesh_map.neighbour_offsets, mesh_map.neighbours, mesh_map.neighbour_lengths, headings,
+        mesh_map.topology.surface, mesh_map.neighbour_lengths, headings,
         np.zeros(count, bool), allowed, roll, 0.7, 0.2, distances, predecessors,
         np.array([start * HEADINGS + 2], np.int32), np.array([target], np.int32), np.full(1, 0.1, np.float32),
         np.array([goal_heading], np.int32), mesh_map.vertices[target],
-        np.full(len(mesh_map.neighbours), DRIVABLE, np.uint8), ground_of(mesh_map), NO_CHASSIS, scratch_for(count),
+        np.full(len(mesh_map.neighbours), DRIVABLE, np.uint8), NO_CHASSIS, scratch_for(count),
         np.zeros(1, np.uint8),
     )  # fmt: skip
     expected = slow_search(mesh_map, headings, allowed, roll, 0.7, 0.2, (start, 2), target, 0.1, goal_heading)
