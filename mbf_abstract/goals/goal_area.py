@@ -13,7 +13,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 
@@ -89,13 +92,12 @@ class PolygonArea(GoalArea):
 
     def depth(self, pose: Pose) -> float:
         """Distance [m] from the nearest edge; what is inside says the even-odd rule."""
-        inside, nearest = False, math.inf
+        nearest = math.inf
         for (x1, y1, _), (x2, y2, _) in zip(self.corners, self.corners[1:] + self.corners[:1], strict=True):
-            if (y1 > pose.y) != (y2 > pose.y) and pose.x < x1 + (pose.y - y1) / (y2 - y1) * (x2 - x1):
-                inside = not inside
             dx, dy, px, py = x2 - x1, y2 - y1, pose.x - x1, pose.y - y1
             share = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-18), 0.0), 1.0)
             nearest = min(nearest, math.hypot(px - share * dx, py - share * dy))
+        inside = inside_polygon(np.array([pose.position]), np.array(self.corners))[0]
         return nearest if inside else -nearest
 
     def members(self) -> tuple[Pose, ...]:

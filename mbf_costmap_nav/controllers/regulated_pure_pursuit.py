@@ -15,6 +15,7 @@ import math
 from typing import ClassVar
 
 from mbf_abstract.geometry import Path, Twist, normalize_angle
+from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
@@ -22,7 +23,6 @@ from mbf_costmap_nav.control.path_geometry import look_ahead_point
 from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower, to_base_frame
 from mbf_costmap_nav.grid.costmap import FREE, INSCRIBED
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.grid.footprint_check import arc_poses
 
 DEFAULT_DECAY, LEAST_DECAY = 10.0, 1e-3
 """1/m: of a map without an inflation layer, and of one whose costs do not fall at all."""

@@ -16,11 +16,11 @@ from typing import Any, ClassVar
 
 from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult, InnerPlugin, PluginKind
 from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower, to_base_frame
-from mbf_costmap_nav.grid.footprint_check import arc_poses
 from mbf_costmap_nav.planning.nav_core import wrap_nav_core
 from mbf_costmap_nav.plugins import CostmapContext
 

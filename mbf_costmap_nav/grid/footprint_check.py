@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry.arithmetic import plane_rotation, rotated
+from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
@@ -78,32 +79,4 @@ def footprint_samples(vertices: FloatArray, resolution: float) -> FloatArray:
     counts = [max(2, math.ceil(extent / resolution) + 1) for extent in high - low]
     axes = [np.linspace(low[k], high[k], counts[k])[1:-1] for k in range(2)]
     lattice = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
-    return np.ascontiguousarray(np.vstack([outline, lattice[_inside(vertices, lattice)]]))
-
-
-def _inside(vertices: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
-    """(n,) bool: whether points lie in a simple polygon (crossing number)."""
-    inside = np.zeros(len(points), dtype=bool)
-    for a, b in zip(vertices, np.roll(vertices, -1, axis=0), strict=True):
-        spans = (a[1] > points[:, 1]) != (b[1] > points[:, 1])
-        height = b[1] - a[1] if b[1] != a[1] else 1.0
-        inside ^= spans & (points[:, 0] < a[0] + (points[:, 1] - a[1]) * (b[0] - a[0]) / height)
-    return inside
-
-
-def arc_poses(
-    pose: tuple[float, float, float], vx: float, vy: float, wz: float, duration: float, step: float
-) -> FloatArray:
-    """Poses (n, 3) of a body that keeps a velocity, every ``step`` [s] up to ``duration``, the start left out.
-
-    Exact integration of a constant twist (vx, vy [m/s], wz [rad/s]).
-    """
-    x, y, yaw = pose
-    times = np.append(np.arange(step, duration, step), duration)
-    angles = wz * times
-    # integral of the rotation over time: sin(a)/w and (1 - cos(a))/w, stable where w vanishes
-    sine = times * np.sinc(angles / np.pi)
-    versine = times * np.sinc(angles / (2.0 * np.pi)) * np.sin(angles / 2.0)
-    forward, left = vx * sine - vy * versine, vx * versine + vy * sine
-    c, s = math.cos(yaw), math.sin(yaw)
-    return np.column_stack([x + c * forward - s * left, y + s * forward + c * left, yaw + angles])
+    return np.ascontiguousarray(np.vstack([outline, lattice[inside_polygon(lattice, vertices)]]))

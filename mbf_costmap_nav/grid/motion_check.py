@@ -12,9 +12,10 @@ import math
 import numpy as np
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry.arcs import arc_poses
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.grid.footprint_check import FootprintCheck, arc_poses
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 
 
 def obstacle_ahead(

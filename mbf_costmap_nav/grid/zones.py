@@ -20,6 +20,7 @@ from pydantic import field_validator
 
 from mbf_abstract.config.findings import Finding
 from mbf_abstract.config.validation import validate
+from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_costmap_nav.files.map_description import MapError, read_mapping, told
 
@@ -44,12 +45,8 @@ class Zone(ParameterModel):
         return np.array(self.polygon, dtype=np.float64)
 
     def contains(self, x: float, y: float) -> bool:
-        """Whether the point (x, y) [m] lies inside (crossing number; points on the border go either way)."""
-        ax, ay = self.corners.T
-        bx, by = np.roll(ax, -1), np.roll(ay, -1)
-        spans = (ay > y) != (by > y)
-        crossings = ax[spans] + (bx[spans] - ax[spans]) * (y - ay[spans]) / (by[spans] - ay[spans])
-        return bool(np.count_nonzero(crossings > x) % 2)
+        """Whether the point (x, y) [m] lies inside."""
+        return bool(inside_polygon(np.array([[x, y]]), self.corners)[0])
 
 
 class ZonesFile(ParameterModel):

@@ -14,12 +14,13 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_costmap_nav.grid.costmap import UNKNOWN
-from mbf_costmap_nav.grid.footprint_check import FootprintCheck, arc_poses
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.grid.motion_check import obstacle_ahead
 from mbf_costmap_nav.plugins import CostmapRecovery
 

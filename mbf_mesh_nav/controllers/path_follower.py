@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.geometry.pursuit import arc_to, in_robot_frame
+from mbf_abstract.geometry.arcs import arc_to, in_robot_frame
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult

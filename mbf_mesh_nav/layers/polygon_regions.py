@@ -6,8 +6,8 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
+from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_abstract.parameters import ParameterModel, parameter
-from mbf_mesh_nav.kernels.mesh.polygons import inside_polygon
 from mbf_mesh_nav.map.layer import FloatArray, IntArray, LethalArray
 
 ON_OUTLINE = 1e-6

@@ -9,8 +9,8 @@ import numpy as np
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.arcs import in_robot_frame
 from mbf_abstract.geometry.arithmetic import rotated_back
-from mbf_abstract.geometry.pursuit import in_robot_frame
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult
 from mbf_mesh_nav.map.mesh_map import MeshMap

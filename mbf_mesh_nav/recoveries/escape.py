@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.geometry.pursuit import arc_to
+from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import parameter

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.arcs import arc_to, in_robot_frame
 from mbf_abstract.geometry.arithmetic import norm
-from mbf_abstract.geometry.pursuit import arc_to, in_robot_frame
 from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult

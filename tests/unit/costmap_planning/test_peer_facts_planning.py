@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from mbf_abstract.execution.oscillation import OscillationDetector
 from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import GetPathOutcome
@@ -20,7 +21,7 @@ from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePurs
 from mbf_costmap_nav.files.map_io import load_image
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.grid.footprint_check import FootprintCheck, arc_poses
+from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.kernels.map.footprint_samples import rasterise_polygon
 from mbf_costmap_nav.layers.speed_limit import SpeedLimitLayer
 from mbf_costmap_nav.map.layer import LayerContext

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_mesh_nav.kernels.layers.neighbourhood_layers import height_differences
-from mbf_mesh_nav.kernels.mesh.polygons import inside_polygon
 from mbf_mesh_nav.layers.border import BorderLayer
 from mbf_mesh_nav.layers.clearance import ClearanceLayer
 from mbf_mesh_nav.layers.height_diff import HeightDiffLayer
