@@ -16,7 +16,6 @@ from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.events import EventBus, MemorySink
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.view import UNKNOWN_OCCUPANCY, FloorMap
 from mbf_abstract.server.factory import installed_servers, read_config
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
@@ -42,11 +41,9 @@ class StandingRobot:
 @contextmanager
 def standing_server(cls: type[AbstractNavigationServer], config: Config) -> Iterator[AbstractNavigationServer]:
     """Build a server around a robot that stands at the origin; closed on the way out."""
-    clock, transforms = SimClock(), TransformBuffer()
-    parameters = config.parameters
-    events = EventBus(clock.now, [MemorySink()])
-    with cls(config, StandingRobot(clock), clock, transforms, events) as server:
-        place_robot(server, Pose.planar(0.0, 0.0, frame_id=parameters.global_frame))
+    clock = SimClock()
+    with cls(config, StandingRobot(clock), clock, events=EventBus(clock.now, [MemorySink()])) as server:
+        place_robot(server, Pose.planar(0.0, 0.0, frame_id=config.parameters.global_frame))
         yield server
 
 

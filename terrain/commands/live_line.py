@@ -1,6 +1,6 @@
-"""The line that lives in the terminal while a run goes on: what is done, a bar, and the time.
+"""The status line in the terminal while a run goes on: the present step, a bar, and the time.
 
-Where there is no terminal, and with ``mbf run --json`` and ``--quiet``, only notes are printed, which must be read.
+Where there is no terminal, and with ``mbf run --json`` and ``--quiet``, only notes are printed.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class LiveLine:
         hidden = not (show and self._console.is_terminal)
         self._bar = Progress(*columns, console=self._console, transient=True, disable=hidden)
         self._task = self._bar.add_task("starting", total=None)
-        self._way: float | None = None
+        self._longest: float | None = None
 
     def __enter__(self) -> LiveLine:
         self._bar.start()
@@ -45,7 +45,7 @@ class LiveLine:
         self._bar.stop()
 
     def step(self, text: str) -> None:
-        """Tell of a preparation that may take a while; a text that ends in ``(2 of 5)`` fills the bar so far."""
+        """Show a preparation that may take a while; a text that ends in ``(2 of 5)`` fills the bar so far."""
         counted = COUNTED.search(text)
         done, total = map(int, counted.groups()) if counted else (0, None)
         self._bar.remove_task(self._task)
@@ -56,12 +56,12 @@ class LiveLine:
         self._console.print(text, markup=False, soft_wrap=True)
 
     def progress(self, progress: RunProgress) -> None:
-        """Tell how the drive goes; the bar shows how much of the longest way to the goal is done."""
+        """Show the progress of the drive; the bar is the share of the longest distance to the goal."""
         left = progress.distance_left
         if math.isfinite(left):
-            self._way = max(left, self._way or 0.0)
-        done = self._way - left if self._way is not None and math.isfinite(left) else None
-        self._bar.update(self._task, description=progress_text(progress), completed=done, total=self._way)
+            self._longest = max(left, self._longest or 0.0)
+        done = self._longest - left if self._longest is not None and math.isfinite(left) else None
+        self._bar.update(self._task, description=progress_text(progress), completed=done, total=self._longest)
 
 
 def progress_text(progress: RunProgress) -> str:

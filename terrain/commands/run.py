@@ -46,9 +46,9 @@ def run(
         "127.0.0.1", "--view-host", help="Interface of the page; others than loopback are not encrypted."
     ),
     view_token: bool = typer.Option(
-        True, "--view-token/--no-view-token", help="A token in the page's address, so that only who has it gets in."
+        True, "--view-token/--no-view-token", help="A token in the page's address, without which access is refused."
     ),
-    view_read_only: bool = typer.Option(False, "--view-read-only", help="Let nobody steer, only watch."),
+    view_read_only: bool = typer.Option(False, "--view-read-only", help="Watching only, no steering."),
     view_speed: float = typer.Option(
         1.0, "--view-speed", min=0.0, help="With --view: at most so many times real time; 0 = no limit."
     ),
@@ -140,7 +140,7 @@ def compare(
     right: Path = typer.Argument(..., help="Folder of another run."),
     out: Path = typer.Option(Path("compare.html"), "--out", help="The page to write."),
 ) -> None:
-    """Lay two runs side by side: a table of their metrics here, and one page with everything."""
+    """Compare two runs: a table of their metrics in the terminal, and one page with everything."""
     with readable_errors():
         from rich.console import Console
         from rich.markup import escape

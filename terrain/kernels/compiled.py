@@ -1,4 +1,4 @@
-"""The one way kernels of this package are compiled: at the first call, cached on disk, IEEE arithmetic throughout."""
+"""Compilation of this package's kernels: at the first call, cached on disk, IEEE arithmetic throughout."""
 
 from __future__ import annotations
 

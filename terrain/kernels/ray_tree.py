@@ -72,7 +72,7 @@ def cut(centres: FloatArray, order: OrderArray, cuts: OrderArray) -> int:
 
 @kernel
 def write_box(box: FloatArray, lane: int, lower: FloatArray, upper: FloatArray, order: OrderArray, hair: float) -> None:
-    """Write the box around the triangles of ``order`` into ``box`` (6, 8), a hair larger than they are."""
+    """Write the box around the triangles of ``order`` into ``box`` (6, 8), one rounding step larger than they are."""
     for axis in range(3):
         low, high = lower[order[0], axis], upper[order[0], axis]
         for face in order:

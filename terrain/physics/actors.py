@@ -1,7 +1,7 @@
 """Things that move by themselves: people and other robots on routes, doors that close. Only sensors see them.
 
-Their positions are functions of the world's time and of what they were made with; only who gives way looks at the
-robot too. Seeds go into the routes. They are as heavy as walls: a robot in the way of one that does not look is pushed.
+Their positions are functions of the world's time and of their parameters; only those with ``gives_way`` depend on the
+robot too. Seeds go into the routes. They are as heavy as walls: an actor that does not give way pushes a robot aside.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ AnyWorld = BulletWorld | KinematicWorld
 PERSON_RADIUS: float = 0.25  # m
 PERSON_HEIGHT: float = 1.7  # m
 MAX_ROUTE_DRAWS = 10_000
-COURTESY = 0.3  # m; who gives way stops this far from the robot
+COURTESY = 0.3  # m; an actor that gives way stops this far from the robot
 
 
 class Actor(Protocol):
@@ -54,7 +54,7 @@ class Actor(Protocol):
 
 
 class VisibleRobot(Protocol):
-    """What somebody who walks sees of a robot."""
+    """What a walker sees of a robot."""
 
     @property
     def spec(self) -> RobotSpec:
@@ -86,7 +86,7 @@ PERSON = Body()
 
 
 class RouteWalker:
-    """Somebody or something that follows a closed route of straight lines at constant speed.
+    """A person or thing that follows a closed route of straight lines at constant speed.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ class RouteWalker:
         return Pose.planar(x, y, math.atan2(ahead[1], ahead[0]), z + self._lift)
 
     def meet(self, robot: VisibleRobot) -> None:
-        """Know from now on which robot to give way to."""
+        """Give way to this robot from now on."""
         self._robot = robot if self._gives_way else None
 
     def _move(self) -> None:

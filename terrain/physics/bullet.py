@@ -1,7 +1,7 @@
-"""The one door to PyBullet: import it quietly, and say what to install where it is missing.
+"""Import of PyBullet: quiet, and with a clear error where it is missing.
 
 PyBullet's C++ side prints straight to the process's output (a build line on import, warnings without a line end on
-loading). That would glue onto our own output, so such calls happen inside ``quiet_native_output``.
+loading). That would mix with our own output, so such calls happen inside ``quiet_native_output``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ STANDARD_OUTPUT, STANDARD_ERROR = 1, 2
 
 
 class SimulatorMissingError(ImportError):
-    """PyBullet is not installed; the text says how to get it."""
+    """PyBullet is not installed; the text names the command that installs it."""
 
 
 @contextmanager

@@ -1,7 +1,7 @@
-"""How deep a convex outline lies in walls and other things on the floor: the least move that would free it, in metres.
+"""Penetration depth of a convex outline in walls and other things: the shortest motion that frees it, in metres.
 
-Separating axes: two convex shapes are apart if and only if their shadows on some edge normal are; where no shadow is,
-the narrowest overlap of the shadows is the depth (Ericson, Real-Time Collision Detection, 2005, 4.4). Depths below zero
+Separating axes: two convex shapes are apart if and only if their projections on some edge normal are; else the
+narrowest overlap of the projections is the depth (Ericson, Real-Time Collision Detection, 2005, 4.4). Depths below zero
 are those of shapes that are apart, by at least so much.
 """
 
@@ -23,7 +23,7 @@ def placed(corners: FloatArray, x: float, y: float, yaw: float) -> FloatArray:
 
 
 def depth_in_polygon(corners: FloatArray, other: FloatArray) -> float:
-    """How deep [m] the convex outlines (n, 2) and (m, 2), counter-clockwise, lie in each other."""
+    """Penetration depth [m] of the convex outlines (n, 2) and (m, 2), counter-clockwise."""
     depth = math.inf
     for nx, ny in (*_normals(corners), *_normals(other)):
         ours, theirs = corners[:, 0] * nx + corners[:, 1] * ny, other[:, 0] * nx + other[:, 1] * ny
@@ -32,7 +32,7 @@ def depth_in_polygon(corners: FloatArray, other: FloatArray) -> float:
 
 
 def depth_in_circle(corners: FloatArray, x: float, y: float, radius: float) -> float:
-    """How deep [m] a convex outline (n, 2), counter-clockwise, and a circle lie in each other."""
+    """Penetration depth [m] of a convex outline (n, 2), counter-clockwise, and a circle."""
     ahead = np.roll(corners, -1, axis=0)
     normals = _normals(corners)
     outside: float = max((x - a[0]) * n[0] + (y - a[1]) * n[1] for a, n in zip(corners.tolist(), normals, strict=True))
@@ -43,7 +43,7 @@ def depth_in_circle(corners: FloatArray, x: float, y: float, radius: float) -> f
 
 
 def depth_in_cells(corners: FloatArray, occupied: NDArray[np.bool_], resolution: float, origin: FloatArray) -> float:
-    """How deep [m] a convex outline (n, 2), counter-clockwise, lies in any occupied cell; -inf far from all of them.
+    """Penetration depth [m] of a convex outline (n, 2), counter-clockwise, in occupied cells; -inf far from all.
 
     Parameters
     ----------
@@ -65,8 +65,8 @@ def depth_in_cells(corners: FloatArray, occupied: NDArray[np.bool_], resolution:
     depths = np.full(len(x), math.inf)
     for ax, ay in ((1.0, 0.0), (0.0, 1.0), *_normals(corners)):
         half = 0.5 * resolution * (abs(ax) + abs(ay))
-        shadow, middles = corners[:, 0] * ax + corners[:, 1] * ay, x * ax + y * ay
-        depths = np.minimum(depths, np.minimum(shadow.max() - middles, middles - shadow.min()) + half)
+        projected, middles = corners[:, 0] * ax + corners[:, 1] * ay, x * ax + y * ay
+        depths = np.minimum(depths, np.minimum(projected.max() - middles, middles - projected.min()) + half)
     return float(depths.max(initial=-math.inf))
 
 

@@ -1,4 +1,4 @@
-"""Notice when driving goes wrong: tipped over, slipping, high-centred, stuck, collided. Pure, fed with samples.
+"""Detects when driving goes wrong: tipped over, slipping, high-centred, stuck, collided. Pure, fed with samples.
 
 Use it on the simulator's ground truth, to count what physics did to a run; a controller must not look at it. Each
 kind has a condition that must hold for a while, then counts once until it has been false again.
@@ -83,7 +83,7 @@ class Incident:
 
 @dataclass(frozen=True)
 class IncidentLimits:
-    """When a motion counts as a incident.
+    """When a motion counts as an incident.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A robot without physics: it does what it is told, within its limits, on flat ground or on a heightfield.
+"""A robot without physics: it follows commands within its limits, on flat ground or on a heightfield.
 
 Use it for sweeps of hundreds of runs and for tests of planners and controllers: it steps some thirty times faster
 than Bullet. It never slips or tips over, so do not judge routes over rough ground with it. Walls of an occupancy grid,
@@ -88,7 +88,7 @@ class KinematicRobot:
         return 1.0 / math.hypot(1.0, slope_x * math.cos(yaw) + slope_y * math.sin(yaw))
 
     def _can_stand(self, x: float, y: float, yaw: float) -> bool:
-        """Whether a pose is free, or at least freer than the present one; notes what is in the way."""
+        """Whether a pose is free, or at least freer than the present one; notes what blocks it."""
         if not self.world.contains(x, y):
             self._touched |= {Thing.WALL}
             return False

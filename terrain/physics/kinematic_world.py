@@ -115,7 +115,7 @@ class KinematicWorld:
     def contact(
         self, outline: FloatArray, x: float, y: float, yaw: float, reach: float, gap: float = 0.0
     ) -> tuple[float, frozenset[Thing]]:
-        """How deep [m] a robot lies in walls, obstacles and actors, and which of them it touches.
+        """Penetration depth [m] of a robot in walls, obstacles and actors, and which of them it touches.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ class KinematicWorld:
         reach : float
             Distance [m] from there to the farthest corner.
         gap : float
-            What is nearer than this [m] counts as touched, less than a cell of the building.
+            Things nearer than this [m] count as touched, less than a cell of the building.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""One simulated world with its robot and sensors, moved on in lockstep by whoever owns the clock.
+"""One simulated world with its robot and sensors, stepped in lockstep by the owner of the clock.
 
 ``advance_to`` is a pure function of what the simulation was made of, its seeds and the commands sent: no thread, no
 clock, no global state. In a run, a thread of ``SimClock`` calls it at a steady period; in a test, call it directly.

@@ -3,7 +3,7 @@
 Use it where contact matters: slopes, bumps, wheels that slip, doors that push. For sweeps on ground that does not
 matter take ``terrain.physics.kinematic_robot`` instead, which is some thirty times faster.
 
-Two ways to put ground in. ``add_heightfield`` is Bullet's own heightfield; the planner's mesh from
+There are two kinds of ground. ``add_heightfield`` is Bullet's own heightfield; the planner's mesh from
 ``Heightfield.surface`` is the same surface to a fraction of a millimetre. ``add_mesh`` is a concave triangle mesh:
 overhangs are possible, rays are faster. Bullet's heightfield has two traps that are guarded here: more than 2**21
 samples are cut off silently, and slanted rays miss it where raw heights are positive, so heights are shifted to <= 0
@@ -68,7 +68,7 @@ class BulletWorld:
     ground_bodies : set of int
         Bodies that are there to be driven on; touching any other counts as a collision.
     things : dict of int to Thing
-        What bodies are that are not simply fixed, to tell collisions apart.
+        Kinds of bodies that are not fixed, to distinguish collisions.
     """
 
     def __init__(self, time_step: float = TIME_STEP) -> None:

@@ -1,4 +1,4 @@
-"""What moved by itself during a run, as it is recorded: how it looks, and where it was at every sample."""
+"""Recorded tracks of actors: their shapes, and their poses at every sample."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def track_arrays(tracks: list[ActorTrack]) -> dict[str, Any]:
 
 
 def tracks_from(arrays: dict[str, Any]) -> list[ActorTrack]:
-    """Read what ``track_arrays`` made; recordings from before actors were recorded have none."""
+    """Read what ``track_arrays`` made; older recordings may have none."""
     return [
         ActorTrack(str(thing), *(arrays[f"actor_{number}_{name}"] for name in ("vertices", "faces", "poses")))
         for number, thing in enumerate(arrays.get("actor_things", ()))

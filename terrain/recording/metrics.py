@@ -1,6 +1,6 @@
-"""The numbers of a run (``metrics.json``), from its recording alone: how far, how fast, how tilted, how often asked.
+"""The numbers of a run (``metrics.json``), from its recording alone: distances, speeds, tilt, counts of calls.
 
-Everything is measured on the robot's true poses, not on what it believed.
+Everything is measured on the robot's true poses, not on the estimated ones.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ STANDING_YAW_RATE = 0.05  # rad/s
 
 @dataclass(frozen=True)
 class Metrics:
-    """What one run came to.
+    """The numbers of one run.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Metrics:
     mean_speed : float
         Track length by time [m/s].
     climb_m : float
-        Sum of all ways up along the track.
+        Sum of all rises along the track.
     max_tilt_deg, max_roll_deg, max_pitch_deg : float
         Largest magnitudes.
     distance_to_goal_m : float or None

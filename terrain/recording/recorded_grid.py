@@ -1,4 +1,4 @@
-"""A map of cells as a run leaves it behind: costs in steps of a hundredth, a byte each.
+"""A recorded grid map: costs in steps of a hundredth, one byte each.
 
 Made from ``GridView``, the server's own picture of its map; coarse enough that a replanning run of some minutes keeps
 its maps in a few hundred kilobytes.
@@ -60,7 +60,7 @@ def grid_arrays(grids: list[RecordedGrid]) -> dict[str, Any]:
 
 
 def grids_from(arrays: dict[str, Any]) -> list[RecordedGrid]:
-    """Read what ``grid_arrays`` made; recordings from before there were grids have none."""
+    """Read what ``grid_arrays`` made; older recordings may have none."""
     if "grid_cells" not in arrays:
         return []
     shapes, ends = arrays["grid_shapes"], np.cumsum(arrays["grid_shapes"].prod(axis=1))

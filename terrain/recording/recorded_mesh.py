@@ -1,4 +1,4 @@
-"""A map of triangles as a run leaves it behind: the surface once, its costs as often as they were seen to change.
+"""A recorded mesh map: the surface once, its costs as often as they have changed.
 
 Made from ``MeshView``, the server's own picture of its map. Costs are kept in half precision: three digits are enough
 for a colour, and infinity stays infinity.
@@ -70,7 +70,7 @@ def mesh_arrays(meshes: list[RecordedMesh]) -> dict[str, Any]:
 
 
 def meshes_from(arrays: dict[str, Any]) -> list[RecordedMesh]:
-    """Read what ``mesh_arrays`` made; recordings from before there were meshes have none."""
+    """Read what ``mesh_arrays`` made; older recordings may have none."""
     if "mesh_times" not in arrays:
         return []
     vertices, faces = arrays["mesh_vertices"], arrays["mesh_faces"]

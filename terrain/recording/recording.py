@@ -148,7 +148,7 @@ class Recording:
         for name in ("paths", "scans"):
             arrays |= _stamped_arrays(name, getattr(self, name))
         arrays |= grid_arrays(self.grids) | mesh_arrays(self.meshes) | track_arrays(self.actors)
-        words: dict[str, Any] = {
+        metadata: dict[str, Any] = {
             "scenario": self.scenario,
             "backend": self.backend,
             "verdict": asdict(self.verdict),
@@ -158,7 +158,7 @@ class Recording:
             "frame_id": self.start.frame_id,
             "events": [event.to_json() for event in self.events],
         }
-        arrays["words"] = np.array(json.dumps(words))
+        arrays["words"] = np.array(json.dumps(metadata))
         with replacing(file) as part, part.open("wb") as out:
             (np.savez_compressed if compress else np.savez)(out, **arrays)
 
@@ -204,27 +204,27 @@ def _stamped(name: str, arrays: dict[str, Any]) -> list[StampedPoints]:
 
 
 def _recording_from(arrays: dict[str, Any]) -> Recording:
-    words = json.loads(str(arrays["words"]))
-    ending = words["verdict"]
+    metadata = json.loads(str(arrays["words"]))
+    ending = metadata["verdict"]
     shape = RobotShape(
-        words["robot"], arrays["footprint"], words["height"], arrays["wheels"], words["wheel_radius"]
+        metadata["robot"], arrays["footprint"], metadata["height"], arrays["wheels"], metadata["wheel_radius"]
     )  # fmt: skip
     return Recording(
-        scenario=words["scenario"],
-        backend=words["backend"],
+        scenario=metadata["scenario"],
+        backend=metadata["backend"],
         robot=shape,
         ground=_surface("ground", arrays),
         walls=_surface("walls", arrays),
         obstacles=_surface("obstacles", arrays),
-        start=_pose(arrays["start"], words["frame_id"]),
-        goals=tuple(_pose(row, words["frame_id"]) for row in arrays["goals"]),
+        start=_pose(arrays["start"], metadata["frame_id"]),
+        goals=tuple(_pose(row, metadata["frame_id"]) for row in arrays["goals"]),
         times=arrays["times"],
         poses=arrays["poses"],
         twists=arrays["twists"],
         commands=arrays["commands"],
         paths=_stamped("paths", arrays),
         scans=_stamped("scans", arrays),
-        events=tuple(Event.from_json(line) for line in words["events"]),
+        events=tuple(Event.from_json(line) for line in metadata["events"]),
         verdict=Verdict(ending["outcome"], ending["message"], tuple(ending["failures"])),
         grids=grids_from(arrays),
         meshes=meshes_from(arrays),

@@ -1,7 +1,7 @@
-"""A recording that is on the disk while its run goes on, in parts, so that a run that is killed can be replayed.
+"""A recording saved in parts while its run goes on, so that a killed run can be replayed.
 
-Every two seconds of the run are a file of their own, which is there whole or not at all, whenever the process ends.
-When the run has ended in order, its recording is written in one piece and the parts are taken away.
+Each part holds two seconds of the run and is written atomically. After an orderly end, the recording is written in one
+file and the parts are removed.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class RecordingParts:
         self._events.append(event)
 
     def close(self) -> None:
-        """Keep what is there."""
+        """Keep the parts."""
 
     def after_step(self, time: float) -> None:
         """Write the next part if it is due; on the simulator's thread, ``time`` [s] is simulated."""
@@ -75,7 +75,7 @@ class RecordingParts:
             self._flush()
 
     def _flush(self) -> None:
-        """Write the next part; a disk that does not take it is told once and ends the parts."""
+        """Write the next part; a full disk is reported once and ends the parts."""
         if self._failed:
             return
         events, self._events = self._events, []
@@ -89,12 +89,12 @@ class RecordingParts:
             self._bus.emit(EventKind.SINK_FAILED, "recording", sink=PARTS, message=f"{type(error).__name__}: {error}")
 
     def remove(self) -> None:
-        """Take the parts away; the whole recording is on the disk."""
+        """Remove the parts; the whole recording is on the disk."""
         remove_parts(self._folder.parent)
 
 
 def remove_parts(folder: Path) -> None:
-    """Take the parts in a run's folder away, if there are any."""
+    """Remove the parts from a run's folder, if there are any."""
     shutil.rmtree(folder / PARTS, ignore_errors=True)
 
 

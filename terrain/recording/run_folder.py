@@ -1,4 +1,4 @@
-"""A run that was left on the disk: its recording and its numbers, read again."""
+"""The folder of a run: its recording and its numbers, read again."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RESULTS = ("metrics.json", "timing.json", "recording.npz", "picture.png", "repor
 
 
 def read_run(folder: Path) -> tuple[Recording, dict[str, Any]]:
-    """Return the recording and the metrics of a run's folder; of a run that was cut short, as far as it came.
+    """Return the recording and the metrics of a run's folder; of a run that was cut short, up to its end.
 
     What only the run itself knew, as slip and wall time, is there if metrics.json and timing.json are; all else is
     measured again. Raises RecordingError for a folder without a readable recording.
@@ -29,7 +29,7 @@ def read_run(folder: Path) -> tuple[Recording, dict[str, Any]]:
 
 
 def clear_results(folder: Path) -> None:
-    """Take away what an earlier run has left in a folder, so that nothing of it is taken for this one's."""
+    """Remove the results of an earlier run, so that they are not mistaken for new ones."""
     for name in RESULTS:
         (folder / name).unlink(missing_ok=True)
     remove_parts(folder)

@@ -1,8 +1,8 @@
-"""Whether a run has succeeded: one answer, made once at the end of a run, which everything that tells of it shows.
+"""Whether a run has succeeded: decided once, at the end of the run, and shown everywhere.
 
 A run succeeds if navigation reached the last goal, the robot was at every goal in truth, no limit of the scenario was
-broken, and the robot touched nothing while it moved. What is wrong stands in ``Verdict.failures``, whatever navigation
-says.
+broken, and the robot touched nothing while it moved. ``Verdict.failures`` lists what is wrong, whatever
+navigation reported.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Verdict:
     outcome : int or None
         Code of navigation's last goal; None for a run that was cut short before it had one.
     message : str
-        Navigation's words for it.
+        Message of that goal.
     failures : tuple of str
         What must not happen in a run and did; empty in a good one.
     """
@@ -50,7 +50,7 @@ class Verdict:
 
     @property
     def title(self) -> str:
-        """The verdict in a word: navigation's outcome, or FAILED where that one is a success and the run is none."""
+        """Short verdict: navigation's outcome, or FAILED where that is a success but the run is not."""
         return "FAILED" if self.failures and self._navigation_succeeded else self.outcome_name
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""What a run was made with: the same scenario and seed is promised to be the same drive for equal versions only."""
+"""The versions a run was made with: a scenario and seed give the same drive for equal versions only."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def write_versions(folder: Path) -> None:
 
 
 def _cpu() -> str:
-    """Name of the CPU; where Linux does not tell, what Python knows."""
+    """Name of the CPU, from Linux or else from Python."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all: written beside their place and put there when they are finished."""
+"""Atomic writes: to a temporary file beside the target, which replaces the target when it is complete."""
 
 from __future__ import annotations
 

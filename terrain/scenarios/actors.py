@@ -26,7 +26,7 @@ from terrain.worlds.occupancy import OccupancyGrid
 
 
 class Walker(ParameterModel):
-    """Somebody who walks a closed route again and again."""
+    """A person who walks a closed route again and again."""
 
     type: Literal["walker"]
     route: tuple[tuple[float, float], ...] = parameter(..., "Corners; the last leg leads back to the first.", unit="m")
@@ -34,7 +34,7 @@ class Walker(ParameterModel):
     start: float = parameter(0.0, "How far along the route it starts.", unit="m", ge=0.0)
     radius: float = parameter(PERSON_RADIUS, "Of the upright cylinder it is.", unit="m", gt=0.0)
     height: float = parameter(PERSON_HEIGHT, "Of the upright cylinder it is.", unit="m", gt=0.0)
-    gives_way: bool = parameter(False, "Wait while our robot is just ahead, instead of pushing it.")
+    gives_way: bool = parameter(False, "Wait while the robot is just ahead, instead of pushing it.")
 
 
 class OtherRobot(ParameterModel):
@@ -45,7 +45,7 @@ class OtherRobot(ParameterModel):
     route: tuple[tuple[float, float], ...] = parameter(..., "Corners; the last leg leads back to the first.", unit="m")
     speed: float = parameter(0.5, "Speed.", unit="m/s", ge=0.0, le=5.0)
     start: float = parameter(0.0, "How far along the route it starts.", unit="m", ge=0.0)
-    gives_way: bool = parameter(False, "Wait while our robot is just ahead, instead of pushing it.")
+    gives_way: bool = parameter(False, "Wait while the robot is just ahead, instead of pushing it.")
 
 
 class Crowd(ParameterModel):
@@ -56,7 +56,7 @@ class Crowd(ParameterModel):
     speed: float = parameter(0.6, "Walking speed.", unit="m/s", ge=0.0, le=5.0)
     x_range: tuple[float, float] | None = parameter(None, "Part of the building where they walk.", unit="m")
     y_range: tuple[float, float] | None = parameter(None, "Part of the building where they walk.", unit="m")
-    gives_way: bool = parameter(False, "Wait while our robot is just ahead, instead of pushing it.")
+    gives_way: bool = parameter(False, "Wait while the robot is just ahead, instead of pushing it.")
 
 
 class Door(ParameterModel):

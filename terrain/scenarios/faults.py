@@ -35,7 +35,7 @@ class TimedFault(ParameterModel):
 
 
 class SensorFault(TimedFault):
-    """A sensor says nothing, its last measurement again and again, or something untrue."""
+    """A sensor gives nothing, repeats its last measurement, or gives wrong values."""
 
     type: Literal["silent", "stale", "wrong"]
     sensor: str = parameter(..., "Name of the sensor, or localization, odometry or imu.")

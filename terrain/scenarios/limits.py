@@ -16,13 +16,13 @@ class Limits(ParameterModel):
     max_path_length: float | None = parameter(None, "Longest track.", unit="m", gt=0.0)
     goal_distance: float | None = parameter(
         None,
-        "Largest true distance to a goal where navigation says it is reached; absent = the navigation's tolerance and "
+        "Largest true distance to a goal that navigation reports as reached; absent = the navigation's tolerance and "
         "three standard deviations of the pose.",
         unit="m",
         gt=0.0,
     )
     goal_angle: float | None = parameter(None, "Largest true angle to it; absent likewise.", unit="deg", gt=0.0)
-    forbidden: tuple[IncidentKind, ...] = parameter((), "Mishaps that must not happen.")
+    forbidden: tuple[IncidentKind, ...] = parameter((), "Incidents that must not happen.")
 
 
 def broken_limits(limits: Limits, metrics: Mapping[str, Any]) -> list[str]:

@@ -1,7 +1,7 @@
-"""Runs that are a little different from the scenario as written, each in its own way, drawn from the run's seed.
+"""Small changes of a scenario, drawn from the seed of each run.
 
 A scenario that succeeds only from one exact start, with one exact friction and a perfect pose, proves little. The block
-``perturb:`` says how far a run may be from it; ``benchmarks/margins.py`` counts how many such runs still succeed.
+``perturb:`` limits the changes; ``benchmarks/margins.py`` counts how many such runs still succeed.
 """
 
 from __future__ import annotations

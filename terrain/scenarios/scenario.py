@@ -53,10 +53,10 @@ class Scenario(ParameterModel):
     world: World = parameter(..., "What it takes place in.")
     robot: Literal["husky", "turtlebot", "car"] = parameter(..., "Model of the robot.")
     start: Place = parameter(..., "Where the robot starts: x, y, yaw, or the name of a place of the world.")
-    goals: tuple[Place, ...] = parameter(..., "Where it shall go, in order.")
+    goals: tuple[Place, ...] = parameter(..., "Where it goes, in order.")
     sensors: tuple[Sensor, ...] = parameter((), "Its lidars and cameras.")
     odometry: Literal["exact", "wheels"] = parameter(
-        "exact", "Velocity as it is, or as turning wheels tell; then odom drifts and map -> odom corrects it."
+        "exact", "True velocity, or that of the turning wheels; then odom drifts and map -> odom corrects it."
     )
     imu: bool = parameter(False, "Whether it has an IMU, for scripts: simulation.latest['imu'] is the tilt.")
     localization: LocalizationNoise = parameter(LocalizationNoise(), "Noise of the pose; none = it is exact.")

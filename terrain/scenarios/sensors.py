@@ -41,7 +41,7 @@ def make_proprioceptive_sensors(scenario: model.Scenario, robot: AnyRobot, seed:
 
 
 def make_localization(noise: LocalizationNoise, robot: AnyRobot, seed: int) -> Localization:
-    """Make the localisation of a robot, which is as noisy as the scenario says."""
+    """Make the localisation of a robot with the scenario's noise."""
     angles = math.radians(noise.yaw_noise), math.radians(noise.tilt_noise)
     return Localization(
         robot, _generator(seed, LOCALIZATION), PoseNoise(noise.position_noise, noise.height_noise, *angles)

@@ -62,7 +62,7 @@ class ScenarioWorld:
     actors: list[Actor] = field(default_factory=list)
 
     def introduce(self, robot: VisibleRobot) -> None:
-        """Let those who walk know the robot, for they may give way to it."""
+        """Make the robot known to the walkers, which may give way to it."""
         for actor in self.actors:
             if isinstance(actor, RouteWalker):
                 actor.meet(robot)

@@ -29,7 +29,7 @@ from terrain.worlds.slope_map import LETHAL_SLOPE
 from terrain.worlds.surface import NO_SURFACE
 
 FARTHEST = 10_000.0
-"""Coordinates [m] at which the physics, in single precision, still tells a millimetre."""
+"""Coordinates [m] up to which the physics, in single precision, resolves a millimetre."""
 
 
 class TerrainWorld(ParameterModel):
@@ -180,9 +180,9 @@ class MeshWorld(LevelsWorld):
     type: Literal["mesh"]
     file: Path = parameter(..., "The mesh file, in any format that the mesh server reads.")
     up_axis: Literal["", "x", "y", "z"] = parameter(
-        "", "Axis of the file that points up; empty = what the file or its format says."
+        "", "Axis of the file that points up; empty = as in the file or its format."
     )
-    unit: float = parameter(0.0, "Length of the file's unit; 0 = what the file says, or 1.", unit="m", ge=0.0, le=1e6)
+    unit: float = parameter(0.0, "Length of the file's unit; 0 = as in the file, or 1.", unit="m", ge=0.0, le=1e6)
 
     def levels(self) -> MultiLevelWorld:
         """Read the file."""

@@ -1,9 +1,9 @@
-"""The frame of every simulated sensor, and the lidars.
+"""Base class of the simulated sensors, and the lidars.
 
-A sensor measures when it is asked, at a stamp; ``Simulation`` asks at the sensor's rate. All noise comes from the
+``Simulation`` calls ``measure`` at the sensor's rate. All noise comes from the
 sensor's own generator, so that one sensor's faults do not shift another's noise. Three switches make it fail, for
-scenarios: ``silent`` (nothing comes), ``stale`` (the last measurement comes again, with its old stamp) and ``wrong``
-(new measurements that are not true).
+scenarios: ``silent`` (no measurement), ``stale`` (the last measurement again, with its old stamp) and ``wrong``
+(new measurements with wrong values).
 """
 
 from __future__ import annotations
@@ -81,11 +81,11 @@ class Sensor(ABC, Generic[Measurement]):
 
     @abstractmethod
     def _sense(self, stamp: float) -> Measurement:
-        """Take an honest measurement, noise included."""
+        """Take a correct measurement, with noise."""
 
     @abstractmethod
     def _falsify(self, measurement: Measurement) -> Measurement:
-        """Return what a defective sensor would say instead."""
+        """Return the wrong measurement of a defective sensor."""
 
 
 @dataclass(frozen=True)

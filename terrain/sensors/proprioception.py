@@ -28,7 +28,7 @@ class Tilt:
 
 
 class Imu(Sensor[Tilt]):
-    """Roll, pitch and turning rates with white noise; no heading, which an IMU cannot know."""
+    """Roll, pitch and turning rates with white noise; no heading."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class WheelOdometryReading:
 
 
 class WheelOdometry(Sensor[WheelOdometryReading]):
-    """Dead reckoning from wheel speeds. Wheels that slip, and wheels not quite as large as thought, make it drift.
+    """Dead reckoning from wheel speeds. Slipping wheels and errors of the wheels' size make it drift.
 
     Parameters
     ----------

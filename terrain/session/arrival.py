@@ -1,7 +1,7 @@
-"""Whether a robot has arrived: where it was in truth, not where it believed to be.
+"""Whether a robot has arrived, by its true pose and not by the estimated one.
 
-Navigation ends a goal by the pose that the localisation gives. If that is off, navigation says that the goal is reached
-and the robot stands elsewhere; such a run is none that succeeded.
+Navigation ends a goal by the pose of the localisation. If that is wrong, navigation reports the goal as reached while
+the robot stands elsewhere; such a run has not succeeded.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ DEVIATIONS = 3.0  # standard deviations of its pose; what a robot cannot know to
 
 @dataclass(frozen=True)
 class Arrival:
-    """Where the robot was when navigation said that a goal was reached.
+    """Where the robot was when navigation reported a goal as reached.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ def arrival_tolerance(
 
 
 def missed_goals(metrics: Mapping[str, Any]) -> list[str]:
-    """Name every goal that navigation said was reached and in truth was not."""
+    """Name every goal that navigation reported as reached and that was missed in truth."""
     distance, angle = metrics["arrival_tolerance"]
     missed = []
     for number, arrival in enumerate(metrics["arrivals"], 1):

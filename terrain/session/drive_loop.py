@@ -1,4 +1,4 @@
-"""The thread that steps a simulation on a clock and feeds what it yields to a server and a recorder."""
+"""The thread that steps a simulation on a clock and publishes its poses and scans."""
 
 from __future__ import annotations
 

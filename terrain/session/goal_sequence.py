@@ -1,4 +1,4 @@
-"""The goals that a run visits, one after the other: those of the scenario, then those that somebody asks for.
+"""The goals that a run visits, one after the other: those of the scenario, then those from outside.
 
 The sequence runs on the thread that calls ``visit_goals``. ``go_to``, ``cancel`` and ``end`` are called on the
 simulator's thread (``DriveLoop.on_tick``), between two steps, so that a goal from outside comes at a definite time.
@@ -42,7 +42,7 @@ class GoalSequence:
     Attributes
     ----------
     on_goal : list of callables
-        Called with each goal that somebody has asked for, before it is sent.
+        Called with each goal from outside, before it is sent.
     is_waiting : bool
         Whether there is no goal to go to at the moment.
     target : Pose or None
@@ -50,7 +50,7 @@ class GoalSequence:
     last_result : MoveBaseResult or None
         How the last goal has ended.
     arrivals : list of Arrival
-        Where the robot was in truth when navigation said that a goal was reached, goal by goal.
+        Where the robot was in truth when navigation reported a goal as reached, goal by goal.
     """
 
     def __init__(self, session: Session, executive: GoalExecutive, stay: bool = False) -> None:

@@ -10,9 +10,8 @@ from typing import TypeVar
 
 from mbf_abstract.events import EventBus, EventSink, MemorySink
 from mbf_abstract.geometry import Command, Pose
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
-from mbf_abstract.server.factory import read_config
+from mbf_abstract.server.factory import make_server
 from mbf_abstract.time.clock import Clock, WallClock
 from mbf_abstract.time.sim_clock import SimClock
 from terrain.physics.simulation import Simulation
@@ -23,7 +22,7 @@ from terrain.session.drive_loop import DEFAULT_RATES, ClockedRobot, DriveLoop
 S = TypeVar("S", bound="SimulationSession")
 
 SENSE_FIRST = 0.5  # s; by then every sensor has measured and every map has been updated
-TIME_TO_END = 1.0  # s of simulated time for threads to end; it passes only while somebody waits for it
+TIME_TO_END = 1.0  # s of simulated time for threads to end; it passes only while a thread waits
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,6 @@ class SimulationSession(ABC):
         options: SessionOptions,
         send: Callable[[Command], None] | None = None,
     ) -> None:
-        server_class, config = read_config(config_file)
         self.simulation = simulation
         self.clock: Clock = WallClock() if options.wall_clock else SimClock()
         self.memory = MemorySink(maxlen=self.max_events)
@@ -108,7 +106,7 @@ class SimulationSession(ABC):
         self.events = EventBus(self.clock.now, [self.memory, self.digest, *options.sinks])
         robot = ClockedRobot(simulation, send or simulation.robot.send_command, self.digest)
         options.on_step("building the map")
-        server = server_class(config, robot, self.clock, TransformBuffer(), self.events, options.seed or 0)
+        server = make_server(config_file, robot, self.clock, events=self.events, seed=options.seed or 0)
         self.navigator = Navigator(server)
         self.loop = DriveLoop(simulation, robot, localization, server, self.digest, self.rates)
         self.loop.publish()
@@ -118,7 +116,7 @@ class SimulationSession(ABC):
     @property
     @abstractmethod
     def goals(self) -> list[Pose]:
-        """Where the robot shall go, in order."""
+        """The robot's goals, in order."""
 
     def run(self) -> None:
         """Let time pass: start stepping the simulator, and wait until sensors and maps are alive."""

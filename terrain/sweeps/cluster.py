@@ -16,7 +16,7 @@ CONNECTION_TIMEOUT = 20.0  # s
 
 
 class ClusterError(Exception):
-    """The cluster cannot be used; the text says what to do."""
+    """The cluster cannot be used; the text names the remedy."""
 
 
 def run_on_cluster(jobs: Sequence[Job], address: str) -> Iterator[tuple[Job, dict[str, Any]]]:
@@ -31,7 +31,7 @@ def run_on_cluster(jobs: Sequence[Job], address: str) -> Iterator[tuple[Job, dic
     Raises
     ------
     ClusterError
-        Dask is not installed, nobody answers at the address, or a worker has several threads.
+        Dask is not installed, no scheduler answers at the address, or a worker has several threads.
     distributed.KilledWorker
         A run took several workers down with it.
     """

@@ -52,8 +52,8 @@ def sweep(
                 finished, escape(well_formed(loaded.name)), len(left), console=console, disable=not console.is_terminal
             ):
                 log.append(run.key(hashed), {**metrics, "seed": run.seed, "variant": run.variant})
-                told = well_formed(f"seed {run.seed} {run.variant}: {metrics['verdict']}")
-                console.print(told, markup=False, highlight=False, soft_wrap=True)
+                text = well_formed(f"seed {run.seed} {run.variant}: {metrics['verdict']}")
+                console.print(text, markup=False, highlight=False, soft_wrap=True)
             rows = [log.rows[run.key(hashed)] for run in planned]
         files = write_tables(f"{loaded.name}: {loaded.proves}", rows, out)
         summary = summarise(rows)

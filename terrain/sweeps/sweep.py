@@ -34,7 +34,7 @@ class SweepRun:
         return " ".join(f"{key}={value}" for key, value in sorted(self.settings.items()))
 
     def key(self, scenario_hash: str) -> str:
-        """Return what tells this run from all others; a file that a setting names counts with what it says."""
+        """Return the key of this run; a file that a setting names counts with its contents."""
         files = [_hash_of_file(file).hex()[:16] for file in _named_files(list(self.settings.values()), Path())]
         return "/".join([scenario_hash, str(self.seed), self.variant, *files])
 
@@ -43,7 +43,7 @@ Job = tuple[Scenario, SweepRun]
 
 
 def hash_of(scenario: Scenario) -> str:
-    """Return a short hash of everything a scenario's files say: maps, meshes and images too, and what those name."""
+    """Return a short hash of the contents of a scenario's files, with maps, meshes, images and the files they name."""
     digest = hashlib.sha256(scenario.model_dump_json(exclude={"navigation"}).encode())
     for backend, file in sorted(scenario.navigation.items()):
         digest.update(backend.encode() + _hash_of_file(file))

@@ -69,7 +69,7 @@ def _run_in_pool(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Itera
 def _end_with_the_parent(parent: int) -> None:
     """Let a worker end soon after its parent was killed; it would wait for work for ever.
 
-    It also ends at once when it is told to, so that its job is given to another one: what a navigation server would do
+    It also ends at once on a signal, so that its job is given to another one: what a navigation server would do
     first, stop its robot, is of no use to a simulated one.
     """
 

@@ -1,6 +1,6 @@
 """A run to play again in any browser: one HTML file that needs no network and no Python to be opened.
 
-The scene is put up once in a viser server that nobody else can reach; its messages, with the times between them, are
+The scene is put up once in a viser server that listens at loopback only; its messages, with the times between them, are
 the recording, which viser packs into one page with its own viewer, a time bar and speeds. Files stay small because a
 frame is only the robot's pose: about 3 MB for a terrain of a quarter of a million triangles.
 
@@ -131,7 +131,7 @@ def frame_indices(times: FloatArray) -> NDArray[np.intp]:
 
 
 def status_text(recording: Recording, index: int) -> str:
-    """What stands above the robot."""
+    """Text above the robot."""
     speed = float(np.hypot(*recording.twists[index, :2]))
     tilt = float(np.degrees(recording.tilt[index]))
     return f"{recording.times[index]:.0f} s   {speed:.1f} m/s   tilt {tilt:.0f}°"

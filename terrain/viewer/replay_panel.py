@@ -1,4 +1,4 @@
-"""The words of a replay: what has happened along the time bar, how the behaviour tree stands, what the colours mean.
+"""The text panel of a replay: events along the time bar, the state of the behaviour tree, and a legend of colours.
 
 The page of a replay is made by viser and knows scenes only. The panel is HTML and a few lines of script that read the
 time from the time bar; what it shows lies in the page as JSON, so it works from disk and without network.
@@ -13,7 +13,7 @@ from typing import Any
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import SYMBOLS
 from terrain.viewer.pictures.legend import Entry, legend_html
-from terrain.viewer.reports.event_lines import is_told, line_of
+from terrain.viewer.reports.event_lines import is_shown, line_of
 from terrain.viewer.reports.tree_html import COLOURS, INDENT
 
 SHOWN_LINES = 8
@@ -38,13 +38,13 @@ function showTree(time) {
   place.replaceChildren();
   if (!tree) return;
   const now = tree.nodes.map(() => ['INVALID', '']);
-  for (const [at, index, status, said] of tree.changes) { if (at > time) break; now[index] = [status, said]; }
+  for (const [at, index, status, message] of tree.changes) { if (at > time) break; now[index] = [status, message]; }
   const branch = [];
   tree.nodes.forEach(([name, depth], index) => {
-    const [status, said] = now[index];
+    const [status, message] = now[index];
     branch[depth] = status;
     if (status === 'INVALID' && depth > 0 && branch[depth - 1] !== 'RUNNING') return;
-    const failed = status === 'FAILURE' && said ? '  ' + said : '';
+    const failed = status === 'FAILURE' && message ? '  ' + message : '';
     add(place, run.symbols[status] + ' ' + name + failed, 'padding-left:' + depth * run.indent + 'px;color:' +
       run.colours[status] + (status === 'RUNNING' ? ';font-weight:600' : ''));
   });
@@ -84,7 +84,7 @@ def with_panel(page: str, events: Iterable[Event], legend: Iterable[Entry] = ())
 
 def _data(events: tuple[Event, ...]) -> dict[str, Any]:
     """What the script goes through: the runs of trees with their changes, and the lines, all by time [s]."""
-    lines = [line_of(event) for event in events if is_told(event)]
+    lines = [line_of(event) for event in events if is_shown(event)]
     trees: list[dict[str, Any]] = []
     for event in events:
         if event.kind is EventKind.TREE:

@@ -1,4 +1,4 @@
-"""Everything of a run that is looked at, made from its recording: picture, report, replay and log for Foxglove."""
+"""All views of a run, made from its recording: picture, report, replay and log for Foxglove."""
 
 from __future__ import annotations
 

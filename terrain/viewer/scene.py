@@ -152,7 +152,7 @@ def look_at_route(camera: Any, recording: Recording, farther: float = 1.0) -> No
 
 
 class RobotModel:
-    """Body and wheels of a robot in the scene, and a label on a stick that tells how it does.
+    """Body and wheels of a robot in the scene, and a label on a stick with its status.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ class TerrainFileError(Exception):
         self.reason = reason
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        """Survive the way back from a worker process."""
+        """Keep the arguments when it is pickled for another process."""
         return type(self), (self.path, self.reason)
 
 
@@ -129,7 +129,7 @@ def read_elevation(path: str | Path, max_samples: int = MAX_SAMPLES) -> Elevatio
     Raises
     ------
     TerrainFileError
-        Missing file, unknown ending, too many samples, or contents that are not what the ending says.
+        Missing file, unknown ending, too many samples, or contents that do not match the ending.
     """
     path = Path(path)
     readers = {".asc": _read_esri_ascii, ".hgt": _read_hgt, ".tif": _read_geotiff, ".tiff": _read_geotiff}
@@ -177,10 +177,10 @@ def _read_esri_ascii(path: Path, max_samples: int) -> Elevation:
     header: dict[str, float] = {}
     with path.open(encoding="ascii") as file:
         for line in file:
-            words = line.split()
-            if len(words) != 2 or not re.match(r"[A-Za-z_]+$", words[0]):
+            fields = line.split()
+            if len(fields) != 2 or not re.match(r"[A-Za-z_]+$", fields[0]):
                 break
-            header[words[0].lower()] = float(words[1])
+            header[fields[0].lower()] = float(fields[1])
     missing = [key for key in ("ncols", "nrows", "cellsize") if key not in header]
     if missing:
         raise TerrainFileError(path, f"header without {', '.join(missing)}")

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from PIL import Image
 
-from terrain.worlds.occupancy import OccupancyGrid, all_digits
+from terrain.worlds.occupancy import OccupancyGrid, write_map_files
 
 BoolArray = NDArray[np.bool_]
 
@@ -145,19 +144,10 @@ def _door(room: dict[str, Any], door: dict[str, Any], sides: dict[str, Rectangle
 
 def write_map(grid: OccupancyGrid, folder: str | Path, name: str) -> Path:
     """Write map_server files ``name.yaml`` and ``name.png`` into ``folder``; return the yaml's path."""
-    folder = Path(folder)
     pixels = np.full(grid.occupied.shape, PIXEL_UNKNOWN, dtype=np.uint8)
     pixels[grid.free] = PIXEL_FREE
     pixels[grid.occupied] = PIXEL_OCCUPIED
-    Image.fromarray(pixels[::-1]).save(folder / f"{name}.png", optimize=True)
-    yaml_path = folder / f"{name}.yaml"
-    yaml_path.write_text(
-        f"image: {name}.png\nresolution: {all_digits(grid.resolution)}\n"
-        f"origin: [{all_digits(grid.origin_x)}, {all_digits(grid.origin_y)}, 0.0]\n"
-        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
-        encoding="utf-8",
-    )
-    return yaml_path
+    return write_map_files(Path(folder) / name, pixels, grid)
 
 
 def write_office_map(folder: str | Path) -> Path:

@@ -1,6 +1,6 @@
-"""Length of the shortest way over a surface, to measure driven ways against; knows no cost, no robot, no planner.
+"""Length of the shortest path over a surface, to compare driven paths with; independent of costs, robot and planner.
 
-Use it for tables: path length / shortest length tells how much of a detour a planner made. It is an upper bound of
+Use it for tables: path length / shortest length is the detour that a planner made. It is an upper bound of
 the geodesic distance, at most 3 % above it: Dijkstra's search over corners and ``POINTS_PER_EDGE`` points on every edge
 (M. Lanthier, A. Maheshwari, J.-R. Sack, Approximating weighted shortest paths on polyhedral surfaces, 1997), joined
 across every face. It takes about 10 microseconds per face; planners of ``mbf_mesh_nav`` are faster.
@@ -30,7 +30,7 @@ FLOOR_CELL = 0.2  # m; width of the squares that a building's floor is made of
 
 
 def geodesic_length(surface: Surface, places: Sequence[Sequence[float]]) -> float:
-    """Length [m] of the shortest way over a surface through places in their order, inf where there is none.
+    """Length [m] of the shortest path over a surface through places in their order, inf where there is none.
 
     Parameters
     ----------

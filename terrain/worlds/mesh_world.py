@@ -25,9 +25,9 @@ def read_mesh_world(path: str | Path, up_axis: str = "", unit: float = 0.0) -> S
     Parameters
     ----------
     up_axis : str
-        Axis of the file that points up, "x", "y" or "z"; "" = what the file or its format says.
+        Axis of the file that points up, "x", "y" or "z"; "" = as in the file or its format.
     unit : float
-        Length of the file's unit [m]; 0 = what the file says, or 1.
+        Length of the file's unit [m]; 0 = as in the file, or 1.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Worlds of several levels, of our own making: a parking garage with ramps, and a bridge over a road.
 
-Only a planner on a mesh can find its way in them: a 2D map shows floor and roof, deck and road at the same place. The
-``ground`` is what wheels may roll on and what a mesh server plans on; ``walls`` are in the way of wheels and sensors.
+Only a planner on a mesh finds paths in them: a 2D map shows floor and roof, deck and road at the same place. The
+``ground`` is what wheels may roll on and what a mesh server plans on; ``walls`` block wheels and sensors.
 """
 
 from __future__ import annotations

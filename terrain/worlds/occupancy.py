@@ -70,9 +70,22 @@ def read_occupancy(path: str | Path) -> OccupancyGrid:
     return OccupancyGrid(occupied, floor.occupancy == 0, floor.resolution, floor.origin_x, floor.origin_y)
 
 
-def all_digits(value: float) -> str:
-    """All digits of a number for a map file, whole ones without a point."""
-    return repr(float(value)).removesuffix(".0")
+def write_map_files(file: Path, pixels: NDArray[np.uint8], grid: OccupancyGrid, mode: str = "") -> Path:
+    """Write map_server files: ``pixels`` (ny, nx) as ``file``.png, and a yaml with the grid's geometry; return that.
+
+    Parameters
+    ----------
+    mode : str
+        Line of the yaml that sets the meaning of the pixels; trinary without it.
+    """
+    from PIL import Image
+
+    Image.fromarray(pixels[::-1]).save(file.parent / f"{file.name}.png", optimize=True)
+    resolution, x, y = (repr(float(v)).removesuffix(".0") for v in (grid.resolution, grid.origin_x, grid.origin_y))
+    text = f"image: {file.name}.png\n{mode}resolution: {resolution}\norigin: [{x}, {y}, 0.0]\n"
+    yaml_file = file.parent / f"{file.name}.yaml"
+    yaml_file.write_text(f"{text}negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n", encoding="utf-8")
+    return yaml_file
 
 
 def merge_rectangles(occupied: NDArray[np.bool_]) -> IntArray:

@@ -1,7 +1,7 @@
 """A terrain as a 2D map, so that a costmap server can be run outdoors and compared with a mesh server.
 
-What a flat map can know of hills: how steep each cell is, seen over the length of the robot. It cannot know which way
-the robot will stand on it; that is the comparison's point. Use ``slope_grid`` for a map of free and occupied cells,
+A 2D map can hold how steep each cell is over the length of the robot. It cannot hold the heading of the robot on the
+slope; that is what the comparison shows. Use ``slope_grid`` for a map of free and occupied cells,
 ``write_slope_map`` for one with every shade between.
 """
 
@@ -11,11 +11,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from mbf_abstract.geometry.arithmetic import arctan
 from terrain.worlds.heightfield import Heightfield
-from terrain.worlds.occupancy import OccupancyGrid, all_digits
+from terrain.worlds.occupancy import OccupancyGrid, write_map_files
 from terrain.worlds.smoothing import smoothed
 
 FloatArray = NDArray[np.float64]
@@ -48,14 +47,18 @@ def slope_occupancy(terrain: Heightfield, resolution: float, lethal_slope: float
     share = (cell_slopes(terrain, resolution) - FREE_SLOPE) / (lethal_slope - FREE_SLOPE)
     occupancy = np.rint(OCCUPIED * np.clip(share, 0.0, 1.0)).astype(np.uint8)
     edge = max(1, round(BORDER / resolution))
-    for strip in (occupancy[:edge], occupancy[-edge:], occupancy[:, :edge], occupancy[:, -edge:]):
-        strip[...] = OCCUPIED
+    for edge_cells in (occupancy[:edge], occupancy[-edge:], occupancy[:, :edge], occupancy[:, -edge:]):
+        edge_cells[...] = OCCUPIED
     return occupancy
 
 
 def slope_grid(terrain: Heightfield, resolution: float, lethal_slope: float = LETHAL_SLOPE) -> OccupancyGrid:
     """Map of a terrain where ground steeper than ``lethal_slope`` [degrees] and the border are occupied."""
-    occupied = slope_occupancy(terrain, resolution, lethal_slope) == OCCUPIED
+    return _as_grid(terrain, resolution, slope_occupancy(terrain, resolution, lethal_slope))
+
+
+def _as_grid(terrain: Heightfield, resolution: float, occupancy: NDArray[np.uint8]) -> OccupancyGrid:
+    occupied = occupancy == OCCUPIED
     return OccupancyGrid(occupied, ~occupied, resolution, terrain.x0, terrain.y0)
 
 
@@ -63,13 +66,5 @@ def write_slope_map(
     terrain: Heightfield, folder: str | Path, name: str, resolution: float, lethal_slope: float = LETHAL_SLOPE
 ) -> Path:
     """Write map_server files of mode ``raw``: pixels are occupancies, so the shades survive. Return the yaml's path."""
-    folder = Path(folder)
-    Image.fromarray(slope_occupancy(terrain, resolution, lethal_slope)[::-1]).save(folder / f"{name}.png")
-    yaml_path = folder / f"{name}.yaml"
-    yaml_path.write_text(
-        f"image: {name}.png\nmode: raw\nresolution: {all_digits(resolution)}\n"
-        f"origin: [{all_digits(terrain.x0)}, {all_digits(terrain.y0)}, 0.0]\n"
-        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
-        encoding="utf-8",
-    )
-    return yaml_path
+    occupancy = slope_occupancy(terrain, resolution, lethal_slope)
+    return write_map_files(Path(folder) / name, occupancy, _as_grid(terrain, resolution, occupancy), "mode: raw\n")

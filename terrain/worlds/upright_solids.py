@@ -47,7 +47,7 @@ class UprightSolid:
         return math.hypot(max(0.0, abs(ahead) - 0.5 * self.size[0]), max(0.0, abs(left) - 0.5 * self.size[1]))
 
     def depth(self, corners: FloatArray) -> float:
-        """How deep [m] a convex outline (n, 2), counter-clockwise, lies in it; below 0 where they are apart."""
+        """Penetration depth [m] of a convex outline (n, 2), counter-clockwise; below 0 where they are apart."""
         if len(self.size) == 2:
             return depth_in_circle(corners, self.pose.x, self.pose.y, self.size[0])
         half_length, half_width = 0.5 * self.size[0], 0.5 * self.size[1]

@@ -28,7 +28,7 @@ class ClassicPlanner:
     frequency : float
         Plans per second [Hz] also while the robot drives; 0 = stop planning with the first plan.
     on_done : callable
-        Told each goal that has ended, from the thread that ended it.
+        Called with each goal that has ended, on the thread that ended it.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class ClassicPlanner:
         self._handle = self._mission.send(
             GetPathGoal(self._mission.required_target(), planner=self._planner, concurrency_slot=PLANNER_SLOT)
         )
-        self._handle.subscribe(self._tell_if_done)
+        self._handle.subscribe(self._report_if_done)
 
     def take_result(self, handle: AnyGoalHandle) -> GetPathResult | None:
         """Return the result of the present goal and arrange the next; None for a goal that no longer counts."""
@@ -91,6 +91,6 @@ class ClassicPlanner:
             self.running = self.running and self._frequency > 0.0
         return result
 
-    def _tell_if_done(self, handle: AnyGoalHandle) -> None:
+    def _report_if_done(self, handle: AnyGoalHandle) -> None:
         if handle.done:
             self._on_done(handle)

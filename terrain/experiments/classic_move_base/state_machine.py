@@ -59,7 +59,7 @@ class ClassicState(Enum):
 
 
 class Trigger(Enum):
-    """What made the last recovery necessary; the value is what an abort then says."""
+    """What made the last recovery necessary; the value is the message of an abort."""
 
     PLANNING = "Failed to find a valid plan. Even after executing recovery behaviors."
     CONTROLLING = "Failed to find a valid control. Even after executing recovery behaviors."
@@ -285,7 +285,7 @@ class ClassicMoveBase:
         try:
             pose = self._mission.robot_pose()
         except RobotStateError:
-            return  # the running action stops the robot and says so
+            return  # the running action stops the robot and reports it
         reference = self._oscillation_pose
         if reference is None or pose.distance_to(reference) >= self.settings.oscillation_distance:
             self._oscillation_pose = pose

@@ -33,7 +33,7 @@ def table1(
     world: Path = typer.Option(
         WAREHOUSE, "--world", help="World file (format: terrain/experiments/table1/environments/warehouse.yaml)."
     ),
-    outdoor: bool = typer.Option(False, "--outdoor", help="On a mesh of rough ground among rocks that nobody mapped."),
+    outdoor: bool = typer.Option(False, "--outdoor", help="On a mesh of rough ground among unmapped rocks."),
     ablations: bool = typer.Option(False, "--ablations", help="Run the ablations too."),
     workers: int = typer.Option(2, "--workers", min=1, help="Worker processes."),
     out: Path = typer.Option(Path("runs/table1"), "--out", help="Folder for results; runs that it holds are kept."),

@@ -6,7 +6,7 @@ are the other readings of move_base's parameters (benchmarks section 6.3). ``ABL
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
@@ -122,26 +122,18 @@ def make_executive(condition: Condition, navigator: Navigator) -> Executive:
     """Make the condition's executive and give the server the condition's limits."""
     if condition.executive == "tree":
         return _make_tree(condition, navigator)
-    limits = condition.limits
-    settings = ClassicSettings(
-        planner_frequency=limits.planner_frequency,
-        planner_patience=limits.planner_patience,
-        controller_patience=limits.controller_patience,
-        max_planning_retries=limits.max_planning_retries,
-        recovery_behaviors=RECOVERIES,
-        oscillation_timeout=limits.oscillation_timeout,
-    )
+    settings = ClassicSettings(recovery_behaviors=RECOVERIES, **asdict(condition.limits))
     kind = FilteredMoveBase if condition.executive == "filtered_move_base" else ClassicMoveBase
     return kind(navigator, settings, planner="main", controller="follow")
 
 
 def _make_tree(condition: Condition, navigator: Navigator) -> TreeExecutive:
-    limits, shape = condition.limits, condition.tree
+    limits, shape = condition.limits, asdict(condition.tree)
     navigator.server.set_parameters(
         planner_patience=limits.planner_patience,
         planner_max_retries=limits.max_planning_retries,
         controller_patience=limits.controller_patience,
-        controller_max_retries=shape.controller_max_retries,
+        controller_max_retries=shape.pop("controller_max_retries"),
         oscillation_timeout=limits.oscillation_timeout,
     )
     clear, relax_planner, out_of_collision, relax_controller, escape_distance = RECOVERIES
@@ -154,13 +146,7 @@ def _make_tree(condition: Condition, navigator: Navigator) -> TreeExecutive:
         relax_planner=relax_planner,
         relax_controller=relax_controller,
         move_away=escape_distance,
-        second_planner_pause=shape.second_planner_pause,
-        second_planner_look_ahead=shape.second_planner_look_ahead,
-        longest_update=shape.longest_update,
-        control_retries=shape.control_retries,
-        replans=shape.replans,
-        reuse_path=shape.reuse_path,
-        by_outcome=shape.by_outcome,
         progress_timeout=0.0,
+        **shape,
     )
     return TreeExecutive(navigation_tree(options), navigator, CONTROL_PERIOD)

@@ -81,7 +81,7 @@ class Tally:
 
     @property
     def all_contacts(self) -> int:
-        """Contacts with anything, whoever moved."""
+        """All contacts."""
         return sum(self.contacts.values())
 
 

@@ -44,7 +44,7 @@ OnRow = Callable[[Job, Mapping[str, Any]], None]
 
 
 class ChecksFailed(RuntimeError):
-    """An acceptance check has failed; the text names it and says what was found."""
+    """An acceptance check has failed; the text names it and what was found."""
 
 
 def run_experiment(campaign: Campaign, seeds: Sequence[int], ablations: bool, on_row: OnRow) -> dict[str, Any]:

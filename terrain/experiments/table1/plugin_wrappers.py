@@ -26,7 +26,7 @@ SOURCE = "table1"
 
 
 def hashed_latency(seed: int, start: Pose, goal: Pose, mean: float) -> float:
-    """Time [s] a query takes: the same for the same seed, start cell and goal cell, whoever asks and whenever."""
+    """Time [s] a query takes: a function of seed, start cell and goal cell only."""
     cells = [math.floor(value / QUERY_CELL) for value in (start.x, start.y, goal.x, goal.y)]
     digest = hashlib.sha256(repr((seed, *cells)).encode()).digest()
     share = int.from_bytes(digest[:8], "big") / 2.0**64
@@ -43,7 +43,7 @@ class PaddedPlanner(AbstractPlanner):
         self._latency = latency
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
-        """Plan; whoever called then sleeps for ``modelled_compute_time``."""
+        """Plan; the caller then sleeps for ``modelled_compute_time``."""
         self.modelled_compute_time = hashed_latency(self._seed, request.start, request.goal, self._latency)
         return self._planner.make_plan(request)
 

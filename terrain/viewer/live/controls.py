@@ -1,4 +1,4 @@
-"""What the page may ask of a run: a new goal, an end, a pause, other plugins, a fault.
+"""The commands of the page to a run: a new goal, an end, a pause, other plugins, a fault.
 
 Threads of the page call ``post`` and nothing else. The simulator's thread calls ``work_off`` between two steps of the
 world; everything that is asked for happens there, while no other thread of the run works.
@@ -60,7 +60,7 @@ class LiveControls:
             try:
                 command()
             except Exception as error:  # whatever a page has asked for, the world goes on
-                self._tell("refused", message=f"{type(error).__name__}: {error}")
+                self._log("refused", message=f"{type(error).__name__}: {error}")
         if self.holding:
             self._server.pause_all()  # again and again, for goals that an executive has sent meanwhile
 
@@ -69,22 +69,22 @@ class LiveControls:
         """Go to where a ray (3,), (3,) [m] hits the ground, heading away from where the robot is now."""
         place = self._where_it_hits(np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64))
         if place is None:
-            self._tell("there is no ground where the click was")
+            self._log("there is no ground where the click was")
             return
         x, y, z = place.tolist()
         robot = self._session.simulation.robot.pose()
         yaw = math.atan2(y - robot.y, x - robot.x)
-        self._tell("new goal", x=round(x, 3), y=round(y, 3), z=round(z, 3))
+        self._log("new goal", x=round(x, 3), y=round(y, 3), z=round(z, 3))
         self._sequence.go_to(AskedGoal(Pose.planar(x, y, yaw, z), self.planner, self.controller))
 
     def cancel(self) -> None:
         """Cancel the present goal."""
-        self._tell("cancel")
+        self._log("cancel")
         self._sequence.cancel("canceled in the live view")
 
     def hold(self, holding: bool) -> None:
         """Pause all goals, or let them go on."""
-        self._tell("pause" if holding else "resume")
+        self._log("pause" if holding else "resume")
         self.holding = holding
         if not holding:
             self._server.resume_all()
@@ -95,12 +95,12 @@ class LiveControls:
 
     def inject(self, fault: SensorFault | LocalizationJump) -> None:
         """Let a fault happen."""
-        self._tell("fault", **fault.model_dump())
+        self._log("fault", **fault.model_dump())
         self._session.faults.add(fault)
 
     def end(self, reason: str) -> None:
         """End the run."""
-        self._tell("end", reason=reason)
+        self._log("end", reason=reason)
         self._sequence.end(reason)
 
     # -----------------------------------------------------------------------------------------------------
@@ -111,6 +111,6 @@ class LiveControls:
         distance = float(self._ground.distances(origin[None], direction[None], MAX_RANGE)[0])
         return origin + distance * direction if math.isfinite(distance) else None
 
-    def _tell(self, what: str, **facts: object) -> None:
-        """Write into the event log that somebody has interfered with the run."""
+    def _log(self, what: str, **facts: object) -> None:
+        """Log what a visitor has done to the run."""
         self._session.events.emit(EventKind.CUSTOM, "live_view", what=what, **facts)

@@ -1,4 +1,4 @@
-"""A camera that goes along with the robot; how one looks at it stays in the visitor's hands."""
+"""A camera that follows the robot; the visitor still chooses the view."""
 
 from __future__ import annotations
 

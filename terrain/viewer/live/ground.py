@@ -159,7 +159,7 @@ def costs_at(view: GridView, points: FloatArray) -> tuple[NDArray[np.float32], N
 
 
 def legend_html(colours: Any, low: str, high: str, forbidden: bool = True) -> str:
-    """A bar of colours with the words for its ends."""
+    """A bar of colours with labels at its ends."""
     stops = ",".join(f"rgb({int(red)},{int(green)},{int(blue)})" for red, green, blue in colours)
     bar = f'<span style="flex:1;height:0.8em;border-radius:2px;background:linear-gradient(to right,{stops})"></span>'
     box = '<span style="width:0.8em;height:0.8em;border-radius:2px;background:rgb({},{},{})"></span>'

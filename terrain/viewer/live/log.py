@@ -1,6 +1,6 @@
-"""What the page tells in words: goals that have ended, what else is worth knowing, and the running tree.
+"""Text for the page: goals that have ended, notable events, and the running tree.
 
-An event sink: it keeps little, so that it costs a run that nobody watches next to nothing.
+An event sink: it keeps little, so that an unwatched run pays almost nothing for it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import NodeState, TreeState
-from terrain.viewer.reports.event_lines import Line, is_told, line_of
+from terrain.viewer.reports.event_lines import Line, is_shown, line_of
 
 MAX_LINES = 60
 
@@ -36,11 +36,11 @@ class LiveLog:
 
     def write(self, event: Event) -> None:
         """Take one event."""
-        told = is_told(event)
-        if not (told or event.kind is EventKind.TREE):
+        shown = is_shown(event)
+        if not (shown or event.kind is EventKind.TREE):
             return
         with self._lock:
-            if told:
+            if shown:
                 line = line_of(event)
                 self._lines.appendleft(line)
                 if event.kind is EventKind.GOAL_FINISHED:
@@ -49,7 +49,7 @@ class LiveLog:
                 self._tree.take(event)
 
     def close(self) -> None:
-        """Keep what is there."""
+        """Do nothing."""
 
     def snapshot(self) -> Snapshot:
         """Return what is known now."""

@@ -1,4 +1,4 @@
-"""What moves or changes in the live view: robot, people, doors, plan, where the command leads, what sensors see."""
+"""What moves or changes in the live view: robot, actors, plan, predicted motion, scans."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from terrain.viewer.scene import (
 
 FloatArray = NDArray[np.float64]
 
-AHEAD = 2.0  # s that the way of the present command is drawn for
+AHEAD = 2.0  # s over which the present command is extrapolated
 AHEAD_STEPS = 20
 FIELD_ARROWS = 40  # along the longer side of the field
 FIELD_COLOUR = (120, 150, 215)
@@ -95,7 +95,9 @@ class MovingThings:
         if motion is None:
             self._ahead.clear()
         else:
-            self._ahead.update(time, lambda: add_path(self._scene, "/ahead", way_ahead(pose, motion), AHEAD_COLOUR))
+            self._ahead.update(
+                time, lambda: add_path(self._scene, "/ahead", predicted_points(pose, motion), AHEAD_COLOUR)
+            )
 
     def _next_motion(self) -> PlannedMotion | None:
         """What the controller at work has planned, or else its present command, for a while."""
@@ -157,7 +159,7 @@ def motion_of(command: Command) -> PlannedMotion | None:
     return PlannedMotion(np.tile([command.vx, command.vy, command.wz], (AHEAD_STEPS, 1)), AHEAD / AHEAD_STEPS)
 
 
-def way_ahead(pose: Pose, motion: PlannedMotion) -> FloatArray:
+def predicted_points(pose: Pose, motion: PlannedMotion) -> FloatArray:
     """Points (n + 1, 3) [m] that a motion leads through, in the plane the robot stands on."""
     vx, vy, wz = motion.velocities.T * motion.step_time
     heading = np.cumsum(wz) - 0.5 * wz  # in the middle of each step

@@ -20,9 +20,9 @@ class ViewOptions:
     speed : float
         Simulated seconds per second at most; 0 = as fast as possible.
     token : bool
-        Let only those in who know the address, which has a token in it; without, whoever can reach it.
+        Put a token into the address, so that only those who know it have access; without it, all who can reach it have.
     read_only : bool
-        Let nobody steer; else there are two addresses, one to steer and one to watch.
+        Watching only; else there are two addresses, one to steer and one to watch.
 
     Raises
     ------

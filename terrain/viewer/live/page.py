@@ -1,6 +1,6 @@
-"""The page: the scene, the buttons, and what goes on in words and plots.
+"""The page: the scene, the buttons, status texts and plots.
 
-It is made before the run begins and drawn by whoever calls ``show``; nothing here reads time or decides when.
+It is made before the run begins and drawn by ``show``; nothing here reads time or decides when to draw.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class LivePage:
     controls : LiveControls
     log : LiveLog
     steered : bool
-        Whether anybody may steer; else there are no buttons, and what chooses the view is disabled.
+        Whether the page may steer; else there are no buttons, and the choices of the view are disabled.
     """
 
     def __init__(
@@ -84,12 +84,12 @@ class LivePage:
     def show(self, time: float, history: History) -> None:
         """Draw the present state; ``time`` is simulated time [s]."""
         with self._server.atomic():
-            self.things.show(time, self._words(time), is_driving=self._sequence.target is not None)
+            self.things.show(time, self._status(time), is_driving=self._sequence.target is not None)
             self._camera.show(np.array(self._session.simulation.robot.pose().position))
             self._ground.show()
             if self._drive is not None:
                 self._drive.show()
-            self._show_words(time)
+            self._show_texts(time)
             if self._frame % PLOT_EVERY == 0:
                 self._plots.show(history)
         self._frame += 1
@@ -98,7 +98,7 @@ class LivePage:
         self._server.gui.main_panel.dock_right()
         self._server.gui.main_panel.set_width(PANEL_WIDTH)
         panel = gui.add_panel()
-        with panel.add_tab("What goes on"):
+        with panel.add_tab("Status"):
             with gui.add_folder("Actions"):
                 self._actions = gui.add_html("")
             with gui.add_folder("Last two minutes"):
@@ -110,7 +110,7 @@ class LivePage:
         panel.dock_left()
         panel.set_width(PANEL_WIDTH)
 
-    def _show_words(self, time: float) -> None:
+    def _show_texts(self, time: float) -> None:
         snapshot = self._log.snapshot()
         tree = tree_html(snapshot.nodes) if snapshot.nodes else NO_TREE
         for element, content in (
@@ -122,8 +122,8 @@ class LivePage:
             if element.content != content:
                 element.content = content
 
-    def _words(self, time: float) -> str:
-        """What stands above the robot."""
+    def _status(self, time: float) -> str:
+        """Text above the robot."""
         robot = self._session.simulation.robot
         return f"{time:.0f} s   {robot.velocity().speed:.1f} m/s   tilt {tilt_of(robot.pose()):.0f}°"
 

@@ -46,7 +46,7 @@ class DrivePanel:
         )
 
     def show(self) -> None:
-        """Let the button say what it would do."""
+        """Label the button with its effect."""
         label = "Resume" if self._controls.holding else "Pause"
         if self._hold.label != label:
             self._hold.label = label

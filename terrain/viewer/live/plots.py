@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from terrain.viewer.pictures.colours import DRIVEN, PLANNED, SLOPE_COLOURS, Colour
 
 PERIOD = 0.2  # s of simulated time between two samples
-UNWATCHED_PERIOD = 1.0  # s, while nobody looks
+UNWATCHED_PERIOD = 1.0  # s, without visitors
 LENGTH = 600  # samples: two minutes
 HEIGHT = 110  # pixels
 

@@ -1,7 +1,7 @@
 """Watches and steers one run: serves the page, handles its requests, and limits the speed of the run.
 
-All of it happens on the simulator's thread after a step of the world (``DriveLoop.on_tick``). Nothing is drawn while
-nobody watches. If the page fails, the run goes on without it.
+All of it happens on the simulator's thread after a step of the world (``DriveLoop.on_tick``). Nothing is drawn
+without visitors. If the page fails, the run goes on without it.
 """
 
 from __future__ import annotations

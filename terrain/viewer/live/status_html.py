@@ -1,4 +1,4 @@
-"""The words of the page, as HTML: what every action does, how goals have ended, what has happened."""
+"""The status texts of the page as HTML: state of every action, results of goals, events."""
 
 from __future__ import annotations
 

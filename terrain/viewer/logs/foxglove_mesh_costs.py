@@ -40,7 +40,7 @@ def updates(frame: str, meshes: list[RecordedMesh]) -> Iterator[tuple[RecordedMe
 def _entity(
     frame: str, name: str, mesh: RecordedMesh, faces: NDArray[np.int32], top: float, lift: float
 ) -> SceneEntity:
-    """Some faces of the map; ``highest_cost`` tells what the darkest colour means."""
+    """Some faces of the map; ``highest_cost`` is the cost of the darkest colour."""
     used, corners = np.unique(faces, return_inverse=True)
     vertices = mesh.vertices[used] + np.array([0.0, 0.0, lift])
     entity = SceneEntity(frame_id=frame, id=name, frame_locked=True, timestamp=timestamp(mesh.time))

@@ -17,7 +17,7 @@ from terrain.viewer.pictures.colours import BODY, DRIVEN, GOAL, OBSTACLE, PLANNE
 from terrain.viewer.pictures.picture import ViewerMissing
 from terrain.viewer.pictures.shading import vertex_colours
 from terrain.viewer.pictures.shapes import cut_walls, prism
-from terrain.viewer.reports.event_text import words
+from terrain.viewer.reports.event_text import event_text
 from terrain.worlds.surface import Surface
 
 TIMELINE = "run"
@@ -95,4 +95,4 @@ def _log_happenings(rerun: Any, stream: Any, recording: Recording) -> None:
         stream.log("world/scan", rerun.Points3D(points, radii=SCAN_POINT, colors=SCAN))
     for event in recording.events:
         stream.set_time(TIMELINE, duration=event.time)
-        stream.log("events", rerun.TextLog(f"{event.source}: {event.kind.value}: {words(event)}"))
+        stream.log("events", rerun.TextLog(f"{event.source}: {event.kind.value}: {event_text(event)}"))

@@ -9,7 +9,7 @@ topic      schema                           contents
 /scan      foxglove.PointCloud              what a range sensor hit
 /map       foxglove.Grid                    the map, where it is a grid
 /mesh_map  foxglove.SceneUpdate             the map, where it is a mesh, in the colours of its costs
-/log       foxglove.Log                     events in words
+/log       foxglove.Log                     events as text
 /events    mbf.Event                        events as in events.jsonl
 /actions   mbf.ActionStates                 what each action does
 /motion    mbf.Motion                       speed, yaw rate, their commands, tilt, cross-track error
@@ -36,7 +36,7 @@ from terrain.recording.recording import Recording
 from terrain.viewer.logs import foxglove_mesh_costs as mesh_costs
 from terrain.viewer.logs import foxglove_messages as message
 from terrain.viewer.logs import foxglove_scene as scene
-from terrain.viewer.reports.event_text import NOTABLE, words
+from terrain.viewer.reports.event_text import NOTABLE, event_text
 from terrain.viewer.reports.timeline import ACTIONS
 from terrain.viewer.scene import wheel_angles
 
@@ -87,7 +87,7 @@ def messages_of(recording: Recording) -> list[Stamped]:
 
 
 def _stage(recording: Recording) -> Iterator[Any]:
-    """What stands and what moves, as it looks; where the moving things are is told on ``/tf``."""
+    """Shapes of what stands and what moves; the poses of moving things are on ``/tf``."""
     yield scene.world(recording)
     yield scene.robot(recording.robot)
     if recording.actors:
@@ -145,7 +145,7 @@ def _track(recording: Recording) -> Iterator[Stamped]:
 
 
 def _log(event: Event) -> Log:
-    text = f"{event.kind.value}: {words(event)}"
+    text = f"{event.kind.value}: {event_text(event)}"
     return Log(timestamp=message.timestamp(event.time), level=_level(event), message=text, name=event.source)
 
 

@@ -31,7 +31,7 @@ SIZE = (800, 450)  # pixels
 FRAMES = 72
 FRAME_TIME, LAST_FRAME_TIME = 90, 2500  # ms
 SMOOTHING = 2  # the world is drawn so many times as large
-LARGEST_FACE = 1.0  # m; longer edges are cut, so that the middles of faces tell which one is nearer
+LARGEST_FACE = 1.0  # m; longer edges are cut, so that faces can be ordered by their middles
 SKY = (232, 238, 244)
 COLOURS = 96
 LEAST_ROBOT = 0.024  # of the picture's width; smaller robots are drawn larger than they are
@@ -56,11 +56,11 @@ def write_animation(file: str | Path, recording: Recording) -> None:
 def _palette(frame: Image.Image) -> Image.Image:
     """The colours of a frame and of everything that is painted over it, which small things would not get otherwise."""
     wide, high = frame.size
-    sheet = Image.new("RGB", (wide, high + SWATCH * len(PAINTED)))
-    sheet.paste(frame, (0, 0))
+    swatches = Image.new("RGB", (wide, high + SWATCH * len(PAINTED)))
+    swatches.paste(frame, (0, 0))
     for row, colour in enumerate(PAINTED):
-        sheet.paste(colour, (0, high + SWATCH * row, wide, high + SWATCH * (row + 1)))
-    return sheet.quantize(COLOURS, dither=Image.Dither.NONE)
+        swatches.paste(colour, (0, high + SWATCH * row, wide, high + SWATCH * (row + 1)))
+    return swatches.quantize(COLOURS, dither=Image.Dither.NONE)
 
 
 class Camera:
@@ -157,7 +157,7 @@ def _frames(recording: Recording) -> Iterator[Image.Image]:
 
 
 def _paint_moment(painter: ImageDraw.ImageDraw, camera: Camera, recording: Recording, index: int) -> None:
-    """Plan and scan of the time, the track until then, the robot, and how it does."""
+    """Plan and scan at that time, the track until then, the robot and its status."""
     now = float(recording.times[index])
     for points, colour, width in (
         (next((path for time, path in reversed(recording.paths) if time <= now), None), PLANNED, 3),

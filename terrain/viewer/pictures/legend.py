@@ -1,4 +1,4 @@
-"""What the colours of a run mean: only those that occur in it."""
+"""The legend of a run's colours, of those that occur in it."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def legend_of(recording: Recording) -> list[Entry]:
 
 
 def legend_html(entries: Iterable[Entry]) -> str:
-    """Return a line of small boxes, each with its word."""
-    words = (
+    """Return a line of small boxes, each with its name."""
+    items = (
         f'<span style="{STYLE}"><span style="{BOX.format(*colour)}"></span><span>{name}</span></span>'
         for name, colour in entries
     )
-    return "".join(words)
+    return "".join(items)

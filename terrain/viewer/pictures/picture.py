@@ -1,7 +1,7 @@
 """A run from above: shaded ground, walls, what moved, plan, driven track, start and goals, as a PNG by matplotlib.
 
-Use it for reports and READMEs; one look tells what happened. It takes about a second per hundred thousand
-triangles. For motion see ``terrain.viewer.replay``.
+Use it for reports and READMEs; it takes about a second per hundred thousand triangles. For motion see
+``terrain.viewer.replay``.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ HALO = 1.6  # points of white around lines, so that they show on any ground
 
 
 class ViewerMissing(Exception):
-    """A package that draws is not installed; the text says how to get it."""
+    """A package that draws is not installed; the text names the command that installs it."""
 
 
 def write_picture(file: str | Path, recording: Recording) -> None:
@@ -75,7 +75,7 @@ def png_bytes(figure: Figure) -> bytes:
     """Return the figure as a PNG file, cut to its contents."""
     buffer = io.BytesIO()
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)  # drawn as a box, which says enough
+        warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)  # drawn as a box
         figure.savefig(buffer, format="png", bbox_inches="tight", facecolor="white")
     return buffer.getvalue()
 

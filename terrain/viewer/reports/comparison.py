@@ -24,7 +24,7 @@ def write_comparison(file: Path, names: tuple[str, str], left: Run, right: Run) 
 
 
 def comparison_html(names: tuple[str, str], left: Run, right: Run) -> str:
-    """Return the page's text: ``names`` tell the runs apart, a run is its recording and its metrics."""
+    """Return the page's text: ``names`` identify the runs, a run is its recording and its metrics."""
     runs = (left[0], right[0])
     heads = [f"<p>{escape(name)}</p>{report.summary(run)}" for name, run in zip(names, runs, strict=True)]
     parts = [
@@ -44,12 +44,12 @@ def compare_metrics(left: Mapping[str, Any], right: Mapping[str, Any]) -> list[t
     """Rows of name, left, right and right minus left; a metric that one run lacks is a dash."""
     names = [*left, *(name for name in right if name not in left)]
     return [
-        (name, _told(left, name), _told(right, name), _difference(left.get(name), right.get(name))) for name in names
+        (name, _shown(left, name), _shown(right, name), _difference(left.get(name), right.get(name))) for name in names
     ]
 
 
 def compare_digests(left: Mapping[str, Any], right: Mapping[str, Any]) -> str:
-    """Say whether two runs are the same drive, bit for bit, which equal numbers in the table do not prove."""
+    """Return whether two runs are the same drive, bit for bit; equal numbers in the table do not prove it."""
     digests = left.get("digest"), right.get("digest")
     if None in digests:
         return "digest: at least one run has none, so whether they are the same drive is not known"
@@ -58,7 +58,7 @@ def compare_digests(left: Mapping[str, Any], right: Mapping[str, Any]) -> str:
     return "digest: differs; the two runs are not the same drive"
 
 
-def _told(metrics: Mapping[str, Any], name: str) -> str:
+def _shown(metrics: Mapping[str, Any], name: str) -> str:
     return cell(metrics[name]) if metrics.get(name) is not None else "-"
 
 

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.outcomes import is_success, outcome_name
-from terrain.viewer.reports.event_text import NOTABLE, words
+from terrain.viewer.reports.event_text import NOTABLE, event_text
 
-TOLD = NOTABLE | {EventKind.GOAL_FINISHED, EventKind.GOAL_PAUSED, EventKind.GOAL_RESUMED, EventKind.CUSTOM}
-REPLACED = "preempted by a new plan"  # how exe_path ends a goal while the robot drives on along a newer path
+SHOWN = NOTABLE | {EventKind.GOAL_FINISHED, EventKind.GOAL_PAUSED, EventKind.GOAL_RESUMED, EventKind.CUSTOM}
+REPLACED = "preempted by a new plan"  # message of exe_path's goal when the robot continues on a newer path
 GOOD, BAD, NEITHER = "#1a7f37", "#cf222e", "#6b7280"
 
 
 @dataclass(frozen=True)
 class Line:
-    """One thing that happened: time [s], who tells it, what, and whether that is good (None = neither)."""
+    """One event: time [s], source, text, and whether it is good (None = neither)."""
 
     time: float
     source: str
@@ -28,13 +28,13 @@ class Line:
         return NEITHER if self.good is None else (GOOD if self.good else BAD)
 
 
-def is_told(event: Event) -> bool:
-    """Whether a reader wants to know of it; not each time a path is swapped for a newer one."""
-    return event.kind in TOLD and event.data.get("message") != REPLACED
+def is_shown(event: Event) -> bool:
+    """Whether a page lists the event; replacements of a path by a newer one are left out."""
+    return event.kind in SHOWN and event.data.get("message") != REPLACED
 
 
 def line_of(event: Event) -> Line:
-    """Put an event into words."""
+    """Return the line of an event."""
     if event.kind is EventKind.GOAL_FINISHED:
         outcome = event.data.get("outcome")
         code = outcome if isinstance(outcome, int) else 0
@@ -42,5 +42,5 @@ def line_of(event: Event) -> Line:
         good = None if name == "CANCELED" else is_success(code)
         return Line(event.time, event.source, f"{name}: {event.data.get('message', '')}", good)
     what = "" if event.kind is EventKind.CUSTOM else event.kind.value.replace("_", " ")
-    text = " ".join(part for part in (what, words(event)) if part)
+    text = " ".join(part for part in (what, event_text(event)) if part)
     return Line(event.time, event.source, text, False if event.kind is EventKind.FAULT else None)

@@ -1,4 +1,4 @@
-"""Events in words: which of them a reader of a run must see, and one line for each."""
+"""Events as text: which of them a report must show, and one line for each."""
 
 from __future__ import annotations
 
@@ -18,6 +18,6 @@ NOTABLE = {
 LEFT_OUT = ("traceback", "goal_id")
 
 
-def words(event: Event) -> str:
-    """What an event carries, as ``key: value`` pairs."""
+def event_text(event: Event) -> str:
+    """Return the data of an event as ``key: value`` pairs."""
     return ", ".join(f"{key}: {value}" for key, value in event.data.items() if key not in LEFT_OUT)

@@ -33,7 +33,7 @@ def beside(left: str, right: str) -> str:
 
 
 def table(header: tuple[str, ...], rows: Iterable[tuple[Any, ...]]) -> str:
-    """A table of at most ``MAX_ROWS`` rows, folded if it is long; what was left out is said."""
+    """A table of at most ``MAX_ROWS`` rows, folded if it is long, with a note of rows left out."""
     listed = list(rows)
     if not listed:
         return "<p>none</p>"
@@ -47,7 +47,7 @@ def table(header: tuple[str, ...], rows: Iterable[tuple[Any, ...]]) -> str:
 
 
 def cell(value: Any) -> str:
-    """A value in few letters."""
+    """A value as short text."""
     if isinstance(value, float) and math.isfinite(value):
         return f"{value:.4g}"
     return ", ".join(map(str, value)) or "none" if isinstance(value, list) else str(value)

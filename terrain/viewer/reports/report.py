@@ -22,7 +22,7 @@ from terrain.recording.metrics import cross_track_errors
 from terrain.recording.recording import Recording
 from terrain.recording.whole_files import write_whole
 from terrain.viewer.pictures.picture import ViewerMissing, picture_png
-from terrain.viewer.reports.event_text import NOTABLE, words
+from terrain.viewer.reports.event_text import NOTABLE, event_text
 from terrain.viewer.reports.page import page, table
 from terrain.viewer.reports.timeline import timeline_svg
 
@@ -49,7 +49,7 @@ def report_html(recording: Recording, metrics: Mapping[str, Any]) -> str:
 
 
 def title_of(recording: Recording) -> str:
-    """What was run, in a few words."""
+    """What was run, in a line."""
     return f"{recording.scenario} on {recording.backend}"
 
 
@@ -131,4 +131,4 @@ def _goals(recording: Recording) -> Iterable[tuple[str, ...]]:
 def _notable(recording: Recording) -> Iterable[tuple[str, ...]]:
     for event in recording.events:
         if event.kind in NOTABLE:
-            yield f"{event.time:.2f} s", event.kind.value, event.source, words(event)
+            yield f"{event.time:.2f} s", event.kind.value, event.source, event_text(event)

@@ -1,7 +1,7 @@
 """A timeline as SVG: a row for each action and plugin with a bar for each goal and call, and a row of what went wrong.
 
 A goal's bar reaches from its acceptance to its end, a planner's from call to answer; a controller is called too often
-for that, so its bar is the whole control loop and tells how many cycles it had. Colours tell outcomes.
+for that, so its bar is the whole control loop, with the number of its cycles. Colours show outcomes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from html import escape
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.outcomes import is_success, outcome_name
-from terrain.viewer.reports.event_text import NOTABLE, words
+from terrain.viewer.reports.event_text import NOTABLE, event_text
 
 ACTIONS = ("move_base", "get_path", "exe_path", "recovery", "refine_path")
 MARKS_ROW = "stops, faults"
@@ -94,8 +94,8 @@ class _Frame:
     def bar(self, bar: Bar) -> str:
         end = self._last if bar.end is None else bar.end
         outcome = "" if bar.outcome is None else outcome_name(bar.outcome)
-        told = bar.note or ("not finished" if bar.end is None else "")
-        title = escape(": ".join(part for part in (bar.row, outcome, told) if part))
+        note = bar.note or ("not finished" if bar.end is None else "")
+        title = escape(": ".join(part for part in (bar.row, outcome, note) if part))
         x, y = self._x(bar.begin), self._y(bar.row) + (ROW - BAR) // 2
         return (
             f'<rect x="{x:.1f}" y="{y}" width="{max(2.0, (end - bar.begin) * self._scale):.1f}" height="{BAR}" rx="2" '
@@ -106,7 +106,7 @@ class _Frame:
     def mark(self, event: Event) -> str:
         """A diamond: red for a fault, else grey."""
         x, y = self._x(event.time), self._y(MARKS_ROW) + ROW // 2
-        title = escape(f"{event.time:.2f} s: {event.source}: {event.kind.value}: {words(event)}")
+        title = escape(f"{event.time:.2f} s: {event.source}: {event.kind.value}: {event_text(event)}")
         colour = BAD if event.kind in FAULTS else "#57606a"
         return f'<path d="M{x:.1f} {y - 7}l6 7l-6 7l-6 -7z" fill="{colour}"><title>{title}</title></path>'
 

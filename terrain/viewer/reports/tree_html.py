@@ -1,6 +1,6 @@
 """A behaviour tree as HTML: one line for each node, indented, coloured by its status; for the live view and replays.
 
-Idle nodes are shown only below a node that runs; what might have run below the others, ``mbf tree show`` tells.
+Idle nodes are shown only below a running node; ``mbf tree show`` prints the whole tree.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ INDENT = 12  # pixels
 
 
 def tree_html(nodes: Iterable[NodeState]) -> str:
-    """Return the lines; what a node said stands as a tooltip on it, and beside it where it has failed."""
+    """Return the lines; a node's message is its tooltip, and is shown beside it where it has failed."""
     return "".join(_line(node) for node in worth_showing(nodes))
 
 
@@ -31,7 +31,7 @@ def worth_showing(nodes: Iterable[NodeState]) -> Iterator[NodeState]:
 
 def _line(node: NodeState) -> str:
     at_work = "font-weight:600;" if node.status == RUNNING else ""
-    said = f' <span style="opacity:0.75">{escape(node.message)}</span>' if node.status == "FAILURE" else ""
+    message = f' <span style="opacity:0.75">{escape(node.message)}</span>' if node.status == "FAILURE" else ""
     tip = escape(f"{node.type}: {node.message}", quote=True)
     style = f"padding-left:{INDENT * node.depth}px;color:{COLOURS[node.status]};{at_work}"
-    return f'<div title="{tip}" style="{style}">{SYMBOLS[node.status]} {escape(node.name)}{said}</div>'
+    return f'<div title="{tip}" style="{style}">{SYMBOLS[node.status]} {escape(node.name)}{message}</div>'

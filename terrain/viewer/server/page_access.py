@@ -1,4 +1,4 @@
-"""Who may see a page of a run, and who may steer it: told by the address, the ``Host`` and the ``Origin`` of a request.
+"""Who may see the page of a run, and who may steer it, by the address, the ``Host`` and the ``Origin`` of a request.
 
 A browser lets any web page open a WebSocket to this machine, so it is not enough to listen at loopback. Three things
 must be right before viser hears of a visitor:
@@ -40,7 +40,7 @@ class PageAccess:
     host : str
         Interface the page listens at.
     roles : mapping of str to Role
-        Token, the first part of an address's path -> role; the token ``""`` needs none. Without any nobody gets in.
+        Token, the first part of an address's path -> role; the token ``""`` needs none. Without any, all are refused.
     """
 
     host: str = LOOPBACK

@@ -1,4 +1,4 @@
-"""Stands between the network and viser: refuses visitors who may not come in, and messages nobody may send.
+"""Stands between the network and viser: refuses visitors without access, and messages that are not allowed.
 
 viser has no hook for that, so its server is started with a request handler and a connection handler of ours around its
 own. Whether that has worked is checked, see ``PageGuard.is_installed``.
@@ -18,7 +18,7 @@ from typing import Any
 from terrain.viewer.server.page_access import PageAccess
 from terrain.viewer.server.page_messages import is_allowed
 
-MAX_MESSAGE = 64 * 1024  # bytes; what a browser says is far shorter
+MAX_MESSAGE = 64 * 1024  # bytes; messages of a browser are far shorter
 MAX_VISITORS = 32
 MAX_REFUSED = 100  # messages; who sends more than these that are wrong is disconnected
 TRY_AGAIN_LATER, POLICY_VIOLATION = 1013, 1008  # WebSocket close codes (RFC 6455, 7.4.1)

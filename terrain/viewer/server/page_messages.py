@@ -1,4 +1,4 @@
-"""What a visitor's browser may say to a page: three kinds of messages, every value checked, and nothing else.
+"""What a visitor's browser may send to a page: three kinds of messages, every value checked, and nothing else.
 
 viser takes whatever a client sends: it sets any property of a control to any value, takes uploads, and asks for a
 public tunnel. So messages are checked before viser sees them. What is left out here never arrives.

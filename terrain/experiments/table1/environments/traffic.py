@@ -1,7 +1,7 @@
 """The other robots: each shuttles on a fixed route, stops for what is near ahead of it, and never replans.
 
 A shuttle's motion is a function of its route, its speed and its phase; the executive that is measured acts on it only
-by standing in its way. ``polite=False`` leaves out even that.
+by standing on its route. ``polite=False`` removes even that.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from terrain.experiments.table1.environments.robot import CARRIER, HALF_LENGTH, 
 FloatArray = NDArray[np.float64]
 
 STOP_DISTANCE = 0.6  # m ahead of its front: nearer than this a polite robot stops
-SIDE_MARGIN = 0.05  # m; what is this far beside its way is not ahead of it
+SIDE_MARGIN = 0.05  # m; what is this far beside its route is not ahead of it
 DWELL = 5.0  # s; how long it stands at each corner, to load
 SPEED_RANGE = (0.25, 0.5)  # m/s
 PHASE_RANGE = (0.0, 0.08)

@@ -29,7 +29,7 @@ class WarehouseWorld(KinematicWorld):
     building : OccupancyGrid
     shuttles : sequence of Shuttle
     on_contact : callable
-        Told ``(with_what, who_moved)`` once for each contact: "rack" or "robot", "we" or "they".
+        Called with ``(with_what, who_moved)`` once for each contact: "rack" or "robot", "we" or "they".
     """
 
     def __init__(self, building: OccupancyGrid, shuttles: Sequence[Shuttle], on_contact: OnContact) -> None:
@@ -52,7 +52,7 @@ class WarehouseWorld(KinematicWorld):
                 self.contact_began("robot", "they")
 
     def contact_began(self, with_what: str, who_moved: str) -> None:
-        """Note a contact; tell it if it is a new one."""
+        """Note a contact; report it if it is a new one."""
         last = self._last_contact.get((with_what, who_moved), -math.inf)
         self._last_contact[with_what, who_moved] = self.time
         if self.time - last > CONTACT_PAUSE:

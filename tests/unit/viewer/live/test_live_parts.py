@@ -11,7 +11,7 @@ from mbf_abstract.time.sim_clock import SimClock
 from terrain.viewer.live.follow import first_direction
 from terrain.viewer.live.ground import costs_at, legend_html
 from terrain.viewer.live.log import LiveLog
-from terrain.viewer.live.moving import AHEAD, AHEAD_STEPS, field_arrows, motion_of, way_ahead
+from terrain.viewer.live.moving import AHEAD, AHEAD_STEPS, field_arrows, motion_of, predicted_points
 from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.overlay import Overlay
 from terrain.viewer.live.pace import MAX_LAG, Pace
@@ -33,14 +33,14 @@ def test_the_way_ahead_is_what_small_steps_of_the_command_lead_to(command):
         y += (command.vx * np.sin(yaw) + command.vy * np.cos(yaw)) * AHEAD / steps
         yaw += command.wz * AHEAD / steps
 
-    way = way_ahead(pose, motion_of(command))
+    points = predicted_points(pose, motion_of(command))
 
-    assert len(way) == AHEAD_STEPS + 1
-    np.testing.assert_allclose(way[0], pose.position)
-    np.testing.assert_allclose(way[-1], [x, y, 0.5], atol=2e-3)
+    assert len(points) == AHEAD_STEPS + 1
+    np.testing.assert_allclose(points[0], pose.position)
+    np.testing.assert_allclose(points[-1], [x, y, 0.5], atol=2e-3)
 
 
-def test_there_is_no_way_ahead_of_a_robot_that_stands_and_none_is_guessed_for_a_car():
+def test_nothing_is_predicted_for_a_robot_that_stands_or_for_a_car():
     assert motion_of(Twist()) is None
     assert motion_of(AckermannCommand(1.0, 0.2)) is None
 
