@@ -18,7 +18,9 @@ from mbf_abstract.config.configuration import Config
 from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.geometry import FloatArray, Path
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.disc_map import DiscMap
 from mbf_abstract.maps.disc_queries import DiscQueries
+from mbf_abstract.maps.navigation_map import MapContext
 from mbf_abstract.maps.queries import CellState, MapQueries, PlaceAnswer
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.outcomes import GetPathOutcome
@@ -36,7 +38,7 @@ class ElevationGridParameters(ParameterModel):
     robot_radius: float = parameter(0.3, "Radius of the robot.", unit="m", ge=0.0)
 
 
-class ElevationGrid:
+class ElevationGrid(DiscMap):
     """The map: heights (ny, nx) [m] at ``resolution`` [m] with row 0 at y = 0, and what follows from them."""
 
     def __init__(self, heights: FloatArray, parameters: ElevationGridParameters, frame_id: str) -> None:
@@ -51,6 +53,14 @@ class ElevationGrid:
         """Flat index of the sample next to a point [m], -1 outside the grid."""
         (ny, nx), iy, ix = self.heights.shape, round(y / self.resolution), round(x / self.resolution)
         return iy * nx + ix if 0 <= iy < ny and 0 <= ix < nx else -1
+
+    def obstacles_near(self, x: float, y: float, within: float) -> FloatArray:
+        """Places (n, 2) [m] of the lethal samples around, and of those that the grid does not have."""
+        (ny, nx), reach = self.heights.shape, np.arange(-1 - within // self.resolution, 2 + within // self.resolution)
+        ix, iy = np.meshgrid(np.rint(x / self.resolution) + reach, np.rint(y / self.resolution) + reach)
+        lethal = (ix < 0) | (ix >= nx) | (iy < 0) | (iy >= ny)
+        lethal[~lethal] = self.clearance[iy[~lethal].astype(int), ix[~lethal].astype(int)] == 0.0
+        return np.column_stack([ix[lethal], iy[lethal]]) * self.resolution
 
     def points(self, samples: NDArray[np.int_]) -> FloatArray:
         """Positions (n, 3) [m] of samples given by flat index (n,)."""
@@ -80,10 +90,8 @@ class ElevationGrid:
 
 
 @dataclass(frozen=True)
-class ElevationContext(PluginContext):
+class ElevationContext(MapContext[ElevationGrid]):
     """What plugins of this server are constructed with."""
-
-    grid: ElevationGrid
 
 
 class ElevationPlanner(AbstractPlanner):
@@ -91,8 +99,8 @@ class ElevationPlanner(AbstractPlanner):
 
     def __init__(self, context: ElevationContext) -> None:
         super().__init__(context)
-        self.grid = context.grid
-        self._graph = context.grid.graph().tocsr()
+        self.grid = context.navigation_map
+        self._graph = self.grid.graph().tocsr()
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Search from the sample next to the start to the sample next to the goal, by those next to the via poses."""
@@ -148,7 +156,7 @@ class ElevationGridServer(AbstractNavigationServer):
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the grid."""
-        return ElevationContext(**vars(base), grid=self.grid)
+        return ElevationContext(**vars(base), navigation_map=self.grid, transforms=self.runtime.transforms)
 
     @property
     def queries(self) -> MapQueries:

@@ -20,6 +20,7 @@ from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.geometry import FloatArray, Path
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.disc_queries import DiscQueries
+from mbf_abstract.maps.navigation_map import MapContext
 from mbf_abstract.maps.queries import CellState, MapQueries, PlaceAnswer
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.outcomes import GetPathOutcome
@@ -32,10 +33,8 @@ STEPS = [(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
 
 
 @dataclass(frozen=True)
-class OctreeContext(PluginContext):
+class OctreeContext(MapContext[OctreeMap]):
     """What plugins of this server are constructed with."""
-
-    map: OctreeMap
 
 
 class OctreePlanner(AbstractPlanner):
@@ -43,7 +42,7 @@ class OctreePlanner(AbstractPlanner):
 
     def __init__(self, context: OctreeContext) -> None:
         super().__init__(context)
-        self.map = context.map
+        self.map = context.navigation_map
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Search from the column of the start to the column of the goal, by those of the via poses."""
@@ -109,7 +108,7 @@ class OctreeQueries(DiscQueries):
 
     def clear_map(self) -> None:
         """Forget everything that was seen."""
-        self.map.forget()
+        self.map.clear()
 
 
 class OctreeServer(AbstractNavigationServer):
@@ -126,7 +125,7 @@ class OctreeServer(AbstractNavigationServer):
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add the map."""
-        return OctreeContext(**vars(base), map=self.map)
+        return OctreeContext(**vars(base), navigation_map=self.map, transforms=self.runtime.transforms)
 
     @property
     def queries(self) -> MapQueries:
@@ -142,5 +141,4 @@ class OctreeServer(AbstractNavigationServer):
 
     def map_problem(self) -> str:
         """Whether the sensors have gone silent."""
-        age, limit = self.runtime.clock.now() - self.map.last_scan, self.map.parameters.max_age
-        return f"no scan for {age:.1f} s" if 0.0 < limit < age else ""
+        return self.map.stale_reason(self.runtime.clock.now())

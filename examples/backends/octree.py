@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray
+from mbf_abstract.maps.disc_map import DiscMap
 from mbf_abstract.parameters import ParameterModel, parameter
 
 Cube = tuple[int, int, int]
@@ -124,11 +125,12 @@ class FlatView:
     blocked: frozenset[Column] = frozenset()
 
 
-class OctreeMap:
+class OctreeMap(DiscMap):
     """The map: an octree that scans go into, and its newest flat view."""
 
     def __init__(self, parameters: OctreeParameters, frame_id: str) -> None:
         self.parameters, self.frame_id, self.resolution = parameters, frame_id, parameters.resolution
+        self.robot_radius = parameters.robot_radius
         self.tree, self.view, self.last_scan = Octree(self.resolution), FlatView(), -math.inf
 
     def look(self) -> None:
@@ -139,10 +141,22 @@ class OctreeMap:
         blocked = {(x + dx, y + dy) for x, y in occupied for dx, dy in disc}
         self.view = FlatView(frozenset(occupied), frozenset(known), frozenset(blocked))
 
-    def forget(self) -> None:
+    def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
         """Begin with nothing known."""
         self.tree = Octree(self.resolution)
         self.look()
+        return ["octree"]
+
+    def stale_reason(self, now: float) -> str:
+        """Whether the sensors have gone silent."""
+        age, limit = now - self.last_scan, self.parameters.max_age
+        return f"no scan for {age:.1f} s" if 0.0 < limit < age else ""
+
+    def obstacles_near(self, x: float, y: float, within: float) -> FloatArray:
+        """Places (n, 2) [m] of the occupied columns around."""
+        ix, iy = self.column(x, y)
+        near = [(ix + dx, iy + dy) for dx, dy in self.around(within + self.resolution)]
+        return self.middles([column for column in near if column in self.view.occupied])[:, :2]
 
     def around(self, radius: float) -> Iterator[Column]:
         """Offsets of the columns within a radius [m]."""

@@ -9,7 +9,7 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.navigator import Navigator
-from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.outcomes import GetPathOutcome, RecoveryOutcome
 from mbf_abstract.testing.contract import check_planner
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.time.sim_clock import SimClock
@@ -22,6 +22,16 @@ planners:
   - {name: shortest, type: "elevation_grid:ElevationPlanner"}
 controllers:
   - {name: carrot, type: "follow_carrot:FollowCarrot"}
+recovery_behaviors:
+  - {name: ahead, type: drive_on_heading}
+  - {name: back_up, type: back_up}
+  - {name: move_away, type: move_away}
+  - {name: rotate, type: rotate}
+  - {name: clear, type: clear}
+  - {name: relax, type: relax}
+ahead: {distance: 8.0, speed: 0.5, time_limit: 60.0}
+back_up: {distance: 3.0}
+move_away: {clearance: 1.5}
 elevation_grid: {file: hill.npy, resolution: 0.25, max_slope: 0.6, robot_radius: 0.3}
 """
 START, GOAL = Pose.planar(1.0, 5.0), Pose.planar(9.0, 5.0)
@@ -97,6 +107,20 @@ def test_a_valid_pose_is_found_within_the_tolerance_only(navigator):
     assert queries.find_valid_pose(FLANK, 0.3, 0.0).pose is None
 
 
+def test_the_recoveries_of_the_core_know_the_hill_and_the_end_of_the_grid(navigator):
+    behind = navigator.recover("back_up")
+    assert behind.outcome == RecoveryOutcome.IMPASSABLE and "an obstacle is in the way" in behind.message
+    assert 0.0 < navigator.robot_pose().x < 0.5
+    ahead = navigator.recover("ahead")
+    assert ahead.outcome == RecoveryOutcome.IMPASSABLE and "an obstacle is in the way" in ahead.message
+    stopped_at = navigator.robot_pose().x
+    assert 2.0 < stopped_at < 4.5, "the flank is steep from 4.5 m on at the latest"
+    assert navigator.recover("move_away").success
+    assert navigator.robot_pose().x < stopped_at - 0.5
+    for name in ("rotate", "clear", "relax"):
+        assert navigator.recover(name).success
+
+
 def test_the_planner_keeps_the_contract():
     module = importlib.import_module("elevation_grid")
     parameters = module.ElevationGridParameters(file="none", resolution=0.25, max_slope=0.6)
@@ -106,7 +130,7 @@ def test_the_planner_keeps_the_contract():
         module.ElevationPlanner,
         [(START, GOAL)],
         unreachable=[(START, FLANK), (START, HILL_TOP)],
-        make_context=lambda base: module.ElevationContext(**vars(base), grid=grid),
+        make_context=lambda base: module.ElevationContext(**vars(base), navigation_map=grid),
         watched=[grid.heights, grid.clearance],
         cancel_within=1.0,
     )

@@ -10,7 +10,7 @@ from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
-from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.testing.contract import check_planner
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.time.clock import Priority
@@ -26,6 +26,8 @@ planners:
   - {name: astar, type: "occupancy_octree:OctreePlanner"}
 controllers:
   - {name: carrot, type: "follow_carrot:FollowCarrot"}
+recovery_behaviors: [{name: ahead, type: drive_on_heading}, {name: clear, type: clear}]
+ahead: {distance: 5.0, speed: 0.4}
 occupancy_octree: {resolution: 0.2, robot_radius: 0.3, z_min: 0.05, z_max: 1.0, max_age: 1.5, reach: 12.0}
 """
 START, GOAL = Pose.planar(0.05, 0.05), Pose.planar(6.05, 0.05)
@@ -96,6 +98,18 @@ def test_the_robot_drives_around_the_post_and_under_the_table(world):
     assert world.robot.pose.distance_to(GOAL) < 0.3
     assert np.abs(beside_the_post[:, 1]).min() > 0.8 + 0.25, "the post is 0.8 m wide to either side"
     assert np.abs(track[track[:, 0] > 4.0, 1]).max() < 3.0, "the table is straight ahead"
+
+
+def test_the_recoveries_of_the_core_stop_before_the_post_and_while_nothing_is_seen(world):
+    ahead = world.navigator.recover("ahead")
+    assert ahead.outcome == RecoveryOutcome.IMPASSABLE and "an obstacle is in the way" in ahead.message
+    assert 1.5 < world.robot.pose.x < 2.5 - 0.3 + 0.1
+    assert world.navigator.recover("clear").message == "cleared octree"
+    assert not world.navigator.server.map.view.occupied
+    world.on = False
+    world.clock.sleep(2.0)
+    stale = world.navigator.recover("ahead")
+    assert stale.outcome == RecoveryOutcome.PAT_EXCEEDED and "no scan for" in stale.message
 
 
 def test_a_plan_keeps_away_from_what_was_seen_and_goes_under_the_table(world):
@@ -200,7 +214,7 @@ def test_the_planner_keeps_the_contract():
         module.OctreePlanner,
         [(START, GOAL)],
         unreachable=[(START, Pose.planar(2.3, 0.0)), (START, Pose.planar(45.0, 0.0))],
-        make_context=lambda base: module.OctreeContext(**vars(base), map=known),
+        make_context=lambda base: module.OctreeContext(**vars(base), navigation_map=known),
         cancel_within=1.0,
     )
     assert known.view is before
