@@ -54,7 +54,7 @@ def plan(
     with readable_errors():
         from mbf_abstract.commands.bench import place_robot, read_config_or_map, standing_server
         from mbf_abstract.commands.plan_picture import draw_plan
-        from mbf_abstract.compiling.compilation import told_of_kernels
+        from mbf_abstract.compiling.compilation import record_compilations
         from mbf_abstract.goals.goal_types import GetPathGoal
         from mbf_abstract.navigator import Navigator
         from mbf_abstract.time.clock import wall_seconds
@@ -68,7 +68,7 @@ def plan(
             goal_pose = _pose("goal", to_place, server, notes)
             place_robot(server, start_pose)
             began = wall_seconds()
-            with waiting("planning") as say, told_of_kernels(lambda name: say(f"compiling {name}")) as compiled:
+            with waiting("planning") as say, record_compilations(lambda name: say(f"compiling {name}")) as compiled:
                 goal_to_plan = GetPathGoal(goal_pose, planner=planner, dist_tolerance=tolerance)
                 result = Navigator(server).send(goal_to_plan).wait()
             seconds = wall_seconds() - began - compiled.seconds

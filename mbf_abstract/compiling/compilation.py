@@ -1,8 +1,7 @@
-"""Time that numba's compiler takes at the first use of a kernel is nobody's: no patience and no hang guard counts it.
+"""The time of numba's compiler at the first use of a kernel, which no patience and no hang guard counts.
 
-Who watches a call of foreign code says with ``watch_compiler`` what is to be done while a kernel is compiled on the
-thread of that call. Who talks to a user hears of every kernel with ``told_of_kernels``. ``kernel_cache`` connects this
-to numba; here nothing is imported that takes time.
+``watch_compiler`` pauses a limit while a kernel is compiled on the thread of a call; ``record_compilations`` reports
+every kernel to a user. ``kernel_cache`` connects this module to numba; here nothing is imported that takes time.
 """
 
 from __future__ import annotations
@@ -26,12 +25,12 @@ class _Watchers(threading.local):
 
 @dataclass
 class Compiled:
-    """What was compiled in a stretch of time: the names of the kernels, one within the other too, and how long it took.
+    """What was compiled in a period of time: the names of the kernels, nested ones too, and how long it took.
 
     Attributes
     ----------
     kernels : list of str
-        Without what numba compiles of its own for them.
+        Without numba's own functions that they need.
     seconds : float
         Real time [s].
     kept : bool
@@ -58,9 +57,9 @@ def unwatch_compiler() -> None:
 
 
 @contextmanager
-def told_of_kernels(tell: Callable[[str], None]) -> Iterator[Compiled]:
-    """Tell the name of each kernel that is compiled, on whatever thread; yields the sum of it."""
-    listener = (Compiled(), tell)
+def record_compilations(report: Callable[[str], None]) -> Iterator[Compiled]:
+    """Report the name of each kernel that is compiled, on any thread; yields the record of all."""
+    listener = (Compiled(), report)
     _listeners.append(listener)
     try:
         yield listener[0]
@@ -69,20 +68,20 @@ def told_of_kernels(tell: Callable[[str], None]) -> Iterator[Compiled]:
 
 
 class CompilerClock:
-    """Passes on when numba compiles; it does so on one thread at a time, perhaps a kernel within another one."""
+    """Notifies watchers and records when numba compiles: on one thread at a time, perhaps a kernel within another."""
 
     def __init__(self) -> None:
         self._depth = 0
         self._began = 0.0
 
     def start(self, kernel: str, kept: bool) -> None:
-        """Say that a kernel is compiled from now on, on this thread, and whether the result is kept on disk."""
-        for compiled, tell in tuple(_listeners):
+        """Note that a kernel is compiled from now on, on this thread, and whether the result is kept on disk."""
+        for compiled, report in tuple(_listeners):
             if kernel.startswith("numba."):
                 continue
             compiled.kernels.append(kernel)
             compiled.kept &= kept
-            tell(kernel)
+            report(kernel)
         self._depth += 1
         if self._depth == 1:
             self._began = wall_seconds()
@@ -90,7 +89,7 @@ class CompilerClock:
                 on_start()
 
     def end(self) -> None:
-        """Say that it is done, or has failed."""
+        """Note that it is done, or has failed."""
         self._depth -= 1
         if self._depth == 0:
             for _, on_end in _watchers.pairs:

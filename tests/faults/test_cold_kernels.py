@@ -5,7 +5,7 @@ import pytest
 from numba import njit
 
 from mbf_abstract.compiling import kernel_cache
-from mbf_abstract.compiling.compilation import told_of_kernels
+from mbf_abstract.compiling.compilation import record_compilations
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
@@ -41,7 +41,7 @@ CLOCKS = [
 
 @pytest.mark.parametrize(("make_clock", "limits"), CLOCKS)
 def test_the_compilers_time_counts_neither_for_the_planners_patience_nor_for_the_guard(make_clock, limits):
-    with Bench(clock=make_clock(), **limits) as bench, told_of_kernels(lambda name: None) as compiled:
+    with Bench(clock=make_clock(), **limits) as bench, record_compilations(lambda name: None) as compiled:
         kernel = cold_kernel()
 
         def plan(request):
@@ -90,7 +90,7 @@ def test_a_cancel_during_the_compilation_ends_the_goal_after_the_grace():
         compiling = []
 
         def plan(request):
-            with told_of_kernels(compiling.append):
+            with record_compilations(compiling.append):
                 kernel()
             return straight_plan(request)
 

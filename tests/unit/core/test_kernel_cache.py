@@ -11,7 +11,7 @@ import numba
 import pytest
 
 from mbf_abstract.compiling import kernel_cache
-from mbf_abstract.compiling.compilation import told_of_kernels
+from mbf_abstract.compiling.compilation import record_compilations
 from mbf_abstract.compiling.kernel_cache import compile_lazily
 
 DECORATOR = "from mbf_abstract.compiling.kernel_cache import compile_lazily as kernel\n"
@@ -87,22 +87,22 @@ def test_without_a_folder_to_write_to_kernels_are_compiled_anew_and_a_warning_sa
     source = "def doubled(x):\n    return 2 * x\n\ndef halved(x):\n    return x / 2\n"
     exec(compile(source, "/a/read-only/installation/kernels.py", "exec"), space)  # for numba a file without a folder
 
-    with pytest.warns(UserWarning, match="set NUMBA_CACHE_DIR to a folder of your own") as told:
+    with pytest.warns(UserWarning, match="set NUMBA_CACHE_DIR to a folder of your own") as warned:
         doubled, halved = kernel_cache.compile_lazily(space["doubled"]), kernel_cache.compile_lazily(space["halved"])
 
-    assert len(told) == 1, "one word for all kernels"
-    with told_of_kernels(lambda name: None) as compiled:
+    assert len(warned) == 1, "one warning for all kernels"
+    with record_compilations(lambda name: None) as compiled:
         assert doubled(4) == 8 and halved(4) == 2.0
     assert len(compiled.kernels) == 2 and not compiled.kept
 
 
-def test_who_listens_hears_of_kernels_that_are_kept_and_not_of_what_numba_needs_for_them(tmp_path):
+def test_a_record_names_kernels_that_are_kept_and_not_what_numba_needs_for_them(tmp_path):
     file = tmp_path / "kernels.py"
     file.write_text("import numpy as np\n\ndef ones(n):\n    return np.ones(n).sum()\n")
     space: dict = {"__name__": "kernels"}
     exec(compile(file.read_text(), str(file), "exec"), space)
 
-    with told_of_kernels(lambda name: None) as compiled:
+    with record_compilations(lambda name: None) as compiled:
         assert compile_lazily(space["ones"])(3) == 3.0
 
     assert compiled.kernels == ["kernels.ones"] and compiled.kept and compiled.seconds > 0.0
