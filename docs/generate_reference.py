@@ -28,8 +28,7 @@ EXAMPLES = {
     "straight_on_costmap": ("planner", "costmap"),
     "chase_on_mesh": ("controller", "mesh"),
     "chase_on_costmap": ("controller", "costmap"),
-    "look_around_on_mesh": ("recovery", "mesh"),
-    "look_around_on_costmap": ("recovery", "costmap"),
+    "look_around": ("recovery", "mesh"),
     "flooded_ground": ("layer", "mesh"),
     "wet_floor": ("layer", "costmap"),
 }

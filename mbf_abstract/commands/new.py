@@ -2,7 +2,7 @@
 
 The core knows no map, so the templates are data of the map's own package: the folder ``templates`` beside its server
 holds ``<kind>.py.txt`` and ``test_<kind>.py.txt`` with ``$name`` and ``$class_name``. A new backend gets this command
-by adding such a folder.
+by adding such a folder. Kinds that are the same on every map have their template here.
 """
 
 from __future__ import annotations
@@ -68,7 +68,10 @@ def plugin_source(kind: str, name: str, map_name: str) -> str:
         raise ValueError(f"no kind {kind!r}; known: {', '.join(GROUPS)}")
     if not name.isidentifier() or name != name.lower() or keyword.iskeyword(name):
         raise ValueError(f"{name!r} is no name for a module: lower-case letters, digits and underscores")
-    return _fill(_package_of(map_name), f"templates/{kind}.py.txt", kind, name, map_name)
+    package, template = _package_of(map_name), f"{kind}.py.txt"
+    if files("mbf_abstract").joinpath(f"commands/templates/{template}").is_file():
+        return _fill("mbf_abstract", f"commands/templates/{template}", kind, name, map_name)
+    return _fill(package, f"templates/{template}", kind, name, map_name)
 
 
 def class_name(name: str) -> str:

@@ -37,7 +37,7 @@ planners:
 controllers:
   - {name: chase, type: "chase_on_mesh:ChaseOnMesh"}
 recovery_behaviors:
-  - {name: look, type: "look_around_on_mesh:LookAroundOnMesh"}
+  - {name: look, type: "look_around:LookAround"}
 look: {rate: 1.5}
 mesh_map:
   mesh_file: ground.ply
@@ -53,7 +53,7 @@ controllers:
   - {name: chase, type: "chase_on_costmap:ChaseOnCostmap"}
   - {name: carrot, type: "follow_carrot:FollowCarrot"}
 recovery_behaviors:
-  - {name: look, type: "look_around_on_costmap:LookAroundOnCostmap"}
+  - {name: look, type: "look_around:LookAround"}
 look: {rate: 1.5}
 global_costmap: &room
   robot_radius: 0.2
@@ -154,7 +154,7 @@ def test_the_controllers_keep_the_contract(target, place):
 
 @pytest.mark.parametrize(
     ("map_name", "target"),
-    [("mesh", "look_around_on_mesh:LookAroundOnMesh"), ("costmap", "look_around_on_costmap:LookAroundOnCostmap")],
+    [("mesh", "look_around:LookAround"), ("costmap", "look_around:LookAround")],
 )
 def test_the_recoveries_keep_the_contract(target, place):
     check_recovery(load(target), start=Pose.planar(2.0, 2.0), make_context=place)
