@@ -84,14 +84,6 @@ class RobotSpec:
         return URDF_FOLDER / f"{self.name}.urdf"
 
     @cached_property
-    def inscribed_radius(self) -> float:
-        """Radius [m] of the largest circle about base_link inside the footprint."""
-        corners = np.array(self.footprint)
-        edges = np.roll(corners, -1, axis=0) - corners
-        along = np.clip(-np.sum(corners * edges, axis=1) / np.sum(edges**2, axis=1), 0.0, 1.0)
-        return float(norm(corners + along[:, None] * edges).min())
-
-    @cached_property
     def circumscribed_radius(self) -> float:
         """Radius [m] of the smallest circle about base_link around the footprint."""
         return float(norm(np.array(self.footprint)).max())

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RectBivariateSpline
 
 from mbf_abstract.geometry import Pose, quaternion_from_yaw, quaternion_multiply
-from mbf_abstract.geometry.arithmetic import arctan, norm
+from mbf_abstract.geometry.arithmetic import arctan
 from terrain.worlds.smoothing import smoothed
 from terrain.worlds.surface import Surface, height_grid
 
@@ -132,28 +132,14 @@ class Heightfield:
         iy = np.clip(np.floor(v).astype(np.intp), 0, self.ny - 2)
         return ix, iy, np.where(outside, np.nan, u - ix), np.where(outside, np.nan, v - iy)
 
-    def _corner_heights(self, ix: NDArray[np.intp], iy: NDArray[np.intp]) -> tuple[FloatArray, ...]:
-        """Heights of the corners (0, 0), (1, 0), (0, 1) and (1, 1) of cells, in float64."""
-        corners = ((iy, ix), (iy, ix + 1), (iy + 1, ix), (iy + 1, ix + 1))
-        return tuple(np.asarray(self.heights[corner], dtype=np.float64) for corner in corners)
-
     def height_at(self, x: ArrayLike, y: ArrayLike) -> FloatArray:
         """Height [m] of the triangulated surface, float64 of the broadcast shape; nan outside the terrain."""
         ix, iy, s, t = self._locate(x, y)
-        h00, h10, h01, h11 = self._corner_heights(ix, iy)
+        corners = ((iy, ix), (iy, ix + 1), (iy + 1, ix), (iy + 1, ix + 1))
+        h00, h10, h01, h11 = (np.asarray(self.heights[corner], dtype=np.float64) for corner in corners)
         lower = h00 * (1.0 - s - t) + h10 * s + h01 * t
         upper = h11 * (s + t - 1.0) + h10 * (1.0 - t) + h01 * (1.0 - s)
         return np.asarray(np.where(s + t <= 1.0, lower, upper))
-
-    def normal_at(self, x: ArrayLike, y: ArrayLike) -> FloatArray:
-        """Return the unit normal (..., 3) of the triangle under each position, pointing up; nan outside."""
-        ix, iy, s, t = self._locate(x, y)
-        h00, h10, h01, h11 = self._corner_heights(ix, iy)
-        is_lower = s + t <= 1.0
-        rise_x = np.where(is_lower, h10 - h00, h11 - h01)
-        rise_y = np.where(is_lower, h01 - h00, h11 - h10)
-        normal = np.stack([-rise_x / self.dx, -rise_y / self.dy, np.where(np.isnan(s), np.nan, 1.0)], axis=-1)
-        return np.asarray(normal / norm(normal)[..., None])
 
     def ground_at(self, x: float, y: float) -> tuple[float, float, float]:
         """Height [m] and its derivatives along x and y at one place, without the cost of array calls.

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from scipy import ndimage
 
-from terrain.experiments.table1.environments.robot import CARRIER
+from terrain.experiments.table1.environments.robot import CARRIER, HALF_WIDTH
 from terrain.experiments.table1.environments.traffic import make_traffic
 from terrain.experiments.table1.environments.world import load_world
 
@@ -26,7 +26,7 @@ def test_six_waypoints_and_the_start_are_free_for_a_robot_that_turns():
         assert clearance[int(y / 0.05), int(x / 0.05)] > CARRIER.circumscribed_radius + 0.1
 
 
-def test_the_tour_is_closed():
+def test_the_waypoint_sequence_is_closed():
     world = load_world()
     assert math.dist(world.start[:2], world.waypoints[-1][:2]) < 0.1
 
@@ -34,7 +34,7 @@ def test_the_tour_is_closed():
 def test_no_route_leads_through_a_rack():
     world = load_world()
     grid = world.grid()
-    free = ndimage.distance_transform_edt(~grid.occupied) * grid.resolution > CARRIER.inscribed_radius
+    free = ndimage.distance_transform_edt(~grid.occupied) * grid.resolution > HALF_WIDTH
     for route in world.routes:
         for a, b in pairwise([*route, route[0]]):
             points = np.linspace(a, b, 200)
