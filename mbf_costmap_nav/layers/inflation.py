@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.layers.inflation import InflationRadii
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import FREE, INSCRIBED, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
@@ -28,7 +29,7 @@ from mbf_costmap_nav.kernels.map.inflation import LARGEST_RADIUS, inflate
 from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext
 
 
-class InflationLayerParameters(LayerParameters):
+class InflationLayerParameters(LayerParameters, InflationRadii):
     """Parameters of the inflation layer."""
 
     inflation_radius: float = parameter(0.55, "Distance from obstacles with a cost.", unit="m", ge=0.0, le=100.0)

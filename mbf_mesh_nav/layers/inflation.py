@@ -11,9 +11,12 @@ Cost: linear in the vertices within the radius; an update in the vertices whose 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from pydantic import model_validator
 
+from mbf_abstract.maps.layers.inflation import InflationRadii
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.kernels.layers.inflation import repair_distances, set_fading_costs
 from mbf_mesh_nav.map.layer import (
@@ -26,7 +29,7 @@ from mbf_mesh_nav.map.layer import (
 )
 
 
-class InflationParameters(LayerParameters):
+class InflationParameters(LayerParameters, InflationRadii):
     """Parameters of ``inflation``."""
 
     inscribed_radius: float = parameter(0.25, "Radius of the robot's inner circle.", unit="m", gt=0.0)
@@ -43,6 +46,11 @@ class InflationParameters(LayerParameters):
                 f"robot's body touches would be free, got {self.inflation_radius:g} m"
             )
         return self
+
+    def relaxed(self, factor: float, robot_radius: float) -> InflationParameters:
+        """As of all inflations; the layer's own inscribed radius shrinks too, to that of the robot at most."""
+        inscribed = min(self.inscribed_radius, max(factor * self.inscribed_radius, robot_radius or math.inf))
+        return super().relaxed(factor, inscribed).model_copy(update={"inscribed_radius": inscribed})
 
 
 class InflationLayer(MeshLayer):

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from mbf_abstract.maps.layers.inflation import InflationRadii
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.recoveries.chosen_maps import ChosenMapsParameters, ChosenMapsRecovery, described
 from mbf_abstract.maps.relaxation import Slack
@@ -76,40 +77,27 @@ class RelaxRecovery(ChosenMapsRecovery):
         )
         return RecoveryResult(RecoveryOutcome.SUCCESS, text)
 
+    def _usual(self, navigation_map: NavigationMap) -> dict[str, Any]:
+        """Return the usual parameters of the chosen layers of a map, by name."""
+        names = self.parameters.layers or tuple(navigation_map.layers)
+        return {name: navigation_map.usual_parameters(name) for name in names if name in navigation_map.layers}
+
     def _layer_without_radius(self) -> str:
         """Say which of the named layers is no inflation layer; empty if all are."""
-        for navigation_map in self.chosen_maps().values():
-            for name in self.parameters.layers:
-                if name in navigation_map.layers and not _is_inflation(navigation_map.usual_parameters(name)):
+        for navigation_map in self.chosen_maps().values() if self.parameters.layers else ():
+            for name, usual in self._usual(navigation_map).items():
+                if not isinstance(usual, InflationRadii):
                     return f"the layer {name!r} has no inflation radius"
         return ""
 
     def _relax(self, navigation_map: NavigationMap, until: float, request: RecoveryRequest) -> list[str]:
         """Relax the inflation layers of a map until a time [s]; return what each of them is relaxed to."""
         factor, relaxed = self.parameters.inflation_factor, []
-        for name in [] if factor == 1.0 else self.parameters.layers or navigation_map.layers:
-            usual = navigation_map.usual_parameters(name) if name in navigation_map.layers else None
-            if _is_inflation(usual):
-                parameters = relaxed_inflation(usual, factor, navigation_map.inscribed_radius)
+        for name, usual in self._usual(navigation_map).items():
+            if factor < 1.0 and isinstance(usual, InflationRadii):
+                parameters = usual.relaxed(factor, navigation_map.inscribed_radius)
                 navigation_map.set_layer_parameters(name, parameters, until)
                 relaxed.append(f"{name} at {parameters.inflation_radius:.3g} m")
         if relaxed:
             self.update(navigation_map, request)
         return relaxed
-
-
-def _is_inflation(parameters: Any) -> bool:
-    return hasattr(parameters, "inflation_radius")
-
-
-def relaxed_inflation(usual: Any, factor: float, robot_radius: float) -> Any:
-    """Parameters of an inflation layer with smaller radii [m] and faster decay, no narrower than the robot."""
-    inscribed = getattr(usual, "inscribed_radius", robot_radius)  # a mesh layer has one of its own, wider if need be
-    inscribed = min(inscribed, max(factor * inscribed, robot_radius or inscribed))
-    changes = {
-        "inflation_radius": max(factor * usual.inflation_radius, inscribed),
-        "cost_scaling_factor": usual.cost_scaling_factor / factor,
-    }
-    if hasattr(usual, "inscribed_radius"):
-        changes["inscribed_radius"] = inscribed
-    return usual.model_copy(update=changes)

@@ -11,7 +11,6 @@ from pydantic import ValidationError
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer_list import LayerListError
-from mbf_abstract.maps.recoveries.relax import relaxed_inflation
 from mbf_costmap_nav.files.map_description import MapError, MapMode
 from mbf_costmap_nav.files.map_io import OccupancyMap, save_map
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
@@ -121,7 +120,7 @@ def test_relaxing_leaves_every_cell_forbidden_on_which_the_robot_would_touch_som
     costmap.update(None, 0.0)
     before = costmap.snapshot().cells
     usual = costmap.usual_parameters("inflation")
-    costmap.set_layer_parameters("inflation", relaxed_inflation(usual, factor, costmap.inscribed_radius), until=5.0)
+    costmap.set_layer_parameters("inflation", usual.relaxed(factor, costmap.inscribed_radius), until=5.0)
     costmap.update(None, 1.0)
     relaxed = costmap.snapshot().cells
     assert np.array_equal(relaxed >= 253, before >= 253) and (relaxed <= before).all()
