@@ -1,4 +1,4 @@
-"""The map of the backend ``occupancy_octree``: an octree of occupancy, as OctoMap has, and what it means for a disc.
+"""An octree of occupancy, as OctoMap has: the map of the backend ``occupancy_octree``.
 
 When to use: maps in which the height of things matters and most of space is empty or solid. When not: large maps at
 full rate, it is plain Python.
@@ -9,15 +9,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray
-from mbf_abstract.maps.disc_map import DiscMap
-from mbf_abstract.parameters import ParameterModel, parameter
 
 Cube = tuple[int, int, int]
 Column = tuple[int, int]
@@ -103,72 +99,3 @@ def _above(cube: Cube, level: int) -> Cube:
 def _children(parent: Cube) -> list[Cube]:
     x, y, z = parent
     return [(2 * x + dx, 2 * y + dy, 2 * z + dz) for dx, dy, dz in CORNERS]
-
-
-class OctreeParameters(ParameterModel):
-    """The configuration's block ``occupancy_octree``."""
-
-    resolution: float = parameter(0.1, "Edge of the smallest cube.", unit="m", gt=0.0)
-    robot_radius: float = parameter(0.3, "Radius of the robot.", unit="m", gt=0.0)
-    z_min: float = parameter(0.05, "What lies lower is driven over.", unit="m")
-    z_max: float = parameter(1.0, "What hangs higher is driven under.", unit="m")
-    reach: float = parameter(30.0, "The planner looks so far around its start.", unit="m", gt=0.0)
-    max_age: float = parameter(2.0, "Without a scan for so long the robot is held; 0 = never.", unit="s", ge=0.0)
-
-
-@dataclass(frozen=True)
-class FlatView:
-    """What the octree means for the robot's disc, by column; never changed, a new one replaces it."""
-
-    occupied: frozenset[Column] = frozenset()
-    known: frozenset[Column] = frozenset()
-    blocked: frozenset[Column] = frozenset()
-
-
-class OctreeMap(DiscMap):
-    """The map: an octree that scans go into, and its newest flat view."""
-
-    def __init__(self, parameters: OctreeParameters, frame_id: str) -> None:
-        self.parameters, self.frame_id, self.resolution = parameters, frame_id, parameters.resolution
-        self.robot_radius = parameters.robot_radius
-        self.tree, self.view, self.last_scan = Octree(self.resolution), FlatView(), -math.inf
-
-    def look(self) -> None:
-        """Make the flat view anew."""
-        heights = self.parameters.z_min, self.parameters.z_max
-        occupied, known = (self.tree.columns(*heights, only) for only in (True, False))
-        disc = list(self.around(self.parameters.robot_radius))
-        blocked = {(x + dx, y + dy) for x, y in occupied for dx, dy in disc}
-        self.view = FlatView(frozenset(occupied), frozenset(known), frozenset(blocked))
-
-    def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
-        """Begin with nothing known."""
-        self.tree = Octree(self.resolution)
-        self.look()
-        return ["octree"]
-
-    def stale_reason(self, now: float) -> str:
-        """Whether the sensors have gone silent."""
-        age, limit = now - self.last_scan, self.parameters.max_age
-        return f"no scan for {age:.1f} s" if 0.0 < limit < age else ""
-
-    def obstacles_near(self, x: float, y: float, within: float) -> FloatArray:
-        """Places (n, 2) [m] of the occupied columns around."""
-        ix, iy = self.column(x, y)
-        near = [(ix + dx, iy + dy) for dx, dy in self.around(within + self.resolution)]
-        return self.middles([column for column in near if column in self.view.occupied])[:, :2]
-
-    def around(self, radius: float) -> Iterator[Column]:
-        """Offsets of the columns within a radius [m]."""
-        reach = math.ceil(radius / self.resolution)
-        for dx, dy in itertools.product(range(-reach, reach + 1), repeat=2):
-            if math.hypot(dx, dy) * self.resolution <= radius:
-                yield dx, dy
-
-    def column(self, x: float, y: float) -> Column:
-        """Column of a place [m]."""
-        return math.floor(x / self.resolution), math.floor(y / self.resolution)
-
-    def middles(self, columns: list[Column]) -> FloatArray:
-        """Places (n, 3) [m] on the ground in the middle of columns."""
-        return np.column_stack([(np.array(columns).reshape(-1, 2) + 0.5) * self.resolution, np.zeros(len(columns))])

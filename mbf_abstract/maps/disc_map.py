@@ -45,9 +45,9 @@ class DiscMap(NavigationMap):
             return ""
         step = min(STRIDE / command.speed, duration)
         ahead = arc_poses((pose.x, pose.y, pose.yaw), command.vx, command.vy, command.wz, duration, step)
-        before = self._clearance(pose.x, pose.y)
+        before = self.clearance(pose.x, pose.y)
         for x, y, _ in ahead.tolist():
-            clearance = self._clearance(x, y)
+            clearance = self.clearance(x, y)
             if clearance < self.robot_radius and clearance < before:
                 return f"an obstacle is in the way: the robot would touch it at ({x:.2f}, {y:.2f})"
             before = clearance
@@ -62,6 +62,7 @@ class DiscMap(NavigationMap):
         dx, dy = offsets[int(np.argmin(distances))].tolist()
         return dx, dy, 0.0
 
-    def _clearance(self, x: float, y: float) -> float:
+    def clearance(self, x: float, y: float) -> float:
+        """Distance [m] of the nearest obstacle from a place; may be inf beyond the radius of the disc."""
         offset = self.nearest_obstacle(Pose.planar(x, y, frame_id=self.frame_id), self.robot_radius)
         return math.inf if offset is None else math.hypot(*offset)

@@ -139,8 +139,10 @@ class LayeredCostmap(LayeredMap):
             return lasting_map(list(self.layers.enabled), self._geometry, self._default_value, self.frame_id)
 
     def stale_reason(self, now: float) -> str:
-        """Why the map is not current at ``now`` [s]: the age of the map, or the silent sensor; empty if it is."""
+        """Why the map is not current at ``now`` [s]: its age, a layer that raised, a silent sensor; empty if it is."""
         with self._lock:
+            if self.layers.problem:
+                return self.layers.problem
             if self._last_update is None:
                 return "the costmap has not been updated yet"
             age = now - self._last_update
@@ -191,15 +193,18 @@ class LayeredCostmap(LayeredMap):
             box = self._pending
             self._pending = self._geometry.box  # stays so if a layer raises: the next update then repairs everything
             for layer in self.layers.enabled:
-                box = layer.update_bounds(robot_pose, now, box)
+                with self.layers.computing(layer):
+                    box = layer.update_bounds(robot_pose, now, box)
             box = box.clipped(self._geometry.box)
             if not box.empty:
                 self._cells[box.slices] = self._default_value
                 for layer in self.layers.enabled:
-                    layer.update_costs(self._cells, box)
+                    with self.layers.computing(layer):
+                        layer.update_costs(self._cells, box)
                 self._version += 1
                 self._snapshot = None
             self._pending = EMPTY_BOX
+            self.layers.problem = ""
             self._last_update = now
             return EMPTY_BOX if box.empty else box
 

@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mbf_abstract.event_values import error_text
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerParameters, MeshLayer
 
@@ -27,16 +26,10 @@ class LayerGraph(LayerStack[MeshLayer]):
     ----------
     layers : sequence of MeshLayer
         Inputs before the layers that read them, computed or not.
-
-    Attributes
-    ----------
-    problem : str
-        Which layer raised what in the last pass, "" if none did.
     """
 
     def __init__(self, layers: Sequence[MeshLayer] = ()) -> None:
         super().__init__(layers)
-        self.problem = ""
         self._interrupted: set[str] = set()  # names of the layers that raised in passes that did not come through
         self._owed: dict[str, IntArray] = {}  # what passes changed that did not come through
 
@@ -62,9 +55,9 @@ class LayerGraph(LayerStack[MeshLayer]):
         for name, layer in self.items():
             from_inputs = union_of([changed[read.name] for read in layer.inputs if read.name in changed])
             try:
-                own = union_of([changed.get(name, NOTHING_CHANGED), self._follow(layer, from_inputs), event(layer)])
-            except BaseException as error:  # sys.exit() in a layer must not pass for an update
-                self.problem = f"layer '{name}' raised {type(error).__name__}: {error_text(error)}"
+                with self.computing(layer):
+                    own = union_of([changed.get(name, NOTHING_CHANGED), self._follow(layer, from_inputs), event(layer)])
+            except BaseException:  # also a sys.exit()
                 self._interrupted.add(name)
                 self._owed = changed
                 raise

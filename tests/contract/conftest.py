@@ -1,5 +1,7 @@
 """The same places as a costmap and as a mesh: walls where a test wants them, and layers that sensors fill."""
 
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -132,6 +134,7 @@ def world(request):
     )
 
 
+# ------------------------------------------------------------------------------------------------- whole backends
 PLUGINS = """
 recovery_behaviors:
   - {name: wait, type: wait}
@@ -139,6 +142,7 @@ recovery_behaviors:
   - {name: back_up, type: back_up}
   - {name: clear, type: clear}
   - {name: relax, type: relax}
+  - {name: move_away, type: move_away}
 """
 
 COSTMAP = (
@@ -185,6 +189,31 @@ mesh_map:
 )
 
 
+GRAPH = (
+    PLUGINS
+    + """
+planners: [{name: dijkstra, type: "mbf_abstract.maps.graph.graph_planner:GraphPlanner"}]
+controllers: [{name: follower, type: follow_path}]
+"""
+)
+
+ELEVATION_GRID = (
+    GRAPH
+    + """
+backend: elevation_grid:ElevationGridServer
+elevation_grid: {file: flat.npy, resolution: 0.1, robot_radius: 0.3, obstacles: {sources: [lidar]}}
+"""
+)
+
+OCCUPANCY_OCTREE = (
+    GRAPH
+    + """
+backend: occupancy_octree:OctreeServer
+occupancy_octree: {resolution: 0.2, width: 12.0, height: 8.0, robot_radius: 0.3, obstacles: {sources: [lidar]}}
+"""
+)
+
+
 def costmap_server(rig, **parameters):
     return rig.server(COSTMAP, parameters)
 
@@ -194,7 +223,30 @@ def mesh_server(rig, **parameters):
     return rig.server(MESH, parameters)
 
 
-BACKENDS = {"costmap": costmap_server, "mesh": mesh_server}
+def elevation_grid_server(rig, **parameters):
+    np.save(rig.folder / "flat.npy", np.zeros((81, 121)))
+    return rig.server(ELEVATION_GRID, parameters)
+
+
+def occupancy_octree_server(rig, **parameters):
+    return rig.server(OCCUPANCY_OCTREE, parameters)
+
+
+BACKENDS = {
+    "costmap": costmap_server,
+    "mesh": mesh_server,
+    "elevation_grid": elevation_grid_server,
+    "occupancy_octree": occupancy_octree_server,
+}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def example_backends():
+    """The example backends are imported by name, as a configuration does."""
+    folder = str(Path(__file__).resolve().parents[2] / "examples" / "backends")
+    sys.path.insert(0, folder)
+    yield
+    sys.path.remove(folder)
 
 
 @pytest.fixture(scope="session")

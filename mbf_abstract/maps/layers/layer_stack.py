@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Generic, TypeVar
 
+from mbf_abstract.event_values import error_text
 from mbf_abstract.maps.layers.layer import MapLayer
 from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_abstract.maps.layers.source_watch import first_reason
@@ -14,6 +16,11 @@ Layer_co = TypeVar("Layer_co", bound=MapLayer, covariant=True)
 
 class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
     """Layers by name, ``stack["inflation"]``, in the order in which they are computed.
+
+    Attributes
+    ----------
+    problem : str
+        Which layer raised what since the map was last computed as a whole; empty if none did.
 
     Raises
     ------
@@ -26,6 +33,7 @@ class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
         if len(set(names)) != len(names):
             raise LayerListError(f"the layers of a map need different names, got {names}")
         self._layers = {layer.name: layer for layer in layers}
+        self.problem = ""
 
     def __getitem__(self, name: str) -> Layer_co:
         if name not in self._layers:
@@ -59,8 +67,19 @@ class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
         """Whether any layer takes scans of a source."""
         return any(layer.listens_to(source) for layer in self.values())
 
+    @contextmanager
+    def computing(self, layer: MapLayer) -> Iterator[None]:
+        """Keep as ``problem`` what a layer raises in the ``with`` block, also a ``sys.exit()``, and raise it on."""
+        try:
+            yield
+        except BaseException as error:
+            self.problem = f"layer {layer.name!r} raised {type(error).__name__}: {error_text(error)}"
+            raise
+
     def stale_reason(self, now: float) -> str:
-        """Why the first stale layer is so at ``now`` [s]; empty if all are fresh."""
+        """Which layer raised, or why the first stale layer is so at ``now`` [s]; empty if all are fresh."""
+        if self.problem:
+            return self.problem
         reasons = ((layer.name, layer.stale_reason(now)) for layer in self.enabled)
         return first_reason(f"layer {name!r}: {reason}" for name, reason in reasons if reason)
 

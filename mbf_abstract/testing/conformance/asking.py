@@ -11,7 +11,7 @@ from mbf_abstract.testing.conformance.planning import FACE, WALL
 from mbf_abstract.testing.conformance.rig import T_map_dock
 from mbf_abstract.testing.conformance.site import Site, situation, somewhere
 
-NEAR = somewhere(3.8, 4.0)
+NEAR = somewhere(3.85, 4.0)
 """A place from which a robot would touch the wall."""
 AWAY = somewhere(3.2, 4.0)
 """A place from which it would not."""

@@ -1,11 +1,18 @@
-"""Parameters that change while a goal runs."""
+"""What changes while a goal runs: parameters of the server, plugins and layers, and a layer that breaks."""
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from mbf_abstract.geometry import Path
 from mbf_abstract.goals.goal_types import ExePathGoal
+from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.plugin_host import ServerError
+from mbf_abstract.testing.conformance.planning import FACE, WALL
 from mbf_abstract.testing.conformance.site import Site, situation
 
 
@@ -28,9 +35,83 @@ def limits_change_while_driving(site: Site) -> None:
 def a_bad_change_changes_nothing(site: Site) -> None:
     """A value that is not legal is a ValueError and changes nothing; an unknown plugin is a ServerError."""
     server = site.server
+    set_parameters = server.set_plugin_parameters
     site.expect_raises(ValueError, lambda: server.set_parameters(controller_frequency=-1.0), "a negative frequency")
-    wrong = lambda: server.set_plugin_parameters(PluginKind.RECOVERY, "wait", duration=-1.0)  # noqa: E731
-    site.expect_raises(ValueError, wrong, "a negative duration")
-    unknown = lambda: server.set_plugin_parameters(PluginKind.RECOVERY, "nobody", duration=1.0)  # noqa: E731
-    site.expect_raises(ServerError, unknown, "an unknown recovery")
+    wrong: list[tuple[type[Exception], str, float]] = [(ValueError, "wait", -1.0), (ServerError, "nobody", 1.0)]
+    for error, name, duration in wrong:
+
+        def change(name: str = name, duration: float = duration) -> None:
+            set_parameters(PluginKind.RECOVERY, name, duration=duration)
+
+        site.expect_raises(error, change, f"duration {duration:g} of {name!r}")
     site.expect_outcome(site.navigator.exe_path(site.path((2.0, 4.0), (3.0, 4.0))), ExePathOutcome.SUCCESS)
+
+
+@situation(controller_patience=30.0)
+def a_layer_is_switched_off_while_driving(site: Site) -> None:
+    """A layer that is switched off while the robot stands before its obstacle lets it drive on, and comes back."""
+    site.place(WALL)
+    handle = site.navigator.send(ExePathGoal(site.path((2.0, 4.0), (6.0, 4.0))))
+    site.rig.clock.sleep(6.0)
+    site.expect_stands(1.0, "the path leads into the wall")
+    _set_sensing_layers(site, enabled=False)
+    site.expect_free(FACE)
+    site.expect_moves(0.4, "the layer with the wall is switched off")
+    _set_sensing_layers(site, enabled=True)
+    site.rig.clock.sleep(1.0)
+    site.server.queries.update_map()
+    back = site.server.queries.check_point(FACE).state  # a map may free what lies under the robot
+    site.expect(back in (CellState.LETHAL, CellState.INSCRIBED), f"the wall is {back.name} with the layer switched on")
+    handle.cancel("seen enough")
+
+
+@situation(controller_patience=30.0)
+def a_layer_that_raises_holds_the_robot(site: Site) -> None:
+    """A layer that raises holds the robot and is named with what it raised; once it works again the robot drives on."""
+    for layer in site.map.layers.values():
+        handle = site.navigator.send(ExePathGoal(_long_path(site)))
+        site.expect_moves(1.5, f"before the layer {layer.name!r} raises")
+        mend = _break(layer)
+        site.rig.clock.sleep(1.0)
+        site.expect_stands(2.5, f"the layer {layer.name!r} raises")
+        problem = site.server.map_problem()
+        for word in (repr(layer.name), "RuntimeError", "broken by the suite"):
+            site.expect(word in problem, f"map_problem does not say {word}: {problem!r}")
+        mend()
+        site.expect_moves(2.5, f"the layer {layer.name!r} works again")
+        handle.cancel("next layer")
+        site.rig.clock.sleep(0.5)
+    site.rig.sensor_errors.clear()  # a layer may raise in the thread of the sensor
+
+
+def _long_path(site: Site) -> Path:
+    """Path from the robot to the farther end of the ground."""
+    pose = site.rig.robot.pose
+    return site.path((pose.x, pose.y), (10.0 if pose.x < 6.0 else 2.0, 4.0))
+
+
+def _set_sensing_layers(site: Site, enabled: bool) -> None:
+    for one in site.maps.values():
+        for name, layer in one.layers.items():
+            if layer.source_names:
+                one.set_layer_parameters(name, layer.parameters.model_copy(update={"enabled": enabled}))
+    site.server.queries.update_map()
+
+
+def _break(layer: Any) -> Callable[[], None]:
+    """Let every method of a layer raise that its map calls to compute it; returns what mends it."""
+
+    def broken(*_: Any, **__: Any) -> Any:
+        raise RuntimeError("broken by the suite")
+
+    asked = {"stale_reason", "listens_to", "configuration_warning", "speed_limit", "shift", "insert_scan"}
+    members = {name: getattr(type(layer), name) for name in dir(type(layer)) if not name.startswith("_")}
+    methods = [name for name, member in members.items() if inspect.isfunction(member) and name not in asked]
+    for name in methods:
+        setattr(layer, name, broken)
+
+    def mend() -> None:
+        for name in methods:
+            delattr(layer, name)
+
+    return mend

@@ -12,7 +12,7 @@ from mbf_abstract.testing.conformance.site import Site, situation, somewhere
 
 CORNERS = ((2.0, 4.0), (5.0, 4.0), (5.0, 6.0), (2.0, 6.0), (2.0, 4.0))
 EIGHT = tuple(
-    (2.0 + 2.0 * math.sin(2.0 * math.pi * k / 80), 4.0 + 1.5 * math.sin(4.0 * math.pi * k / 80)) for k in range(81)
+    (2.0 + 1.4 * math.sin(2.0 * math.pi * k / 80), 4.0 + 1.5 * math.sin(4.0 * math.pi * k / 80)) for k in range(81)
 )
 """A figure of eight through the robot's start, which it crosses halfway."""
 

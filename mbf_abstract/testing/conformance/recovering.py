@@ -5,7 +5,7 @@ from __future__ import annotations
 from mbf_abstract.events import EventKind
 from mbf_abstract.goals.goal_types import ExePathGoal, RecoveryGoal
 from mbf_abstract.maps.queries import CellState
-from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome, RecoveryOutcome
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.testing.conformance.planning import CAGE, FACE, WALL
 from mbf_abstract.testing.conformance.rig import Box
@@ -63,6 +63,39 @@ def clear_frees_what_is_gone(site: Site) -> None:
     site.rig.clock.sleep(0.6)
     site.server.queries.update_map()
     site.expect_state(FACE, CellState.LETHAL)
+
+
+@situation()
+def relax_grants_a_tolerance_for_its_time(site: Site) -> None:
+    """The recovery relax lets paths end beside a blocked goal for its duration, and no longer."""
+    site.place(WALL)
+    relaxed = {"planner_tolerance": 1.0, "duration": 3.0}
+    site.server.set_plugin_parameters(PluginKind.RECOVERY, "relax", **relaxed)
+    for outcome in (GetPathOutcome.BLOCKED_GOAL, GetPathOutcome.SUCCESS, GetPathOutcome.BLOCKED_GOAL):
+        site.expect_outcome(site.navigator.get_path(FACE, dist_tolerance=0.0), outcome)
+        if outcome == GetPathOutcome.SUCCESS:
+            site.rig.clock.sleep(4.0)
+        else:
+            site.expect_outcome(site.navigator.recover("relax"), RecoveryOutcome.SUCCESS)
+
+
+@situation()
+def move_away_gains_distance(site: Site) -> None:
+    """The recovery move_away drives away from an obstacle up to its clearance."""
+    site.place(Box(2.5, 3.0, 2.8, 5.0))
+    site.server.set_plugin_parameters(PluginKind.RECOVERY, "move_away", clearance=0.9)
+    site.expect_outcome(site.navigator.recover("move_away"), RecoveryOutcome.SUCCESS)
+    gap = 2.5 - site.rig.robot.pose.x
+    site.expect(0.75 < gap < 1.1, f"the robot's middle is {gap:.2f} m from the obstacle, wanted is 0.9 m")
+
+
+@situation()
+def move_away_between_obstacles_is_impassable(site: Site) -> None:
+    """The recovery move_away ends with IMPASSABLE where it would only come nearer to something else."""
+    site.place(Box(2.5, 3.0, 2.8, 5.0), Box(1.2, 3.0, 1.5, 5.0))
+    site.server.set_plugin_parameters(PluginKind.RECOVERY, "move_away", clearance=0.9)
+    site.expect_outcome(site.navigator.recover("move_away"), RecoveryOutcome.IMPASSABLE)
+    site.expect_no_contact()
 
 
 @situation()

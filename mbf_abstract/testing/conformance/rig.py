@@ -30,7 +30,7 @@ ROBOT_RADIUS = 0.3
 """Radius of the robot [m]."""
 SENSOR = "lidar"
 """Source of all scans, and the frame of the sensor."""
-SENSOR_HEIGHT, SENSOR_RANGE, RAYS = 0.4, 5.0, 120
+SENSOR_HEIGHT, SENSOR_RANGE, RAYS = 0.4, 5.0, 90
 """The sensor's height above ground [m], how far it sees [m], and its rays around."""
 MAX_SILENCE = 1.0
 """A backend must not let the robot drive on a map whose sensor is silent for longer than this [s]."""
@@ -154,7 +154,8 @@ class MakeServer(Protocol):
 
     The server of ``rig`` on flat, empty, known ground of 12 m x 8 m for a robot of 0.3 m radius, with ``parameters`` at
     the top level of its configuration. It takes scans of the source ``lidar`` and has at least one planner, one
-    controller, and the recoveries ``wait``, ``rotate``, ``back_up`` and ``clear`` under these names.
+    controller, and the recoveries ``wait``, ``rotate``, ``back_up``, ``clear``, ``relax`` and ``move_away`` under these
+    names.
     """
 
     def __call__(self, rig: BackendRig, **parameters: Any) -> AbstractNavigationServer:

@@ -16,10 +16,12 @@ from mbf_abstract.testing.conformance.site import Site, situation
 
 @situation()
 def what_the_sensor_sees_is_lethal_until_it_is_gone(site: Site) -> None:
-    """What was hit is lethal at its place, and free again when rays go through it."""
+    """What was hit is lethal at its place, and free again when rays have gone through it for a while."""
     site.place(WALL)
     site.expect_state(FACE, CellState.LETHAL)
     site.place()
+    site.rig.clock.sleep(2.0)  # for maps that want evidence
+    site.server.queries.update_map()
     site.expect_free(FACE)
 
 

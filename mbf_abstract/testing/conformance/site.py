@@ -15,10 +15,12 @@ import numpy as np
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_types import ActionResult
+from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import is_success, outcome_name
+from mbf_abstract.plugins import PluginKind
 from mbf_abstract.testing.conformance.rig import SENSOR, BackendRig, Box, MakeServer
 from mbf_abstract.testing.contract.report import Report
 
@@ -48,6 +50,18 @@ class Site:
     def __init__(self, rig: BackendRig, server: Any, report: Report) -> None:
         self.rig, self.server, self.navigator = rig, server, Navigator(server)
         self._report = report
+
+    @property
+    def map(self) -> NavigationMap:
+        """The map that the robot is held by."""
+        found: NavigationMap = self.server.plugins.find(PluginKind.RECOVERY, "rotate").instance.navigation_map
+        return found
+
+    @property
+    def maps(self) -> Mapping[str, NavigationMap]:
+        """The maps of the server by name, as its recoveries know them."""
+        behavior = self.server.plugins.find(PluginKind.RECOVERY, "rotate").instance
+        return behavior.maps or {"map": behavior.navigation_map}
 
     # ------------------------------------------------------------------------------------------ expectations
     def expect(self, condition: bool, text: str) -> None:
@@ -137,8 +151,9 @@ class Site:
         self.server.queries.update_map()
 
     def sees(self, scan: RangeScan) -> None:
-        """Hand over one scan, and bring the map up to date."""
-        self.server.take_scan(scan)
+        """Hand over one scan several times, for maps that want evidence, and bring the map up to date."""
+        for _ in range(4):
+            self.server.take_scan(scan)
         self.server.queries.update_map()
 
     def path(self, *corners: tuple[float, float]) -> Path:

@@ -1,0 +1,1 @@
+"""Controllers that are the same on every map."""

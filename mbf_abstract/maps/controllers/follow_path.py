@@ -1,0 +1,117 @@
+"""Follow a path on any map: pure pursuit that stops before what the map says the robot would touch.
+
+When to use: a backend of your own, which drives with it before it has a controller of its own. When not: obstacles that
+are not in the path (it ends with BLOCKED_PATH and never drives around; plan anew while driving), slopes, speed limits
+of layers: the controllers of the costmap and the mesh know their maps better.
+Formula: pure pursuit (Coulter 1992), the arc through a point ahead on the path.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
+from mbf_abstract.geometry.arcs import arc_to
+from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.maps.navigation_map import MapPlugin
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
+
+
+class FollowPathParameters(PluginParameters):
+    """Parameters of ``follow_path``."""
+
+    max_vel_x: float = parameter(0.5, "Speed on a straight path.", unit="m/s", gt=0.0, le=20.0)
+    max_vel_theta: float = parameter(1.0, "Largest yaw rate.", unit="rad/s", gt=0.0, le=20.0)
+    decel_lim_x: float = parameter(0.5, "Deceleration planned before the goal.", unit="m/s^2", gt=0.0, le=100.0)
+    look_ahead_dist: float = parameter(
+        0.5, "Distance along the path of the point that is steered to.", unit="m", gt=0.0, le=20.0
+    )
+    turn_in_place_angle: float = parameter(
+        0.8, "The robot turns on the spot to a point farther off its heading.", unit="rad", gt=0.0, le=math.pi
+    )
+    turn_gain: float = parameter(2.0, "Yaw rate per heading error when turning on the spot.", unit="1/s", gt=0.0)
+    check_ahead_time: float = parameter(1.0, "How far ahead the motion must be free.", unit="s", gt=0.0, le=10.0)
+    max_path_distance: float = parameter(
+        1.0, "Farther from the path than this the path is missed.", unit="m", gt=0.0, le=100.0
+    )
+
+
+MIN_SPEED = 0.05  # m/s; slower a robot would not come to the end of its path
+
+
+class FollowPath(MapPlugin, AbstractController):
+    """Steers along the arc to a point ahead on the path."""
+
+    Parameters: ClassVar[type[PluginParameters]] = FollowPathParameters
+    parameters: FollowPathParameters
+
+    _tracker: PathTracker | None = None
+
+    @property
+    def turns_on_the_spot(self) -> bool:
+        """It does."""
+        return True
+
+    def set_plan(self, path: Path) -> bool:
+        """Take over a path that has poses."""
+        self._tracker = PathTracker(path, dimensions=2) if len(path) else None
+        return self._tracker is not None
+
+    def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
+        """Find the point ahead, steer to it, and look whether that is free."""
+        p, pose, tracker = self.parameters, request.pose, self._tracker
+        if tracker is None:
+            return ControlResult(ExePathOutcome.INVALID_PATH, "no path has been set")
+        tracker.update((pose.x, pose.y))
+        farthest = p.max_path_distance * self.relaxation.slack(self.clock.now()).controller_factor
+        if tracker.deviation > farthest:
+            text = f"{tracker.deviation:.2f} m off the path, limit {farthest:.2f} m"
+            return ControlResult(ExePathOutcome.MISSED_PATH, text)
+        command = self._steer(pose, tracker)
+        try:
+            obstacle = self.navigation_map.obstacle_ahead(self.on_map(pose), command, p.check_ahead_time)
+        except TransformError as error:
+            return ControlResult(ExePathOutcome.TF_ERROR, str(error))
+        if obstacle:
+            return ControlResult(ExePathOutcome.BLOCKED_PATH, obstacle)
+        return ControlResult(ExePathOutcome.SUCCESS, "", command)
+
+    def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
+        """Whether the path has been driven to its end, and the pose is within both tolerances of it."""
+        tracker = self._tracker
+        if tracker is None:
+            return False
+        tracker.update((pose.x, pose.y))
+        gap, turn = self._from_goal(pose, tracker)
+        return tracker.has_arrived(dist_tolerance) and gap <= dist_tolerance and abs(turn) <= angle_tolerance
+
+    def _steer(self, pose: Pose, tracker: PathTracker) -> Twist:
+        """Turn on the spot to what is far off, or at the goal to its heading; else drive along the arc."""
+        p = self.parameters
+        gap, turn = self._from_goal(pose, tracker)
+        if tracker.on_last_section and tracker.remaining < 0.5 * MIN_SPEED and gap < MIN_SPEED:
+            return self._turn(turn)
+        x, y = tracker.point_at(min(tracker.progress + p.look_ahead_dist, tracker.next_cusp)).tolist()
+        bearing, curvature = arc_to(pose, np.array([x, y, pose.z]))
+        if abs(bearing) > p.turn_in_place_angle:
+            return self._turn(bearing)
+        left = max(tracker.to_cusp, gap if tracker.on_last_section else 0.0)
+        speed = min(p.max_vel_x, p.max_vel_theta / max(abs(curvature), 1e-6), math.sqrt(2.0 * p.decel_lim_x * left))
+        speed = max(speed, min(MIN_SPEED, p.max_vel_x))
+        return Twist.planar(vx=speed, wz=max(-p.max_vel_theta, min(speed * curvature, p.max_vel_theta)))
+
+    def _turn(self, angle: float) -> Twist:
+        limit = self.parameters.max_vel_theta
+        return Twist.planar(wz=max(-limit, min(self.parameters.turn_gain * angle, limit)))
+
+    @staticmethod
+    def _from_goal(pose: Pose, tracker: PathTracker) -> tuple[float, float]:
+        """Distance [m] and angle [rad] from the pose to the last one of the path, seen from above."""
+        goal = tracker.goal
+        return math.hypot(goal.x - pose.x, goal.y - pose.y), normalize_angle(goal.yaw - pose.yaw)

@@ -1,0 +1,98 @@
+"""The layers of a ``GraphMap``: what sensors see, and the distance kept from it."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry.arithmetic import exp
+from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
+from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.parameters import parameter
+
+MAX_WAITING = 64
+"""So many scans wait for an update at most; older ones are lost."""
+
+
+class ObstacleParameters(LayerParameters):
+    """Parameters of the obstacles."""
+
+    sources: tuple[str, ...] = parameter((), "Names of the sensors that it listens to.", dynamic=False)
+    expected_update_rate: float = parameter(
+        1.0, "Longest allowed time between two scans of a sensor; 0 switches the check off.", unit="s", ge=0.0
+    )
+    robot_height: float = parameter(1.0, "What hangs higher above the ground is no obstacle.", unit="m", gt=0.0)
+    ground_tolerance: float = parameter(0.05, "Hits lower above the ground are part of it.", unit="m", ge=0.0)
+
+
+class ObstacleLayer(MapLayer):
+    """The newest scan of each sensor; what it does not show any more is forgotten."""
+
+    parameters: ObstacleParameters
+
+    def __init__(self, name: str, parameters: ObstacleParameters) -> None:
+        super().__init__(name, parameters)
+        self._watches = {source: SourceWatch(source) for source in parameters.sources}
+        self._waiting: deque[RangeScan] = deque(maxlen=MAX_WAITING)
+        self._newest: dict[str, RangeScan] = {}
+
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of the sensors."""
+        return tuple(self._watches)
+
+    def insert_scan(self, scan: RangeScan) -> None:
+        """Keep a scan for the next update."""
+        self._watches[scan.source].heard(scan.stamp)
+        self._waiting.append(scan)
+
+    def take_waiting(self) -> list[RangeScan]:
+        """The scans since the last update, oldest first; they are in the map from now on."""
+        scans = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        for scan in scans:
+            self._newest[scan.source] = scan
+            self._watches[scan.source].used()
+        return scans
+
+    def hits(self) -> FloatArray:
+        """Points (k, 3) [m] that the newest scans hit."""
+        return np.concatenate([np.zeros((0, 3)), *(scan.points for scan in self._newest.values())])
+
+    def clear(self) -> None:
+        """Forget the scans."""
+        self._waiting.clear()
+        self._newest.clear()
+        for watch in self._watches.values():
+            watch.cleared()
+
+    def stale_reason(self, now: float) -> str:
+        """Which sensor is silent, or has not been heard since it was cleared."""
+        limit = self.parameters.expected_update_rate
+        return first_reason(watch.stale_reason(now, limit) for watch in self._watches.values())
+
+
+class InflationParameters(LayerParameters):
+    """Parameters of the inflation."""
+
+    inflation_radius: float = parameter(0.6, "Distance from obstacles with a cost.", unit="m", ge=0.0)
+    cost_scaling_factor: float = parameter(
+        5.0, "Rate of decay of the costs beyond the robot's radius.", unit="1/m", ge=0.0
+    )
+
+
+class InflationLayer(MapLayer):
+    """Costs near obstacles, which decay as costmap_2d's do: exp(-factor * (distance - radius of the robot))."""
+
+    parameters: InflationParameters
+
+    def costs(self, clearance: FloatArray, robot_radius: float) -> FloatArray:
+        """Costs (n,) from 0 to 1 for distances (n,) [m] from obstacles."""
+        costs = np.zeros(len(clearance))
+        if self.parameters.enabled:
+            near = clearance <= self.parameters.inflation_radius
+            beyond = np.maximum(clearance[near] - robot_radius, 0.0)
+            costs[near] = exp(-self.parameters.cost_scaling_factor * beyond)
+        return costs

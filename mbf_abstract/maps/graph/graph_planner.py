@@ -1,0 +1,97 @@
+"""Dijkstra's search over the free nodes of a ``GraphMap``: by via points to the goal, or as near as its tolerance says.
+
+When to use: the graph of a backend of your own. When not: paths between the directions of the edges; on a grid of eight
+directions they are up to 8 % longer. Cost: 10 to 20 ms for 10,000 nodes a leg; a cancel is looked at between legs.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray, Path, Pose
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.graph.graph_map import BoolArray, GraphMap
+from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult
+
+START, GOAL = GetPathOutcome.BLOCKED_START, GetPathOutcome.BLOCKED_GOAL
+
+
+class GraphPlanner(AbstractPlanner):
+    """Finds the cheapest way over the graph; costs lengthen its edges."""
+
+    def __init__(self, context: MapContext[GraphMap]) -> None:
+        super().__init__(context)
+        self._map = context.navigation_map
+
+    def make_plan(self, request: PlanRequest) -> PlanResult:
+        """Search leg by leg."""
+        free = self._map.free_nodes()
+        stops = (request.start, *request.via, request.goal)
+        ends = [self._ends(pose, request.dist_tolerance if pose is request.goal else 0.0, free) for pose in stops]
+        for pose, nodes in zip(stops, ends, strict=True):
+            if not len(nodes):
+                return self._refused(pose, is_start=pose is request.start)
+        graph, here = self._graph(free), int(ends[0][0])
+        chain, cost = [here], 0.0
+        for _, targets in pairwise(ends):
+            if request.cancel_token.cancelled:
+                return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
+            costs, before = _dijkstra(graph, here)
+            reached = targets[np.isfinite(costs[targets])]
+            if not len(reached):
+                return PlanResult(GetPathOutcome.NO_PATH_FOUND, "start and goal are not connected")
+            leg, here = [int(reached[0])], int(reached[0])
+            cost += float(costs[here])
+            while leg[-1] != chain[-1]:
+                leg.append(int(before[leg[-1]]))
+            chain += leg[-2::-1]
+        path = self._path(chain, request)
+        return PlanResult(GetPathOutcome.SUCCESS, f"{path.length:.2f} m over {len(chain)} nodes", path, cost)
+
+    def _ends(self, pose: Pose, tolerance: float, free: BoolArray) -> Any:
+        """Free nodes at a pose: its own, then the others within the tolerance [m], nearest first."""
+        own = self._map.node_at(pose.x, pose.y)
+        itself = np.array([own] if own >= 0 and free[own] else [], dtype=np.intp)
+        if own < 0 or tolerance == 0.0:
+            return itself
+        gaps = norm(self._map.nodes - np.asarray(pose.position))
+        near = np.flatnonzero(free & (gaps <= tolerance))
+        return np.concatenate([itself, near[np.argsort(gaps[near], kind="stable")]])
+
+    def _refused(self, pose: Pose, is_start: bool) -> PlanResult:
+        answer = self._map.place(pose.x, pose.y)
+        place = f"({pose.x:.2f}, {pose.y:.2f})"
+        if self._map.node_at(pose.x, pose.y) < 0:
+            return PlanResult(GetPathOutcome.OUT_OF_MAP, f"there is no ground at {place}")
+        return PlanResult(START if is_start else GOAL, f"{place} is {answer.state.name}, cost {answer.cost:.2f}")
+
+    def _graph(self, free: BoolArray) -> Any:
+        """Sparse matrix of what an edge between free nodes costs: its length, longer by the costs."""
+        from scipy.sparse import csr_array  # slow to import
+
+        nodes, costs = self._map.nodes, self._map.state.costs
+        start, end = self._map.edges[free[self._map.edges].all(axis=1)].T
+        lengths = norm(nodes[end] - nodes[start]) * (1.0 + 0.5 * (costs[start] + costs[end]))
+        return csr_array((lengths, (start, end)), shape=(len(nodes), len(nodes)))
+
+    def _path(self, chain: list[int], request: PlanRequest) -> Path:
+        """Path over nodes, which begins and ends exactly where it was asked to if these are its nodes."""
+        points: FloatArray = self._map.nodes[chain].copy()
+        if chain[-1] == self._map.node_at(request.goal.x, request.goal.y):
+            points[-1, :2] = request.goal.x, request.goal.y
+        if len(points) > 1:
+            points[0, :2] = request.start.x, request.start.y
+        return Path.from_points(points, request.goal.orientation, frame_id=self._map.frame_id)
+
+
+def _dijkstra(graph: Any, start: int) -> tuple[FloatArray, Any]:
+    """Costs (n,) from a node, and the node before each (n,)."""
+    from scipy.sparse.csgraph import dijkstra
+
+    costs, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
+    return np.asarray(costs, dtype=np.float64), before
