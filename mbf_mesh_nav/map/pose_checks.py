@@ -76,7 +76,7 @@ def check_path(
     """
     if skip_poses < 0:
         raise ValueError(f"skip_poses must not be negative, got {skip_poses}")
-    state, cost, index = CellState.FREE, 0.0, 0
+    state, cost, index = CellState.FREE, 0.0, -1
     for index in range(0, len(path), skip_poses + 1):
         answer = check_point(mesh_map, path[index]) if path_cells_only else check_pose(mesh_map, path[index], query)
         state, cost = max(state, answer.state), cost + answer.cost

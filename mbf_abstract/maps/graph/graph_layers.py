@@ -8,6 +8,7 @@ import numpy as np
 
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import exp
+from mbf_abstract.maps.layers.inflation import InflationRadii
 from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
 from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
 from mbf_abstract.maps.sensing import RangeScan
@@ -74,7 +75,7 @@ class ObstacleLayer(MapLayer):
         return first_reason(watch.stale_reason(now, limit) for watch in self._watches.values())
 
 
-class InflationParameters(LayerParameters):
+class InflationParameters(LayerParameters, InflationRadii):
     """Parameters of the inflation."""
 
     inflation_radius: float = parameter(0.6, "Distance from obstacles with a cost.", unit="m", ge=0.0)
