@@ -34,7 +34,6 @@ from mbf_mesh_nav.controllers.vector_field import VectorFieldController
 from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.layer import LayerContext
 from mbf_mesh_nav.map.map_builder import build_mesh_map, default_layers
-from mbf_mesh_nav.map.pose_checks import check_pose
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
@@ -67,7 +66,7 @@ def run_chain() -> None:
         controller = plugin(controller_class, mesh_map)
         controller.set_plan(result.path)
         controller.compute_velocity_commands(ControlRequest(result.path[0], Twist()))
-    check_pose(mesh_map, result.path[0], PlaceQuery())
+    mesh_map.pose_check(PlaceQuery())(result.path[0])
 
 
 def load(mesh_file: str) -> None:

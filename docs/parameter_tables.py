@@ -29,9 +29,9 @@ already; otherwise it is read when a goal starts or when the server is made. A d
 Range brackets: `[` includes the bound, `(` does not.
 
 What can change while running is changed by a call, all values of it or none: `server.set_parameters(...)`,
-`server.set_plugin_parameters(kind, name, ...)`; on a costmap server also
-`set_layer_parameters("global", "inflation", inflation_radius=0.8)`, `set_costmap_parameters("local", max_age=1.0)` and
-`set_footprint([[0.4, 0.3], ...])`, which reach the cells with the map's next update.
+`server.set_plugin_parameters(kind, name, ...)`, and on every map `set_map_parameters("local_costmap", max_age=1.0)`,
+`set_layer_parameters("global_costmap.inflation", inflation_radius=0.8)` and `set_footprint(...)` with corners or the
+radius of a round robot (on a mesh: a radius). The map shows it after its next update.
 """
 
 SERVERS = ("costmap", "mesh")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar, Literal, cast
 
@@ -18,20 +17,16 @@ import numpy as np
 from mbf_abstract.config.configuration import Config, PluginDeclaration
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.config.registry import Adapter
-from mbf_abstract.maps.queries import MapQueries
-from mbf_abstract.maps.scan_intake import ScanIntake
-from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.maps.view import FloorMap, GridView
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugins import PluginContext, PluginKind
-from mbf_abstract.server.navigation_server import AbstractNavigationServer
-from mbf_abstract.server.plugin_host import ServerError
+from mbf_abstract.server.map_server import MapServer
 from mbf_costmap_nav.files.map_description import MapError
 from mbf_costmap_nav.files.map_io import load_map_file
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
-from mbf_costmap_nav.map.queries import CostmapQueries
 from mbf_costmap_nav.map.served_costmap import ServedCostmap
 from mbf_costmap_nav.planning.nav_core import wrap_nav_core
 from mbf_costmap_nav.plugins import CostmapContext
@@ -70,7 +65,7 @@ class CostmapPluginDeclaration(PluginDeclaration):
     costmap: Literal["", "local", "global"] = parameter("", "The map this plugin works on; empty = its kind's own.")
 
 
-class CostmapNavigationServer(AbstractNavigationServer):
+class CostmapNavigationServer(MapServer):
     """Navigation on a global and a local costmap."""
 
     backend: ClassVar[str] = "costmap"
@@ -84,15 +79,12 @@ class CostmapNavigationServer(AbstractNavigationServer):
     global_costmap: LayeredCostmap
     local_costmap: LayeredCostmap
 
-    def load_map(self, config: Config) -> None:
-        """Build both costmaps and start updating them."""
-        self._global = self._serve(config, "global_costmap")
-        self._local = self._serve(config, "local_costmap")
-        self.global_costmap, self.local_costmap = self._global.costmap, self._local.costmap
-        both = (self._global, self._local)
-        self._scans = ScanIntake(self.runtime, {one.name: one.scan_target for one in both})
-        for one in both:
-            one.report_configuration_warnings()
+    def serve_maps(self, config: Config) -> Iterator[ServedMap[Any]]:
+        """Build the global costmap, then the local one."""
+        for key in ("global_costmap", "local_costmap"):
+            served = self._serve(config, key)
+            setattr(self, key, served.map)
+            yield served
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
         """Add both maps and the one this plugin is bound to."""
@@ -107,22 +99,6 @@ class CostmapNavigationServer(AbstractNavigationServer):
             maps={"local": self.local_costmap, "global": self.global_costmap},
             transforms=self.runtime.transforms,
         )
-
-    @property
-    def queries(self) -> MapQueries:
-        """The map-independent questions on the costmaps."""
-        return CostmapQueries(
-            self.global_costmap,
-            self.local_costmap,
-            self.runtime.robot,
-            self.runtime.transforms,
-            self.runtime.clock,
-            using=lambda costmap: (self._global if costmap is self.global_costmap else self._local).in_use(),
-        )
-
-    def take_scan(self, scan: RangeScan) -> None:
-        """Feed a scan to every layer that listens to its source, as ``ScanIntake.take``, whose errors it raises."""
-        self._scans.take(scan)
 
     ground_is_level = True
 
@@ -139,72 +115,11 @@ class CostmapNavigationServer(AbstractNavigationServer):
         geometry = costmap.geometry
         return GridView(costs, (geometry.origin_x, geometry.upper_x, geometry.origin_y, geometry.upper_y))
 
-    # --------------------------------------------------------------------------------------- changes at run time
-    def set_layer_parameters(self, costmap: Which, layer: str, /, **changes: Any) -> None:
-        """Change parameters of a layer of one map, all or none; the map's next update takes them into its cells.
-
-        Raises
-        ------
-        ServerError
-            There is no such map or layer.
-        ValueError
-            A value is not legal (pydantic's ValidationError is one), the parameter is read once only, or the layer does
-            not take it. Nothing is changed.
-        """
-        served = self._served(costmap)
-        if layer not in served.costmap.layers:
-            raise ServerError(f"the {costmap} costmap has no layer {layer!r}, only {list(served.costmap.layers)}")
-        served.set_layer_parameters(layer, changes)
-
-    def set_costmap_parameters(self, costmap: Which, /, **changes: Any) -> None:
-        """Change parameters of one map itself, such as ``footprint_padding`` or ``max_age``; raises as for a layer."""
-        self._served(costmap).set_parameters(changes)
-
-    def set_footprint(self, footprint: str | Sequence[Sequence[float]] | float) -> None:
-        """Replace the robot's outline on both maps, e.g. when it lifts a load.
-
-        Parameters
-        ----------
-        footprint : text, list of (x, y) or number
-            Corners [m] without padding, as in the configuration, or the radius [m] of a round robot.
-
-        Raises
-        ------
-        ValueError
-            It is no polygon, or no radius; nothing is changed.
-        """
-        changes = {"footprint": footprint}
+    def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
+        """An outline, or the radius of a round robot."""
         if isinstance(footprint, int | float):
-            changes = {"footprint": None, "robot_radius": footprint}  # type: ignore[dict-item]
-        old = {name: getattr(self._global.parameters, name) for name in changes}
-        self._global.set_parameters(changes)
-        try:
-            self._local.set_parameters(changes)
-        except BaseException:
-            self._global.set_parameters(old)
-            raise
-
-    def _served(self, costmap: Which) -> ServedCostmap:
-        if costmap not in ("global", "local"):
-            raise ServerError(f"there is no costmap {costmap!r}, only global and local")
-        return self._global if costmap == "global" else self._local
-
-    # ------------------------------------------------------------------------------------------------- life cycle
-    @contextmanager
-    def using_map(self, kind: PluginKind) -> Iterator[None]:
-        """Keep both maps updated: a plugin of any kind may be bound to either of them."""
-        with self._global.in_use(), self._local.in_use():
-            yield
-
-    def map_problem(self) -> str:
-        """Why the local costmap is not current, if it is not."""
-        return self.local_costmap.stale_reason(self.runtime.clock.now())
-
-    def close_map(self) -> None:
-        """End the threads that update the maps."""
-        for name in ("_global", "_local"):
-            if hasattr(self, name):
-                getattr(self, name).close()
+            return {"footprint": None, "robot_radius": footprint}
+        return {"footprint": footprint}
 
     @classmethod
     def config_for_map(cls, file: Path, unknown_is_free: bool = True) -> str | None:

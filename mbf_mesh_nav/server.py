@@ -7,7 +7,7 @@ one section, ``mesh_map`` (see ``map_builder``); plugin types are looked for wit
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, cast
@@ -19,19 +19,15 @@ from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Path as PlannedPath
 from mbf_abstract.maps.layers.layer_list import LayerListError
-from mbf_abstract.maps.queries import MapQueries
-from mbf_abstract.maps.scan_intake import ScanIntake, ScanTarget
-from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.served_map import ServedMap
 from mbf_abstract.maps.view import FieldView, MeshView
-from mbf_abstract.parameters import ParameterModel, with_changes
+from mbf_abstract.parameters import ParameterModel
 from mbf_abstract.plugins import PluginContext, PluginKind
-from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.server.plugin_host import ServerError
-from mbf_abstract.time.ticker import Ticker
 from mbf_mesh_nav.files.mesh_io import known_endings, read_mesh, require_packages
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
 from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.map.queries import MeshQueries
 from mbf_mesh_nav.mesh.ground import ground_heights
 from mbf_mesh_nav.mesh.mesh_report import SHOWN_INDICES
 from mbf_mesh_nav.motion.vector_field import VectorField
@@ -64,7 +60,7 @@ mesh_map:
 """
 
 
-class MeshNavigationServer(AbstractNavigationServer):
+class MeshNavigationServer(MapServer):
     """Navigation on one triangle mesh."""
 
     backend: ClassVar[str] = "mesh"
@@ -73,23 +69,24 @@ class MeshNavigationServer(AbstractNavigationServer):
     read_mesh = staticmethod(read_mesh)
     """The reader of mesh files, for packages that know this one by its server only."""
 
-    mesh_map: MeshMap
+    @property
+    def mesh_map(self) -> MeshMap:
+        """The map of the moment."""
+        mesh_map: MeshMap = self.served["mesh_map"].map
+        return mesh_map
 
-    def load_map(self, config: Config) -> None:
+    def serve_maps(self, config: Config) -> Iterator[ServedMap[Any]]:
         """Read the mesh and compute its layers."""
-        self.mesh_map = self._build_map(config, mesh_file=None)
-        target = ScanTarget(  # the map of the moment, which may be swapped
-            config.parameters.global_frame,
-            lambda: self.mesh_map.layers.source_names,
-            lambda source: self.mesh_map.layers.listens_to(source),
-            lambda scan: self.mesh_map.insert_scan(scan),
-        )
-        self._scans = ScanIntake(self.runtime, {"mesh_map": target})
-        self._tell_findings()
-        clock, events = self.runtime.clock, self.runtime.events
         parameters = cast(MeshMapParameters, config.sections["mesh_map"].parameters)
-        period = 1.0 / parameters.update_frequency
-        self._ticker = Ticker(clock, events, lambda: self.mesh_map.update(None, clock.now()), period, "mesh_map")
+        mesh_map = self._build_map(config, mesh_file=None)
+        yield ServedMap(mesh_map, self.runtime, "mesh_map", parameters, parameters.update_frequency)
+        self._report_findings()
+
+    def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
+        """The radius of the disc that stands for the robot; inflation layers have radii of their own."""
+        if not isinstance(footprint, int | float):
+            raise ValueError(f"a mesh map takes the robot for a disc: a radius [m], not {footprint!r}")
+        return {"inscribed_radius": footprint}
 
     def swap_mesh(self, mesh_file: Path | str) -> None:
         """Drive on another mesh from now on, e.g. after the lift; its layers are those of the configuration.
@@ -109,23 +106,25 @@ class MeshNavigationServer(AbstractNavigationServer):
         ServerError
             A goal is using a plugin, or a plugin does not take the new map; the old map stays.
         """
-        old_map, new_map = self.mesh_map, self._build_map(self.config, mesh_file)
+        served, new_map = self.served["mesh_map"], self._build_map(self.config, mesh_file)
+        old_map = served.map
         loaded = [(kind, plugin) for kind in PluginKind for plugin in self.plugins.all_of(kind)]
         held = [plugin for _, plugin in loaded if plugin.acquire(self, lambda: True)]
         try:
             if busy := [plugin.name for _, plugin in loaded if plugin not in held]:
                 raise ServerError(f"the mesh cannot be swapped while {', '.join(busy)} is in use")
-            self.mesh_map = new_map
+            served.map = new_map
             try:
                 specs = [(kind, replace(one.spec, parameters=one.instance.parameters)) for kind, one in loaded]
                 renewed = [(kind, self._construct(spec)) for kind, spec in specs]
             except (Exception, SystemExit) as error:
-                self.mesh_map = old_map
+                served.map = old_map
                 text = f"{type(error).__name__}: {error_text(error)}"
                 raise ServerError(f"a plugin does not take {mesh_file}: {text}") from error
             for kind, plugin in renewed:
                 self.plugins.replace(kind, plugin)
-            self._tell_findings()
+            served.parameters = self.config.sections["mesh_map"].parameters
+            self._report_findings()
         finally:
             for plugin in held:
                 plugin.release(self)
@@ -153,7 +152,7 @@ class MeshNavigationServer(AbstractNavigationServer):
         write_lvr2_map(self.config.path.parent / file, self.mesh_map, layout=layout)
         self.runtime.events.emit(EventKind.MAP, "mesh_map", message=f"the map was saved to {file}")
 
-    def _tell_findings(self) -> None:
+    def _report_findings(self) -> None:
         """One event for everything that was found in, or done to, the mesh of the map."""
         for found in self.mesh_map.report.findings:
             facts = {"finding": found.name, "count": found.count, "repaired": found.repaired}
@@ -183,15 +182,6 @@ class MeshNavigationServer(AbstractNavigationServer):
         """Add the mesh map."""
         return MeshContext(**vars(base), navigation_map=self.mesh_map, transforms=self.runtime.transforms)
 
-    @property
-    def queries(self) -> MapQueries:
-        """The map-independent questions on the mesh."""
-        return MeshQueries(self.mesh_map, self.runtime.robot, self.runtime.transforms, self.runtime.clock)
-
-    def take_scan(self, scan: RangeScan) -> None:
-        """Feed a scan to every layer that listens to its source, as ``ScanIntake.take``, whose errors it raises."""
-        self._scans.take(scan)
-
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
         """Heights of all surfaces at a place, the lowest free one first; see ``ground.ground_heights``."""
         return ground_heights(self.mesh_map, x, y)
@@ -214,50 +204,6 @@ class MeshNavigationServer(AbstractNavigationServer):
             return None
         leads = np.isfinite(fields[0].distances) & fields[0].directions.any(axis=1)
         return FieldView(self.mesh_map.vertices[leads], fields[0].directions[leads])
-
-    # --------------------------------------------------------------------------------------- changes at run time
-    def set_layer_parameters(self, layer: str, /, **changes: Any) -> None:
-        """Change parameters of a layer, all or none; whatever reads the layer follows at once.
-
-        Raises
-        ------
-        ServerError
-            There is no such layer.
-        ValueError
-            A value is not legal (pydantic's ValidationError is one), or the parameter is read once only.
-        """
-        if layer not in self.mesh_map.layers:
-            raise ServerError(f"the mesh map has no layer {layer!r}, only {list(self.mesh_map.layers)}")
-        self.mesh_map.set_layer_parameters(layer, with_changes(self.mesh_map.usual_parameters(layer), changes))
-        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, f"mesh_map.{layer}", **changes)
-
-    def set_edge_cost_factor(self, edge_cost_factor: float) -> None:
-        """Change how much costs lengthen edges; ValueError if the configuration would not take it."""
-        self._check_parameters(edge_cost_factor=edge_cost_factor)
-        self.mesh_map.set_edge_cost_factor(edge_cost_factor)
-        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "mesh_map", edge_cost_factor=edge_cost_factor)
-
-    def set_inscribed_radius(self, inscribed_radius: float) -> None:
-        """Change the radius [m] of the disc that stands for the robot in queries, e.g. when it lifts a load.
-
-        Inflation layers have radii of their own, see ``set_layer_parameters``. ValueError if the configuration would
-        not take it.
-        """
-        self._check_parameters(inscribed_radius=inscribed_radius)
-        self.mesh_map.inscribed_radius = inscribed_radius
-        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "mesh_map", inscribed_radius=inscribed_radius)
-
-    def _check_parameters(self, **changes: float) -> None:
-        with_changes(cast(MeshMapParameters, self.config.sections["mesh_map"].parameters), changes)
-
-    def map_problem(self) -> str:
-        """Name the layer that raised, or the one whose sensor is silent, if there is one."""
-        return self.mesh_map.stale_reason(self.runtime.clock.now())
-
-    def close_map(self) -> None:
-        """End the map's own thread."""
-        if hasattr(self, "_ticker"):
-            self._ticker.stop()
 
     @classmethod
     def config_for_map(cls, file: Path, unknown_is_free: bool = True) -> str | None:

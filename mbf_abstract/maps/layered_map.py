@@ -31,6 +31,15 @@ class LayeredMap(NavigationMap):
         self._lock = threading.RLock()
         self._overridden: dict[str, tuple[Any, float]] = {}  # usual parameters of a layer, end of the override [s]
 
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of all observation sources that layers ask for, sorted."""
+        return self.layers.source_names
+
+    def listens_to(self, source: str) -> bool:
+        """Whether any layer takes scans of a source."""
+        return self.layers.listens_to(source)
+
     def insert_scan(self, scan: RangeScan) -> None:
         """Hand a scan to the layers that listen to its source; the next update takes it into the map.
 

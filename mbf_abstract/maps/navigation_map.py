@@ -9,14 +9,19 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.plugins import Plugin, PluginContext
+
+PlaceCheck = Callable[[Pose], PlaceAnswer]
+"""State and cost at a pose in the frame of the map."""
 
 
 class NavigationMap(ABC):
@@ -31,6 +36,8 @@ class NavigationMap(ABC):
 
     frame_id: str
     layers: Mapping[str, Any] = MappingProxyType({})
+    follows_robot: bool = False
+    """Whether an update needs the robot's pose."""
 
     @property
     def inscribed_radius(self) -> float:
@@ -52,6 +59,38 @@ class NavigationMap(ABC):
         ``robot_pose`` is None while it is unknown.
         """
         return None
+
+    # ------------------------------------------------------------------------------------------------- sensors
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of all observation sources that it asks for, sorted."""
+        return ()
+
+    def listens_to(self, source: str) -> bool:
+        """Whether it takes scans of a source."""
+        return source in self.source_names
+
+    def insert_scan(self, scan: RangeScan) -> None:
+        """Keep a scan in the frame of the map for the next update; never waits for an update."""
+        raise ValueError(f"the map listens to no source, got a scan of {scan.source!r}")
+
+    # -------------------------------------------------------------------------------------------------- places
+    def point_check(self) -> PlaceCheck:
+        """Return a function that gives state and cost of points, on the map as it is now."""
+        raise NotImplementedError(f"{type(self).__name__} cannot be asked about points")
+
+    def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
+        """Return a function that gives state and summed cost of the robot's outline, on the map as it is now.
+
+        With ``center_only`` only the point below the robot's origin is looked at.
+        """
+        raise NotImplementedError(f"{type(self).__name__} cannot be asked about poses")
+
+    def find_valid_pose(
+        self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
+    ) -> PoseAnswer:
+        """Return the nearest pose within the tolerances [m, rad] where the robot fits; both are 0 or more."""
+        raise NotImplementedError(f"{type(self).__name__} cannot be asked where the robot fits")
 
     # -------------------------------------------------------------------------------------------------- motion
     @abstractmethod
@@ -89,6 +128,13 @@ class NavigationMap(ABC):
     def usual_parameters(self, name: str) -> Any:
         """Parameters of a layer apart from an override; raises KeyError if there is none of that name."""
         return self.layers[name].parameters
+
+    def configuration_warnings(self) -> list[str]:
+        """What is legal but hardly meant in the parameters of the map and its layers."""
+        return []
+
+    def take_parameters(self, parameters: Any) -> None:  # noqa: B027 - for maps with parameters that can change
+        """Take over parameters of the map itself that can change at run time; raises ValueError for illegal ones."""
 
     def set_layer_parameters(self, name: str, parameters: Any, until: float = math.inf) -> None:
         """Replace the parameters of one layer, up to a time ``until`` [s] if it is given; see ``LayeredMap``."""

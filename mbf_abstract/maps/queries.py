@@ -84,6 +84,10 @@ class PlaceQuery:
             raise ValueError(f"safety_dist must be 0 m or more and finite, got {self.safety_dist}")
 
 
+AS_CONFIGURED = PlaceQuery()
+"""The robot with its configured outline, and costs as they are."""
+
+
 class MapQueries(Protocol):
     """What a server with a map answers. Poses may be in any known frame; TransformError where it is not known."""
 

@@ -13,6 +13,8 @@ The order of work, bounds and the combination rules are those of costmap_2d.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +22,12 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.maps.layers.layer_stack import LayerStack
+from mbf_abstract.maps.navigation_map import PlaceCheck
+from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.motion_check import nearest_lethal, obstacle_ahead
+from mbf_costmap_nav.map import pose_checks
 from mbf_costmap_nav.map.layer import CostmapLayer, shifted
 from mbf_costmap_nav.map.layers_in_sum import lasting_map, warnings_about
 
@@ -68,6 +73,7 @@ class LayeredCostmap(LayeredMap):
         max_age: float = 0.0,
     ) -> None:
         super().__init__()
+        self.follows_robot = True
         self.layers: LayerStack[CostmapLayer] = LayerStack(layers)
         if not rolling_window:
             geometry = next((own for layer in layers if (own := layer.preferred_geometry())), geometry)
@@ -85,6 +91,28 @@ class LayeredCostmap(LayeredMap):
         for layer in layers:
             layer.match_geometry(geometry)
         self.set_footprint(footprint)
+
+    # ------------------------------------------------------------------------------------------------- places
+    def point_check(self) -> PlaceCheck:
+        """State and cost of the cells of points."""
+        costmap = self.snapshot()
+        return lambda pose: pose_checks.check_point(costmap, pose.x, pose.y)
+
+    def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
+        """State and summed cost of the outline, see ``pose_checks.pose_check``."""
+        if center_only:
+            return pose_checks.pose_check(self.snapshot(), Footprint([]), replace(query, safety_dist=0.0))
+        return pose_checks.pose_check(self.snapshot(), self._outline(query), query)
+
+    def find_valid_pose(
+        self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
+    ) -> PoseAnswer:
+        """Nearest pose where the outline fits, see ``pose_checks.find_valid_pose``."""
+        tolerances = dist_tolerance, angle_tolerance
+        return pose_checks.find_valid_pose(self.snapshot(), self._outline(query), pose, *tolerances, query)
+
+    def _outline(self, query: PlaceQuery) -> Footprint:
+        return self.footprint if query.use_padded_footprint else self.unpadded_footprint
 
     # ------------------------------------------------------------------------------------------------ reading
     @property
@@ -226,6 +254,11 @@ class LayeredCostmap(LayeredMap):
         self._pending = self._geometry.box
 
     # --------------------------------------------------------------------------------------- changes at run time
+    def take_parameters(self, parameters: Any) -> None:
+        """Take over outline, padding and ``max_age`` of ``CostmapParameters``."""
+        self.set_footprint(parameters.robot_footprint(), parameters.footprint_padding)
+        self.max_age = parameters.max_age
+
     def set_footprint(self, footprint: Footprint, padding: float | None = None) -> None:
         """Replace the robot's outline (given without padding), e.g. when it lifts a load; ``padding`` [m] too if given.
 

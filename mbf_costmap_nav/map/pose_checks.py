@@ -4,7 +4,6 @@ Semantics are those of MBF's costmap services (check_point_cost, check_pose_cost
 with these deviations, each the cure of a known fault:
 
 - no cell is counted twice (there the outline was), and the safety distance is a true offset of the footprint;
-- a pose or path in another frame is refused (there the untransformed request was searched); the server transforms;
 - a search that finds nothing returns no pose (there it returned the one it was asked about).
 
 All functions work on a snapshot, so they hold no lock.
@@ -18,8 +17,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.maps.queries import CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.geometry import Pose
+from mbf_abstract.maps.navigation_map import PlaceCheck
+from mbf_abstract.maps.queries import AS_CONFIGURED, CellState, PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_costmap_nav.grid.collision import footprint_costs
 from mbf_costmap_nav.grid.costmap import INSCRIBED, LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
@@ -28,7 +28,6 @@ from mbf_costmap_nav.kernels.map.free_pose import first_fitting_pose
 DEFAULT_ANGLE_INCREMENT = math.radians(5.0)
 FIRST_RING = 64
 """Cells around a pose that are looked at first for one that fits."""
-NO_EXTRAS = PlaceQuery()
 STATE_OF_COST = {INSCRIBED: CellState.INSCRIBED, LETHAL: CellState.LETHAL, UNKNOWN: CellState.UNKNOWN}
 
 
@@ -40,73 +39,26 @@ def check_point(costmap: Costmap, x: float, y: float) -> PlaceAnswer:
     return PlaceAnswer(STATE_OF_COST.get(cost, CellState.FREE), float(cost))
 
 
-def check_pose(costmap: Costmap, footprint: Footprint, pose: Pose, query: PlaceQuery = NO_EXTRAS) -> PlaceAnswer:
-    """State and summed cost of the footprint at a pose.
+def pose_check(costmap: Costmap, footprint: Footprint, query: PlaceQuery = AS_CONFIGURED) -> PlaceCheck:
+    """Return a function that gives state and summed cost of the footprint at a pose in the costmap's frame.
 
     Parameters
     ----------
     costmap : Costmap
     footprint : Footprint
-        Padded or not, as the caller wishes; the query's choices of map and padding are not looked at here.
-    pose : Pose
-        In the costmap's frame.
+        Padded or not, as the caller wishes; the query's choices of map and padding are not looked at here. Without
+        corners only the cell of the pose counts.
     query : PlaceQuery
         Safety distance and cost multipliers; a multiplier of 0 counts as 1 (MBF).
-
-    Raises
-    ------
-    ValueError
-        The pose is in another frame.
     """
-    _require_frame(costmap, pose.frame_id)
-    return _check(costmap, footprint.offset(query.safety_dist), pose, query)
+    outline = footprint.offset(query.safety_dist)
+    multipliers = query.lethal_cost_mult or 1.0, query.inscrib_cost_mult or 1.0, query.unknown_cost_mult or 1.0
 
+    def check(pose: Pose) -> PlaceAnswer:
+        costs = footprint_costs(costmap, outline, pose.x, pose.y, pose.yaw)
+        return PlaceAnswer(costs.state, costs.weighted_sum(*multipliers))
 
-def _check(costmap: Costmap, outline: Footprint, pose: Pose, query: PlaceQuery) -> PlaceAnswer:
-    costs = footprint_costs(costmap, outline, pose.x, pose.y, pose.yaw)
-    total = costs.weighted_sum(
-        query.lethal_cost_mult or 1.0, query.inscrib_cost_mult or 1.0, query.unknown_cost_mult or 1.0
-    )
-    return PlaceAnswer(costs.state, total)
-
-
-def check_path(
-    costmap: Costmap,
-    footprint: Footprint,
-    path: Path,
-    query: PlaceQuery = NO_EXTRAS,
-    *,
-    return_on: CellState | None = None,
-    skip_poses: int = 0,
-    path_cells_only: bool = False,
-) -> PathAnswer:
-    """Accumulate states and costs over the poses of a path.
-
-    Parameters
-    ----------
-    return_on : CellState, optional
-        Stop after the pose at which the accumulated state reaches this one; None or FREE = never.
-    skip_poses : int
-        Poses to leave out after each checked one.
-    path_cells_only : bool
-        Look only at the cell of each pose; footprint and safety distance are ignored.
-
-    Raises
-    ------
-    ValueError
-        The path is in another frame, or ``skip_poses`` is negative.
-    """
-    _require_frame(costmap, path.frame_id)
-    if skip_poses < 0:
-        raise ValueError(f"skip_poses must not be negative, got {skip_poses}")
-    outline = Footprint([]) if path_cells_only else footprint.offset(query.safety_dist)
-    last_checked, state, cost = -1, CellState.FREE, 0.0
-    for index in range(0, len(path), skip_poses + 1):
-        answer = _check(costmap, outline, path[index], query)
-        last_checked, state, cost = index, max(state, answer.state), cost + answer.cost
-        if return_on and state >= return_on:
-            break
-    return PathAnswer(last_checked, state, cost)
+    return check
 
 
 def find_valid_pose(
@@ -115,7 +67,7 @@ def find_valid_pose(
     pose: Pose,
     dist_tolerance: float,
     angle_tolerance: float,
-    query: PlaceQuery = NO_EXTRAS,
+    query: PlaceQuery = AS_CONFIGURED,
     angle_increment: float = DEFAULT_ANGLE_INCREMENT,
 ) -> PoseAnswer:
     """Find the pose nearest to ``pose`` at which the footprint touches nothing lethal or unknown.
@@ -136,15 +88,7 @@ def find_valid_pose(
         Its safety distance; nothing else of it matters here.
     angle_increment : float
         Largest step between two headings [rad].
-
-    Raises
-    ------
-    ValueError
-        The pose is in another frame, a tolerance is negative or no number, or the increment not positive and finite.
     """
-    _require_frame(costmap, pose.frame_id)
-    if not (dist_tolerance >= 0.0 and angle_tolerance >= 0.0 and 0.0 < angle_increment < math.inf):
-        raise ValueError(f"tolerances {dist_tolerance}, {angle_tolerance}, increment {angle_increment} out of range")
     turns = _turns(angle_tolerance, angle_increment)
     outline = footprint.offset(query.safety_dist)
     vertices = outline.vertices if len(outline.vertices) >= 3 else np.zeros((1, 2))
@@ -212,8 +156,3 @@ def _turns(angle_tolerance: float, increment: float) -> NDArray[np.float64]:
     positive = np.arange(1, count + 1) * (limit / count) if count else np.zeros(0)
     turns = np.concatenate([[0.0], np.column_stack([positive, -positive]).ravel()])
     return turns[:-1] if limit == math.pi else turns
-
-
-def _require_frame(costmap: Costmap, frame_id: str) -> None:
-    if frame_id != costmap.frame_id:
-        raise ValueError(f"expected frame {costmap.frame_id!r}, got {frame_id!r}; transform it first")

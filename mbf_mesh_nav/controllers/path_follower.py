@@ -21,7 +21,7 @@ from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS, may_enter
-from mbf_mesh_nav.mesh.surface_point import beyond_border
+from mbf_mesh_nav.mesh.borders import beyond_border
 from mbf_mesh_nav.motion.goal_approach import (
     GoalApproach,
     braking_speed,
@@ -128,7 +128,7 @@ class PathFollower(MeshController):
         hardness = self.mesh_map.snapshot().hardness(self.parameters.cost_limit, corners)
         nearest = np.take_along_axis(hardness, np.argmax(location.barycentric, axis=1)[:, None], axis=1)[:, 0]
         mixed = np.where(nearest > 0.0, (hardness * location.barycentric).sum(axis=1), 0.0)
-        mixed[(location.faces < 0) | beyond_border(self.mesh_map, places, location)] = LETHAL_HARDNESS
+        mixed[(location.faces < 0) | beyond_border(self.mesh_map.topology, places, location)] = LETHAL_HARDNESS
         for distance, before, now in zip(ahead, mixed[:-1], mixed[1:], strict=True):
             if not may_enter(before, now):
                 return float(distance)

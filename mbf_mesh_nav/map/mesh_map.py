@@ -15,8 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
+from mbf_abstract.maps.navigation_map import PlaceCheck
+from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
+from mbf_mesh_nav.map.places import MeshPlaces
 from mbf_mesh_nav.map.snapshot import MeshSnapshot, SnapshotSeries
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
@@ -261,6 +264,32 @@ class MeshMap(LayeredMap):
         if layer_names is not None:
             return [layer.name for layer in self.layers.chosen(layer_names)]
         return [name for name, layer in self.layers.items() if type(layer).clear is not MeshLayer.clear]
+
+    # -------------------------------------------------------------------------------------------------- places
+    def places(self) -> MeshPlaces:
+        """What can be asked of places, on the map as it is now."""
+        return MeshPlaces(self.topology, self.locator, self.snapshot(), self.inscribed_radius)
+
+    def point_check(self) -> PlaceCheck:
+        """State and interpolated cost of the surface at points."""
+        return self.places().check_point
+
+    def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
+        """State and summed cost below the robot's disc."""
+        places = self.places()
+        return places.check_point if center_only else lambda pose: places.check_pose(pose, query)
+
+    def find_valid_pose(
+        self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
+    ) -> PoseAnswer:
+        """Nearest pose where the disc fits; a disc has no heading, so the angle does not matter."""
+        return self.places().find_valid_pose(pose, dist_tolerance, query)
+
+    def take_parameters(self, parameters: Any) -> None:
+        """Take over ``edge_cost_factor`` and ``inscribed_radius`` of ``MeshMapParameters``."""
+        if parameters.edge_cost_factor != self.edge_cost_factor:
+            self.set_edge_cost_factor(parameters.edge_cost_factor)
+        self.inscribed_radius = parameters.inscribed_radius
 
     # -------------------------------------------------------------------------------------------------- motion
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:

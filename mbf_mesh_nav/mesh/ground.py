@@ -5,7 +5,6 @@ from __future__ import annotations
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.queries import CellState
 from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.map.pose_checks import check_point
 
 ONE_SURFACE = 0.01
 """Surfaces so near [m] above each other are one: seams of a scan, the two sides of a sheet."""
@@ -19,6 +18,7 @@ def ground_heights(mesh_map: MeshMap, x: float, y: float) -> tuple[float, ...]:
     Those the robot may stand on come first, then blocked ground, then ceilings; each from the lowest to the highest.
     """
     top, bottom = float(mesh_map.vertices[:, 2].max()), float(mesh_map.vertices[:, 2].min())
+    check_point = mesh_map.point_check()
     ranked: list[tuple[bool, bool, float]] = []
     start = top + 1.0
     while start > bottom:
@@ -27,7 +27,7 @@ def ground_heights(mesh_map: MeshMap, x: float, y: float) -> tuple[float, ...]:
             break
         height = start - float(distances[0])
         is_ceiling = bool(mesh_map.face_normals[faces[0], 2] < LEAST_UPWARD)
-        is_blocked = check_point(mesh_map, Pose((x, y, height))).state >= CellState.LETHAL
+        is_blocked = check_point(Pose((x, y, height))).state >= CellState.LETHAL
         ranked.append((is_ceiling, is_blocked, height))
         start = height - ONE_SURFACE
     return tuple(height for _, _, height in sorted(ranked))

@@ -7,13 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry.arithmetic import norm
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
-from mbf_mesh_nav.mesh.locate import Location, SurfacePoint
+from mbf_mesh_nav.mesh.locate import SurfacePoint
 
-BORDER_SLACK = 0.05
-"""A position may be so far [m] past a border of the surface and count as on it: rounding, and the width of a wheel."""
 ON_EDGE = 1e-9
 INFINITELY_FAR = np.float32(np.inf)
 
@@ -44,41 +41,6 @@ def surface_point_at_vertex(mesh_map: MeshMap, vertex: int) -> SurfacePoint:
     face = int(mesh_map.vertex_faces[mesh_map.vertex_face_offsets[vertex]])
     barycentric = (mesh_map.faces[face] == vertex).astype(np.float64)
     return SurfacePoint(face, barycentric, mesh_map.vertices[vertex].copy(), 0.0)
-
-
-def beyond_border(
-    mesh_map: MeshMap, places: NDArray[np.float64], location: Location, slack: float = BORDER_SLACK
-) -> NDArray[np.bool_]:
-    """Whether positions (n, 3) lie past a border of the surface, by more than ``slack`` [m] sideways.
-
-    The surface point nearest to such a position lies on a border edge, and not below or above it. ``location`` is that
-    of the places; those without a face are not beyond a border.
-    """
-    on_surface = np.maximum(location.faces, 0)
-    offsets = np.where(location.faces[:, None] >= 0, places - location.points, 0.0)
-    normals = mesh_map.face_normals[on_surface]
-    sideways = offsets - (offsets * normals).sum(axis=1, keepdims=True) * normals
-    # Side i of a face runs from corner i to the next, so it is opposite to the corner after that. In a vertex the face
-    # may be any of those around it.
-    near = np.nan_to_num(location.barycentric, nan=1.0) > ON_EDGE
-    on_border = (~np.roll(near, -2, axis=1) & (mesh_map.face_neighbours[on_surface] < 0)).any(axis=1)
-    in_vertex = near.sum(axis=1) == 1
-    on_border |= in_vertex & (near & mesh_map.topology.border_vertices[mesh_map.faces[on_surface]]).any(axis=1)
-    return np.asarray(on_border & (norm(sideways) > slack))
-
-
-def on_surface(
-    mesh_map: MeshMap, position: NDArray[np.float64] | tuple[float, ...], reach: float
-) -> SurfacePoint | None:
-    """Return the surface point of a position at most ``reach`` [m] above or below it, None also past a border."""
-    point = mesh_map.locate_one(position, reach)
-    if point is None or point.distance <= BORDER_SLACK or min(point.barycentric.tolist()) > ON_EDGE:
-        return point  # too near, or inside a face: not past a border
-    place = np.asarray(position, dtype=np.float64)[None]
-    location = Location(
-        np.array([point.face], dtype=np.int32), point.barycentric[None], point.point[None], np.array([point.distance])
-    )
-    return None if beyond_border(mesh_map, place, location)[0] else point
 
 
 def corner_distances(

@@ -17,8 +17,8 @@ from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw, quaternion_multiply
 from mbf_abstract.geometry.arithmetic import norm, rotated, rotated_back, scalar_products
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.borders import beyond_border
 from mbf_mesh_nav.mesh.locate import Location
-from mbf_mesh_nav.mesh.surface_point import beyond_border
 
 _SMALL_CORNER = 0.2  # [rad] between the path's end and the goal's heading: driven without an approach
 _SMALL_TURN = 1.2  # [rad] between the robot's heading and the path's begin: steered into without a curve
@@ -87,7 +87,7 @@ def _fits(mesh_map: MeshMap, blocked: NDArray[np.bool_], curve: NDArray[np.float
     if (spots.faces < 0).any() or blocked[mesh_map.faces[spots.faces]].any():
         return False
     steps = norm(np.diff(spots.points, axis=0))
-    return not beyond_border(mesh_map, curve, spots).any() and bool((steps <= _LONGEST_STEP).all())
+    return not beyond_border(mesh_map.topology, curve, spots).any() and bool((steps <= _LONGEST_STEP).all())
 
 
 def _corner_at_goal(path: Path) -> float:

@@ -23,12 +23,12 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_mesh_nav.kernels.motion.path_poses import poses_along
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
+from mbf_mesh_nav.mesh.borders import on_surface
 from mbf_mesh_nav.mesh.ground import ground_heights
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.surface_point import (
     describe_blockage,
     nearest_corner,
-    on_surface,
     position_text,
     surface_point_at_vertex,
 )
@@ -134,7 +134,7 @@ class SurfacePlanner(MeshPlanner):
     ) -> SurfacePoint | PlanResult:
         """Put a pose on the surface, or say why that fails."""
         reach = self.parameters.max_surface_distance
-        point = on_surface(self.mesh_map, pose.position, reach)
+        point = on_surface(self.mesh_map.topology, self.mesh_map.locator, pose.position, reach)
         if point is None:
             distance = self.mesh_map.locate([pose.position]).distances[0]
             where = f"the {name} {position_text(pose.position)} is {distance:.2f} m from the surface"

@@ -112,7 +112,7 @@ def forbidden(costmap):
 def test_a_layer_of_one_map_changes_with_its_next_update_and_the_log_tells(site):
     server, clock, told = site
     costs = [np.count_nonzero(costmap.snapshot().cells) for costmap in (server.global_costmap, server.local_costmap)]
-    server.set_layer_parameters("global", "around", inflation_radius=1.5, cost_scaling_factor=1.0)
+    server.set_layer_parameters("global_costmap.around", inflation_radius=1.5, cost_scaling_factor=1.0)
     clock.sleep(0.5)
     assert np.count_nonzero(server.global_costmap.snapshot().cells) > costs[0]
     assert np.count_nonzero(server.local_costmap.snapshot().cells) == costs[1]
@@ -138,7 +138,7 @@ def test_a_robot_that_lifts_a_load_is_larger_on_both_maps(site, outline):
 
 def test_padding_and_age_of_one_map_change(site):
     server, _, _ = site
-    server.set_costmap_parameters("local", footprint_padding=0.1, max_age=0.0)
+    server.set_map_parameters("local_costmap", footprint_padding=0.1, max_age=0.0)
     assert server.local_costmap.inscribed_radius > server.global_costmap.inscribed_radius
     assert server.local_costmap.is_current(1e6) and not server.global_costmap.is_current(1e6)
 
@@ -154,14 +154,22 @@ def test_a_robot_too_large_for_the_inflation_is_told_of(site):
 @pytest.mark.parametrize(
     ("change", "error", "says"),
     [
-        (lambda s: s.set_layer_parameters("global", "around", inflation_radius=-1.0), ValueError, "inflation_radius"),
-        (lambda s: s.set_layer_parameters("global", "around", radius=1.0), ValueError, "radius"),
-        (lambda s: s.set_layer_parameters("global", "around", inflation_radius=90.0), ValueError, "900 cells"),
-        (lambda s: s.set_layer_parameters("global", "zone", zones=()), ValueError, "zones: read once"),
-        (lambda s: s.set_layer_parameters("global", "round", enabled=False), ServerError, "'round', only.*'around'"),
-        (lambda s: s.set_layer_parameters("map", "around", enabled=False), ServerError, "only global and local"),
-        (lambda s: s.set_costmap_parameters("global", resolution=0.2), ValueError, "resolution: read once"),
-        (lambda s: s.set_costmap_parameters("global", robot_radius=-0.2), ValueError, "robot_radius"),
+        (
+            lambda s: s.set_layer_parameters("global_costmap.around", inflation_radius=-1.0),
+            ValueError,
+            "inflation_radius",
+        ),
+        (lambda s: s.set_layer_parameters("global_costmap.around", radius=1.0), ValueError, "radius"),
+        (lambda s: s.set_layer_parameters("global_costmap.around", inflation_radius=90.0), ValueError, "900 cells"),
+        (lambda s: s.set_layer_parameters("global_costmap.zone", zones=()), ValueError, "zones: read once"),
+        (
+            lambda s: s.set_layer_parameters("round", enabled=False),
+            ServerError,
+            "no layer 'round', known.*costmap.around",
+        ),
+        (lambda s: s.set_layer_parameters("around", enabled=False), ServerError, "several maps have a layer 'around'"),
+        (lambda s: s.set_map_parameters("global_costmap", resolution=0.2), ValueError, "resolution: read once"),
+        (lambda s: s.set_map_parameters("global_costmap", robot_radius=-0.2), ValueError, "robot_radius"),
         (lambda s: s.set_footprint([(0.0, 0.0), (1.0, 0.0)]), ValueError, "at least 3 points"),
         (lambda s: s.set_footprint(float("nan")), ValueError, "finite"),
     ],

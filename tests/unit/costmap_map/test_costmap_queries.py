@@ -1,5 +1,6 @@
 """The server's side of the queries: which map, which frame, which outline, alive while asked."""
 
+import math
 from contextlib import contextmanager
 
 import pytest
@@ -8,13 +9,27 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer, TransformError
+from mbf_abstract.maps.map_queries import NavigationMapQueries
 from mbf_abstract.maps.queries import CellState, PlaceQuery
-from mbf_costmap_nav.map.queries import CostmapQueries
 
 
-class FixedClock:
-    def now(self) -> float:
-        return 7.0
+class Served:
+    """A costmap that is updated at 7 s, with the users it has had."""
+
+    def __init__(self, costmap):
+        self.map = costmap
+        self.users = []
+
+    @contextmanager
+    def in_use(self):
+        self.users.append("in use")
+        try:
+            yield
+        finally:
+            self.users.append("done")
+
+    def update(self):
+        self.map.update(None, 7.0)
 
 
 class KnownRobot:
@@ -44,7 +59,7 @@ def queries(build, seeing, transforms):
         build("obstacle", obstacle=seeing),
     )
     robot = KnownRobot(Pose.planar(1.5, 4.5, frame_id="odom"))
-    answers = CostmapQueries(global_costmap, local_costmap, robot, transforms, FixedClock())
+    answers = NavigationMapQueries(Served(global_costmap), Served(local_costmap), robot, transforms)
     answers.update_map()
     return answers
 
@@ -83,24 +98,32 @@ def test_an_unknown_frame_raises(queries):
         queries.check_point(Pose.planar(0.0, 0.0, frame_id="nowhere"))
 
 
-def test_updating_works_while_the_robots_pose_is_unknown(build, transforms):
-    costmap = build("static")
-    CostmapQueries(costmap, costmap, KnownRobot(None), transforms, FixedClock()).update_map()
-    assert costmap.last_update == 7.0
+def test_without_a_known_pose_only_questions_about_it_fail(build, transforms):
+    served = Served(build("static"))
+    queries = NavigationMapQueries(served, served, KnownRobot(None), transforms)
+    queries.update_map()
+    assert served.map.last_update == 7.0
+    with pytest.raises(RobotStateError):
+        queries.check_pose(None)
 
 
 def test_a_map_is_kept_alive_while_it_is_asked_even_if_that_fails(build, transforms):
-    costmap, users = build("static"), []
-
-    @contextmanager
-    def using(asked):
-        users.append(asked)
-        try:
-            yield
-        finally:
-            users.remove(asked)
-
-    answers = CostmapQueries(costmap, costmap, KnownRobot(None), transforms, FixedClock(), using)
+    served = Served(build("static"))
     with pytest.raises(TransformError):
-        answers.check_point(Pose.planar(0.0, 0.0, frame_id="nowhere"))
-    assert users == []
+        NavigationMapQueries(served, served, KnownRobot(None), transforms).check_point(
+            Pose.planar(0.0, 0.0, frame_id="nowhere")
+        )
+    assert served.users == ["in use", "done"]
+
+
+@pytest.mark.parametrize("tolerances", [(math.nan, 0.0), (-1.0, 0.0), (1.0, math.nan), (1.0, -0.1)])
+def test_tolerances_that_are_no_numbers_are_misuse(queries, tolerances):
+    with pytest.raises(ValueError, match="tolerances must not be negative"):
+        queries.find_valid_pose(Pose.planar(5.0, 5.0), *tolerances)
+
+
+def test_path_cells_only_ignores_outline_and_safety_distance(queries):
+    path = Path.from_points([(x + 0.5, 5.5, 0.0) for x in range(2)])
+    query = PlaceQuery(safety_dist=3.0)
+    assert queries.check_path(path, query, path_cells_only=True).state is CellState.FREE
+    assert queries.check_path(path, query).state is CellState.OUTSIDE

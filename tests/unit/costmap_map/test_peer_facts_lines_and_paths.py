@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path
+from mbf_abstract.maps.map_queries import check_path
 from mbf_abstract.maps.queries import CellState
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.zones import Zone
 from mbf_costmap_nav.kernels.map.footprint_samples import rasterise_polygon
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays
-from mbf_costmap_nav.map.pose_checks import check_path
+from mbf_costmap_nav.map.pose_checks import pose_check
 
 
 def line(x0, y0, x1, y1):
@@ -63,12 +64,14 @@ def cells_path(cells):
 
 def test_f174_a_path_over_all_cells_meets_the_obstacle(nav2_map):
     path = cells_path([(x, y) for y in range(10) for x in range(10)])
-    answer = check_path(nav2_map("top_left_obstacle"), Footprint([]), path, return_on=CellState.LETHAL)
+    answer = check_path(pose_check(nav2_map("top_left_obstacle"), Footprint([])), path, return_on=CellState.LETHAL)
     assert answer.state >= CellState.LETHAL and 0 <= answer.last_checked < 99
 
 
 def test_f175_f176_f177_a_column_of_free_and_unknown_cells(nav2_map):
-    answer = check_path(nav2_map("top_left_obstacle"), Footprint([]), cells_path([(1, y) for y in range(10)]))
+    answer = check_path(
+        pose_check(nav2_map("top_left_obstacle"), Footprint([])), cells_path([(1, y) for y in range(10)])
+    )
     assert answer.state is CellState.UNKNOWN, "no lethal cell, but an unknown one"
     assert answer.cost > 0
 
@@ -76,4 +79,4 @@ def test_f175_f176_f177_a_column_of_free_and_unknown_cells(nav2_map):
 def test_f178_a_footprint_along_a_row_of_the_open_map(nav2_map):
     footprint = Footprint.parse("[[0.5, 0.5], [0.5, -0.5], [-0.5, -0.5], [-0.5, 0.5]]")
     path = Path.from_points([(x + 0.5, 5.5, 0.0) for x in range(1, 9)])
-    assert check_path(nav2_map("open_space"), footprint, path).state is CellState.FREE
+    assert check_path(pose_check(nav2_map("open_space"), footprint), path).state is CellState.FREE

@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.maps.map_queries import check_path
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_costmap_nav.grid.collision import footprint_costs
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.map.pose_checks import cells_by_distance, check_path, check_point, check_pose, find_valid_pose
+from mbf_costmap_nav.map.pose_checks import cells_by_distance, check_point, find_valid_pose, pose_check
 
 UNIT_SQUARE = Footprint([(0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5)])
 RECTANGLE = Footprint([(0.75, 0.4), (0.75, -0.4), (-0.75, -0.4), (-0.75, 0.4)])
@@ -145,7 +146,7 @@ def test_the_cost_of_a_pose_counts_every_cell_once_with_its_multiplier(costmap):
     costmap.cells[5, 4:7] = (254, 253, 255)
     footprint = Footprint([(1.4, 1.4), (-1.4, 1.4), (-1.4, -1.4), (1.4, -1.4)])  # covers 3 x 3 cells
     query = PlaceQuery(lethal_cost_mult=2.0, inscrib_cost_mult=3.0, unknown_cost_mult=0.5)
-    answer = check_pose(costmap, footprint, Pose.planar(5.5, 5.5), query)
+    answer = pose_check(costmap, footprint, query)(Pose.planar(5.5, 5.5))
     assert answer.state is CellState.UNKNOWN
     assert answer.cost == 6 * 10 + 2 * 254 + 3 * 253 + 0.5 * 255
 
@@ -153,8 +154,8 @@ def test_the_cost_of_a_pose_counts_every_cell_once_with_its_multiplier(costmap):
 def test_a_safety_distance_keeps_that_far_from_a_corner(costmap):
     costmap.cells[8, 8] = 254  # its nearest corner is (8, 8); the square's is (6, 6), 2.83 m away
     pose = Pose.planar(5.5, 5.5)
-    assert check_pose(costmap, UNIT_SQUARE, pose, PlaceQuery(safety_dist=1.9)).state is CellState.FREE
-    assert check_pose(costmap, UNIT_SQUARE, pose, PlaceQuery(safety_dist=2.9)).state is CellState.LETHAL
+    assert pose_check(costmap, UNIT_SQUARE, PlaceQuery(safety_dist=1.9))(pose).state is CellState.FREE
+    assert pose_check(costmap, UNIT_SQUARE, PlaceQuery(safety_dist=2.9))(pose).state is CellState.LETHAL
 
 
 @pytest.fixture
@@ -165,32 +166,20 @@ def path():
 def test_a_path_check_accumulates_over_all_poses(costmap, path):
     costmap.cells[5, 3] = 254
     costmap.cells[5, 6] = 100
-    answer = check_path(costmap, Footprint([]), path)
+    answer = check_path(pose_check(costmap, Footprint([])), path)
     assert (answer.last_checked, answer.state, answer.cost) == (7, CellState.LETHAL, 354.0)
 
 
 def test_a_path_check_stops_at_the_state_it_is_told(costmap, path):
     costmap.cells[5, 3] = 254
-    answer = check_path(costmap, Footprint([]), path, return_on=CellState.LETHAL)
+    answer = check_path(pose_check(costmap, Footprint([])), path, return_on=CellState.LETHAL)
     assert (answer.last_checked, answer.state) == (2, CellState.LETHAL)
 
 
 def test_a_path_check_skips_poses(costmap, path):
     costmap.cells[5, 2] = 254
-    answer = check_path(costmap, Footprint([]), path, skip_poses=1)
+    answer = check_path(pose_check(costmap, Footprint([])), path, skip_poses=1)
     assert (answer.last_checked, answer.state) == (6, CellState.FREE)
-
-
-def test_path_cells_only_ignores_the_footprint(costmap, path):
-    costmap.cells[4, :] = 254
-    query = PlaceQuery(safety_dist=1.0)
-    assert check_path(costmap, UNIT_SQUARE, path, query, path_cells_only=True).state is CellState.FREE
-    assert check_path(costmap, UNIT_SQUARE, path, query).state is CellState.OUTSIDE
-
-
-def test_a_pose_in_another_frame_is_refused(costmap):
-    with pytest.raises(ValueError, match="'map', got 'odom'"):
-        check_pose(costmap, UNIT_SQUARE, Pose.planar(5.0, 5.0, frame_id="odom"))
 
 
 @given(st.integers(0, 2**32 - 1), st.tuples(st.floats(0.5, 11.5), st.floats(0.5, 11.5)), st.floats(-3.0, 3.0))
@@ -203,7 +192,7 @@ def test_no_cell_nearer_than_the_one_found_fits(seed, place, yaw):
     found = find_valid_pose(grid, outline, asked, 4.0, 0.0)
 
     def fits(x, y):
-        return check_pose(grid, outline, Pose.planar(x, y, yaw)).state in (CellState.FREE, CellState.INSCRIBED)
+        return pose_check(grid, outline)(Pose.planar(x, y, yaw)).state in (CellState.FREE, CellState.INSCRIBED)
 
     home = grid.world_to_cell(*place)
     fitting = {
@@ -240,17 +229,6 @@ def test_a_place_that_fits_far_away_is_preferred_to_a_near_one_in_the_unknown():
     assert found.state is CellState.UNKNOWN and found.pose.x == 201.5
     grid.cells[0, 10:13] = 0
     assert find_valid_pose(grid, wide, Pose.planar(199.0, 0.5), math.inf, 0.0).pose.x == 11.5
-
-
-@pytest.mark.parametrize(
-    ("dist_tolerance", "angle_tolerance", "increment"),
-    [(math.nan, 0.0, 0.1), (-1.0, 0.0, 0.1), (1.0, math.nan, 0.1), (1.0, 0.1, math.nan), (1.0, 0.1, math.inf)],
-)
-def test_tolerances_that_are_no_numbers_are_misuse(costmap, dist_tolerance, angle_tolerance, increment):
-    with pytest.raises(ValueError, match="out of range"):
-        find_valid_pose(
-            costmap, UNIT_SQUARE, Pose.planar(5, 5), dist_tolerance, angle_tolerance, angle_increment=increment
-        )
 
 
 @pytest.mark.parametrize("safety_dist", [-0.1, math.nan, math.inf])

@@ -11,6 +11,7 @@ from mbf_abstract.execution.oscillation import OscillationDetector
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.layers.layer_stack import LayerStack
+from mbf_abstract.maps.map_queries import check_path
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
@@ -25,7 +26,7 @@ from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 from mbf_costmap_nav.kernels.map.footprint_samples import rasterise_polygon
 from mbf_costmap_nav.layers.speed_limit import SpeedLimitLayer
 from mbf_costmap_nav.map.layer import LayerContext
-from mbf_costmap_nav.map.pose_checks import check_path
+from mbf_costmap_nav.map.pose_checks import pose_check
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
 from mbf_costmap_nav.planners.hybrid_astar import HybridAStarPlanner
@@ -252,7 +253,7 @@ def centres(cells):
 
 
 def test_f173_of_an_empty_path_no_pose_is_checked(shared_data):
-    answer = check_path(nav2_map(shared_data, "top_left_obstacle"), Footprint([]), Path(np.zeros((0, 3))))
+    answer = check_path(pose_check(nav2_map(shared_data, "top_left_obstacle"), Footprint([])), Path(np.zeros((0, 3))))
     assert answer.last_checked == -1
 
 
@@ -267,12 +268,12 @@ def test_f173_of_an_empty_path_no_pose_is_checked(shared_data):
 )
 def test_the_first_bad_pose_of_a_path(shared_data, name, cells, stop_at, first_bad):
     stop = CellState[stop_at]
-    answer = check_path(nav2_map(shared_data, name), Footprint([]), centres(cells), return_on=stop)
+    answer = check_path(pose_check(nav2_map(shared_data, name), Footprint([])), centres(cells), return_on=stop)
     assert (answer.last_checked if answer.state >= stop else None) == first_bad
 
 
 def test_f177_a_path_over_cells_with_a_cost_is_not_free_of_cost(shared_data):
-    answer = check_path(nav2_map(shared_data, "maze2"), Footprint([]), centres([(3, 2)]))
+    answer = check_path(pose_check(nav2_map(shared_data, "maze2"), Footprint([])), centres([(3, 2)]))
     assert answer.state is CellState.FREE and answer.cost > 0.0
 
 

@@ -123,7 +123,7 @@ def test_a_saved_map_has_the_costs_of_its_layers_and_is_a_map_again(navigator, t
 def test_layer_parameters_change_at_run_time_and_are_an_event(navigator):
     server = navigator.server
     server.set_layer_parameters("slopes", threshold=0.4)
-    server.set_edge_cost_factor(0.5)
+    server.set_map_parameters("mesh_map", edge_cost_factor=0.5)
     assert server.mesh_map.layers["slopes"].parameters.threshold == 0.4
     assert server.mesh_map.edge_cost_factor == 0.5
     told = server.runtime.events.memory.of_kind(EventKind.PARAMETER_CHANGED)
@@ -133,7 +133,7 @@ def test_layer_parameters_change_at_run_time_and_are_an_event(navigator):
 @pytest.mark.parametrize(
     ("layer", "changes", "error", "text"),
     [
-        ("slope", {"threshold": 0.4}, ServerError, "no layer 'slope', only.*'slopes'"),
+        ("slope", {"threshold": 0.4}, ServerError, "no layer 'slope', known are mesh_map.slopes"),
         ("slopes", {"threshold": "steep"}, ValueError, "threshold"),
         ("slopes", {"angle": 0.4}, ValueError, "angle"),
     ],
@@ -164,12 +164,13 @@ def test_the_disc_of_queries_and_the_edge_cost_factor_change_at_run_time_within_
     server, beside = navigator.server, Pose.planar(2.0, 2.0)
     server.mesh_map.apply(lambda layer: layer.replace(np.full_like(layer.costs, 0.1), np.zeros_like(layer.lethal)))
     narrow = server.queries.check_pose(beside).cost
-    server.set_inscribed_radius(0.6)
+    server.set_footprint(0.6)
     assert server.queries.check_pose(beside).cost > 2.0 * narrow > 0.0
     for change in (
-        lambda: server.set_inscribed_radius(-0.1),
-        lambda: server.set_inscribed_radius(float("nan")),
-        lambda: server.set_edge_cost_factor(101.0),
+        lambda: server.set_footprint(-0.1),
+        lambda: server.set_footprint(float("nan")),
+        lambda: server.set_footprint([(0.3, 0.3), (-0.3, 0.3), (0.0, -0.3)]),
+        lambda: server.set_map_parameters("mesh_map", edge_cost_factor=101.0),
     ):
         with pytest.raises(ValueError):
             change()

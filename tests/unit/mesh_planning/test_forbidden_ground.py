@@ -17,7 +17,6 @@ from mbf_mesh_nav.controllers.mppi import MPPIController
 from mbf_mesh_nav.controllers.path_follower import PathFollower
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS, hardness_at, may_enter
 from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.map.pose_checks import check_point, check_pose
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
@@ -169,9 +168,9 @@ def test_a_goal_past_the_border_is_out_of_the_map(make_plugin, plain, planner_cl
 
 def test_a_robot_past_the_border_stands_on_no_ground(plain):
     mesh_map = plain()
-    assert check_pose(mesh_map, Pose.planar(-0.3, 3.0), PlaceQuery()).state == CellState.OUTSIDE
-    assert check_point(mesh_map, Pose.planar(-0.3, 3.0)).state == CellState.OUTSIDE
-    assert check_point(mesh_map, Pose((0.0, 3.0, 0.3))).state != CellState.OUTSIDE
+    assert mesh_map.pose_check(PlaceQuery())(Pose.planar(-0.3, 3.0)).state == CellState.OUTSIDE
+    assert mesh_map.point_check()(Pose.planar(-0.3, 3.0)).state == CellState.OUTSIDE
+    assert mesh_map.point_check()(Pose((0.0, 3.0, 0.3))).state != CellState.OUTSIDE
 
 
 def test_a_path_that_leaves_the_surface_is_blocked_at_its_border(make_plugin, plain):

@@ -10,7 +10,6 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_abstract.time.cancel import CancelToken
 from mbf_mesh_nav.map.mesh_map import MeshMap
-from mbf_mesh_nav.map.pose_checks import find_valid_pose
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
@@ -235,5 +234,5 @@ def test_a_place_for_the_robot_is_looked_for_on_its_own_storey_only(plain, paint
     storeys = [floor.vertices, floor.vertices + np.array([0.0, 0.0, 1.2])]
     mesh_map = MeshMap.from_arrays(np.vstack(storeys), np.vstack([floor.faces, floor.faces + len(floor.vertices)]))
     paint(mesh_map, lambda v: np.where(v[:, 2] > 1.0, np.inf, 0.0))
-    below, above = (find_valid_pose(mesh_map, Pose.planar(1.5, 1.5, z=z), 2.0, PlaceQuery()) for z in (0.0, 1.2))
+    below, above = (mesh_map.find_valid_pose(Pose.planar(1.5, 1.5, z=z), 2.0, 0.0, PlaceQuery()) for z in (0.0, 1.2))
     assert below.pose is not None and above.pose is None

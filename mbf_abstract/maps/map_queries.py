@@ -1,0 +1,141 @@
+"""The map-independent questions, answered for the maps of a server: choose the map, transform, keep it alive, ask."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from typing import Any, Protocol
+
+from mbf_abstract.drive.robot import RobotInformation
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.maps.navigation_map import PlaceCheck
+from mbf_abstract.maps.queries import AS_CONFIGURED, CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
+
+
+class AskedMap(Protocol):
+    """A ``ServedMap``, as far as questions need it."""
+
+    map: Any
+
+    def in_use(self) -> AbstractContextManager[None]:
+        """Keep the map updated for the time of a ``with`` block."""
+
+    def update(self) -> None:
+        """Bring the map up to date now."""
+
+
+class NavigationMapQueries:
+    """A ``MapQueries`` over one or two maps.
+
+    Parameters
+    ----------
+    global_map : AskedMap
+        The map plans are made on.
+    local_map : AskedMap
+        The map the robot drives on; the same one where a server has only one.
+    robot : RobotInformation
+        Where the robot is, for questions without a pose.
+    transforms : TransformBuffer
+        Takes poses and paths into the frames of the maps.
+    """
+
+    def __init__(
+        self, global_map: AskedMap, local_map: AskedMap, robot: RobotInformation, transforms: TransformBuffer
+    ) -> None:
+        self._global, self._local, self._robot, self._transforms = global_map, local_map, robot, transforms
+
+    def check_point(self, point: Pose, local: bool = False) -> PlaceAnswer:
+        """State and cost of one point."""
+        served = self._local if local else self._global
+        with served.in_use():
+            check: PlaceCheck = served.map.point_check()
+            return check(self._on(served, point))
+
+    def check_pose(self, pose: Pose | None, query: PlaceQuery = AS_CONFIGURED) -> PlaceAnswer:
+        """State and summed cost of the robot's outline at ``pose`` (None = where the robot is)."""
+        served = self._of(query)
+        with served.in_use():
+            check: PlaceCheck = served.map.pose_check(query)
+            return check(self._on(served, pose))
+
+    def check_path(
+        self,
+        path: Path,
+        query: PlaceQuery = AS_CONFIGURED,
+        return_on: CellState | None = None,
+        skip_poses: int = 0,
+        path_cells_only: bool = False,
+    ) -> PathAnswer:
+        """Worst state and summed cost along a path, all on one state of the map; see ``check_path``.
+
+        With ``path_cells_only`` the points of the path are looked at; outline and safety distance are ignored.
+        """
+        served = self._of(query)
+        with served.in_use():
+            check = served.map.pose_check(query, center_only=path_cells_only)
+            return check_path(check, self._transforms.transform_path(path, served.map.frame_id), return_on, skip_poses)
+
+    def find_valid_pose(
+        self, pose: Pose | None, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery = AS_CONFIGURED
+    ) -> PoseAnswer:
+        """Nearest pose within the tolerances [m, rad] where the robot fits, in the map's frame; inf = anywhere.
+
+        Raises
+        ------
+        ValueError
+            A tolerance is negative or no number.
+        """
+        if not (dist_tolerance >= 0.0 and angle_tolerance >= 0.0):
+            raise ValueError(f"tolerances must not be negative, got {dist_tolerance} m and {angle_tolerance} rad")
+        served = self._of(query)
+        with served.in_use():
+            there = self._on(served, pose)
+            answer: PoseAnswer = served.map.find_valid_pose(there, dist_tolerance, angle_tolerance, query)
+            return answer
+
+    def clear_map(self) -> None:
+        """Forget what sensors have marked, on the local map first, and update the maps."""
+        for served in self._all():
+            served.map.clear()
+        self.update_map()
+
+    def update_map(self) -> None:
+        """Bring the maps up to date now, the local one first."""
+        for served in self._all():
+            with served.in_use():
+                served.update()
+
+    def _all(self) -> list[AskedMap]:
+        return [self._local, self._global] if self._local is not self._global else [self._global]
+
+    def _of(self, query: PlaceQuery) -> AskedMap:
+        return self._local if query.local else self._global
+
+    def _on(self, served: AskedMap, pose: Pose | None) -> Pose:
+        return self._transforms.transform_pose(pose or self._robot.pose(), served.map.frame_id)
+
+
+def check_path(check: PlaceCheck, path: Path, return_on: CellState | None = None, skip_poses: int = 0) -> PathAnswer:
+    """Worst state and summed cost over every ``skip_poses + 1``-th pose of a path in the frame of the map.
+
+    Parameters
+    ----------
+    return_on : CellState, optional
+        Stop after the pose at which the worst state reaches this one; None or FREE = never.
+    skip_poses : int
+        Poses to leave out after each checked one.
+
+    Raises
+    ------
+    ValueError
+        ``skip_poses`` is negative.
+    """
+    if skip_poses < 0:
+        raise ValueError(f"skip_poses must not be negative, got {skip_poses}")
+    last, state, cost = -1, CellState.FREE, 0.0
+    for last in range(0, len(path), skip_poses + 1):
+        answer = check(path[last])
+        state, cost = max(state, answer.state), cost + answer.cost
+        if return_on and state >= return_on:
+            break
+    return PathAnswer(last, state, cost)

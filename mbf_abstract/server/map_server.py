@@ -1,0 +1,138 @@
+"""A server on maps: scans, questions, freshness, changes at run time, written once for every backend.
+
+A backend's server derives ``MapServer``, builds its maps in ``serve_maps`` and hands them to plugins in
+``make_context``. The first map is the one plans are made on, the last one that on which the robot drives.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+from mbf_abstract.config.configuration import Config
+from mbf_abstract.maps.map_queries import NavigationMapQueries
+from mbf_abstract.maps.queries import MapQueries
+from mbf_abstract.maps.scan_intake import ScanIntake
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.served_map import ServedMap
+from mbf_abstract.plugins import PluginKind
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.server.plugin_host import ServerError
+
+
+class MapServer(AbstractNavigationServer):
+    """Navigation on maps.
+
+    Attributes
+    ----------
+    served : dict of str to ServedMap
+        The maps by the names of their sections.
+    """
+
+    served: dict[str, ServedMap[Any]]
+
+    @abstractmethod
+    def serve_maps(self, config: Config) -> Iterator[ServedMap[Any]]:
+        """Build the maps one after the other; raises where their files are bad."""
+
+    @abstractmethod
+    def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
+        """Parameters of a map that stand for an outline of the robot, see ``set_footprint``; raises ValueError."""
+
+    def load_map(self, config: Config) -> None:
+        """Build the maps and begin to update them."""
+        self.served = {}
+        for served in self.serve_maps(config):
+            self.served[served.name] = served  # at once: what is there is closed if the next one fails
+        self._scans = ScanIntake(self.runtime, {name: served.scan_target for name, served in self.served.items()})
+        for served in self.served.values():
+            served.report_configuration_warnings()
+
+    @property
+    def queries(self) -> MapQueries:
+        """The map-independent questions."""
+        maps = list(self.served.values())
+        return NavigationMapQueries(maps[0], maps[-1], self.runtime.robot, self.runtime.transforms)
+
+    def take_scan(self, scan: RangeScan) -> None:
+        """Hand a scan to every map with a layer that listens to its source, as ``ScanIntake.take``."""
+        self._scans.take(scan)
+
+    def map_problem(self) -> str:
+        """Why the map that the robot drives on is stale, if it is."""
+        reason: str = list(self.served.values())[-1].map.stale_reason(self.runtime.clock.now())
+        return reason
+
+    @contextmanager
+    def using_map(self, kind: PluginKind) -> Iterator[None]:
+        """Keep all maps updated: a plugin of any kind may be bound to any of them."""
+        with ExitStack() as stack:
+            for served in self.served.values():
+                stack.enter_context(served.in_use())
+            yield
+
+    def close_map(self) -> None:
+        """End the updates."""
+        for served in getattr(self, "served", {}).values():
+            served.close()
+
+    # --------------------------------------------------------------------------------------- changes at run time
+    def set_layer_parameters(self, layer: str, /, **changes: Any) -> None:
+        """Change parameters of a layer, all or none; the next update of the map shows it.
+
+        Parameters
+        ----------
+        layer : str
+            ``map.layer``, e.g. ``"global_costmap.inflation"``; the layer's name alone where one map only has it.
+
+        Raises
+        ------
+        ServerError
+            There is no such layer, or several maps have it.
+        ValueError
+            A value is not legal (pydantic's ValidationError is one), the parameter is read once only, or the layer does
+            not take it. Nothing is changed.
+        """
+        served, name = self._layer(layer)
+        served.set_layer_parameters(name, changes)
+
+    def set_map_parameters(self, name: str, /, **changes: Any) -> None:
+        """Change parameters of one map itself, by the name of its section; raises as for a layer."""
+        if name not in self.served:
+            raise ServerError(f"there is no map {name!r}, only {', '.join(self.served)}")
+        self.served[name].set_parameters(changes)
+
+    def set_footprint(self, footprint: str | Sequence[Sequence[float]] | float) -> None:
+        """Replace the robot's outline on all maps, e.g. when it lifts a load.
+
+        Parameters
+        ----------
+        footprint : text, list of (x, y) or number
+            Corners [m] without padding, as in the configuration, or the radius [m] of a round robot.
+
+        Raises
+        ------
+        ValueError
+            It is no polygon, no radius, or the backend takes round robots only; nothing is changed.
+        """
+        changes = self.footprint_changes(footprint)
+        old = [{name: getattr(one.parameters, name) for name in changes} for one in self.served.values()]
+        changed: list[ServedMap[Any]] = []
+        try:
+            for served in self.served.values():
+                served.set_parameters(changes)
+                changed.append(served)
+        except BaseException:
+            for served, before in zip(changed, old, strict=False):
+                served.set_parameters(before)
+            raise
+
+    def _layer(self, layer: str) -> tuple[ServedMap[Any], str]:
+        places = {f"{name}.{one}": (served, one) for name, served in self.served.items() for one in served.map.layers}
+        found = [place for place in places if layer in (place, places[place][1])]
+        if len(found) != 1:
+            problem = f"there is no layer {layer!r}" if not found else f"several maps have a layer {layer!r}"
+            raise ServerError(f"{problem}, known are {', '.join(places) or 'none'}")
+        return places[found[0]]

@@ -1,0 +1,103 @@
+"""What a point, a pose or a path on a mesh costs, and where a round robot fits.
+
+The robot is a disc of its inscribed radius, grown by the safety distance, lying on the surface; its part of the map
+are the vertices below it that are connected to the place it stands on, so the storeys above and below do not count.
+
+- OUTSIDE: no surface within ``SURFACE_DISTANCE`` above or below the position, or past a border.
+- LETHAL: the disc (of a point: the nearest vertex) touches a lethal vertex or one whose cost is infinite or NaN.
+- INSCRIBED: of a point only: a robot standing there would touch one.
+
+Deviation from the costmap's answers: a disc has no heading, hence ``angle_tolerance`` never matters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.arithmetic import norm, scalar_products
+from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
+from mbf_mesh_nav.map.layer import IntArray
+from mbf_mesh_nav.map.snapshot import MeshSnapshot
+from mbf_mesh_nav.mesh.borders import on_surface
+from mbf_mesh_nav.mesh.locate import SurfaceLocator, SurfacePoint
+from mbf_mesh_nav.mesh.topology import MeshTopology
+
+SURFACE_DISTANCE = 0.5
+"""How far [m] a position may be off the surface to count as on it; less than a storey, more than a wheel."""
+
+OUTSIDE = PlaceAnswer(CellState.OUTSIDE, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPlaces:
+    """Places on one state of the map, for a robot of ``inscribed_radius`` [m]; poses are in the map's frame."""
+
+    topology: MeshTopology
+    locator: SurfaceLocator
+    snapshot: MeshSnapshot
+    inscribed_radius: float
+
+    def check_point(self, point: Pose) -> PlaceAnswer:
+        """State and interpolated cost of the surface at a point."""
+        place = self._on_surface(point)
+        if place is None:
+            return OUTSIDE
+        weights = place.barycentric > 1e-12
+        costs = self.snapshot.costs[self.topology.faces[place.face][weights]]
+        cost = float(scalar_products(place.barycentric[weights], costs))
+        if self._blocked(np.array([self._nearest_vertex(place)])).any():
+            return PlaceAnswer(CellState.LETHAL, cost)
+        touched = self._blocked(self._disc(place, self.inscribed_radius)).any()
+        return PlaceAnswer(CellState.INSCRIBED if touched else CellState.FREE, cost)
+
+    def check_pose(self, pose: Pose, query: PlaceQuery) -> PlaceAnswer:
+        """State of the robot's disc at a pose and the sum of the costs of the vertices below it."""
+        place = self._on_surface(pose)
+        if place is None:
+            return OUTSIDE
+        vertices = self._disc(place, self.inscribed_radius + query.safety_dist)
+        blocked, costs = self._blocked(vertices), self.snapshot.costs[vertices]
+        costs = np.where(blocked, costs * query.lethal_cost_mult, costs)
+        return PlaceAnswer(CellState.LETHAL if blocked.any() else CellState.FREE, float(costs.sum()))
+
+    def find_valid_pose(self, pose: Pose, dist_tolerance: float, query: PlaceQuery) -> PoseAnswer:
+        """Nearest pose within ``dist_tolerance`` [m] where the disc fits: the pose itself, else a vertex near it.
+
+        Near a pose on the surface only vertices of the same storey count; a tolerance of inf means anywhere on it.
+        """
+        first = self.check_pose(pose, query)
+        if first.state < CellState.LETHAL:
+            return PoseAnswer(first.state, first.cost, pose)
+        vertices, place = self.topology.vertices, self._on_surface(pose)
+        everywhere = np.arange(len(vertices), dtype=np.int32)
+        near = everywhere if place is None else self._disc(place, dist_tolerance)
+        near = near[~self._blocked(near)]
+        distances = norm(vertices[near] - np.array(pose.position))
+        order = np.argsort(distances, kind="stable")
+        for vertex in near[order[distances[order] <= dist_tolerance]]:
+            x, y, z = vertices[vertex].tolist()
+            there = replace(pose, position=(x, y, z))
+            answer = self.check_pose(there, query)
+            if answer.state < CellState.LETHAL:
+                return PoseAnswer(answer.state, answer.cost, there)
+        return PoseAnswer(first.state, first.cost, None)
+
+    def _on_surface(self, pose: Pose) -> SurfacePoint | None:
+        return on_surface(self.topology, self.locator, pose.position, SURFACE_DISTANCE)
+
+    def _nearest_vertex(self, place: SurfacePoint) -> int:
+        return int(self.topology.faces[place.face][np.argmax(place.barycentric)])
+
+    def _disc(self, place: SurfacePoint, radius: float) -> IntArray:
+        mesh = self.topology
+        graph = (mesh.vertices, mesh.neighbour_offsets, mesh.neighbours)
+        return vertices_in_disc(*graph, self._nearest_vertex(place), place.point, float(radius))
+
+    def _blocked(self, vertices: IntArray) -> NDArray[np.bool_]:
+        snapshot = self.snapshot
+        return np.asarray(snapshot.lethal[vertices] | ~np.isfinite(snapshot.costs[vertices]))
