@@ -1,19 +1,21 @@
-"""A map for a round robot that knows one thing: where the obstacles around a place are.
+"""A map for a round robot: what is at a place, where the obstacles around it are, and where the robot might stand.
 
-Derive from ``DiscMap`` in a map backend of your own: the recoveries of the core run on it. Not for robots whose outline
-matters, nor for surfaces above each other.
+Derive from ``DiscMap`` in a map backend of your own: recoveries and questions of the core run on it. Not for robots
+whose outline matters, nor for surfaces above each other.
 """
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from dataclasses import replace
 
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
-from mbf_abstract.maps.navigation_map import NavigationMap
+from mbf_abstract.maps.navigation_map import NavigationMap, PlaceCheck
+from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
 
 STRIDE = 0.05
 """Distance [m] between two places that are looked at along a motion."""
@@ -31,6 +33,14 @@ class DiscMap(NavigationMap):
     robot_radius: float
 
     @abstractmethod
+    def place(self, x: float, y: float, safety_dist: float = 0.0) -> PlaceAnswer:
+        """State and cost at a place [m] for a disc grown by ``safety_dist`` [m]; INSCRIBED where it would touch."""
+
+    @abstractmethod
+    def candidates(self, x: float, y: float, dist_tolerance: float) -> FloatArray:
+        """Places (n, 3) [m] where the robot might fit, in any order; those beyond the tolerance [m] are passed over."""
+
+    @abstractmethod
     def obstacles_near(self, x: float, y: float, within: float) -> FloatArray:
         """Places (n, 2) [m] of all obstacles within a distance [m]; others may be there, and what is off the map."""
 
@@ -38,6 +48,41 @@ class DiscMap(NavigationMap):
     def inscribed_radius(self) -> float:
         """Radius [m] of the disc."""
         return self.robot_radius
+
+    def point_check(self) -> PlaceCheck:
+        """State and cost of points: INSCRIBED where a robot would touch something."""
+        return lambda pose: self.place(pose.x, pose.y)
+
+    def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
+        """State and cost of the disc: LETHAL where it touches something."""
+        if center_only:
+            return self.point_check()
+
+        def check(pose: Pose) -> PlaceAnswer:
+            answer = self.place(pose.x, pose.y, query.safety_dist)
+            return replace(answer, state=CellState.LETHAL) if answer.state is CellState.INSCRIBED else answer
+
+        return check
+
+    def find_valid_pose(
+        self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
+    ) -> PoseAnswer:
+        """Return the pose itself if the disc fits, else the nearest free candidate; the heading stays."""
+        check = self.pose_check(query)
+        first = check(pose)
+        if first.state < CellState.LETHAL:
+            return PoseAnswer(first.state, first.cost, pose)
+        points = self.candidates(pose.x, pose.y, dist_tolerance)
+        distances = np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y)
+        for index in np.argsort(distances, kind="stable"):
+            if distances[index] > dist_tolerance:
+                break
+            x, y, z = points[index].tolist()
+            there = replace(pose, position=(x, y, z))
+            answer = check(there)
+            if answer.state < CellState.LETHAL:
+                return PoseAnswer(answer.state, answer.cost, there)
+        return PoseAnswer(first.state, first.cost, None)
 
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
         """Where the disc would come to touch an obstacle, or nearer to one it touches."""

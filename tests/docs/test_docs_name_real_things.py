@@ -18,7 +18,7 @@ from mbf_abstract.maps.queries import MapQueries
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.server.map_server import MapServer
 from mbf_mesh_nav.plugins import MeshPlanner
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -84,7 +84,7 @@ def test_every_yaml_block_has_known_keys_or_names_of_its_plugins():
     ("pattern", "owner"),
     [
         (r"`navigator\.(?!server)(\w+)", Navigator),
-        (r"`server\.(?!queries)(\w+)", AbstractNavigationServer),
+        (r"`server\.(?!queries)(\w+)", MapServer),
         (r"`server\.queries\.(\w+)", MapQueries),
         (r"`handle\.(\w+)", GoalHandle),
     ],

@@ -159,6 +159,10 @@ class GraphMap(LayeredMap, DiscMap):
             return np.full(len(self.nodes), np.inf)
         return np.asarray(cKDTree(self.nodes[lethal]).query(self.nodes)[0])
 
+    def take_parameters(self, parameters: Any) -> None:
+        """Take over ``robot_radius`` of ``GraphMapParameters``; layers have parameters of their own."""
+        self.robot_radius, self._outdated = parameters.robot_radius, True
+
     def _replace_parameters(self, name: str, parameters: Any) -> None:
         self.layers[name].parameters = parameters
         self._outdated = True
@@ -177,6 +181,10 @@ class GraphMap(LayeredMap, DiscMap):
             return PlaceAnswer(CellState.LETHAL, float(state.costs[node]))
         touches = state.clearance[node] <= self.robot_radius + safety_dist
         return PlaceAnswer(CellState.INSCRIBED if touches else CellState.FREE, float(state.costs[node]))
+
+    def candidates(self, x: float, y: float, dist_tolerance: float) -> FloatArray:
+        """All nodes on which the robot's middle may be."""
+        return np.asarray(self.nodes[self.free_nodes()])
 
     def free_nodes(self) -> BoolArray:
         """Nodes (n,) on which the robot's middle may be."""

@@ -152,21 +152,17 @@ def test_a_robot_too_large_for_the_inflation_is_told_of(site):
 
 
 @pytest.mark.parametrize(
-    ("change", "error", "says"),
+    ("change", "error", "text"),
     [
         (
-            lambda s: s.set_layer_parameters("global_costmap.around", inflation_radius=-1.0),
+            lambda s: s.set_layer_parameters("global_costmap.around", inflation_radius=-1),
             ValueError,
             "inflation_radius",
         ),
         (lambda s: s.set_layer_parameters("global_costmap.around", radius=1.0), ValueError, "radius"),
         (lambda s: s.set_layer_parameters("global_costmap.around", inflation_radius=90.0), ValueError, "900 cells"),
         (lambda s: s.set_layer_parameters("global_costmap.zone", zones=()), ValueError, "zones: read once"),
-        (
-            lambda s: s.set_layer_parameters("round", enabled=False),
-            ServerError,
-            "no layer 'round', known.*costmap.around",
-        ),
+        (lambda s: s.set_layer_parameters("round", enabled=False), ServerError, "no layer 'round', known.*'?around"),
         (lambda s: s.set_layer_parameters("around", enabled=False), ServerError, "several maps have a layer 'around'"),
         (lambda s: s.set_map_parameters("global_costmap", resolution=0.2), ValueError, "resolution: read once"),
         (lambda s: s.set_map_parameters("global_costmap", robot_radius=-0.2), ValueError, "robot_radius"),
@@ -174,10 +170,10 @@ def test_a_robot_too_large_for_the_inflation_is_told_of(site):
         (lambda s: s.set_footprint(float("nan")), ValueError, "finite"),
     ],
 )
-def test_a_change_that_is_not_legal_changes_nothing(site, change, error, says):
+def test_a_change_that_is_not_legal_changes_nothing(site, change, error, text):
     server, clock, told = site
     before = forbidden(server.global_costmap), forbidden(server.local_costmap)
-    with pytest.raises(error, match=says):
+    with pytest.raises(error, match=text):
         change(server)
     clock.sleep(0.5)
     assert (forbidden(server.global_costmap), forbidden(server.local_costmap)) == before

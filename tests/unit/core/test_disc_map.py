@@ -1,22 +1,43 @@
 """The map-independent questions of a round robot, on a half plane: free on the left, a wall on the right."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer, TransformError
-from mbf_abstract.maps.disc_queries import DiscQueries
+from mbf_abstract.maps.disc_map import DiscMap
+from mbf_abstract.maps.map_queries import NavigationMapQueries
 from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery
 
 
-class HalfPlane(DiscQueries):
-    def place(self, x, y, safety_dist):
+class HalfPlane(DiscMap):
+    frame_id = "map"
+    robot_radius = 0.5
+
+    def place(self, x, y, safety_dist=0.0):
         state = CellState.LETHAL if x > 0.0 else CellState.INSCRIBED if x + safety_dist > -0.5 else CellState.FREE
         return PlaceAnswer(state, 2.0)
 
     def candidates(self, x, y, dist_tolerance):
         return np.column_stack([np.linspace(x - 4.0, x + 4.0, 81), np.full((81, 1), y), np.zeros(81)])
+
+    def obstacles_near(self, x, y, within):
+        return np.array([[max(x, 0.0), y]])
+
+
+class Served:
+    """The half plane, always up to date."""
+
+    map = HalfPlane()
+
+    def in_use(self):
+        return nullcontext()
+
+    def update(self):
+        self.map.update(None, 0.0)
 
 
 class Robot:
@@ -28,7 +49,7 @@ class Robot:
 def queries():
     transforms = TransformBuffer()
     transforms.set(Transform((-1.0, 0.0, 0.0), parent="map", child="dock", static=True))
-    return HalfPlane("map", Robot(), transforms)
+    return NavigationMapQueries(Served(), Served(), Robot(), transforms)
 
 
 def test_without_a_pose_the_robot_is_asked_for(queries):
