@@ -19,7 +19,7 @@ class CostmapContext(MapContext[LayeredCostmap]):
     """What a costmap plugin is constructed with.
 
     Planners and refiners are bound to the global costmap, controllers and recoveries to the local one, unless the
-    plugin's block says ``costmap: local`` or ``costmap: global``. ``maps`` has both, under these names; without them
+    plugin's block sets ``costmap: local`` or ``costmap: global``. ``maps`` has both, under these names; without them
     the one costmap is both.
     """
 

@@ -131,11 +131,11 @@ class CostmapNavigationServer(MapServer):
 
     @classmethod
     def read_floor(cls, file: Path) -> FloorMap | None:
-        """Read every image format this package reads, and map_server's YAML; a map with a yaw is laid upright."""
+        """Read every image format this package reads, and map_server's YAML; resample a map with a yaw."""
         if file.suffix.lower() not in MAP_SUFFIXES:
             return None
         try:
-            content = load_map_file(file).upright()
+            content = load_map_file(file).axis_aligned()
         except MapError as error:
             raise ConfigError([Finding(str(error.file), 1, "", "a map", error.reason)]) from error
         return FloorMap(content.occupancy, content.resolution, *content.origin[:2])

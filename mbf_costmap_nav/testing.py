@@ -24,7 +24,7 @@ from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext, shifted
 __all__ = ["ContractBroken", "check_layer"]
 
 COST_OF_LATER_LAYERS = 77
-"""Stands out of the box, where layers after the checked one have written already."""
+"""Marks cells outside the box, where layers after the checked one have written already."""
 SEEN_AT = 1.0
 """Time [s] of the updates with scans."""
 REACH = 8
@@ -44,9 +44,9 @@ def check_layer(
     """Check a costmap layer against the contract, with and without unknown space.
 
     Writes inside its box only, legal values, two instances that agree, updates that change nothing while nothing has
-    changed, maps and scans left alone, parameters that can be set again, ``reset`` that forgets scans,
-    ``shift`` that keeps what stays in a rolling window and forgets what leaves it, ``clear_area`` that forgets the area
-    and nothing else. Cells within 8 of a border or an area are left out of the last two, for layers that spread costs.
+    changed, maps and scans left alone, parameters that can be set again, ``reset`` that drops scans,
+    ``shift`` that keeps what stays in a rolling window and drops what leaves it, ``clear_area`` that clears the area
+    and nothing else. Cells within 8 of a border or an area are left out of the last two, for layers that inflate costs.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def _check_shift(site: _Site, fresh: _Site, scans: Scans, report: Report) -> Non
 
 
 def _check_clear_area(make: Callable[[], _Site], scans: Scans, report: Report) -> None:
-    """Clear the left half, and all but the left half: one part forgets, the other stays."""
+    """Clear the left half, and all but the left half: one part is cleared, the other stays."""
     for inside in (True, False):
         site, name = make(), f"clear_area(inside={inside})"
         grid = site.layer.geometry.box

@@ -83,7 +83,7 @@ class PathFollower(CostmapController):
         return self.costmap.footprint
 
     def set_plan(self, path: Path) -> bool:
-        """Take over a path of at least one pose in a frame from which there is a way to the costmap's."""
+        """Take over a path of at least one pose, in a frame with a transform to the costmap's."""
         if len(path) == 0 or not self.transforms.can_transform(self.costmap.frame_id, path.frame_id):
             return False
         self.tracker = PathTracker(path, dimensions=2)

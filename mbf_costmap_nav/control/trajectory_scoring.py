@@ -72,9 +72,9 @@ def roll_out(
 
 
 def _path_ahead(cycle: ControlCycle, length: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Points (m, 2) of the path over ``length`` [m] from the progress on, or to its end, and which of them are free.
+    """Points (m, 2) of the path over ``length`` [m] ahead of the progress, or to its end, and which of them are free.
 
-    From a cusp they run straight on, and what lies there does not count.
+    Beyond a cusp they continue straight; obstacles there are ignored.
     """
     tracker = cycle.tracker
     on_path = min(length, tracker.to_cusp)

@@ -1,7 +1,7 @@
 """Dynamic window approach: try all velocities the robot can reach in one step, keep the one with the best arc.
 
 When to use: robots that must get around obstacles that are not in the path, with little computing time (under 1 ms).
-When not: it only thinks in arcs of constant velocity, so it stalls where a turn and a counter-turn are needed (narrow
+When not: it samples arcs of constant velocity only, so it stalls where a turn and a counter-turn are needed (narrow
 S-shaped gaps, parking); ``costmap.mppi`` plans those. It does not follow a path exactly (``regulated_pure_pursuit``).
 
 Formula: Fox, Burgard, Thrun 1997; the objective is the weighted sum of the trajectory critics instead of the paper's
@@ -68,7 +68,7 @@ class DwaController(PathFollower):
 
     @property
     def turns_on_the_spot(self) -> bool:
-        """It does."""
+        """Always true."""
         return True
 
     @property

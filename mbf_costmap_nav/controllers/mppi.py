@@ -3,12 +3,12 @@
 When to use: the best of our controllers among obstacles; it swerves, backs up and threads gaps because every sample is
 a whole manoeuvre of ``time_steps``, not an arc. Differential, omnidirectional and Ackermann robots. When not: very
 small computers (a cycle of 2000 x 56 takes about 1 ms), or when the path must be followed to the centimetre.
-Known failure: two equally good ways around an obstacle can average to neither; the footprint check then falls back to
+Known failure: the mean of two equally good paths around an obstacle may collide; the footprint check then falls back to
 the best single sample. A robot that can turn on the spot turns to a path that begins behind it. A car turns onto a path
-it looks away from by a right angle, slowly where its turning radius is larger than the way it looks ahead
-(``max_vel_x * time_steps * model_dt``); one that looks back along its path drives it backward and ends with the wrong
-heading. Give it paths that begin with its heading, as ``costmap.hybrid_astar`` does; it drives their cusps, and asks
-for another plan (NO_VALID_CMD) where it stands beside its goal.
+at a right angle to its heading, but slowly where its turning radius is larger than its horizon
+(``max_vel_x * time_steps * model_dt``); a car that faces back along its path drives it backward and ends with the wrong
+heading. Give it paths that begin with its heading, as ``costmap.hybrid_astar`` does; it drives their cusps, and
+requests a new plan (NO_VALID_CMD) where it stands beside its goal.
 
 Formula: information-theoretic MPPI (Williams et al. 2018, algorithm 2), with Nav2's structure of critics; the noise
 comes from a pool drawn once from the plugin's generator, so that a cycle draws only an index. Deviation: the noise is
@@ -41,9 +41,9 @@ NOISE_POOL = 4
 SMOOTHING = np.array([-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0]) / 231.0
 """Savitzky-Golay filter of 9 points, quadratic (Savitzky and Golay 1964, table I)."""
 DEFAULT_RADIUS = 0.5
-"""Turning circle [m] of a car where neither the parameters nor the robot tell one."""
+"""Turning radius [m] of a car where neither the parameters nor the robot give one."""
 STANDSTILL, IDLE_CYCLES = 0.05, 60
-"""A car commanded to be slower than this [m/s] for so many cycles does not get on and needs another plan."""
+"""A car commanded to drive slower than this [m/s] for so many cycles makes no progress and needs a new plan."""
 FALLBACK_SAMPLES = 30
 """How many of the best single samples are tried when the mean does not fit."""
 
@@ -72,7 +72,7 @@ class MppiParameters(PluginParameters):
     )
     min_turning_radius: float | None = parameter(
         None,
-        "Turning circle of an Ackermann robot; absent = the robot's, or 0.5 m where that turns on the spot.",
+        "Turning radius of an Ackermann robot; absent = the robot's, or 0.5 m where that turns on the spot.",
         unit="m",
         ge=0.0,
         le=100.0,
@@ -133,7 +133,7 @@ class MppiController(PathFollower):
 
     @property
     def turns_on_the_spot(self) -> bool:
-        """Whether its motion model does."""
+        """Whether its motion model can turn on the spot."""
         return self._radius == 0.0
 
     @property
@@ -151,7 +151,7 @@ class MppiController(PathFollower):
             controls = self._optimise(cycle)
             if controls is not None and self._is_stuck(controls):
                 left = cycle.tracker.remaining
-                text = f"no motion that a car can do gets it on, {left:.2f} m before the end of its path"
+                text = f"no feasible motion of the car makes progress, {left:.2f} m before the end of its path"
                 return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
             if controls is not None:
                 command = controls[:, 0].copy()
@@ -163,7 +163,7 @@ class MppiController(PathFollower):
         return ControlResult(ExePathOutcome.NO_VALID_CMD, text)
 
     def _is_stuck(self, controls: Float32Array) -> bool:
-        """Whether a car that drives ``controls`` has found no way on for a while: it cannot mend where it stands."""
+        """Whether a car that drives ``controls`` has made no progress for a while; it cannot turn on the spot."""
         idle = self._radius > 0.0 and abs(controls[0, 0]) < STANDSTILL
         self._idle_cycles = self._idle_cycles + 1 if idle else 0
         return self._idle_cycles > IDLE_CYCLES

@@ -70,7 +70,7 @@ class RegulatedPurePursuitParameters(PluginParameters):
     collision_check_time: float = parameter(1.0, "How far ahead in time it is simulated.", unit="s", gt=0.0, le=10.0)
     min_distance_to_obstacle: float = parameter(
         0.0,
-        "Way ahead that is checked at least, however slow; 0 = what the check time covers.",
+        "Least length ahead that is checked at low speed; 0 = only what the check time covers.",
         unit="m",
         ge=0.0,
         le=2.0,
@@ -89,15 +89,15 @@ class RegulatedPurePursuitController(PathFollower):
 
     _at_goal = False
     _outline: tuple[Footprint, Footprint] | None = None
-    """The costmap's outline without padding, and what the collision check makes of it."""
+    """The costmap's outline without padding, and the one used by the collision check."""
 
     def set_plan(self, path: Path) -> bool:
-        """Take over a path and forget that the robot stood at the end of the last one."""
+        """Take over a path; that the robot stood at the end of the last one no longer counts."""
         self._at_goal = False
         return super().set_plan(path)
 
     def parameters_changed(self) -> None:
-        """Forget the outline of the old padding."""
+        """Drop the outline with the old padding."""
         self._outline = None
 
     def checked_footprint(self) -> Footprint:

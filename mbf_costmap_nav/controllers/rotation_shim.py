@@ -1,7 +1,7 @@
 """Rotation shim: turn in place towards a new path first, then let another controller drive.
 
 When to use: controllers that start a path with a wide arc or back up (MPPI, DWA) on robots that can turn in place in
-tight rooms. When not: ``costmap.regulated_pure_pursuit``, which turns by itself, and car-like robots.
+tight spaces. When not: ``costmap.regulated_pure_pursuit``, which turns by itself, and car-like robots.
 
 The inner controller is constructed here, on the same context, from its own parameter block: ``inner_type`` is a type as
 in the list of controllers, ``inner: {...}`` its parameters; both are checked with the rest of the configuration. There
@@ -51,7 +51,7 @@ class RotationShimController(PathFollower):
 
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)
-        # What a configuration may name, its validation has checked by the server's registry.
+        # The server's registry has already checked the type when it validated the configuration.
         registry = PluginRegistry("costmap", adapters=(wrap_nav_core,))
         inner_class: Any = registry.load(PluginKind.CONTROLLER, self.parameters.inner_type)
         parameters = inner_class.Parameters.model_validate(self.parameters.inner)
@@ -62,7 +62,7 @@ class RotationShimController(PathFollower):
 
     @property
     def turns_on_the_spot(self) -> bool:
-        """It does."""
+        """Always true."""
         return True
 
     def set_plan(self, path: Path) -> bool:
@@ -71,12 +71,12 @@ class RotationShimController(PathFollower):
         return super().set_plan(path) and self._inner.set_plan(path)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
-        """Whatever the inner controller says."""
+        """Delegated to the inner controller."""
         super().is_goal_reached(pose, dist_tolerance, angle_tolerance)
         return self._inner.is_goal_reached(pose, dist_tolerance, angle_tolerance)
 
     def cancel(self) -> bool:
-        """Whatever the inner controller says."""
+        """Delegated to the inner controller."""
         return self._inner.cancel()
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
@@ -112,7 +112,7 @@ class RotationShimController(PathFollower):
         return Twist.planar(wz=min(max(wanted, speed - change), speed + change))
 
     def _sweeps_obstacle(self, cycle: ControlCycle, command: Twist) -> bool:
-        """Whether half a second of turning on would touch a lethal cell; the inner controller may know better then."""
+        """Whether turning for another half second would touch a lethal cell; then the inner controller takes over."""
         pose = cycle.request.pose
         poses = arc_poses((pose.x, pose.y, pose.yaw), 0.0, 0.0, command.wz, 0.5, 0.05)
         return cycle.footprint.first_collision(cycle.costmap, poses) >= 0

@@ -17,7 +17,7 @@ from mbf_costmap_nav.kernels.control.critics import furthest_reached
 Float32Array = NDArray[np.float32]
 
 AHEAD = 4
-"""How many path points beyond the furthest reached one the robot should look at."""
+"""How many path points beyond the furthest reached one the desired heading points at."""
 FACING = 0.785
 """Angle [rad] to that point below which the robot faces the path."""
 
@@ -28,21 +28,23 @@ LOOKING_AWAY = 1.571
 class CriticParameters(ParameterModel):
     """Weights of the critics; a weight of 0 switches a critic off (obstacles still count as collisions)."""
 
-    obstacle: float = parameter(4.0, "Weight of the mean cell cost along the way (0..1).", ge=0.0, le=1e4)
+    obstacle: float = parameter(4.0, "Weight of the mean cell cost along the trajectory (0..1).", ge=0.0, le=1e4)
     goal: float = parameter(5.0, "Weight of the distance to a near goal.", unit="1/m", ge=0.0, le=1e4)
     goal_angle: float = parameter(3.0, "Weight of the heading at a near goal.", unit="1/rad", ge=0.0, le=1e4)
     path_align: float = parameter(10.0, "Weight of the distance from the path.", unit="1/m", ge=0.0, le=1e4)
-    path_follow: float = parameter(5.0, "Weight of the way still left on the path.", unit="1/m", ge=0.0, le=1e4)
+    path_follow: float = parameter(
+        5.0, "Weight of the distance to the target point ahead on the path.", unit="1/m", ge=0.0, le=1e4
+    )
     path_angle: float = parameter(2.0, "Weight of the heading towards the path.", unit="1/rad", ge=0.0, le=1e4)
     prefer_forward: float = parameter(
-        5.0, "Weight of driving the wrong way round, mostly backward.", unit="s/m", ge=0.0, le=1e4
+        5.0, "Weight of driving against the path's direction of travel, mostly backward.", unit="s/m", ge=0.0, le=1e4
     )
     twirling: float = parameter(0.0, "Weight of turning; for omnidirectional robots.", unit="s/rad", ge=0.0, le=1e4)
 
 
 @dataclass
 class Rollouts:
-    """Sampled trajectories and all a critic may want to know; positions are relative to the robot, axes of the map.
+    """Sampled trajectories and the inputs of the critics; positions are relative to the robot, axes of the map.
 
     Attributes
     ----------
@@ -52,7 +54,7 @@ class Rollouts:
         vx, vy [m/s], wz [rad/s] of each step.
     path : (m, 2) float32
         Points of the path ahead [m], ``path_spacing`` apart; the first is the robot's nearest. Beyond a cusp they run
-        straight on: the robot comes to it without creeping, and turns round when it is there.
+        straight on, so that the robot does not creep towards the cusp; it reverses when it is there.
     path_free : (m,) bool
         Whether the cell of each path point is below the inscribed cost.
     path_spacing : float
@@ -66,14 +68,14 @@ class Rollouts:
     backward : bool
         Whether the path is driven in reverse here.
     goal_tolerance : float
-        How near [m] to the goal is near enough.
+        Distance [m] from the goal that counts as arrived.
     costmap : Costmap
     robot : (x, y)
         The robot's position [m] in the map, to look cells up.
     discs : (k,) float32
         Offsets [m] along the robot's x axis of the discs of its inscribed radius that stand for its footprint.
     turning_radius : float
-        Of the tightest curve [m]; 0 = the robot turns on the spot.
+        Radius of the tightest curve [m]; 0 = the robot turns on the spot.
     collided : (samples,) bool
         Set by the obstacle critic.
     """
@@ -110,18 +112,18 @@ class Rollouts:
 
     @property
     def direction_ahead(self) -> float:
-        """Direction [rad] in which the robot should look: to a path point ahead, in reverse away from it."""
+        """Desired heading [rad]: towards a path point ahead, in reverse away from it."""
         x, y = self.path[min(max(self.furthest, AHEAD) + AHEAD, len(self.path) - 1)].tolist()
         return math.atan2(-y, -x) if self.backward else math.atan2(y, x)
 
     @property
     def faces_path(self) -> bool:
-        """Whether the robot roughly looks along its path."""
+        """Whether the robot roughly faces along its path."""
         return self._angle_off_path < FACING
 
     @property
     def has_to_turn(self) -> bool:
-        """Whether the robot looks away from its path and can turn on the spot, which it should before it drives."""
+        """Whether the robot faces away from its path and can turn on the spot, which it should do before it drives."""
         return self.turning_radius == 0.0 and self._angle_off_path > LOOKING_AWAY
 
     @property
@@ -137,4 +139,4 @@ class Critic(ABC):
 
     @abstractmethod
     def score(self, rollouts: Rollouts) -> Float32Array | None:
-        """Cost (samples,) without the weight; None where the critic has nothing to say (e.g. the goal is far)."""
+        """Cost (samples,) without the weight; None where the critic does not apply (e.g. the goal is far)."""

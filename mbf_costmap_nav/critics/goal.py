@@ -1,4 +1,4 @@
-"""Draws to the goal once it is near: mean distance of the trajectory to it."""
+"""Attracts to the goal once it is near: mean distance of the trajectory to it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
 from mbf_costmap_nav.kernels.control.critics import mean_distance_to_point
 
 ACTIVE_WITHIN = 1.4
-"""Length [m] left on the path below which the goal draws; before, following the path does."""
+"""Length [m] left on the path below which this critic applies; before, the path critics do."""
 
 
 class GoalCritic(Critic):

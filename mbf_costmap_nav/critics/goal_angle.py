@@ -1,6 +1,6 @@
 """Turns to the goal's heading once the robot stands within the tolerance of the goal's position.
 
-A car cannot turn there: near the goal, it is judged by the heading it ends with.
+A car cannot turn there, so near the goal it is scored by its final heading.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
 from mbf_costmap_nav.kernels.control.critics import mean_angle_to
 
 CAR_WITHIN = 1.0
-"""Length [m] left on the path below which a car minds the heading of its end."""
+"""Length [m] left on the path below which a car is scored by its final heading."""
 
 
 class GoalAngleCritic(Critic):

@@ -1,7 +1,7 @@
-"""Keeps away from obstacles: mean cell cost along the way, and the mark of those that collide.
+"""Keeps away from obstacles: mean cell cost along the trajectory; marks trajectories that collide.
 
-The footprint stands as a row of discs of the inscribed radius along the robot's x axis, each looked up as one cell of
-the inflated map. Corners stick out of the discs by up to 0.41 inscribed radii; the controllers check the chosen
+The footprint is approximated by a row of discs of the inscribed radius along the robot's x axis, each looked up as one
+cell of the inflated map. Corners stick out of the discs by up to 0.41 inscribed radii; the controllers check the chosen
 trajectory with the full footprint afterwards.
 """
 
@@ -16,7 +16,7 @@ from mbf_costmap_nav.kernels.control.critics import map_costs
 STRIDE = 2
 """Every how many steps the map is looked up: at 0.05 s and 0.5 m/s every 5 cm, one cell."""
 COLLISION = 1.0e6
-"""Cost of a collision, beyond the reach of all other terms."""
+"""Cost of a collision, larger than the sum of all other terms."""
 
 _VALUES = np.concatenate([np.arange(INSCRIBED) / 252.0, np.full(UNKNOWN - INSCRIBED, COLLISION), [0.0]])
 VALUE_OF_COST = _VALUES.astype(np.float32)
@@ -24,10 +24,10 @@ VALUE_OF_COST = _VALUES.astype(np.float32)
 
 
 class ObstacleCritic(Critic):
-    """Cost of the cells on the way."""
+    """Cost of the cells along the trajectory."""
 
     def score(self, rollouts: Rollouts) -> Float32Array:
-        """Mean value of the dearest disc; marks ``rollouts.collided``."""
+        """Mean over the steps of the most expensive disc; marks ``rollouts.collided``."""
         grid = rollouts.costmap
         total = map_costs(
             grid.cells,

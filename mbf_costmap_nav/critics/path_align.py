@@ -1,9 +1,9 @@
-"""Keeps on the path: distance between the trajectory and the path after the same length travelled.
+"""Keeps to the path: distance between the trajectory and the path after the same length travelled.
 
-Silent near the goal, where the path is too short to compare with, for all but cars, which come to their heading only by
-their path, and where the path itself is blocked: a robot that
-is to drive around an obstacle must be allowed to leave the path. Silent too where a car looks away from its path: it
-has to leave the path in order to turn, and the least distance from it is that of not starting at all.
+Not applied near the goal, where the path is too short to compare with (except for cars, which reach their heading only
+by following the path), nor where the path itself is blocked: a robot that drives around an obstacle must leave the
+path. Nor is it applied where a car faces away from its path: it has to leave the path in order to turn, and standing
+still would have the least distance.
 """
 
 from __future__ import annotations

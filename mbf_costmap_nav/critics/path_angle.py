@@ -1,7 +1,7 @@
-"""Turns towards the path where the robot looks away from it; silent once it roughly faces it.
+"""Turns towards the path where the robot faces away from it; not applied once it roughly faces it.
 
-A car is judged by the heading it ends with: it turns only while it drives, so over the whole way it gains too little to
-make up for what driving away from the path costs.
+A car is scored by its final heading: it turns only while it drives, so the mean over the trajectory gains too little to
+outweigh the cost of leaving the path.
 """
 
 from __future__ import annotations

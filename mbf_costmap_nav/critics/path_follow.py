@@ -1,6 +1,6 @@
-"""Drives on: distance from the trajectory's end to a free path point a little beyond what any sample reaches.
+"""Rewards progress: distance from the trajectory's end to a free path point a little beyond what any sample reaches.
 
-Silent where a robot that can turn on the spot looks away from its path: it would drive the path the wrong way round.
+Not applied where a robot that can turn on the spot faces away from its path: it would drive the path backward.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Prefers driving forward, where the sensors look; in reverse where the poses of the path ask for that."""
+"""Prefers driving forward, where the sensors look; backward where the poses of the path require it."""
 
 from __future__ import annotations
 

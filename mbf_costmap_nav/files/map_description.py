@@ -23,10 +23,10 @@ OccupancyArray = NDArray[np.uint8]
 FREE_OCCUPANCY = 0
 OCCUPIED = 100
 UNKNOWN_OCCUPANCY = 255
-MAX_TOLD = 10
-"""Findings of one file that its MapError tells."""
-TOLD_WIDTH = 300
-"""Characters of one of them; a key may be as long as the file."""
+MAX_REPORTED = 10
+"""Findings of one file that its MapError reports."""
+REPORTED_WIDTH = 300
+"""Characters reported of one finding; a key may be as long as the file."""
 
 
 class MapError(Exception):
@@ -44,7 +44,7 @@ class MapError(Exception):
         self.reason = reason
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        """Survive the way back from a worker process."""
+        """Support pickling, for errors raised in worker processes."""
         return type(self), (self.file, self.reason)
 
 
@@ -120,11 +120,11 @@ def read_description(file: Path) -> MapDescription:
 
 
 def read_mapping(file: Path) -> YamlDocument:
-    """Read a YAML file whose top level is a mapping; raises MapError with all that is wrong with it."""
+    """Read a YAML file whose top level is a mapping; raises MapError with all findings."""
     try:
         return load_yaml(file)
     except ConfigError as error:
-        raise MapError(file, told(error.findings)) from error
+        raise MapError(file, findings_text(error.findings)) from error
 
 
 def validated_description(
@@ -143,12 +143,12 @@ def validated_description(
             )
             for one in error.errors(include_url=False)
         ]
-        raise MapError(file, told(findings)) from error
+        raise MapError(file, findings_text(findings)) from error
 
 
-def told(findings: Sequence[Finding]) -> str:
+def findings_text(findings: Sequence[Finding]) -> str:
     """Findings of one file as the reason of its MapError, the first ten of them."""
     texts = [f"line {one.line}: {one.text.removeprefix(f'{one.file}:{one.line}:').strip()}" for one in findings]
-    lines = [text if len(text) <= TOLD_WIDTH else f"{text[:TOLD_WIDTH]}..." for text in texts[:MAX_TOLD]]
-    more = [f"and {len(findings) - MAX_TOLD} more"] if len(findings) > MAX_TOLD else []
+    lines = [text if len(text) <= REPORTED_WIDTH else f"{text[:REPORTED_WIDTH]}..." for text in texts[:MAX_REPORTED]]
+    more = [f"and {len(findings) - MAX_REPORTED} more"] if len(findings) > MAX_REPORTED else []
     return "; ".join(lines + more)

@@ -5,10 +5,10 @@ from bottom to top. The channels of an image are averaged, then rounded: in mode
 if there is one, as in map_server; else those of colour alone. In mode scale a pixel that is not opaque is unknown.
 
 Origins with a yaw are kept in ``OccupancyMap``. A ``Costmap`` has axes parallel to its frame, so ``to_costmap``
-resamples such a map onto the smallest upright grid around it (see ``turned_map``).
+resamples such a map onto the smallest axis-aligned grid around it (see ``rotated_map``).
 
-A bad file raises one ``MapError`` that names the file and the reason. The number of cells, also of the upright grid, is
-checked against a limit before memory is taken for them.
+A bad file raises one ``MapError`` that names the file and the reason. The number of cells, also of the axis-aligned
+grid, is checked against a limit before memory is allocated.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from mbf_costmap_nav.files.map_description import (
     validated_description,
 )
 from mbf_costmap_nav.grid.costmap import FREE, LETHAL, MAX_CELLS, UNKNOWN, Costmap
-from mbf_costmap_nav.grid.rotated_map import turned_upright, upright_shape
+from mbf_costmap_nav.grid.rotated_map import axis_aligned_shape, rotated_to_axes
 
 IMAGE_SUFFIXES = {".pgm", ".png", ".bmp"}
 BARE_IMAGE_RESOLUTION = 0.05  # m, what most map makers use
 IMAGE_FORMATS = ("PPM", "PNG", "BMP")
-"""What Pillow may try; for some of its other formats it starts programs."""
+"""Formats that Pillow may try; for some of its other formats it starts external programs."""
 GREY_MODES = {"1", "L", "LA", "P", "RGB", "RGBA"}
 """Pillow's names of the 8-bit pixel layouts we read."""
 
@@ -64,18 +64,18 @@ class OccupancyMap:
     resolution: float
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
-    def upright(self, max_cells: int = MAX_CELLS) -> OccupancyMap:
+    def axis_aligned(self, max_cells: int = MAX_CELLS) -> OccupancyMap:
         """Return the same map with yaw 0, resampled if it has a yaw.
 
         Raises
         ------
         ValueError
-            The smallest upright grid around it has more than ``max_cells`` cells.
+            The smallest axis-aligned grid around it has more than ``max_cells`` cells.
         """
         x, y, yaw = self.origin
         if math.remainder(yaw, 2.0 * math.pi) == 0.0:
             return self
-        occupancy, (dx, dy) = turned_upright(self.occupancy, yaw, max_cells)
+        occupancy, (dx, dy) = rotated_to_axes(self.occupancy, yaw, max_cells)
         return OccupancyMap(occupancy, self.resolution, (x + dx * self.resolution, y + dy * self.resolution, 0.0))
 
     def to_costmap(
@@ -92,12 +92,12 @@ class OccupancyMap:
         track_unknown_space : bool
             Keep unknown cells unknown; otherwise they become free.
         max_cells : int
-            As for ``upright``, whose ValueError it raises.
+            As for ``axis_aligned``, whose ValueError it raises.
         """
         table = np.full(256, UNKNOWN if track_unknown_space else FREE, dtype=np.uint8)
         table[:OCCUPIED] = np.arange(OCCUPIED) * LETHAL // OCCUPIED
         table[OCCUPIED:UNKNOWN_OCCUPANCY] = LETHAL
-        flat = self.upright(max_cells)
+        flat = self.axis_aligned(max_cells)
         return Costmap(table[flat.occupancy], flat.resolution, flat.origin[0], flat.origin[1], frame_id)
 
 
@@ -107,12 +107,12 @@ def load_map(file: Path | str, max_cells: int = MAX_CELLS, *, confined: bool = F
     Parameters
     ----------
     confined : bool
-        Refuse an image out of the YAML file's folder; for files that come from somebody else.
+        Refuse an image outside the YAML file's folder; for files from untrusted sources.
 
     Raises
     ------
     MapError
-        Anything wrong with either file, or more than ``max_cells`` cells.
+        Either file is invalid, or the map has more than ``max_cells`` cells.
     """
     file = Path(file)
     description = read_description(file)
@@ -189,7 +189,7 @@ def load_image(
 
 
 def _read_pixels(file: Path, max_cells: int, mode: MapMode) -> NDArray[np.uint8]:
-    """Grey and opacity (height, width, 2) uint8 of an image, top row first; the mode says what grey is the mean of."""
+    """Grey and opacity (height, width, 2) uint8 of an image, top row first; ``mode`` decides which channels count."""
     if kind := special_file(file):
         raise MapError(file, f"expected an image, got {kind}")
     try:
@@ -208,7 +208,7 @@ def _read_pixels(file: Path, max_cells: int, mode: MapMode) -> NDArray[np.uint8]
         raise MapError(file, f"has too many pixels: {error}") from error
     except UnidentifiedImageError as error:
         raise MapError(file, "is no image that can be read (pgm, png, bmp)") from error
-    except (OSError, ValueError, SyntaxError) as error:  # Pillow reports damaged files by any of these
+    except (OSError, ValueError, SyntaxError) as error:  # Pillow raises any of these for damaged files
         raise MapError(file, getattr(error, "strerror", None) or f"damaged image: {error}") from error
     channels = 4 if mode is MapMode.TRINARY and has_opacity else 3
     total = pixels[..., :channels].sum(axis=2, dtype=np.uint16)
@@ -218,7 +218,7 @@ def _read_pixels(file: Path, max_cells: int, mode: MapMode) -> NDArray[np.uint8]
 def _decode(file: Path, max_cells: int, description: MapDescription) -> OccupancyMap:
     pixels = _read_pixels(file, max_cells, description.mode)
     try:
-        upright_shape(pixels.shape[:2], description.origin[2], max_cells)
+        axis_aligned_shape(pixels.shape[:2], description.origin[2], max_cells)
     except ValueError as error:
         raise MapError(file, str(error)) from error
     occupancy = description.occupancy_of_grey()[pixels[..., 0]]

@@ -1,8 +1,8 @@
-"""What lies under the robot's footprint at a pose: the oriented collision check of controllers, recoveries and queries.
+"""The cells under the robot's footprint at a pose: the oriented collision check of controllers, recoveries and queries.
 
-When to use: for single poses and short motions. The check is exact (``kernels.cover``) and costs a few microseconds
-plus about 2 ns a covered cell. When not: in a planner's inner loop compare the cell of the centre with ``INSCRIBED``
-first, which decides most poses; for a batch of trajectories call the kernels directly.
+When to use: for single poses and short motions. The check is exact (``kernels.map.footprint_cost``) and costs a few
+microseconds plus about 2 ns a covered cell. When not: in a planner's inner loop compare the cell of the centre with
+``INSCRIBED`` first, which decides most poses; for a batch of trajectories call the kernels directly.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class FootprintCosts(NamedTuple):
     Attributes
     ----------
     covered : int
-        Number of cells; -1 if a corner of the footprint lies out of the map (all else is 0 then).
+        Number of cells; -1 if a corner of the footprint lies outside the map (all else is 0 then).
     lethal, inscribed, unknown : int
         How many of them are 254, 253, 255.
     rest : int
@@ -42,12 +42,12 @@ class FootprintCosts(NamedTuple):
 
     @property
     def outside(self) -> bool:
-        """Whether a corner lies out of the map."""
+        """Whether a corner lies outside the map."""
         return self.covered < 0
 
     @property
     def in_collision(self) -> bool:
-        """Whether a lethal cell is covered, or the footprint reaches out of the map."""
+        """Whether a lethal cell is covered, or the footprint extends beyond the map."""
         return self.outside or self.lethal > 0
 
     @property

@@ -1,10 +1,10 @@
-"""The robot's outline on the ground: parsing, radii, padding and true offset.
+"""The robot's outline in the plane: parsing, radii, padding and true offset.
 
-Two ways to make an outline larger live here, because two callers need different ones:
+There are two ways to enlarge an outline, because callers need different ones:
 
 - ``padded`` is costmap_2d's ``footprint_padding``: every vertex moves by the padding along x and along y, away from
   the base's axes. It keeps the number of vertices and is what users' configurations mean. It is not an offset: the
-  sides of a slanted outline move by another distance than asked.
+  sides of a slanted outline move by a distance other than the padding.
 - ``offset`` keeps at least the given distance from the outline everywhere. Safety distances use it.
 """
 
@@ -34,8 +34,8 @@ class Footprint:
     Attributes
     ----------
     vertices : (n, 2) float64, read-only
-        Corners [m] in order (either sense), x forward, y left. Fewer than three points stand for a robot that is a
-        point: only the cell of its centre counts.
+        Corners [m] in order (either orientation), x forward, y left. Fewer than three points stand for a robot that is
+        a point: only the cell of its centre counts.
     inscribed_radius : float
         Distance [m] from the base to the nearest side; the largest float for fewer than three points (costmap_2d).
     circumscribed_radius : float
@@ -87,7 +87,7 @@ class Footprint:
         return footprint
 
     def at(self, x: float, y: float, yaw: float) -> FloatArray:
-        """Vertices (n, 2) [m] with the base at (x, y) [m], turned by ``yaw`` [rad]."""
+        """Vertices (n, 2) [m] with the base at (x, y) [m], rotated by ``yaw`` [rad]."""
         return np.asarray(rotated(plane_rotation(yaw), self.vertices) + np.array([x, y]))
 
     def padded(self, padding: float) -> Footprint:
@@ -186,7 +186,7 @@ def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
 
 
 def _shrunk(vertices: FloatArray, distance: float) -> FloatArray:
-    """What is left of the hull when each side moves inwards by ``distance`` [m]; sides may vanish on the way."""
+    """What is left of the hull when each side moves inwards by ``distance`` [m]; sides may vanish."""
     hull = rest = _convex_hull(vertices) if len(vertices) >= 3 else np.zeros((0, 2))
     sides = np.roll(hull, -1, axis=0) - hull
     for vertex, side in zip(hull, sides, strict=True):

@@ -1,8 +1,8 @@
-"""Does the robot fit at a pose? The footprint prepared for fast checks of many poses on a costmap snapshot.
+"""The footprint as samples, prepared for fast collision checks of many poses on a costmap snapshot.
 
-When to use: inside controllers, recoveries and kinematic planners. When not: a client's question about one pose, which
-the queries answer with an exact cover of cells. Unknown cells and the world outside the map do not collide: a rolling
-window always ends somewhere.
+When to use: inside controllers, recoveries and kinematic planners. When not: a client's query about one pose; the
+queries rasterise the footprint exactly. Unknown cells and poses outside the map do not collide, because a rolling
+window ends near the robot.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ FloatArray = NDArray[np.float64]
 
 
 class FootprintCheck:
-    """A footprint as points that cover it.
+    """A footprint as a set of samples.
 
     Attributes
     ----------
     footprint : Footprint
     samples : (n, 2) float64
-        Covering points in the base frame [m], outline first; the origin alone for a point robot.
+        Footprint samples in the base frame [m], outline first; the origin alone for a point robot.
     """
 
     def __init__(self, footprint: Footprint, resolution: float) -> None:
@@ -49,18 +49,18 @@ class FootprintCheck:
         return self.cost(costmap, x, y, yaw) == LETHAL
 
     def lethal_count(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
-        """Number of covering points on lethal cells: a measure of how deep the robot is in a collision."""
+        """Number of footprint samples on lethal cells: a measure of how deep the robot is in a collision."""
         points = rotated(plane_rotation(yaw), self.samples) + np.array([x, y])
         cells, inside = costmap.world_to_cells(points)
         return int(np.count_nonzero(costmap.cells[cells[inside, 1], cells[inside, 0]] == LETHAL))
 
     def outside_count(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
-        """Number of covering points off the map."""
+        """Number of footprint samples off the map."""
         points = rotated(plane_rotation(yaw), self.samples) + np.array([x, y])
         return int(np.count_nonzero(~costmap.world_to_cells(points)[1]))
 
     def touched(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
-        """Number of covering points on lethal cells or off the map."""
+        """Number of footprint samples on lethal cells or off the map."""
         return self.lethal_count(costmap, x, y, yaw) + self.outside_count(costmap, x, y, yaw)
 
     def first_collision(self, costmap: Costmap, poses: FloatArray) -> int:

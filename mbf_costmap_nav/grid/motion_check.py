@@ -2,7 +2,7 @@
 
 A robot that already touches an obstacle may move as long as it touches no more than before, so backing out of a
 collision works and driving deeper into it does not. Where the whole footprint lies on obstacles no direction is known
-to lead out, and only ``escape`` moves.
+to lead out, and only ``escape`` may move.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ def obstacle_ahead(
     *,
     leaves_collisions: bool = False,
 ) -> str:
-    """Say where moving on would touch more of obstacles and the end of the map than now; empty: the motion is free.
+    """Where the motion would touch more obstacle cells or map border than now, as a text; empty if it is free.
 
     Parameters
     ----------
     pose : Pose
         Of the base, in the frame of the costmap.
     command : Twist
-        What is kept for ``duration`` [s].
+        Kept for ``duration`` [s].
     leaves_collisions : bool
         Whether the motion was chosen to lead out of a collision, however deep it is.
     """

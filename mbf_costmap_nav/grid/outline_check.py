@@ -1,6 +1,6 @@
-"""Is a polygon the outline of a robot? Asked where a configuration is read, so that the rest may trust it.
+"""Check that a polygon is a valid outline of a robot, once, where a configuration is read.
 
-When to use: for outlines that people write. When not: outlines made by ``Footprint`` itself.
+When to use: for outlines from users. When not: outlines made by ``Footprint`` itself.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ LEAST_AREA = 1e-6
 
 
 def outline_problem(corners: FloatArray) -> str:
-    """What keeps corners (n, 2) [m] from being the outline of a robot around its base; "" if nothing does.
+    """Why corners (n, 2) [m] are not the outline of a robot around its base; "" if they are.
 
     A corner that is given twice in a row, also the first one again at the end, counts once.
     """

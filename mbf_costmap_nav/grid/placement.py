@@ -1,7 +1,7 @@
-"""Where the data of a layer lies that is given in another frame than its costmap: a floor plan, zones, a mask.
+"""Places layer data given in another frame than the costmap: a floor plan, zones, a mask.
 
 When to use: in a layer whose data does not come from a sensor. When not: for observations, which the server brings into
-the costmap's frame, because they hold at their own time only.
+the costmap's frame, because they are valid at their own time only.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ class Placement:
 
     @property
     def known(self) -> bool:
-        """Whether it is known where the data lies, or was before the transform got lost."""
+        """Whether a transform is known, or was known before it got lost."""
         return self.in_costmap_frame or self.T_data_costmap is not None
 
     def refresh(self) -> bool:
-        """Look the transform up; return whether the data lies elsewhere now."""
+        """Look the transform up; return whether it has changed."""
         if self.in_costmap_frame:
             return False
         try:

@@ -1,8 +1,8 @@
-"""The cells of one map as another grid sees them: a floor plan or mask under a costmap of another resolution or frame.
+"""Resampling of one map on another grid: a floor plan or mask under a costmap of another resolution or frame.
 
-Each cell takes the value of the source at its centre. A finer or turned source has cells that no centre hits: a wall or
-a painted line one cell wide would vanish. So every cost of the source is written once more into the grid's cell in
-which its own centre lies, where it is the higher one: nothing gets lost, and nothing gets wider than a cell.
+Each cell takes the value of the source at its centre. A finer or rotated source has cells that no centre hits: a wall
+or a painted line one cell wide would vanish. So every cost of the source is also written into the grid's cell that
+contains its own centre, where it is the higher one: no obstacle is lost, and none grows by more than a cell.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from mbf_costmap_nav.grid.costmap import FREE, UNKNOWN, CellArray, CellBox, Cost
 from mbf_costmap_nav.grid.placement import mapped
 
 ON_A_BORDER = 1e-6
-"""A centre this close [cells] below a border counts as above it, so that rounding never moves it to and fro: on a grid
-half a cell beside its source every centre lies on one, and each wall would be lost here and twice as thick there."""
+"""A centre this close [cells] below a border counts as above it, so that rounding cannot move it back and forth: on a
+grid half a cell beside its source every centre lies on one, and each wall would be lost here and twice as thick
+there."""
 
 
 def sample_costmap(
@@ -132,6 +133,6 @@ def _known(cells: CellArray) -> CellArray:
 
 
 def _higher(values: CellArray, costs: CellArray) -> CellArray:
-    """The higher of both where there is a cost; unknown gives way to any cost, but not to free."""
+    """The higher of both where there is a cost; any cost replaces unknown, free does not."""
     raises = (costs > FREE) & ((values == UNKNOWN) | (costs > values))
     return np.where(raises, costs, values)

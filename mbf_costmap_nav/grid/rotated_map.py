@@ -1,8 +1,8 @@
-"""Occupancies whose image is turned against its frame, on the smallest upright grid around them.
+"""Occupancies of an image rotated against its frame, resampled on the smallest axis-aligned grid around them.
 
-Each new cell takes the value at its centre; what lies outside the turned image is unknown. Occupied cells that no new
-centre hits are written once more where their own centre lies, so that no obstacle gets lost. The work is done in blocks
-of rows: beside the maps themselves it needs little memory, however large they are.
+Each new cell takes the value at its centre; what lies outside the rotated image is unknown. Occupied cells that no new
+centre hits are also written where their own centre lies, so that no obstacle is lost. The work is done in blocks of
+rows, so it needs little memory beside the maps themselves.
 """
 
 from __future__ import annotations
@@ -17,30 +17,32 @@ from mbf_abstract.geometry.arithmetic import plane_rotation, rotated, rotated_ba
 from mbf_costmap_nav.files.map_description import OCCUPIED, UNKNOWN_OCCUPANCY, OccupancyArray
 
 BLOCK_CELLS = 500_000
-"""Cells worked on at a time; each takes about 100 bytes meanwhile."""
+"""Cells per block; each takes about 100 bytes of temporary memory."""
 
 
-def upright_shape(shape: tuple[int, ...], yaw: float, max_cells: int) -> tuple[tuple[int, int], NDArray[np.float64]]:
-    """Size of the smallest upright grid around a turned image, and where it begins.
+def axis_aligned_shape(
+    shape: tuple[int, ...], yaw: float, max_cells: int
+) -> tuple[tuple[int, int], NDArray[np.float64]]:
+    """Size and lower-left corner of the smallest axis-aligned grid around a rotated image.
 
     Parameters
     ----------
     shape : (height, width)
         Of the image [cells].
     yaw : float
-        Turn [rad] around the corner of cell (0, 0).
+        Rotation [rad] about the corner of cell (0, 0).
     max_cells : int
 
     Returns
     -------
     (height, width) : int
     lower : (2,) float64
-        Lower-left corner (x, y) of the grid [cells], seen from the corner of cell (0, 0).
+        Lower-left corner (x, y) of the grid [cells], relative to the corner of cell (0, 0).
 
     Raises
     ------
     ValueError
-        It has more than ``max_cells`` cells.
+        The grid has more than ``max_cells`` cells.
     """
     height, width = shape
     if math.remainder(yaw, 2.0 * math.pi) == 0.0:
@@ -49,19 +51,23 @@ def upright_shape(shape: tuple[int, ...], yaw: float, max_cells: int) -> tuple[t
     lower = corners.min(axis=0)
     columns, rows = np.ceil(corners.max(axis=0) - lower - 1e-9).astype(int).tolist()
     if rows * columns > max_cells:
-        raise ValueError(f"turned by {yaw:g} rad it needs {columns} x {rows} cells, more than the limit of {max_cells}")
+        raise ValueError(
+            f"rotated by {yaw:g} rad it needs {columns} x {rows} cells, more than the limit of {max_cells}"
+        )
     return (rows, columns), lower
 
 
-def turned_upright(occupancy: OccupancyArray, yaw: float, max_cells: int) -> tuple[OccupancyArray, tuple[float, float]]:
-    """Return the occupancies on an upright grid, and the grid's lower-left corner [cells] seen from the old one.
+def rotated_to_axes(
+    occupancy: OccupancyArray, yaw: float, max_cells: int
+) -> tuple[OccupancyArray, tuple[float, float]]:
+    """Return the occupancies on an axis-aligned grid, and its lower-left corner [cells] relative to the old one.
 
     Parameters
     ----------
     occupancy : (height, width) uint8
         Bottom row first.
     yaw : float
-        Turn [rad] around the corner of cell (0, 0).
+        Rotation [rad] about the corner of cell (0, 0).
     max_cells : int
 
     Raises
@@ -69,7 +75,7 @@ def turned_upright(occupancy: OccupancyArray, yaw: float, max_cells: int) -> tup
     ValueError
         The new grid has more than ``max_cells`` cells.
     """
-    shape, lower = upright_shape(occupancy.shape, yaw, max_cells)
+    shape, lower = axis_aligned_shape(occupancy.shape, yaw, max_cells)
     upright = np.full(shape, UNKNOWN_OCCUPANCY, dtype=np.uint8)
     rotation = plane_rotation(yaw)
     for block in _row_blocks(shape):

@@ -1,4 +1,4 @@
-"""Areas with a meaning of their own: polygons from YAML and mask images, for the keep-out and speed-limit layers.
+"""Zones: polygons from YAML and mask images, for the keep-out and speed-limit layers.
 
 A zones file is a YAML mapping with one list::
 
@@ -6,7 +6,7 @@ A zones file is a YAML mapping with one list::
       - {name: stairs, polygon: [[1.0, 2.0], [3.0, 2.0], [3.0, 4.0]]}
       - {name: ramp, polygon: [[5.0, 0.0], [7.0, 0.0], [7.0, 2.0], [5.0, 2.0]], speed_limit: 0.3}
 
-Coordinates are metres in the costmap's frame, unless the layer is told another (``map_frame``). A mask image is a
+Coordinates are metres in the costmap's frame, unless the layer names another one (``map_frame``). A mask image is a
 map_server map; it may have another grid than the costmap (see ``resampling``).
 """
 
@@ -22,7 +22,7 @@ from mbf_abstract.config.findings import Finding
 from mbf_abstract.config.validation import validate
 from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_abstract.parameters import ParameterModel, parameter
-from mbf_costmap_nav.files.map_description import MapError, read_mapping, told
+from mbf_costmap_nav.files.map_description import MapError, findings_text, read_mapping
 
 
 class Zone(ParameterModel):
@@ -61,10 +61,10 @@ def load_zones(file: Path) -> tuple[Zone, ...]:
     Raises
     ------
     MapError
-        The file is missing, breaks a limit of ``mbf_abstract.config.yaml_source``, or holds something else than zones.
+        The file is missing, breaks a limit of ``mbf_abstract.config.yaml_source``, or holds anything but zones.
     """
     document, findings = read_mapping(file), list[Finding]()
     content = validate(ZonesFile, document.data, document, (), findings)
     if content is None:
-        raise MapError(file, told(findings))
+        raise MapError(file, findings_text(findings))
     return content.zones

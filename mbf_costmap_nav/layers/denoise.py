@@ -1,7 +1,7 @@
 """Denoise layer: frees obstacle cells in groups too small to be real.
 
-When to use: after obstacle layers fed by a sensor that speckles, before the inflation layer. When not: where a thin
-pole may be one cell wide. Cost: one labelling of the changed box, about 10 ns a cell. Known failure: a real thing
+When to use: after obstacle layers fed by a sensor with speckle noise, before the inflation layer. When not: where a
+thin pole may be one cell wide. Cost: one labelling of the changed box, about 10 ns a cell. Known failure: a real thing
 smaller than ``minimal_group_size`` cells is removed too; keep that number small.
 
 A group is a set of obstacle cells connected by sides, or by sides and corners. The rule is Nav2's denoise layer.
@@ -38,7 +38,7 @@ class DenoiseLayer(CostmapLayer):
     parameters: DenoiseLayerParameters
 
     def match_geometry(self, geometry: GridGeometry) -> None:
-        """Forget what the cells held before denoising."""
+        """Drop the record of the cells before denoising."""
         super().match_geometry(geometry)
         self._obstacles = np.zeros((geometry.height, geometry.width), dtype=np.bool_)
 
@@ -54,7 +54,7 @@ class DenoiseLayer(CostmapLayer):
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
         """Free the small groups of the box.
 
-        A group that reaches out of the box is judged by the obstacles remembered there; one that is too small ends
+        A group that extends beyond the box is judged by the obstacles remembered there; one that is too small ends
         within ``minimal_group_size`` cells.
         """
         window = cells[box.slices]

@@ -3,7 +3,7 @@
 The rule is costmap_2d's: 254 at the obstacle; 253 up to the inscribed radius (the robot's centre there means contact
 whatever its heading); beyond it int(252 * exp(-cost_scaling_factor * (distance - inscribed_radius))); nothing beyond
 the inflation radius, which is rounded up to whole cells and is never less than the inscribed radius: cells the robot
-cannot stand on never look free. Distances are exact Euclidean ones between cell centres.
+cannot stand on never count as free. Distances are exact Euclidean ones between cell centres.
 
 When to use: after all layers that mark obstacles, in every map a planner works on. Layers listed after it are not
 inflated. When not: for pure length or any-angle tests, where a gradient of cost bends the paths. Cost: 1 to 2 ns a cell
@@ -53,7 +53,7 @@ class InflationLayer(CostmapLayer):
         self._seeds: NDArray[np.uint8] = np.zeros((0, 0), dtype=np.uint8)
 
     def match_geometry(self, geometry: GridGeometry) -> None:
-        """Size the memory of seeds and the cost table."""
+        """Allocate the seeds and the cost table."""
         super().match_geometry(geometry)
         self._seeds = np.zeros((geometry.height, geometry.width), dtype=np.uint8)
         self._tabulate()
@@ -69,11 +69,11 @@ class InflationLayer(CostmapLayer):
 
     @property
     def lasting(self) -> bool:
-        """It is as lasting as what it inflates; unknown cells are not."""
+        """As lasting as the costs it inflates; not if it inflates unknown cells."""
         return not self.parameters.inflate_around_unknown
 
     def configuration_warning(self) -> str:
-        """Say that the radius is smaller than the robot and is not kept to."""
+        """Warn that the radius is smaller than the inscribed radius and was widened."""
         radius = self.parameters.inflation_radius
         if radius >= self._inscribed_radius:
             return ""
@@ -104,7 +104,8 @@ class InflationLayer(CostmapLayer):
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
         """Inflate the lethal cells the layers before left in the box, and those remembered around it.
 
-        Cells out of the box already hold later layers' costs and must not spread, so the seeds are kept apart.
+        Cells outside the box already hold later layers' costs and must not be inflated, so the seeds are kept
+        separately.
         """
         window = cells[box.slices]
         seeds = window == LETHAL

@@ -6,8 +6,8 @@ in the mask, or use the speed-limit layer. Cost: nothing after the first update,
 Known failure: a robot that stands inside such an area finds no plan; the escape recovery leads out.
 
 Every cell a polygon touches is lethal. A mask's occupancy raises costs in proportion (as Nav2's keep-out filter);
-free and unknown parts of a mask say nothing. Of a mask finer than the map the highest cost in a cell counts, so that a
-line one pixel wide keeps out.
+free and unknown parts of a mask have no effect. Of a mask finer than the map the highest cost in a cell counts, so that
+a line one pixel wide is effective.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class KeepoutLayer(CostmapLayer):
         self._paint()
 
     def shift(self, geometry: GridGeometry, dx: int, dy: int) -> None:
-        """Paint again where the window is now."""
+        """Paint again at the window's new position."""
         super().shift(geometry, dx, dy)
         self._paint()
 
@@ -91,7 +91,7 @@ class KeepoutLayer(CostmapLayer):
         return box.union(changed)
 
     def stale_reason(self, now: float) -> str:
-        """Say that the frame of the areas is unknown."""
+        """Why the areas cannot be placed: their frame is unknown."""
         return self._placement.problem
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:

@@ -1,4 +1,4 @@
-"""Obstacle layer: what planar and 3D sensors see, marked where rays end and cleared along their way.
+"""Obstacle layer: observations of planar and 3D sensors, marked where rays end and cleared along the rays.
 
 When to use: in every map of a robot that has a range finder, below the inflation layer. When not: for overhanging or
 low things that a ray at another height passes over and would clear, use the voxel layer; for sonars with wide cones the
@@ -6,7 +6,7 @@ range sensor layer. Cost: one visit per cell of every ray, about 0.1 ms for 720 
 cell is cleared only by a ray that passes it, so a moved obstacle leaves traces where no ray goes; several sensors at
 different heights clear each other's marks.
 
-The order (clear all, then mark all), the range and height limits and the three ways of combining are costmap_2d's. A
+The order (clear all, then mark all), the range and height limits and the three combination methods are costmap_2d's. A
 source that is silent for longer than its ``expected_update_rate`` makes the map not current; that is on by default.
 """
 
@@ -67,7 +67,7 @@ class ObstacleLayer(GridLayer):
         return first_reason(buffer.stale_reason(now) for buffer in self.buffers.values())
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
-        """Trace the rays of all observations, mark their hits, free the robot's place; report the touched box."""
+        """Trace the rays of all observations, mark hits, free the cells under the robot; report the touched box."""
         touched = np.zeros(4, dtype=np.int64)
         observed = [(buffer.parameters, seen) for buffer in self.buffers.values() for seen in buffer.current(now)]
         for limits, seen in observed:
@@ -110,15 +110,15 @@ class ObstacleLayer(GridLayer):
         combine(cells, self.cells, box, self.parameters.combination_method)
 
     def reset(self) -> None:
-        """Forget all marks and the observations they came from."""
+        """Clear all marks and the observations they came from."""
         super().reset()
-        self._forget_observations()
+        self._drop_observations()
 
     def clear_area(self, box: CellBox, inside: bool) -> None:
-        """Forget the cells inside or outside of ``box``, and the observations, which would mark them again."""
+        """Clear the cells inside or outside of ``box``, and the observations, which would mark them again."""
         super().clear_area(box, inside)
-        self._forget_observations()
+        self._drop_observations()
 
-    def _forget_observations(self) -> None:
+    def _drop_observations(self) -> None:
         for buffer in self.buffers.values():
             buffer.forget()

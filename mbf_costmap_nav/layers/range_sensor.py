@@ -69,16 +69,16 @@ class RangeSensorLayer(CostmapLayer):
         self.probability = shifted(self.probability, dx, dy, UNDECIDED)
 
     def reset(self) -> None:
-        """Forget all readings."""
+        """Clear all readings."""
         self.probability.fill(UNDECIDED)
-        self._forget_waiting()
+        self._drop_waiting()
 
     def clear_area(self, box: CellBox, inside: bool) -> None:
-        """Forget the readings inside or outside of ``box``, and those that wait, which would mark them again."""
+        """Clear the readings inside or outside of ``box``, and the queued ones, which would mark them again."""
         clear_cells(self.probability, box.clipped(self.geometry.box), inside, UNDECIDED)
-        self._forget_waiting()
+        self._drop_waiting()
 
-    def _forget_waiting(self) -> None:
+    def _drop_waiting(self) -> None:
         self._waiting.clear()
         for watch in self.watches.values():
             watch.cleared()
@@ -101,7 +101,7 @@ class RangeSensorLayer(CostmapLayer):
         )
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
-        """Take the waiting readings into the beliefs."""
+        """Update the beliefs with the queued readings."""
         while self._waiting:
             seen = self._waiting.popleft()
             limits = self.parameters.sources[seen.source]

@@ -4,9 +4,9 @@ When to use: ramps, crossings, places with people. When not: to keep the robot o
 cells at all; one look-up per question. Known failure: the limit applies from the moment the robot's centre is inside,
 so draw an area with the distance the robot needs to brake.
 
-It writes no costs. ``LayeredCostmap.speed_limit`` asks it. A zone's ``speed_limit`` is a speed [m/s], or a share of the
-full speed [%] with ``limit_type: percent``. In a mask, limit = ``base`` + ``multiplier`` * occupancy (0..100); free and
-unknown mask cells set no limit (Nav2's speed filter).
+It writes no costs; ``LayeredCostmap.speed_limit`` queries it. A zone's ``speed_limit`` is a speed [m/s], or a share of
+the full speed [%] with ``limit_type: percent``. In a mask, limit = ``base`` + ``multiplier`` * occupancy (0..100); free
+and unknown mask cells set no limit (Nav2's speed filter).
 """
 
 from __future__ import annotations
@@ -52,22 +52,24 @@ class SpeedLimitLayer(CostmapLayer):
         self._mask: Costmap | None = None
         if files.mask_file:
             mask_file = context.base_folder / files.mask_file
-            mask = load_map(mask_file, context.max_cells, confined=context.confine_images).upright(context.max_cells)
+            mask = load_map(mask_file, context.max_cells, confined=context.confine_images).axis_aligned(
+                context.max_cells
+            )
             self._mask = Costmap(mask.occupancy, mask.resolution, mask.origin[0], mask.origin[1], context.frame_id)
         self._placement = Placement(files.map_frame, context)
 
     @property
     def lasting(self) -> bool:
-        """It changes no cell."""
+        """Always true: it changes no cell."""
         return True
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
-        """Look up where the areas lie; they change no cell."""
+        """Look up the transform of the areas; they change no cell."""
         self._placement.refresh()
         return box
 
     def stale_reason(self, now: float) -> str:
-        """Say that the frame of the areas is unknown."""
+        """Why the areas cannot be placed: their frame is unknown."""
         return self._placement.problem
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:

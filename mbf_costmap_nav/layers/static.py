@@ -3,10 +3,10 @@
 When to use: first in the list of a global map; also in a rolling local map, where it is sampled at the window's cells.
 When not: for areas a robot must not enter although they are free, use a keep-out layer, which stays when the map is
 replaced. Cost: nothing after the first update, as its cells never change by themselves; in a rolling map one copy of
-the window for each move by a cell. Known failure: furniture moves; combine it with a layer that sees.
+the window for each move by a cell. Known failure: furniture moves; combine it with a sensor layer.
 
-The map may be given in another frame (``map_frame``), for example under a local costmap in odom: it is then laid
-through the newest transform, and again whenever that changes. While the transform is unknown the layer holds nothing
+The map may be given in another frame (``map_frame``), for example under a local costmap in odom: it is then placed
+by the newest transform, and again whenever that changes. While the transform is unknown the layer holds nothing
 and the costmap is not current. The interpretation of values is costmap_2d's static layer with ``trinary_costmap`` off;
 map files in trinary mode give the same result as with it on.
 """
@@ -38,7 +38,7 @@ class StaticLayerParameters(LayerParameters):
 
 
 LETHAL_SHARE = 0.95
-"""A map with a greater share of occupied cells is hardly what anybody wanted."""
+"""A map with a greater share of occupied cells is probably misconfigured."""
 
 
 class StaticLayer(GridLayer):
@@ -71,7 +71,7 @@ class StaticLayer(GridLayer):
         return self._placement.in_costmap_frame
 
     def configuration_warning(self) -> str:
-        """Say that nearly all of the map is occupied."""
+        """Warn that nearly all of the map is occupied."""
         known = self._map.cells != UNKNOWN
         share = float(np.sum(self._map.cells == LETHAL)) / max(int(np.sum(known)), 1)
         if share < LETHAL_SHARE:
@@ -82,7 +82,7 @@ class StaticLayer(GridLayer):
 
     @property
     def default_value(self) -> int:
-        """Cells out of the map hold no information, whatever unknown means inside of it."""
+        """Cells outside the map hold no information, however unknown cells inside it are treated."""
         return UNKNOWN
 
     def preferred_geometry(self) -> GridGeometry | None:
@@ -103,7 +103,7 @@ class StaticLayer(GridLayer):
         self._sample(CellBox(0, box.y1 - dy, box.x1, box.y1) if dy > 0 else CellBox(0, 0, box.x1, -dy))
 
     def _sample(self, box: CellBox) -> None:
-        """Take each cell's value from the map, no obstacle getting lost; nothing while the map has no place."""
+        """Take each cell's value from the map, without losing obstacles; nothing while the map cannot be placed."""
         box = box.clipped(self.geometry.box)
         if self._placement.known:
             self.cells[box.slices] = sample_costmap(
@@ -111,7 +111,7 @@ class StaticLayer(GridLayer):
             )
 
     def stale_reason(self, now: float) -> str:
-        """Say that the map's frame is unknown."""
+        """Why the map cannot be placed: its frame is unknown."""
         return self._placement.problem
 
     def reset(self) -> None:

@@ -2,7 +2,7 @@
 
 When to use: with depth cameras or 3D lidars, or several planar ones at different heights, where a ray over a low thing
 must not clear it. When not: for one planar lidar the obstacle layer is cheaper and equal. Cost: about twice the
-obstacle layer's for each ray, 8 bytes a cell. Known failure: what reaches above the top voxel is cut off there.
+obstacle layer's for each ray, 8 bytes a cell. Known failure: obstacles above the top voxel are not recorded.
 
 Thresholds and defaults are costmap_2d's voxel layer; a column without any ray keeps the value of unknown space.
 """

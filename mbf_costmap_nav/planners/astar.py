@@ -2,16 +2,16 @@
 
 When to use: the default. It settles only the cells that could lie on a better path and finds the same cost as
 ``costmap.dijkstra``. When not: the path turns in steps of 45 degrees (``theta_star`` or a smoother give straight
-lines), and it does not know the robot's turning circle (``hybrid_astar``).
+lines), and it ignores the robot's turning radius (``hybrid_astar``).
 
 Cost: about 20 ns per settled cell; across 1000 x 1000 cells in some 7 ms.
 
-``interpolated_potential`` spreads navfn's potential from the goal and follows its gradient from the start, as navfn's
-A* does. Unlike there no cell is ever dropped, so a path is found wherever there is one, and the spreading is not
-directed: the values are exact only if all lower ones come first, and directing it was measured to save no time.
+``interpolated_potential`` propagates navfn's potential from the goal and follows its gradient from the start, as
+navfn's A* does. Unlike there no cell is ever dropped, so a path is found wherever there is one, and the propagation
+uses no heuristic: values are exact only in ascending order, and a heuristic was measured to save no time.
 
 Formula: Hart, Nilsson, Raphael 1968 with the octile distance as heuristic; the open list is a ring of buckets, see
-``kernels.grid_search``.
+``kernels.search.grid_search``.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class AStarPlanner(GridPlanner):
     parameters: AStarParameters
 
     def search(self, grid: SearchGrid, start: Pose, goal: Pose, tolerance: float) -> Leg:
-        """Search from the start; a goal that is not reached leaves the whole reachable field to choose from."""
+        """Search from the start; if the goal is not reached, the nearest reachable cell is taken."""
         if self.parameters.interpolated_potential:
             return plan_down_potential(grid, start, goal, tolerance, interpolated=True)
         cut, goal_cell = self.parameters.cut_corners, grid.cell_of(goal)

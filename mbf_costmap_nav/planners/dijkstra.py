@@ -11,7 +11,7 @@ update instead, which is within 5 % of the Euclidean distance, the closer the fa
 Cost: about 15 ns per cell of the whole free space nearer than the start.
 
 Formula: Dijkstra 1959; gradient descent as in navfn (Brock and Khatib 1999) with bilinear interpolation; the quadratic
-update in ``kernels.open_list.relax_interpolated``.
+update in ``kernels.search.relaxing``.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class DijkstraPlanner(GridPlanner):
     parameters: DijkstraParameters
 
     def search(self, grid: SearchGrid, start: Pose, goal: Pose, tolerance: float) -> Leg:
-        """Spread from the goal to the start and walk downhill."""
+        """Propagate from the goal to the start and descend the field."""
         p = self.parameters
         potential, gradient = p.interpolated_potential, p.gradient_path
         return plan_down_potential(grid, start, goal, tolerance, interpolated=potential, gradient_path=gradient)

@@ -1,12 +1,12 @@
-"""Hybrid A*: paths a car-like robot can drive, with its turning circle, its heading at the goal, and reversing.
+"""Hybrid A*: paths a car-like robot can drive, with its turning radius, its heading at the goal, and reversing.
 
 When to use: Ackermann robots, and long robots that do not fit everywhere at every heading. When not: robots that turn
 in place; ``costmap.astar`` or ``costmap.theta_star`` are 10 to 100 times faster and give shorter paths.
 Known failure: like every search with bins it can miss a passage hardly wider than the robot; ``max_states`` bounds the
-time it takes to say so.
+time until it reports failure.
 
-Formula: Dolgov et al. 2010, curves after Dubins and after Reeds and Shepp; see ``kernels.hybrid_astar`` and
-``kernels.car_curves``. The footprint is checked all along the path, whose poses are at most a cell apart. The goal
+Formula: Dolgov et al. 2010, curves after Dubins and after Reeds and Shepp; see ``kernels.car.hybrid_astar`` and
+``kernels.car.curves``. The footprint is checked all along the path, whose poses are at most a cell apart. The goal
 tolerance applies where the robot does not fit at the goal or cannot get there: the path then ends at the nearest place
 within it that can be reached at the goal's heading (exactly, or within half a bin of the search).
 """
@@ -41,11 +41,11 @@ FloatArray = NDArray[np.float64]
 UNKNOWN_AS = 252
 """Cost of the unknown cells that may be driven through, as for the other planners."""
 DEFAULT_RADIUS = 0.5
-"""Tightest curve [m] where neither the parameters nor the robot tell one."""
+"""Radius [m] of the tightest curve where neither the parameters nor the robot give one."""
 CELLS_OF_BINS = (2.0, 1.0, 0.5, 0.25)
-"""Sides [cells] of the bins: coarse ones first, an eighth of the states; what they cannot reach, finer ones may."""
+"""Sides [cells] of the bins: coarse ones first, for an eighth of the states; then finer ones."""
 STATES_THAT_SHOW = 20_000
-"""With so many states tried in bins of a cell or less, finer ones are not asked: there is no way."""
+"""After so many states in bins of a cell or less finer ones are not tried: there is no path."""
 
 
 class HybridAStarParameters(PluginParameters):
@@ -60,7 +60,7 @@ class HybridAStarParameters(PluginParameters):
     )
     allow_reversing: bool = parameter(True, "Reeds-Shepp curves; otherwise Dubins curves, forward only.")
     allow_unknown: bool = parameter(True, "Plan through unknown cells, counted like cost 252.")
-    cost_factor: float = parameter(2.0, "How much longer a way through cells of cost 252 counts.", ge=0.0, le=1000.0)
+    cost_factor: float = parameter(2.0, "Relative extra length of a path through cells of cost 252.", ge=0.0, le=1000.0)
     reverse_penalty: float = parameter(2.0, "Factor on the length driven backward.", ge=1.0, le=100.0)
     change_penalty: float = parameter(0.3, "Cost of a change of direction.", unit="m", ge=0.0, le=100.0)
     turning_penalty: float = parameter(1.05, "Factor on the length of curves.", ge=1.0, le=100.0)
@@ -74,7 +74,7 @@ class HybridAStarParameters(PluginParameters):
 
 @dataclass(frozen=True)
 class _World:
-    """One snapshot, and the robot on it: ``samples`` (n, 2) [m] cover its footprint, ``unknown`` cells cost that."""
+    """One snapshot and the robot on it: footprint ``samples`` (n, 2) [m], and the cost of ``unknown`` cells."""
 
     grid: SearchGrid
     samples: FloatArray
@@ -102,7 +102,7 @@ class _World:
 
 @dataclass(frozen=True)
 class _Leg:
-    """What came of the search between two poses (``status`` as of the kernel); without poses there is no way."""
+    """Result of the search between two poses (``status`` of the kernel); without poses there is no path."""
 
     status: int
     poses: FloatArray
@@ -155,7 +155,7 @@ class HybridAStarPlanner(CostmapPlanner):
         return _World(grid, samples, UNKNOWN_AS if may_enter else LETHAL)
 
     def _search(self, world: _World, start: Pose, goal: Pose, tolerance: float) -> _Leg | None:
-        """Search to the goal or, if it cannot be reached, to what can within the tolerance; None if nothing can."""
+        """Search to the goal or, if it is unreachable, to a reachable place within the tolerance; None without one."""
         grid, wanted, from_start = world.grid, goal, world.field(start)
         if not world.fits(goal) or math.isinf(from_start[grid.index(grid.cell_of(goal))]):
             end = None if grid.token.cancelled else grid.nearest_reached(from_start, goal, tolerance, world.samples)
@@ -181,7 +181,7 @@ class HybridAStarPlanner(CostmapPlanner):
         return _Leg(status, poses, cost, states)
 
     def _car(self, resolution: float, cells: float) -> Car:
-        """The car as the search takes it, with bins of so many cells."""
+        """The kinematic model for the search, with bins of so many cells."""
         p, radius = self.parameters, self.turning_radius
         # An arc leaves its bin, and turns by a bin of the headings at least; in fine bins, for tight places, by a part.
         step = max(1.5 * cells * resolution, min(1.0, cells) * 2.0 * math.pi / HEADINGS * radius)
@@ -198,22 +198,22 @@ class HybridAStarPlanner(CostmapPlanner):
         )
 
     def _no_way(self, world: _World, start: Pose, goal: Pose, leg: _Leg | None, tolerance: float) -> PlanResult:
-        """Say whether the goal is walled off, the car cannot get there, or the search gave up."""
+        """Failure with its cause: the goal is walled off, the car cannot get there, or the search gave up."""
         ends = f"from ({start.x:.2f}, {start.y:.2f}) to ({goal.x:.2f}, {goal.y:.2f})"
         if leg is None and not world.fits(goal):
             text = f"the robot does not fit at the goal ({goal.x:.2f}, {goal.y:.2f}, {goal.yaw:.2f} rad)"
             text += f", and no place within {tolerance:.2f} m of it can be reached"
             return PlanResult(GetPathOutcome.BLOCKED_GOAL, text)
         if leg is None:
-            return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no way {ends}, not even for a robot that is a point")
+            return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no path {ends}, not even for a point robot")
         if leg.status == GAVE_UP:
-            text = f"no way {ends} within {leg.states} states; there may be one, see max_states"
+            text = f"no path {ends} within {leg.states} states; there may be one, see max_states"
             return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)
-        return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no drivable way {ends}, all {leg.states} states were tried")
+        return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no drivable path {ends}, all {leg.states} states were tried")
 
 
 def _misfit(world: _World, name: str, pose: Pose, tolerance: float = 0.0) -> PlanResult | None:
-    """Why nothing can be planned to or from a pose, if it shows without a search."""
+    """Why nothing can be planned to or from a pose, if that is known without a search."""
     problem = off_map(world.costmap, pose, name, tolerance)
     if problem or tolerance > 0.0 or world.fits(pose):
         return problem
@@ -228,6 +228,6 @@ def _planar(pose: Pose) -> FloatArray:
 
 
 def to_path(poses: FloatArray, heights: FloatArray, frame_id: str, stamp: float) -> Path:
-    """Path of poses (n, 3: x, y, yaw) at heights (n,); where the robot reverses the headings look against the way."""
+    """Path of poses (n, 3: x, y, yaw) at heights (n,); in reverse, headings point against the motion."""
     orientations = np.array([quaternion_from_yaw(yaw) for yaw in poses[:, 2]])
     return Path(np.column_stack([poses[:, :2], heights]), orientations, frame_id, stamp)

@@ -1,6 +1,6 @@
 """The straight line from start to goal, if it is free; no search.
 
-When to use: docking and other last metres that must not wander, tests, and as a first try before a search. When not:
+When to use: docking and other final approaches that must be straight, tests, and before a search. When not:
 anything between start and goal that must be driven around; it answers NO_PATH_FOUND.
 
 Cost: microseconds. With a goal tolerance the line may end at its last free cell within the tolerance.
@@ -22,7 +22,7 @@ from mbf_costmap_nav.planning.grid_planning import NO_LEG, GridPlanner, Leg
 from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid
 
 SAMPLES_PER_CELL = 10
-"""For the cost of a line: how many samples a cell's length has."""
+"""Samples per cell length for the cost of a line."""
 
 
 class StraightLineParameters(GridPlannerParameters):

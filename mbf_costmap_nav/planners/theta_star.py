@@ -1,15 +1,15 @@
 """Theta*: paths of few straight pieces at any angle.
 
-When to use: long straight runs matter (fast robots, smooth heading) and a car's turning circle does not. When not: the
-exact optimum is asked for (``costmap.astar`` on the eight directions; Theta* is a heuristic, typically within 1 % of
+When to use: long straight runs matter (fast robots, smooth heading) and the turning radius does not. When not: the
+exact optimum is required (``costmap.astar`` on the eight directions; Theta* is a heuristic, typically within 1 % of
 the any-angle optimum and never longer than the octile one), or smooth corners are needed (put ``costmap.smoother``
 behind it).
 
 Cost: twice ``costmap.astar``.
 
-Formula: Lazy Theta* (Nash, Koenig, Tovey 2010), see ``kernels.theta_star``; lines end after a few cells during the
-search and are joined afterwards (``kernels.grid_line.pull_string``). ``spacing`` fills the pieces with poses, as
-controllers that look only at poses want them.
+Formula: Lazy Theta* (Nash, Koenig, Tovey 2010), see ``kernels.search.theta_star``; lines end after a few cells during
+the search and are joined afterwards (``kernels.search.grid_line.pull_string``). ``spacing`` fills the pieces with
+poses, as controllers that look only at poses want them.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class ThetaStarPlanner(GridPlanner):
         return self.parameters.spacing
 
     def search(self, grid: SearchGrid, start: Pose, goal: Pose, tolerance: float) -> Leg:
-        """Search and pull the string."""
+        """Search, then shorten by string pulling."""
         goal_cell, source = grid.cell_of(goal), grid.index(grid.cell_of(start))
         last, flag = grid.index(goal_cell), grid.token.flag
         status, g, origin = theta_search(grid.cells, grid.stride, grid.table, source, last, flag)

@@ -1,7 +1,7 @@
-"""What the grid planners share: the checks, tolerance and via poses, and the way from cells to a path.
+"""What the grid planners share: the checks, tolerance and via poses, and the conversion of cells to a path.
 
 A grid planner derives ``GridPlanner`` and writes one method, ``search``: from a start to a goal on a ``SearchGrid``.
-Everything a client can ask for beside that - exact start and goal poses, goal tolerance, via poses, outcomes with a
+Everything else a client can request - exact start and goal poses, goal tolerance, via poses, outcomes with a
 message that names cell, cost and distance, cancelling - is done once, here.
 """
 
@@ -36,7 +36,7 @@ class Leg:
     """What a search found: points on the map from the start to the end, and the cost [m, weighted].
 
     ``reached_goal`` is False where the leg ends at the nearest reachable cell within the tolerance instead. Without a
-    way, or when the token was set, there are no points.
+    path, or when the token was set, there are no points.
     """
 
     points: NDArray[np.float64]
@@ -55,7 +55,7 @@ class GridPlanner(CostmapPlanner):
 
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)
-        self._room = SearchWorkspace()
+        self._workspace = SearchWorkspace()
 
     @property
     def pose_spacing(self) -> float:
@@ -64,15 +64,15 @@ class GridPlanner(CostmapPlanner):
 
     @abstractmethod
     def search(self, grid: SearchGrid, start: Pose, goal: Pose, tolerance: float) -> Leg:
-        """Find a way from ``start``, in a free cell, to the goal or to a reachable cell within ``tolerance`` [m] of it.
+        """Find a path from ``start``, in a free cell, to the goal or a reachable cell within ``tolerance`` [m] of it.
 
-        The grid's token is to be polled.
+        Implementations poll the grid's cancel token.
         """
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Plan from the start over the via poses to the goal."""
         check_tolerance(request.dist_tolerance)
-        grid = SearchGrid.build(self.costmap.snapshot(), self.parameters, request.cancel_token, self._room)
+        grid = SearchGrid.build(self.costmap.snapshot(), self.parameters, request.cancel_token, self._workspace)
         poses = (request.start, *request.via, request.goal)
         failure = self._check_start(grid, request.start)
         pieces: list[NDArray[np.float64]] = []
@@ -116,12 +116,12 @@ def unless_lasting(
     tolerance: float,
     lethal_cost: int = INSCRIBED,
 ) -> PlanResult:
-    """Return a failure to find a way, as a permanent one where lasting walls part start and goal."""
+    """Return a failure to find a path; it is permanent where permanent walls separate start and goal."""
     if failure.outcome not in (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL):
         return failure
     if not stays_unreachable(costmap, start, goal, tolerance, lethal_cost):
         return failure
-    text = f"{failure.message}; walls of the static map part them, whatever else moves away"
+    text = f"{failure.message}; walls of the static map separate them"
     return replace(failure, message=text, permanent=True)
 
 
@@ -132,7 +132,7 @@ def check_tolerance(tolerance: float) -> None:
 
 
 def off_map(costmap: Costmap, pose: Pose, name: str, tolerance: float = 0.0) -> PlanResult | None:
-    """Say that a pose is off the map, unless a cell's centre is within ``tolerance`` [m] of it."""
+    """Failure for a pose off the map, unless a cell's centre is within ``tolerance`` [m] of it."""
     centre = costmap.cell_to_world(*costmap.world_to_cell_clamped(pose.x, pose.y))
     if costmap.contains(pose.x, pose.y) or math.dist(centre, (pose.x, pose.y)) <= tolerance:
         return None
@@ -151,14 +151,14 @@ def _blocked(grid: SearchGrid, name: str, pose: Pose, cell: Cell) -> str:
 
 
 def _no_path(grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, name: str) -> PlanResult:
-    """Tell a goal without a reachable cell around it from a goal behind walls."""
+    """Failure that distinguishes a goal without a reachable cell around it from a goal behind walls."""
     cell = grid.cell_of(goal)
     if grid.is_blocked(cell) or not grid.costmap.contains(goal.x, goal.y):
         text = f"{_blocked(grid, name, goal, cell)}, and no cell within {tolerance:.2f} m of it can be reached"
         return PlanResult(GetPathOutcome.BLOCKED_GOAL, text)
     distance = math.hypot(goal.x - start.x, goal.y - start.y)
     text = (
-        f"no way from ({start.x:.2f}, {start.y:.2f}) to the {name} ({goal.x:.2f}, {goal.y:.2f}), {distance:.2f} m away"
+        f"no path from ({start.x:.2f}, {start.y:.2f}) to the {name} ({goal.x:.2f}, {goal.y:.2f}), {distance:.2f} m away"
     )
     return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)
 
@@ -166,7 +166,7 @@ def _no_path(grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, name: 
 def _with_exact_ends(
     grid: SearchGrid, points: NDArray[np.float64], start: Pose, goal: Pose | None
 ) -> NDArray[np.float64]:
-    """Put the exact start, and the exact goal if it was reached, in the place of the centres of their cells."""
+    """Replace the cell centres at the ends by the exact start, and by the exact goal if it was reached."""
     points = _from_exactly(grid, np.array([start.x, start.y]), points)
     return points if goal is None else _from_exactly(grid, np.array([goal.x, goal.y]), points[::-1])[::-1]
 
@@ -174,7 +174,7 @@ def _with_exact_ends(
 def _from_exactly(grid: SearchGrid, exact: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Begin with a point of the first point's cell instead of that point, and of what lies as near.
 
-    Where the line from there to the rest is blocked, all points stay: in its own cell it is free.
+    Where the line from there to the rest is blocked, all points are kept: a line within one cell is free.
     """
     if len(points) == 1:
         return np.stack([exact, points[0]])
@@ -184,7 +184,7 @@ def _from_exactly(grid: SearchGrid, exact: NDArray[np.float64], points: NDArray[
 
 
 def heights_along(points: NDArray[np.float64], request: PlanRequest) -> NDArray[np.float64]:
-    """Heights [m] of a path on a flat map: from the start's to the goal's in even measure, as no map knows better."""
+    """Heights [m] of a path on a flat map: interpolated linearly from the start's to the goal's."""
     along = arc_lengths(points)
     share = along / along[-1] if along[-1] > 0.0 else along
     return np.asarray(request.start.z + share * (request.goal.z - request.start.z))
@@ -193,7 +193,7 @@ def heights_along(points: NDArray[np.float64], request: PlanRequest) -> NDArray[
 def _assemble(
     pieces: list[NDArray[np.float64]], request: PlanRequest, reached_goal: bool, frame_id: str, stamp: float
 ) -> Path:
-    """Join the legs; inner poses head along the path, the first and the last keep the orientations asked for."""
+    """Join the legs; inner poses head along the path, the first and the last keep the requested orientations."""
     points = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
     path = Path.from_points(np.column_stack([points, heights_along(points, request)]), request.goal.orientation)
     assert path.orientations is not None

@@ -1,7 +1,7 @@
-"""Whether a goal stays out of reach whatever moves away: what walls and keep-out areas alone make of the map.
+"""Whether a goal is permanently unreachable: separated by walls and keep-out areas alone.
 
-On the map as it is, a wall and a closed box that somebody put there look the same. Here the question is asked again
-on the map of those layers that no sensor writes: where even that has no way, waiting and trying again are useless.
+On the current map a wall and a movable box look the same. So the search is repeated on the map of those layers that no
+sensor writes: where even that has no path, waiting and trying again are useless.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ EIGHT_NEIGHBOURS = np.ones((3, 3), dtype=bool)
 def stays_unreachable(
     costmap: LayeredCostmap, start: Pose, goal: Pose, tolerance: float, lethal_cost: int = INSCRIBED
 ) -> bool:
-    """Whether lasting walls part a start from all cells within ``tolerance`` [m] of a goal.
+    """Whether lasting walls separate a start from all cells within ``tolerance`` [m] of a goal.
 
-    Doubt speaks for a way: unknown cells, corners that are cut, and costs below the inscribed one count as free, and
-    nothing is said of a start that stands in a wall or of poses off the map. ``lethal_cost`` is the planner's.
+    The test is conservative: unknown cells, cut corners and costs below the inscribed one count as free, and the answer
+    is false for a start in a wall and for poses off the map. ``lethal_cost`` is the planner's.
     """
     walls = costmap.lasting()
     if walls is None or not (walls.contains(start.x, start.y) and walls.contains(goal.x, goal.y)):

@@ -1,6 +1,6 @@
 """Binds nav_core-style plugins (``mbf_abstract.server.nav_core``) to the costmaps, for types that are no MBF plugins.
 
-The map an old plugin gets is the ``LayeredCostmap`` its kind is bound to; in place of a transform listener it gets the
+Such a plugin gets the ``LayeredCostmap`` its kind is bound to; in place of a transform listener it gets the
 robot information (``pose()``, ``velocity()``).
 """
 
@@ -40,7 +40,7 @@ class WrappedPlanner(CostmapPlanner):
         self._planner.initialize(self.name, self.costmap)
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
-        """Ask the old planner."""
+        """Call the nav_core planner."""
         return plan_with(self._planner, request)
 
 
@@ -55,15 +55,15 @@ class WrappedController(CostmapController):
         self._controller.initialize(self.name, self.robot, self.costmap)
 
     def set_plan(self, path: Path) -> bool:
-        """Hand the poses over."""
+        """Pass the poses on."""
         return bool(self._controller.set_plan(list(path)))
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
-        """Ask the old controller."""
+        """Call the nav_core controller."""
         return control_with(self._controller)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
-        """Ask the old controller, which has tolerances of its own."""
+        """Call the nav_core controller, which has tolerances of its own."""
         return bool(self._controller.is_goal_reached())
 
 
@@ -78,7 +78,7 @@ class WrappedRecovery(CostmapRecovery):
         self._behavior.initialize(self.name, self.robot, self.global_costmap, self.local_costmap)
 
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
-        """Run the old behavior."""
+        """Run the nav_core behavior."""
         return recover_with(self._behavior)
 
 

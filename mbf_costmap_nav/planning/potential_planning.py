@@ -1,4 +1,4 @@
-"""Planning down a potential (navfn's job): spread costs from the goal to the start, then walk downhill.
+"""Planning down a potential (navfn's job): propagate costs from the goal to the start, then descend.
 
 When to use: by planners whose path follows a field instead of a chain of predecessors. When not: the exact cell path
 to one goal, which ``kernels.grid_search.search`` and ``trace_cells`` give with one search from the start.
@@ -19,7 +19,7 @@ from mbf_costmap_nav.planning.search_grid import Cell, SearchGrid
 def plan_down_potential(
     grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, *, interpolated: bool, gradient_path: bool = True
 ) -> Leg:
-    """Spread from the goal to the start and walk back; a blocked goal is first replaced by the nearest reachable cell.
+    """Propagate from the goal to the start and descend; a blocked goal is first replaced by the nearest reachable cell.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def plan_down_potential(
     """
     source, end = grid.index(grid.cell_of(start)), grid.cell_of(goal)
     reached_goal = True
-    g = _spread(grid, end, source, interpolated) if not grid.is_blocked(end) else None
+    g = _propagate(grid, end, source, interpolated) if not grid.is_blocked(end) else None
     if not grid.token.cancelled and (g is None or np.isinf(g[source])):
         g, reached_goal = _from_nearest_end(grid, start, goal, tolerance, interpolated), False
     if g is None:
@@ -49,12 +49,12 @@ def _from_nearest_end(
     grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, interpolated: bool
 ) -> NDArray[np.float32] | None:
     """Field up to the start from the reachable cell nearest to the goal; None without one, or when cancelled."""
-    from_start = _spread(grid, grid.cell_of(start), -1, interpolated)
+    from_start = _propagate(grid, grid.cell_of(start), -1, interpolated)
     end = None if from_start is None else grid.nearest_reached(from_start, goal, tolerance)
-    return None if end is None else _spread(grid, end, grid.index(grid.cell_of(start)), interpolated)
+    return None if end is None else _propagate(grid, end, grid.index(grid.cell_of(start)), interpolated)
 
 
-def _spread(grid: SearchGrid, source: Cell, until: int, interpolated: bool) -> NDArray[np.float32] | None:
+def _propagate(grid: SearchGrid, source: Cell, until: int, interpolated: bool) -> NDArray[np.float32] | None:
     """Field from ``source`` up to the padded index ``until``, or everywhere for -1; None when cancelled."""
     first, flag = grid.index(source), grid.token.flag
     status, g = search(

@@ -1,4 +1,4 @@
-"""One snapshot of a costmap as the grid planners search it: padded, weighted, and asked about lines and ends.
+"""One snapshot of a costmap for the grid planners: padded, weighted, with queries for lines and goal cells.
 
 When to use: by planners that search over cells. When not: anything that only looks cells up; ``Costmap`` does that.
 """
@@ -23,17 +23,17 @@ from mbf_costmap_nav.kernels.search.search_cells import Records, new_records
 Cell = tuple[int, int]
 
 NO_ROBOT = np.zeros((0, 2))
-"""Covering points of a robot that fits everywhere."""
+"""Footprint samples of a robot that fits everywhere."""
 
 
 class GridPlannerParameters(PluginParameters):
     """Parameters every grid planner has."""
 
     cost_factor: float = parameter(
-        3.0, "How much longer a way through cells of cost 252 counts, in lengths; 0 = shortest way.", ge=0.0, le=1000.0
+        3.0, "Relative extra length of a path through cells of cost 252; 0 = shortest path.", ge=0.0, le=1000.0
     )
     lethal_cost: int = parameter(
-        253, "Cells of this cost and above are obstacles (unknown is asked apart).", ge=1, le=254
+        253, "Cells of this cost and above are obstacles (unknown has a parameter of its own).", ge=1, le=254
     )
     allow_unknown: bool = parameter(True, "Plan through unknown cells, counted like cost 252.")
 
@@ -41,14 +41,14 @@ class GridPlannerParameters(PluginParameters):
 class SearchWorkspace:
     """Memory of one planner's grid searches, kept from plan to plan.
 
-    Fresh pages from the system take a tenth of a search, and twice as long as the search after others used them.
+    Getting fresh pages from the system takes a tenth of a search, and twice as long as a search if others used them.
     """
 
     def __init__(self) -> None:
         self._records = new_records(0)
 
     def records(self, count: int) -> Records:
-        """Return ``count`` records that hold anything, the same ones for the same count."""
+        """Return ``count`` uninitialised records, the same ones for the same count."""
         if len(self._records) != count:
             self._records = new_records(count)
         return self._records
@@ -68,9 +68,9 @@ class SearchGrid:
     table : (256,) float32
         Traversal of each cost, 1 for free, inf for blocked.
     token : CancelToken
-        Ends long answers early; what they say then means nothing.
-    room : SearchWorkspace
-        The planner's memory for ``grid_search.search``, of which the last one's result stands in it.
+        Ends long searches early; their results are then invalid.
+    workspace : SearchWorkspace
+        The planner's memory for ``grid_search.search``; it holds the result of the last search.
     """
 
     costmap: Costmap
@@ -78,7 +78,7 @@ class SearchGrid:
     stride: int
     table: NDArray[np.float32]
     token: CancelToken
-    room: SearchWorkspace
+    workspace: SearchWorkspace
 
     @classmethod
     def build(
@@ -86,9 +86,9 @@ class SearchGrid:
         costmap: Costmap,
         parameters: GridPlannerParameters,
         token: CancelToken,
-        room: SearchWorkspace | None = None,
+        workspace: SearchWorkspace | None = None,
     ) -> SearchGrid:
-        """Prepare a snapshot by the costs a planner wants."""
+        """Prepare a snapshot with the costs of a planner."""
         table = traversal_table(parameters.cost_factor, parameters.lethal_cost, parameters.allow_unknown)
         return cls(
             costmap,
@@ -96,12 +96,12 @@ class SearchGrid:
             costmap.width + 2,
             table,
             token,
-            room or SearchWorkspace(),
+            workspace or SearchWorkspace(),
         )
 
     def records(self) -> Records:
-        """Return memory for a search on this grid; what stands in it is that of the last one."""
-        return self.room.records(self.cells.size)
+        """Return memory for a search on this grid; it holds the records of the last one."""
+        return self.workspace.records(self.cells.size)
 
     @property
     def geometry(self) -> NDArray[np.float64]:
@@ -136,7 +136,7 @@ class SearchGrid:
     ) -> Cell | None:
         """Cell of finite ``g`` whose centre is nearest to the goal, at most ``tolerance`` [m] away; None without one.
 
-        Equally near cells are told apart by their ``g``. With covering points ``samples`` (n, 2) [m] the robot must fit
+        Of equally near cells the one of lower ``g`` counts. With footprint ``samples`` (n, 2) [m] the robot must fit
         there at the goal's heading.
         """
         unknown = LETHAL if math.isinf(self.table[UNKNOWN]) else LETHAL - 2
@@ -148,7 +148,7 @@ class SearchGrid:
 
 
 def traversal_table(cost_factor: float, lethal_cost: int, allow_unknown: bool) -> NDArray[np.float32]:
-    """(256,) float32: what a cell's cost makes of a metre, 1 + cost_factor * cost / 252; inf where blocked."""
+    """(256,) float32: weight of a metre by cell cost, 1 + cost_factor * cost / 252; inf where blocked."""
     costs = np.minimum(np.arange(256), 252)
     table = (1.0 + cost_factor * costs / 252.0).astype(np.float32)
     table[lethal_cost:UNKNOWN] = np.inf

@@ -4,9 +4,9 @@ When to use: the planner answers BLOCKED_START or a controller COLLISION because
 lethal or inscribed. When not: the marks are ghosts; clear the costmap first. It stops (IMPASSABLE) where neither
 direction is better than staying.
 
-Rule: among forward, back and both turns, each tried over ``probe_distance``, take the one with the fewest covering
-points of the footprint on lethal cells or off the map, and then the lowest cost at the centre; repeat until the centre
-is below ``free_cost``. An unknown cell there is free, as nothing is known to be hit; outside the map is not.
+Rule: among forward, back and both turns, each tried over ``probe_distance``, take the one with the fewest footprint
+samples on lethal cells or off the map, and then the lowest cost at the centre; repeat until the centre
+is below ``free_cost``. An unknown cell there counts as free; outside the map does not.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class EscapeRecovery(CostmapRecovery, GuardedRecovery):
         return RecoveryResult(result.outcome, f"{result.message or 'free'}, moved {moved:.2f} m")
 
     def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
-        """As of all recoveries, but the motion may begin in a collision of any depth: it was chosen to lead out."""
+        """As for all recoveries, but the motion may begin in a collision of any depth: it was chosen to lead out."""
         costmap, duration = self.costmap.snapshot(), self.parameters.check_ahead_time
         there = self.on_map(pose)
         return obstacle_ahead(costmap, self.costmap.footprint, there, command, duration, leaves_collisions=True)

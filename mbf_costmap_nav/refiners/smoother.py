@@ -1,13 +1,13 @@
-"""Smooth a path: round its corners, keep clear of obstacles, and tell whether the robot can drive the curves.
+"""Smooth a path: round its corners, keep clear of obstacles, and check that the robot can drive the curves.
 
 When to use: behind a grid planner (A*, Theta*), before a controller that follows exactly. When not: paths of
 ``costmap.hybrid_astar``, which are drivable already - smoothing ignores headings and would break their curvature.
 
 The end poses stay, and so do the heights along the path. A path in another frame than the costmap's is smoothed there
 and handed back in its own. A path that drives backward somewhere is handed back unchanged. With ``max_curvature`` the
-pull to the original path is lowered until the largest curvature of the path is below it; if that fails, or if the path
-runs through lethal cells before and after, the outcome is FAILURE, the message names the place, and the path of the
-result is the one given.
+weight of the original path is lowered until the largest curvature of the path is below it; if that fails, or if the
+path runs through lethal cells before and after, the outcome is FAILURE, the message names the place, and the path of
+the result is the one given.
 
 Formula: the gradient smoother of Dolgov et al. 2010 without its Voronoi term, with a hard limit of the cost instead.
 """
@@ -36,7 +36,7 @@ from mbf_costmap_nav.plugins import CostmapRefiner
 FloatArray = NDArray[np.float64]
 
 SOFTER = 0.25
-"""Each further attempt for the curvature multiplies the pull to the original path by this."""
+"""Each further attempt for the curvature multiplies the weight of the original path by this."""
 ATTEMPTS = 6
 LETHAL_STEP = 0.1
 """Distance [cells] of the places at which the result is looked up."""
@@ -45,8 +45,8 @@ LETHAL_STEP = 0.1
 class SmootherParameters(PluginParameters):
     """Parameters of ``costmap.smoother``."""
 
-    data_weight: float = parameter(0.1, "Pull of each point to where it was.", gt=0.0, lt=1.0)
-    smooth_weight: float = parameter(0.35, "Pull of each point between its neighbours.", gt=0.0, lt=0.5)
+    data_weight: float = parameter(0.1, "Weight of a point's original position.", gt=0.0, lt=1.0)
+    smooth_weight: float = parameter(0.35, "Weight of the midpoint of a point's neighbours.", gt=0.0, lt=0.5)
     spacing: float = parameter(0.1, "Largest distance of two poses.", unit="m", gt=0.0, le=5.0)
     highest_cost: int = parameter(
         200, "Points are not moved to cells of more than this, unless it is better.", ge=0, le=252
@@ -73,7 +73,9 @@ class SmootherRefiner(CostmapRefiner):
         try:
             T_costmap_path = self.transforms.lookup(costmap.frame_id, path.frame_id)
         except TransformError as error:
-            return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path cannot be laid on the costmap: {error}", path)
+            return RefineResult(
+                RefinePathOutcome.MAP_ERROR, f"the path cannot be transformed to the costmap's frame: {error}", path
+            )
         there = T_costmap_path.apply_to_path(path)
         if not costmap.world_to_cells(there.positions)[1].all():
             return RefineResult(RefinePathOutcome.MAP_ERROR, f"the path leaves {costmap}", path)
@@ -90,7 +92,7 @@ class SmootherRefiner(CostmapRefiner):
         return RefineResult(RefinePathOutcome.SUCCESS, "", _with_ends_of(path, refined))
 
     def _drivable(self, costmap: Costmap, points: FloatArray, token: CancelToken) -> FloatArray | RefineResult:
-        """Smoothed points (n, 2) [m] below the largest curvature and off lethal cells, or what is wrong."""
+        """Smoothed points (n, 2) [m] below the largest curvature and off lethal cells, or the reason of a failure."""
         p = self.parameters
         data_weight = p.data_weight
         for _ in range(ATTEMPTS):

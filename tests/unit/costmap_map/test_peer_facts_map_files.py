@@ -157,21 +157,21 @@ def test_a_turned_map_larger_than_the_limit_is_refused_before_memory_is_taken(tm
     Image.fromarray(np.full((1, 2000), 254, dtype=np.uint8)).save(tmp_path / "map.png")
     (tmp_path / "map.yaml").write_text("{image: map.png, resolution: 0.05, origin: [0, 0, 0.785]}")
     says = "1416 x 1415 cells, more than the limit of 1000000"
-    with pytest.raises(MapError, match=rf"map\.png: turned by 0\.785 rad it needs {says}"):
+    with pytest.raises(MapError, match=rf"map\.png: rotated by 0\.785 rad it needs {says}"):
         load_map(tmp_path / "map.yaml", max_cells=1_000_000)
     with pytest.raises(ValueError, match=says):
-        OccupancyMap(np.zeros((1, 2000), np.uint8), 0.05, (0.0, 0.0, 0.785)).upright(max_cells=1_000_000)
-    assert load_map(tmp_path / "map.yaml").upright().occupancy.shape == (1415, 1416)
+        OccupancyMap(np.zeros((1, 2000), np.uint8), 0.05, (0.0, 0.0, 0.785)).axis_aligned(max_cells=1_000_000)
+    assert load_map(tmp_path / "map.yaml").axis_aligned().occupancy.shape == (1415, 1416)
 
 
 @pytest.mark.parametrize("block_cells", [1, 40, 100_000])
 def test_a_map_turned_in_blocks_is_the_same_as_turned_at_once(monkeypatch, block_cells):
     occupancy = np.random.default_rng(4).choice(np.array([0, 40, 100, 150, 255], dtype=np.uint8), (17, 23))
     content = OccupancyMap(occupancy, 0.2, (1.0, 2.0, 2.2))
-    at_once = content.upright()
+    at_once = content.axis_aligned()
     monkeypatch.setattr(turned_map, "BLOCK_CELLS", block_cells)
-    assert np.array_equal(content.upright().occupancy, at_once.occupancy)
-    assert content.upright().origin == at_once.origin
+    assert np.array_equal(content.axis_aligned().occupancy, at_once.occupancy)
+    assert content.axis_aligned().origin == at_once.origin
 
 
 BAD_SAVES = {

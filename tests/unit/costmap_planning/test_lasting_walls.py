@@ -53,7 +53,7 @@ def plan(make_plugin, planner_class, costmap, **request):
 def test_a_goal_behind_a_wall_is_told_for_good(make_plugin, rooms, planner_class):
     result = plan(make_plugin, planner_class, rooms(gap=0, sensed=False))
     assert (result.outcome, result.permanent) == (GetPathOutcome.NO_PATH_FOUND, True)
-    assert "walls of the static map part them, whatever else moves away" in result.message
+    assert "walls of the static map separate them" in result.message
 
 
 @pytest.mark.parametrize("planner_class", PLANNERS)
