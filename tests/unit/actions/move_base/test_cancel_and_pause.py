@@ -2,33 +2,13 @@
 
 import pytest
 
-from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.goals.goal_types import MoveBaseGoal
+from mbf_abstract.geometry import Twist
 from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome, RecoveryOutcome
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
 from mbf_abstract.plugins import PlanResult, RecoveryResult
 from mbf_abstract.testing.faulty import obedient
-from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, straight_plan
-
-NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
-PLUGINS = {
-    "planner": ScriptedPlanner,
-    "controller": ScriptedController,
-    "first": ScriptedRecovery,
-    "second": ScriptedRecovery,
-    "third": ScriptedRecovery,
-}
-ONCE = {"planner_max_retries": 0, "controller_max_retries": 0}
-
-
-@pytest.fixture
-def make_bench(make_bench):
-    return lambda **parameters: make_bench(PLUGINS, **parameters)
-
-
-def send(bench, x=2.0, y=0.0, **fields):
-    return bench.navigator.send(MoveBaseGoal(Pose.planar(x, y), **fields))
+from mbf_abstract.testing.scripted import ScriptedRecovery, straight_plan
 
 
 def _planning(bench):
@@ -41,7 +21,7 @@ def _following(bench):
 
 
 def _recovering(bench):
-    bench.planner.play(NO_PATH)
+    bench.planner.play(bench.no_path)
     bench.plugin("first", ScriptedRecovery).play(
         lambda request: RecoveryResult(0 if request.motion.sleep(9.0) else RecoveryOutcome.CANCELED, "")
     )
@@ -49,9 +29,9 @@ def _recovering(bench):
 
 @pytest.mark.parametrize("begin", [_planning, _following, _recovering])
 def test_a_cancel_ends_the_goal_and_its_parts_in_every_state(make_bench, begin):
-    bench = make_bench(**ONCE)
+    bench = make_bench(retries=0)
     begin(bench)
-    handle = send(bench, 5.0)
+    handle = bench.send(5.0)
     bench.clock.sleep(1.0)
     handle.cancel("enough")
     result = handle.wait()
@@ -65,7 +45,7 @@ def test_a_cancel_ends_the_goal_and_its_parts_in_every_state(make_bench, begin):
 
 def test_a_cancel_in_the_instant_the_plan_is_there_is_not_lost(make_bench):
     bench = make_bench()
-    handle = send(bench, 5.0)
+    handle = bench.send(5.0)
 
     def plan_and_cancel(request):
         handle.cancel()
@@ -79,9 +59,9 @@ def test_a_cancel_in_the_instant_the_plan_is_there_is_not_lost(make_bench):
 
 @pytest.mark.parametrize("begin", [_planning, _following, _recovering])
 def test_a_pause_holds_the_robot_in_every_state_and_the_goal_goes_on_after_it(make_bench, begin):
-    bench = make_bench(oscillation_timeout=5.0, **ONCE)
+    bench = make_bench(retries=0, oscillation_timeout=5.0)
     begin(bench)
-    handle = send(bench, 2.0)
+    handle = bench.send(2.0)
     bench.clock.sleep(1.0)
     handle.pause()
     bench.clock.sleep(0.1)

@@ -6,42 +6,18 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import GoalStatus
-from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
-from mbf_abstract.plugins import PlanResult, RecoveryResult
+from mbf_abstract.plugins import RecoveryResult
 from mbf_abstract.testing.faulty import slow
-from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, straight_plan
-
-NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
-PLUGINS = {
-    "planner": ScriptedPlanner,
-    "controller": ScriptedController,
-    "first": ScriptedRecovery,
-    "second": ScriptedRecovery,
-    "third": ScriptedRecovery,
-}
-ONCE = {"planner_max_retries": 0, "controller_max_retries": 0}
-
-
-@pytest.fixture
-def make_bench(make_bench):
-    return lambda **parameters: make_bench(PLUGINS, **parameters)
-
-
-def send(bench, x=2.0, y=0.0, **fields):
-    return bench.navigator.send(MoveBaseGoal(Pose.planar(x, y), **fields))
-
-
-def recoveries(bench):
-    return [event.data["plugin"] for event in bench.events(EventKind.RECOVERY)]
+from mbf_abstract.testing.scripted import ScriptedRecovery, straight_plan
 
 
 def test_a_newer_goal_takes_over_while_the_robot_drives_on(make_bench):
     bench = make_bench()
     bench.planner.play(straight_plan, slow(bench.clock, 0.5, straight_plan))
-    first = send(bench, 5.0)
+    first = bench.send(5.0)
     bench.clock.sleep(1.0)
-    second = send(bench, 3.0, 2.0)
+    second = bench.send(3.0, 2.0)
     bench.clock.sleep(0.3)
     assert (first.status, first.result.outcome) == (GoalStatus.CANCELED, Outcome.CANCELED)
     assert first.result.message == "preempted by a new goal"
@@ -55,48 +31,48 @@ def test_a_newer_goal_takes_over_while_the_robot_drives_on(make_bench):
 def test_arriving_at_the_old_goal_while_the_new_plan_is_made_is_no_success_of_the_new_one(make_bench):
     bench = make_bench()
     bench.planner.play(straight_plan, slow(bench.clock, 3.0, straight_plan))
-    send(bench, 1.0)
+    bench.send(1.0)
     bench.clock.sleep(1.5)
-    second = send(bench, 1.0, 2.0)
+    second = bench.send(1.0, 2.0)
     assert second.wait().success
     assert bench.robot.pose.distance_to(Pose.planar(1.0, 2.0)) < 0.15
 
 
 def test_a_failed_plan_for_the_new_goal_stops_the_robot_and_recovers(make_bench):
-    bench = make_bench(**ONCE)
-    bench.planner.play(straight_plan, NO_PATH, straight_plan)
-    send(bench, 5.0)
+    bench = make_bench(retries=0)
+    bench.planner.play(straight_plan, bench.no_path, straight_plan)
+    bench.send(5.0)
     bench.clock.sleep(1.0)
-    assert send(bench, 3.0).wait().success
-    assert recoveries(bench) == ["first"]
+    assert bench.send(3.0).wait().success
+    assert bench.recoveries == ["first"]
 
 
 def test_a_newer_goal_during_recovery_is_planned_for_afterwards(make_bench):
-    bench = make_bench(**ONCE)
-    bench.planner.play(NO_PATH, straight_plan)
+    bench = make_bench(retries=0)
+    bench.planner.play(bench.no_path, straight_plan)
     bench.plugin("first", ScriptedRecovery).play(slow(bench.clock, 2.0, RecoveryResult(0, "waited")))
-    first = send(bench, 5.0)
+    first = bench.send(5.0)
     bench.clock.sleep(1.0)
-    second = send(bench, 1.0)
+    second = bench.send(1.0)
     assert second.wait().success
     assert first.status is GoalStatus.CANCELED
     assert [request.goal.x for request in bench.planner.requests] == [5.0, 1.0]
 
 
 def test_a_newer_goal_while_the_robot_stops_is_planned_for_without_the_old_recovery(make_bench):
-    bench = make_bench(planner_frequency=2.0, replan_failed_policy="recover", **ONCE)
+    bench = make_bench(retries=0, planner_frequency=2.0, replan_failed_policy="recover")
     bench.controller.stops_itself = True  # takes five cycles
-    bench.planner.play(straight_plan, NO_PATH, straight_plan)
-    send(bench, 5.0)
+    bench.planner.play(straight_plan, bench.no_path, straight_plan)
+    bench.send(5.0)
     bench.clock.sleep(0.6)
-    second = send(bench, 1.0)
+    second = bench.send(1.0)
     assert second.wait().success
-    assert recoveries(bench) == []
+    assert bench.recoveries == []
 
 
 def test_a_newer_goal_in_an_unknown_frame_stops_the_robot(make_bench):
     bench = make_bench()
-    first = send(bench, 5.0)
+    first = bench.send(5.0)
     bench.clock.sleep(1.0)
     second = bench.navigator.send(MoveBaseGoal(Pose.planar(1.0, 0.0, frame_id="mars")))
     result = second.wait()
@@ -108,9 +84,9 @@ def test_a_newer_goal_in_an_unknown_frame_stops_the_robot(make_bench):
 
 def test_many_goals_at_once_leave_only_the_newest(make_bench):
     bench = make_bench()
-    handles = [send(bench, float(x)) for x in range(1, 6)]
+    handles = [bench.send(float(x)) for x in range(1, 6)]
     bench.clock.sleep(0.5)
-    handles += [send(bench, 0.5), send(bench, 1.0)]
+    handles += [bench.send(0.5), bench.send(1.0)]
     assert handles[-1].wait().success
     assert {handle.status for handle in handles[:-1]} == {GoalStatus.CANCELED}
 
@@ -127,7 +103,7 @@ def test_many_goals_at_once_leave_only_the_newest(make_bench):
 )
 def test_a_goal_that_can_not_be_served_is_rejected_with_the_reason(make_bench, fields, words):
     bench = make_bench()
-    handle = send(bench, **fields)
+    handle = bench.send(**fields)
     assert handle.status is GoalStatus.REJECTED
     assert handle.result.outcome == Outcome.FAILURE
     assert words in handle.result.message
@@ -137,7 +113,7 @@ def test_without_a_robot_pose_the_goal_is_a_transform_error(make_bench):
     bench = make_bench()
     bench.robot.publishes_pose = False
     bench.transforms.clear()
-    result = send(bench).wait()
+    result = bench.send().wait()
     assert (result.outcome, result.final_pose) == (Outcome.TF_ERROR, None)
 
 

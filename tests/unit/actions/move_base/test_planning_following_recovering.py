@@ -4,43 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.outcomes import MoveBaseOutcome as Outcome
-from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
+from mbf_abstract.plugins import ControlResult, RecoveryResult
 from mbf_abstract.testing.faulty import drive
-from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, straight_plan
+from mbf_abstract.testing.scripted import ScriptedRecovery, straight_plan
 
-NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
 BLOCKED = ControlResult(ExePathOutcome.BLOCKED_PATH, "a chair")
-PLUGINS = {
-    "planner": ScriptedPlanner,
-    "controller": ScriptedController,
-    "first": ScriptedRecovery,
-    "second": ScriptedRecovery,
-    "third": ScriptedRecovery,
-}
-ONCE = {"planner_max_retries": 0, "controller_max_retries": 0}
-
-
-@pytest.fixture
-def make_bench(make_bench):
-    return lambda **parameters: make_bench(PLUGINS, **parameters)
-
-
-def send(bench, x=2.0, y=0.0, **fields):
-    return bench.navigator.send(MoveBaseGoal(Pose.planar(x, y), **fields))
-
-
-def recoveries(bench):
-    return [event.data["plugin"] for event in bench.events(EventKind.RECOVERY)]
-
-
-def plans(bench):
-    return len(bench.planner.requests)
 
 
 def alternate(*answers):
@@ -57,19 +29,19 @@ def alternate(*answers):
 
 def test_it_plans_follows_and_succeeds(make_bench, states):
     bench = make_bench()
-    handle = send(bench)
+    handle = bench.send()
     result = handle.wait()
     assert (handle.status, result.outcome) == (GoalStatus.SUCCEEDED, Outcome.SUCCESS)
     assert result.dist_to_goal < 0.1
     assert result.final_pose.x == pytest.approx(2.0, abs=0.1)
     assert states(bench, "move_base") == ["exe_path"]
     assert handle.feedback.dist_to_goal < 0.2
-    assert recoveries(bench) == []
+    assert bench.recoveries == []
 
 
 def test_the_goals_tolerances_reach_planner_and_controller(make_bench):
     bench = make_bench()
-    result = send(bench, dist_tolerance=0.7, angle_tolerance=0.3).wait()
+    result = bench.send(dist_tolerance=0.7, angle_tolerance=0.3).wait()
     request = bench.planner.requests[0]
     assert (request.dist_tolerance, request.angle_tolerance) == (0.7, 0.3)
     assert 0.3 < result.dist_to_goal < 0.75
@@ -77,7 +49,7 @@ def test_the_goals_tolerances_reach_planner_and_controller(make_bench):
 
 def test_without_tolerances_of_the_goal_those_of_the_server_reach_the_planner(make_bench):
     bench = make_bench(dist_tolerance=0.4, angle_tolerance=0.5)
-    send(bench).wait()
+    bench.send().wait()
     request = bench.planner.requests[0]
     assert (request.dist_tolerance, request.angle_tolerance) == (0.4, 0.5)
 
@@ -87,64 +59,64 @@ def test_a_path_that_ends_off_the_target_leaves_less_of_the_tolerance_for_arriva
     bench = make_bench(dist_tolerance=0.4)
     short = Pose.planar(2.0 - off, 0.0)
     bench.planner.play(lambda request: straight_plan(replace(request, goal=short)))
-    result = send(bench).wait()
+    result = bench.send().wait()
     assert result.success
     assert result.final_pose.distance_to(Pose.planar(2.0, 0.0)) <= farthest
 
 
 def test_failed_planning_runs_the_behaviours_in_order_and_ends_with_the_planners_code(make_bench):
-    bench = make_bench(**ONCE)
-    bench.planner.play(NO_PATH)
-    result = send(bench).wait()
-    assert recoveries(bench) == ["first", "second", "third"]
-    assert plans(bench) == 4
+    bench = make_bench(retries=0)
+    bench.planner.play(bench.no_path)
+    result = bench.send().wait()
+    assert bench.recoveries == ["first", "second", "third"]
+    assert bench.plans == 4
     assert (result.outcome, result.message) == (GetPathOutcome.NO_PATH_FOUND, "walled in")
 
 
 def test_failed_control_runs_the_behaviours_in_order_and_ends_with_the_controllers_code(make_bench):
-    bench = make_bench(**ONCE)
+    bench = make_bench(retries=0)
     bench.controller.play(BLOCKED)
-    result = send(bench).wait()
-    assert recoveries(bench) == ["first", "second", "third"]
+    result = bench.send().wait()
+    assert bench.recoveries == ["first", "second", "third"]
     assert (result.outcome, result.message) == (ExePathOutcome.BLOCKED_PATH, "a chair")
 
 
 def test_a_recovery_that_helps_lets_the_goal_succeed(make_bench):
-    bench = make_bench(**ONCE)
-    bench.planner.play(NO_PATH, straight_plan)
-    assert send(bench).wait().success
-    assert recoveries(bench) == ["first"]
+    bench = make_bench(retries=0)
+    bench.planner.play(bench.no_path, straight_plan)
+    assert bench.send().wait().success
+    assert bench.recoveries == ["first"]
 
 
 @pytest.mark.parametrize("answer", [RecoveryResult(RecoveryOutcome.FAILURE, "no"), RuntimeError("broken")])
 def test_a_behaviour_that_fails_is_followed_by_planning_and_then_the_next_one(make_bench, answer):
-    bench = make_bench(**ONCE)
+    bench = make_bench(retries=0)
     bench.plugin("first", ScriptedRecovery).play(answer)
-    bench.planner.play(NO_PATH, NO_PATH, straight_plan)
-    assert send(bench).wait().success
-    assert recoveries(bench) == ["first", "second"]
+    bench.planner.play(bench.no_path, bench.no_path, straight_plan)
+    assert bench.send().wait().success
+    assert bench.recoveries == ["first", "second"]
 
 
 def test_a_plan_after_failed_planning_resets_the_list(make_bench):
-    bench = make_bench(**ONCE)
-    bench.planner.play(NO_PATH, straight_plan)
+    bench = make_bench(retries=0)
+    bench.planner.play(bench.no_path, straight_plan)
     bench.controller.play(drive(0.3), BLOCKED, bench.controller.follow)
-    assert send(bench).wait().success
-    assert recoveries(bench) == ["first", "first"]
+    assert bench.send().wait().success
+    assert bench.recoveries == ["first", "first"]
 
 
 def test_motion_after_failed_control_resets_the_list(make_bench):
-    bench = make_bench(oscillation_distance=0.5, **ONCE)
+    bench = make_bench(retries=0, oscillation_distance=0.5)
     bench.controller.play(BLOCKED, *[drive(0.5)] * 30, BLOCKED, bench.controller.follow)
-    assert send(bench, 4.0).wait().success
-    assert recoveries(bench) == ["first", "first"]
+    assert bench.send(4.0).wait().success
+    assert bench.recoveries == ["first", "first"]
 
 
 def test_without_motion_after_failed_control_the_next_behaviour_runs(make_bench):
-    bench = make_bench(oscillation_distance=0.5, **ONCE)
+    bench = make_bench(retries=0, oscillation_distance=0.5)
     bench.controller.play(BLOCKED, drive(0.5), BLOCKED, bench.controller.follow)
-    assert send(bench, 4.0).wait().success
-    assert recoveries(bench) == ["first", "second"]
+    assert bench.send(4.0).wait().success
+    assert bench.recoveries == ["first", "second"]
 
 
 @pytest.mark.parametrize(
@@ -156,30 +128,30 @@ def test_without_motion_after_failed_control_the_next_behaviour_runs(make_bench)
     ],
 )
 def test_the_goal_and_the_parameters_say_which_behaviours_run(make_bench, fields, parameters, expected):
-    bench = make_bench(**ONCE, **parameters)
-    bench.planner.play(NO_PATH)
-    assert send(bench, **fields).wait().outcome == GetPathOutcome.NO_PATH_FOUND
-    assert recoveries(bench) == expected
+    bench = make_bench(retries=0, **parameters)
+    bench.planner.play(bench.no_path)
+    assert bench.send(**fields).wait().outcome == GetPathOutcome.NO_PATH_FOUND
+    assert bench.recoveries == expected
 
 
 def test_a_fatal_failure_of_control_ends_the_goal_without_recovery(make_bench):
     bench = make_bench()
     bench.controller.play(RuntimeError("broken"))
-    assert send(bench).wait().outcome == ExePathOutcome.INTERNAL_ERROR
-    assert recoveries(bench) == []
+    assert bench.send().wait().outcome == ExePathOutcome.INTERNAL_ERROR
+    assert bench.recoveries == []
 
 
 def test_a_robot_that_gets_nowhere_is_stopped_and_recovered(make_bench):
     bench = make_bench(oscillation_timeout=2.0)
     to_and_fro = [drive(0.3 if i // 5 % 2 else -0.3) for i in range(45)]
     bench.controller.play(*to_and_fro, bench.controller.follow)
-    assert send(bench, 3.0).wait().success
-    assert recoveries(bench) == ["first"]
+    assert bench.send(3.0).wait().success
+    assert bench.recoveries == ["first"]
 
 
 def test_a_robot_that_never_gets_anywhere_ends_with_oscillation(make_bench):
     bench = make_bench(oscillation_timeout=2.0)
     bench.controller.play(alternate(*[drive(0.3)] * 5, *[drive(-0.3)] * 5))
-    result = send(bench, 3.0).wait()
+    result = bench.send(3.0).wait()
     assert result.outcome == Outcome.OSCILLATION
-    assert recoveries(bench) == ["first", "second", "third"]
+    assert bench.recoveries == ["first", "second", "third"]
