@@ -6,8 +6,9 @@ stamp, interpolated. A scan that is newer than the newest transform by at most `
 that one, as a driver that delivers scans before the odometry of the same moment would otherwise never be heard; nothing
 is extrapolated. A scan that is newer still, or older than the history (``tf_cache_time``), is not used.
 
-One map that cannot place a scan does not keep it from the others. What a user would otherwise look for in vain is
-reported once in the event log: a source that no layer listens to, and a map that cannot place what another one takes.
+One map that cannot place a scan, or has a layer that raises, does not keep it from the others. What a user would
+otherwise look for in vain is reported once in the event log: a source that no layer listens to, a layer that raises,
+and a map that cannot place what another one takes.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry.transform_buffer import TransformError
@@ -93,7 +95,13 @@ class ScanIntake:
             placed = scan.in_frame(target.frame_id, self._runtime.transforms, target.transform_tolerance)
         except TransformError as error:
             return error
-        target.insert(placed)
+        try:
+            target.insert(placed)
+        except ValueError:  # of the scan itself: its driver is to blame
+            raise
+        except Exception as error:  # of a layer: the scan is good for the other maps
+            text = f"a layer raised {type(error).__name__} at a scan of {scan.source!r}: {error_text(error)}"
+            self._report(f"{name}.insert_scan", scan.source, text)
         return None
 
     def _report_unknown(self, source: str) -> None:

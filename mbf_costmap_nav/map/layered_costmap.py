@@ -88,6 +88,7 @@ class LayeredCostmap(LayeredMap):
         self._last_update: float | None = None
         self._pending = geometry.box
         self._snapshot: Costmap | None = None
+        self._unmoved: set[str] = set()  # names of layers that have not followed the window
         for layer in layers:
             layer.match_geometry(geometry)
         self.set_footprint(footprint)
@@ -216,6 +217,10 @@ class LayeredCostmap(LayeredMap):
             raise ValueError(f"robot pose is in frame {robot_pose.frame_id!r}, the costmap in {self.frame_id!r}")
         with self._lock:
             self.end_overrides(now)
+            for name in sorted(self._unmoved):  # a layer raised when the window moved: it begins anew
+                with self.layers.computing(self.layers[name]):
+                    self.layers[name].match_geometry(self._geometry)
+                self._unmoved.discard(name)
             if self.rolling_window and robot_pose is not None:
                 self._follow(robot_pose)
             box = self._pending
@@ -249,9 +254,12 @@ class LayeredCostmap(LayeredMap):
             grid.width, grid.height, grid.resolution, ix * grid.resolution, iy * grid.resolution
         )
         self._cells = shifted(self._cells, dx, dy, self._default_value)
-        for layer in self.layers.values():
-            layer.shift(self._geometry, dx, dy)
         self._pending = self._geometry.box
+        self._unmoved |= set(self.layers)
+        for layer in self.layers.values():
+            with self.layers.computing(layer):
+                layer.shift(self._geometry, dx, dy)
+            self._unmoved.discard(layer.name)
 
     # --------------------------------------------------------------------------------------- changes at run time
     def take_parameters(self, parameters: Any) -> None:

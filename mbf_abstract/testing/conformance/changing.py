@@ -91,10 +91,11 @@ def _long_path(site: Site) -> Path:
 
 
 def _set_sensing_layers(site: Site, enabled: bool) -> None:
-    for one in site.maps.values():
-        for name, layer in one.layers.items():
+    server = site.server
+    for served in server.served.values():
+        for name, layer in served.map.layers.items():
             if layer.source_names:
-                one.set_layer_parameters(name, layer.parameters.model_copy(update={"enabled": enabled}))
+                server.set_layer_parameters(f"{served.name}.{name}", enabled=enabled)
     site.server.queries.update_map()
 
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.server.factory import make_server as server_of_file
-from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.time.clock import Priority
 from mbf_abstract.time.sim_clock import SimClock
@@ -95,7 +95,7 @@ class BackendRig:
         self.sensor_errors: list[str] = []
         self._over = False
 
-    def server(self, config: str, parameters: Mapping[str, Any]) -> AbstractNavigationServer:
+    def server(self, config: str, parameters: Mapping[str, Any]) -> MapServer:
         """Make the server of a configuration's text, with parameters that the text does not set.
 
         Raises
@@ -106,9 +106,9 @@ class BackendRig:
         file = self.folder / "navigation.yaml"
         lines = (f"{name}: {json.dumps(value)}" for name, value in parameters.items())  # JSON is legal YAML
         file.write_text("\n".join([config, *lines]), "utf-8")
-        return server_of_file(file, self.robot, self.clock, self.transforms, self.events)
+        return cast(MapServer, server_of_file(file, self.robot, self.clock, self.transforms, self.events))
 
-    def start_sensor(self, server: AbstractNavigationServer) -> None:
+    def start_sensor(self, server: MapServer) -> None:
         """Scan from now on."""
         self.clock.spawn(lambda: self._loop(server), "conformance sensor", Priority.SIMULATOR)
 
@@ -135,7 +135,7 @@ class BackendRig:
         self.robot.close()
         self.clock.sleep(1.0)
 
-    def _loop(self, server: AbstractNavigationServer) -> None:
+    def _loop(self, server: MapServer) -> None:
         start, ticks = self.clock.now(), 0
         while not self._over:
             pose = self.robot.pose
@@ -158,7 +158,7 @@ class MakeServer(Protocol):
     names.
     """
 
-    def __call__(self, rig: BackendRig, **parameters: Any) -> AbstractNavigationServer:
+    def __call__(self, rig: BackendRig, **parameters: Any) -> MapServer:
         """Make the server."""
 
 

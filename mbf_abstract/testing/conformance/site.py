@@ -43,7 +43,7 @@ class Site:
     Attributes
     ----------
     rig : BackendRig
-    server : AbstractNavigationServer
+    server : MapServer
     navigator : Navigator
     """
 
@@ -56,12 +56,6 @@ class Site:
         """The map that the robot is held by."""
         found: NavigationMap = self.server.plugins.find(PluginKind.RECOVERY, "rotate").instance.navigation_map
         return found
-
-    @property
-    def maps(self) -> Mapping[str, NavigationMap]:
-        """The maps of the server by name, as its recoveries know them."""
-        behavior = self.server.plugins.find(PluginKind.RECOVERY, "rotate").instance
-        return behavior.maps or {"map": behavior.navigation_map}
 
     # ------------------------------------------------------------------------------------------ expectations
     def expect(self, condition: bool, text: str) -> None:

@@ -119,6 +119,20 @@ def test_marks_stay_where_they_are_in_the_world_while_the_window_moves(rolling):
     assert rolling.snapshot().cost_at(7.5, 0.5) == UNKNOWN, "new ground comes in unknown"
 
 
+def test_a_layer_that_raises_when_the_window_moves_begins_anew_with_the_next_update(rolling, monkeypatch):
+    rolling.update(Pose.planar(0.0, 0.0), 0.0)
+    rolling.insert_points("laser", [(2.5, 1.5, 0.0)], (0.0, 0.0, 0.0), 0.0)
+    layer = rolling.layers["obstacle"]
+    monkeypatch.setattr(layer, "shift", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        rolling.update(Pose.planar(1.0, 0.0), 1.0)
+    assert "layer 'obstacle' raised ZeroDivisionError" in rolling.stale_reason(1.0)
+    monkeypatch.undo()
+    rolling.update(Pose.planar(1.0, 0.0), 1.5)
+    assert layer.geometry == rolling.geometry and rolling.snapshot().cost_at(2.5, 1.5) == LETHAL
+    assert "raised" not in rolling.stale_reason(1.5)
+
+
 def test_what_leaves_the_window_is_forgotten(rolling):
     rolling.insert_points("laser", [(2.5, 1.5, 0.0)], (0.0, 0.0, 0.0), 0.0)
     rolling.update(Pose.planar(0.0, 0.0), 0.0)

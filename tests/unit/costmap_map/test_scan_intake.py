@@ -101,6 +101,19 @@ def test_a_map_that_cannot_place_a_scan_does_not_keep_it_from_the_other_and_tell
     assert len(seen(server.global_costmap)) == 1 and len(told()) == 1
 
 
+def test_a_layer_that_raises_does_not_keep_a_scan_from_the_other_map_and_is_reported_once(site, monkeypatch):
+    server, transforms, reported = site
+    transforms.set(turned(0.0, 0.0))
+    transforms.set(CONNECTED)
+    (layer,) = (one for one in server.global_costmap.layers.values() if one.source_names)
+    monkeypatch.setattr(layer, "insert_scan", lambda scan: 1 / 0)
+    for _ in range(3):
+        server.take_scan(ahead(0.0))
+    assert len(seen(server.local_costmap)) == 1
+    (message,) = reported()
+    assert "raised ZeroDivisionError at a scan of 'lidar'" in message
+
+
 def test_a_scan_that_no_map_can_place_is_refused_with_the_reason(site):
     server, _, _ = site
     with pytest.raises(TransformError, match="'nowhere'"):
