@@ -1,1 +1,1 @@
-"""What every navigation map has in common: queries, views, range measurements, relaxed tolerances."""
+"""The contract of navigation maps, and everything about maps that is the same on every backend."""
