@@ -176,20 +176,20 @@ def main() -> None:
     published = published_runs(arguments.data)
     shared = {number: worlds[number] for number in sorted({run.world for run in published} & worlds.keys(), key=int)}
     print(f"{'controller':42s}  runs   success collision   timeout    time  score   (time: mean of the successes [s])")
-    told: dict[str, object] = {"published_dwa": summary(published, shared)}
+    results: dict[str, object] = {"published_dwa": summary(published, shared)}
     print_row(f"published DWA run, {len(shared)} worlds", summary(published, shared))
     for name in chosen:
         own = [run for run in runs if run.controller == name]
-        told[name] = summary(own, worlds)
+        results[name] = summary(own, worlds)
         print_row(f"{name}, the same worlds", summary(own, shared))
         print_row(f"{name}, all {len(worlds)} worlds", summary(own, worlds))
-    planner = told["planner"] = planner_results(worlds)
+    planner = results["planner"] = planner_results(worlds)
     print(
         f"Theta*, {CLEARANCE} m clearance: {planner['found']} of {planner['worlds']} worlds,"
         f" at most {planner['largest_excess']:.2f} m over the published path"
     )
     if arguments.json:
-        print(json.dumps(told))
+        print(json.dumps(results))
 
 
 if __name__ == "__main__":

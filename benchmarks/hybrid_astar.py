@@ -215,7 +215,7 @@ def routes_on(name: str, costmap: LayeredCostmap, pairs: int, seed: int, naive: 
     return records
 
 
-def told(name: str, records: list[dict]) -> str:
+def line_of(name: str, records: list[dict]) -> str:
     """One line on some routes."""
     times = np.array([record["seconds"] for record in records])
     reachable, solved = (sum(record[key] for record in records) for key in ("reachable", "solved"))
@@ -245,11 +245,11 @@ def main() -> None:
             continue
         pairs = 3 if arguments.quick else arguments.pairs
         of_map = routes_on(name, inflated(read()), pairs, arguments.seed, arguments.naive)
-        print(told(name, of_map), flush=True)
+        print(line_of(name, of_map), flush=True)
         records += of_map
-    print(told("all", records))
+    print(line_of("all", records))
     reachable = [record for record in records if record["reachable"]]
-    print(told("reachable", reachable))
+    print(line_of("reachable", reachable))
     for record in records:
         if record["reachable"] and not record["solved"]:
             print(f"missed on {record['map']}: {record['fault']}")

@@ -84,7 +84,7 @@ def field_at(mesh_map: MeshMap, path: Path, start: Pose) -> float:
     return float(np.min(path.guidance[0].distances[corners] + steps))
 
 
-def without_point_contacts(mesh_map: MeshMap) -> MeshMap:
+def without_non_manifold_vertices(mesh_map: MeshMap) -> MeshMap:
     """The same mesh, with one vertex for each fan of faces where several touch in a point."""
     faces, corners = mesh_map.faces, np.arange(mesh_map.faces.size).reshape(-1, 3)
     face, side = np.nonzero(mesh_map.face_neighbours >= 0)
@@ -105,7 +105,7 @@ def compare_field(mesh_map: MeshMap, vertices: Sequence[int] = ()) -> list[float
     """Ratios of the wave's whole field to pygeodesic's exact distances from the vertices, or from a middle one."""
     import pygeodesic.geodesic
 
-    mesh_map = without_point_contacts(mesh_map)
+    mesh_map = without_non_manifold_vertices(mesh_map)
     solver = pygeodesic.geodesic.PyGeodesicAlgorithmExact(mesh_map.vertices, mesh_map.faces)
     search, query, ratios = WaveSearch(mesh_map), corner_query(mesh_map), []
     for source in vertices or [len(mesh_map.vertices) // 2]:

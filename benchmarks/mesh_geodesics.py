@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pygeodesic.geodesic
 import trimesh
-from mesh_accuracy import REPAIRS, without_point_contacts
+from mesh_accuracy import REPAIRS, without_non_manifold_vertices
 from mesh_speed import plugin
 from scipy.spatial import Delaunay
 from terrain_meshes import fractal_terrain
@@ -71,7 +71,7 @@ def generated() -> dict[str, Arrays]:
 
 def compare(vertices: np.ndarray, faces: np.ndarray) -> dict[str, np.ndarray]:
     """Relative errors of the lengths by planner."""
-    mesh_map = without_point_contacts(MeshMap.from_arrays(vertices, faces, repair=REPAIRS))
+    mesh_map = without_non_manifold_vertices(MeshMap.from_arrays(vertices, faces, repair=REPAIRS))
     solver = pygeodesic.geodesic.PyGeodesicAlgorithmExact(mesh_map.vertices, mesh_map.faces)
     rng, edge = np.random.default_rng(11), float(mesh_map.neighbour_lengths.mean())
     planners = {"cvp": plugin(CVPPlanner, mesh_map), "any-angle": plugin(AnyAnglePlanner, mesh_map)}

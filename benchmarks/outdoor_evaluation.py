@@ -88,8 +88,8 @@ def evaluate(chosen: list[tuple[Scenario, int]], methods: list[str], workers: in
     for (scenario, run), metrics in run_all(left, workers):
         row = {**metrics, **describe(scenario, run), "failure": failure_of(metrics)}
         log.append(run.key(hash_of(scenario)), row)
-        told = (row["terrain"], f"seed {run.seed}", row["method"], "" if row["route"] else "no route", row["outcome"])
-        print(" | ".join([*told, row["failure"], row["message"]]), flush=True)
+        answer = (row["terrain"], f"seed {run.seed}", row["method"], "" if row["route"] else "no route", row["outcome"])
+        print(" | ".join([*answer, row["failure"], row["message"]]), flush=True)
     return [log.rows[key] for key in keys]
 
 

@@ -1,4 +1,4 @@
-"""Plan all legs of a tour first, choose the cheapest order, then drive the stored paths (Figure 4 of the MBF paper).
+"""Plan all legs of a route first, choose the cheapest order, then drive the stored paths (Figure 4 of the MBF paper).
 
 Only separate planning and driving make this possible: every pair of waypoints is planned before the robot moves, the
 order follows from the costs the map gives, and while driving nothing is planned unless a leg fails. The same script
@@ -26,7 +26,7 @@ WAYPOINTS = [(7.5, 1.5), (1.5, 5.0), (6.0, 5.5), (3.5, 1.5)]  # x, y [m], all in
 
 
 @dataclass
-class Tour:
+class WaypointSequence:
     """Places to visit; place 0 is where the robot starts. ``paths`` and ``costs`` are stored by (from, to)."""
 
     places: list[Pose]
@@ -51,7 +51,7 @@ class Tour:
         return cost(best) < float("inf")
 
     def take_stored_path(self, mission) -> bool:
-        """Hand the stored path of the next leg to the mission; False when the tour is over."""
+        """Hand the stored path of the next leg to the mission; False when the sequence is over."""
         if not self.order:
             return False
         here = self.driven[-1] if self.driven else 0
@@ -69,36 +69,37 @@ class Tour:
 class PlanLeg(GetPath):
     """Plan the next leg nobody has planned yet, between two places where the robot is not."""
 
-    def __init__(self, tour: Tour) -> None:
+    def __init__(self, sequence: WaypointSequence) -> None:
         super().__init__("plan leg")
-        self.tour = tour
+        self.sequence = sequence
 
     def make_goal(self) -> GetPathGoal:
         """Plan from one place to another."""
-        self.leg = self.tour.unplanned.pop()
-        start, end = (self.tour.places[i] for i in self.leg)
+        self.leg = self.sequence.unplanned.pop()
+        start, end = (self.sequence.places[i] for i in self.leg)
         return GetPathGoal(end, start_pose=start)
 
     def take_result(self, result: GetPathResult) -> None:
-        """Store the path; a leg without one is left out of the tour."""
+        """Store the path; a leg without one is left out of the sequence."""
         if result.path is not None:
-            self.tour.paths[self.leg], self.tour.costs[self.leg] = result.path, result.cost
+            self.sequence.paths[self.leg], self.sequence.costs[self.leg] = result.path, result.cost
 
 
-def waypoint_machine(tour: Tour) -> StateMachine:
+def waypoint_machine(sequence: WaypointSequence) -> StateMachine:
     """Plan all legs - choose an order - drive leg by leg; a leg that fails is recovered and planned anew."""
     success, failure = Status.SUCCESS, Status.FAILURE
     return StateMachine(
         "waypoints",
         {
             "legs left?": State(
-                Do("legs left?", lambda mission: bool(tour.unplanned)), {success: "plan leg", failure: "choose order"}
+                Do("legs left?", lambda mission: bool(sequence.unplanned)),
+                {success: "plan leg", failure: "choose order"},
             ),
-            "plan leg": State(PlanLeg(tour), {success: "legs left?", failure: "legs left?"}),
-            "choose order": State(Do("choose order", tour.choose_order), {success: "next leg", failure: failure}),
-            "next leg": State(Do("next leg", tour.take_stored_path), {success: "drive", failure: success}),
+            "plan leg": State(PlanLeg(sequence), {success: "legs left?", failure: "legs left?"}),
+            "choose order": State(Do("choose order", sequence.choose_order), {success: "next leg", failure: failure}),
+            "next leg": State(Do("next leg", sequence.take_stored_path), {success: "drive", failure: success}),
             "drive": State(ExePath(), {success: "arrived", failure: "recover"}),
-            "arrived": State(Do("arrived", tour.leg_is_done), {success: "next leg", failure: failure}),
+            "arrived": State(Do("arrived", sequence.leg_is_done), {success: "next leg", failure: failure}),
             "recover": State(Recovery("clear"), {success: "plan anew", failure: "back up"}),
             "back up": State(Recovery("back_up"), {success: "plan anew", failure: "plan anew"}),
             "plan anew": State(GetPath("plan anew"), {success: "drive", failure: failure}),
@@ -110,10 +111,10 @@ def main(scenario: str, backend: str) -> bool:
     with Session(scenario, SessionOptions(backend=backend)) as session:
         start = session.navigator.robot_pose()
         poses = [Pose.planar(x, y, 0.0, session.world.height_at(x, y)) for x, y in WAYPOINTS]
-        tour = Tour([start, *poses])
-        result = TreeExecutive(waypoint_machine(tour), session.navigator).run()
-        print(f"{result.message}; visited {tour.driven} in {session.clock.now():.0f} s")
-        return result.success and len(tour.driven) == len(poses)
+        sequence = WaypointSequence([start, *poses])
+        result = TreeExecutive(waypoint_machine(sequence), session.navigator).run()
+        print(f"{result.message}; visited {sequence.driven} in {session.clock.now():.0f} s")
+        return result.success and len(sequence.driven) == len(poses)
 
 
 if __name__ == "__main__":

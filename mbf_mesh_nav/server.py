@@ -43,7 +43,7 @@ planners:
   - {{name: cvp, type: cvp}}
 mesh_map:
   mesh_file: {file}
-  repair: [duplicate_vertices, zero_area, duplicate_faces, non_manifold, point_contacts, unreferenced]
+  repair: [duplicate_vertices, zero_area, duplicate_faces, non_manifold, non_manifold_vertices, unreferenced]
   inscribed_radius: 0.3
   edge_cost_factor: 1.0
   default_layer: inflation

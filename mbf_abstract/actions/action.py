@@ -105,7 +105,9 @@ class Action(ABC, Generic[G, R, F]):
             handle.finish(GoalStatus.REJECTED, self.make_result(handle, outcome, message))
             return handle
         slot = self._slot(goal)
-        self.runtime.events.emit(EventKind.GOAL_ACCEPTED, self.name, goal_id=handle.id, slot=slot, **self._tell(goal))
+        self.runtime.events.emit(
+            EventKind.GOAL_ACCEPTED, self.name, goal_id=handle.id, slot=slot, **self._goal_data(goal)
+        )
         with self._condition:
             self._unfinished[handle.id] = handle
         self._dispatch(GoalJob(self, handle, slot))
@@ -152,7 +154,7 @@ class Action(ABC, Generic[G, R, F]):
         """Build a result without path or pose, for ends that have none."""
 
     @abstractmethod
-    def _tell(self, goal: G) -> dict[str, Any]:
+    def _goal_data(self, goal: G) -> dict[str, Any]:
         """Return what the log shall say of an accepted goal."""
 
     def _slot(self, goal: G) -> int:

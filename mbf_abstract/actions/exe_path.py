@@ -102,7 +102,7 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
         offer.handle.activate()
         run.adopt(offer.handle)
         self.finish(old, self.canceled_outcome, "preempted by a new plan")
-        self._tell_started(following)
+        self._report_started(following)
         return offer.handle.goal
 
     def _end_following(self, following: Following) -> None:
@@ -154,7 +154,7 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
             patience=lambda: self.runtime.parameters.controller_patience,
             on_abandon=lambda: self._abandon(following, run),
         )
-        self._tell_started(following)
+        self._report_started(following)
         with run, run.map_in_use():
             following.execution = ControllerExecution(run, take_new_plan, publish)
             end = following.execution.execute()
@@ -217,11 +217,11 @@ class ExePathAction(Action[ExePathGoal, ExePathResult, ExePathFeedback]):
         except RobotStateError:
             return None
 
-    def _tell_started(self, following: Following) -> None:
+    def _report_started(self, following: Following) -> None:
         job = following.job
         self.runtime.events.emit(
             EventKind.GOAL_STARTED, self.name, goal_id=job.handle.id, slot=job.slot, plugin=following.controller
         )
 
-    def _tell(self, goal: ExePathGoal) -> dict[str, Any]:
+    def _goal_data(self, goal: ExePathGoal) -> dict[str, Any]:
         return {"controller": goal.controller, "poses": len(goal.path), "length": goal.path.length}

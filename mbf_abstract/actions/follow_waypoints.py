@@ -52,18 +52,18 @@ class FollowWaypointsAction(Action[FollowWaypointsGoal, FollowWaypointsResult, F
     def execute(self, job: Job) -> FollowWaypointsResult:
         """Visit one waypoint after the other, on the slot's thread."""
         self.runtime.events.emit(EventKind.GOAL_STARTED, self.name, goal_id=job.handle.id, slot=job.slot)
-        return _Tour(self, job).run()
+        return _Run(self, job).run()
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> FollowWaypointsResult:
         """Result with the visits that have ended."""
         done = handle.feedback.results if handle.feedback is not None else ()
         return FollowWaypointsResult(int(outcome), message, results=done)
 
-    def _tell(self, goal: FollowWaypointsGoal) -> dict[str, Any]:
+    def _goal_data(self, goal: FollowWaypointsGoal) -> dict[str, Any]:
         return {"waypoints": len(goal.waypoints), "loops": goal.loops}
 
 
-class _Tour:
+class _Run:
     """One goal's visits."""
 
     def __init__(self, action: FollowWaypointsAction, job: Job) -> None:

@@ -144,5 +144,5 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
         """Result without a path."""
         return GetPathResult(int(outcome), message)
 
-    def _tell(self, goal: GetPathGoal) -> dict[str, Any]:
+    def _goal_data(self, goal: GetPathGoal) -> dict[str, Any]:
         return {"target": list(goal.target_pose.position), "planner": goal.planner}

@@ -97,7 +97,7 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
 
     def execute(self, job: Job) -> MoveBaseResult:
         """Run the state machine; the goal it ends with may be a later one than it began with."""
-        self.tell_started(job.handle)
+        self.report_started(job.handle)
         try:
             self.runtime.robot.pose()
             target = self.target(job.handle)
@@ -120,7 +120,7 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
         """Target pose in the global frame; raises TransformError."""
         return in_global_frame(handle.goal.target_pose, self.runtime)
 
-    def tell_started(self, handle: Handle) -> None:
+    def report_started(self, handle: Handle) -> None:
         """Record that a goal is being worked on."""
         self.runtime.events.emit(EventKind.GOAL_STARTED, self.name, goal_id=handle.id, slot=0)
 
@@ -138,5 +138,5 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
             angle_to_goal=pose.angle_to(target),
         )
 
-    def _tell(self, goal: MoveBaseGoal) -> dict[str, Any]:
+    def _goal_data(self, goal: MoveBaseGoal) -> dict[str, Any]:
         return {"target": list(goal.target_pose.position), "planner": goal.planner, "controller": goal.controller}

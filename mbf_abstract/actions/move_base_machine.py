@@ -296,7 +296,7 @@ class MoveBaseMachine:
         offer.handle.activate()
         offer.handle.on_wake(self._wake)
         self._action.finish(old, MoveBaseOutcome.CANCELED, PREEMPTED)
-        self._action.tell_started(offer.handle)
+        self._action.report_started(offer.handle)
         self._reset_recovery()
         self._failure = None
         self._oscillation.reset()

@@ -74,5 +74,5 @@ class MachineOwner(Protocol):
     def finish(self, handle: Handle, outcome: int, message: str) -> None:
         """End a goal that another one has replaced."""
 
-    def tell_started(self, handle: Handle) -> None:
+    def report_started(self, handle: Handle) -> None:
         """Record that a goal is being worked on."""

@@ -76,5 +76,5 @@ class RecoveryAction(Action[RecoveryGoal, RecoveryResultMessage, NoFeedback]):
         """Result of a goal that ended before or without its behaviour."""
         return RecoveryResultMessage(int(outcome), message, used_plugin=handle.goal.behavior)
 
-    def _tell(self, goal: RecoveryGoal) -> dict[str, Any]:
+    def _goal_data(self, goal: RecoveryGoal) -> dict[str, Any]:
         return {"behavior": goal.behavior}

@@ -86,5 +86,5 @@ class RefinePathAction(Action[RefinePathGoal, RefinePathResult, NoFeedback]):
         """Result with the path as it was."""
         return RefinePathResult(int(outcome), message, refined_path=handle.goal.path, refiner=handle.goal.refiner)
 
-    def _tell(self, goal: RefinePathGoal) -> dict[str, Any]:
+    def _goal_data(self, goal: RefinePathGoal) -> dict[str, Any]:
         return {"refiner": goal.refiner, "poses": len(goal.path)}

@@ -20,7 +20,7 @@ def check(
 ) -> None:
     """Check a configuration: all mistakes at once, exit code 2 if there is any. Tells what was found in its map."""
     with readable_errors():
-        from mbf_abstract.commands.bench import standing_server
+        from mbf_abstract.commands.standing_server import standing_server
         from mbf_abstract.server.factory import read_config
 
         cls, checked = read_config(config)

@@ -1,4 +1,4 @@
-"""``mbf doctor``: is everything here that the commands need, and how to mend what is not."""
+"""``mbf doctor``: is everything here that the commands need, and how to install what is missing."""
 
 from __future__ import annotations
 

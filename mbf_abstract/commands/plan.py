@@ -52,8 +52,8 @@ def plan(
     """
     from_place, to_place = parse_place(start, "--start"), parse_place(goal, "--goal")
     with readable_errors():
-        from mbf_abstract.commands.bench import place_robot, read_config_or_map, standing_server
         from mbf_abstract.commands.plan_picture import draw_plan
+        from mbf_abstract.commands.standing_server import place_robot, read_config_or_map, standing_server
         from mbf_abstract.compiling.compilation import record_compilations
         from mbf_abstract.goals.goal_types import GetPathGoal
         from mbf_abstract.navigator import Navigator
@@ -79,7 +79,7 @@ def plan(
         what = "compiled once, kept on disk" if compiled.kept else "compiled, and not kept for the next time"
         names = ", ".join(dict.fromkeys(compiled.kernels))  # some are compiled for several types
         typer.echo(f"{what} ({compiled.seconds:.1f} s): {names}", err=True)
-    _tell(result, seconds, notes, as_json)
+    _report(result, seconds, notes, as_json)
     if not result.success:
         raise typer.Exit(FAILURE)
 
@@ -102,7 +102,7 @@ def _pose(name: str, place: Place, server: AbstractNavigationServer, notes: list
     return server.ground_pose(place.x, place.y, yaw)
 
 
-def _tell(result: GetPathResult, seconds: float, notes: list[str], as_json: bool) -> None:
+def _report(result: GetPathResult, seconds: float, notes: list[str], as_json: bool) -> None:
     """Print the result on stdout; what was found in the map on stderr, or as one more entry of the JSON object."""
     path = result.path
     facts: dict[str, Any] = {

@@ -141,8 +141,8 @@ class VelocityGate:
                 self._writer.wait_until_free(self._command_timeout)
             reason = problem or self._reason_to_drop(lease)
             if reason:
-                told = [] if problem else command_data(command)
-                self._events.emit(EventKind.COMMAND_DROPPED, lease.owner, command=told, reason=reason)
+                sent = [] if problem else command_data(command)
+                self._events.emit(EventKind.COMMAND_DROPPED, lease.owner, command=sent, reason=reason)
                 begun = self._writer.begin_stop() if problem and self._lease is lease else None
             else:
                 begun = self._writer.begin(self._limited(lease, command))

@@ -83,18 +83,18 @@ class ControllerExecution:
             return end
         finally:
             try:
-                self._tell_robot(lambda: lease.release(stop=self._stops_at(end.state), reason=end.state.value))
+                self._write_to_robot(lambda: lease.release(stop=self._stops_at(end.state), reason=end.state.value))
             finally:
-                self._tell_cycles(began)
+                self._report_cycles(began)
 
     def stop_robot(self, reason: str) -> None:
         """Take the lease away from the loop, from another thread: a call of it hangs. Never waits."""
         if self._lease is not None:
             self._lease.revoke(reason)
 
-    def _tell_robot(self, tell: Callable[[], T]) -> T:
+    def _write_to_robot(self, write: Callable[[], T]) -> T:
         """Let the gate call the driver, supervised: it may block."""
-        return self._run.call_beside("the robot's send_command()", tell)
+        return self._run.call_beside("the robot's send_command()", write)
 
     # -------------------------------------------------------------------------------------- the cycle
     def _loop(self, lease: Lease) -> ControllerEnd:
@@ -173,7 +173,7 @@ class ControllerExecution:
                 self._motion.resume()
             return False
         if not lease.paused:
-            self._tell_robot(lease.pause)
+            self._write_to_robot(lease.pause)
             self._motion.pause()
             self._enter(ControllerState.PAUSED)
         return True
@@ -204,7 +204,7 @@ class ControllerExecution:
         return str(problem) if problem else ""
 
     def _hold(self, lease: Lease, outcome: int, reason: str) -> None:
-        self._tell_robot(lease.stop)
+        self._write_to_robot(lease.stop)
         self._enter(ControllerState.HOLDING)
         self._hold_reason = (outcome, reason)
 
@@ -238,7 +238,7 @@ class ControllerExecution:
         if self.state is not ControllerState.STOPPING:
             self._run.patience_watch.restart()
             self._enter(ControllerState.STOPPING)
-        self._tell_robot(lease.stop)
+        self._write_to_robot(lease.stop)
         if self._run.is_patience_over():
             text = f"the robot is at its goal but still moves at {velocity.speed:.2f} m/s, {velocity.wz:.2f} rad/s"
             return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, text)
@@ -270,7 +270,7 @@ class ControllerExecution:
         if self._run.canceled and self._graceful_stop is None:  # while it computed; a new command is not wanted
             return self._handle_cancel()
         if result.success and result.command is not None:
-            self._motion.told_to_move()
+            self._motion.note_command()
             if self._sent(result.command, lease):
                 self._failures = 0
                 self._run.patience_watch.restart()
@@ -281,14 +281,14 @@ class ControllerExecution:
         return self._count_failure(result, lease)
 
     def _sent(self, command: Command, lease: Lease) -> bool:
-        return self._tell_robot(lambda: lease.send(command))
+        return self._write_to_robot(lambda: lease.send(command))
 
     def _count_failure(self, result: ControlResult, lease: Lease) -> ControllerEnd | None:
         """Stop after a failed cycle; the end, once there were too many or the patience is over."""
         parameters = self._runtime.parameters
         self._failures += 1
         if parameters.force_stop_on_retry or result.command is None:
-            self._tell_robot(lease.stop)
+            self._write_to_robot(lease.stop)
         else:
             self._sent(result.command, lease)
         if self._failures > parameters.controller_max_retries >= 0:
@@ -332,7 +332,7 @@ class ControllerExecution:
             return parameters.force_stop_on_cancel
         return True
 
-    def _tell_cycles(self, began: float) -> None:
+    def _report_cycles(self, began: float) -> None:
         """Record how often the plugin was asked; an event for each call would drown all others."""
         self._runtime.events.emit(
             EventKind.CONTROL_LOOP,

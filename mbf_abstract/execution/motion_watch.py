@@ -34,8 +34,8 @@ class MotionWatch:
         for watch in self._stopwatches:
             watch.resume()
 
-    def told_to_move(self) -> None:
-        """Know that a command comes; a robot that stood until now stood because it was told to."""
+    def note_command(self) -> None:
+        """Take note that a command follows; until now the robot stood because zero was commanded."""
         if self._runtime.gate.last_command.is_stopped():
             self._ignored.restart()
 
@@ -49,8 +49,8 @@ class MotionWatch:
                 f"the robot tilts by {math.degrees(tilt):.1f} degrees, allowed are {allowed:.1f}: "
                 "the ground is steeper than planned"
             )
-        told_to_move = not self._runtime.gate.last_command.is_stopped()
-        if not (told_to_move and measured is not None and measured.is_stopped()):
+        commanded = not self._runtime.gate.last_command.is_stopped()
+        if not (commanded and measured is not None and measured.is_stopped()):
             self._ignored.restart()
         elif 0.0 < parameters.cmd_vel_ignored_tolerance < self._ignored.elapsed:
             return ExePathOutcome.ROBOT_STUCK, f"the robot has ignored its commands for {self._ignored.elapsed:.1f} s"

@@ -93,10 +93,10 @@ class PlannerExecution:
 
     def _call(self) -> PlanResult:
         planner = self._run.plugin.instance
-        with plugin_events(self._runtime, self._run.handle.id, self._run.plugin.name, "make_plan") as told:
+        with plugin_events(self._runtime, self._run.handle.id, self._run.plugin.name, "make_plan") as data:
             answer = self._run.call("make_plan", lambda: self._plan_with(planner))
             result = checked_answer(answer, PlanResult, self._run.plugin.name, "make_plan")
-            told.update(outcome=int(result.outcome), message=result.message)
+            data.update(outcome=int(result.outcome), message=result.message)
         self.last_result = result
         return result
 

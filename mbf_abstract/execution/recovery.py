@@ -109,8 +109,8 @@ class RecoveryExecution:
     def _call(self) -> RecoveryResult:
         behavior = self._run.plugin.instance
         request = RecoveryRequest(self.motion, self._run.handle.cancel_token)
-        with plugin_events(self._run.runtime, self._run.handle.id, self._run.plugin.name, "run_behavior") as told:
+        with plugin_events(self._run.runtime, self._run.handle.id, self._run.plugin.name, "run_behavior") as data:
             answer = self._run.call("run_behavior", lambda: behavior.run_behavior(request))
             result = checked_answer(answer, RecoveryResult, self._run.plugin.name, "run_behavior")
-            told.update(outcome=int(result.outcome), message=result.message)
+            data.update(outcome=int(result.outcome), message=result.message)
         return result

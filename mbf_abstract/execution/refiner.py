@@ -51,8 +51,8 @@ class RefinerExecution:
     def _call(self) -> RefineResult:
         refiner = self._run.plugin.instance
         token = self._run.handle.cancel_token
-        with plugin_events(self._run.runtime, self._run.handle.id, self._run.plugin.name, "apply_refinement") as told:
+        with plugin_events(self._run.runtime, self._run.handle.id, self._run.plugin.name, "apply_refinement") as data:
             answer = self._run.call("apply_refinement", lambda: refiner.apply_refinement(self._path, token))
             result = checked_answer(answer, RefineResult, self._run.plugin.name, "apply_refinement")
-            told.update(outcome=int(result.outcome), message=result.message)
+            data.update(outcome=int(result.outcome), message=result.message)
         return result

@@ -35,7 +35,7 @@ BEYOND_RECOVERY = frozenset(
         ExePathOutcome.OUT_OF_MAP,
     ]
 )
-"""Failures that clearing a map or moving the robot cannot mend."""
+"""Failures that clearing a map or moving the robot cannot resolve."""
 
 
 def recovery_would_help(outcome: int) -> bool:

@@ -34,27 +34,27 @@ class TreeReporter:
         self._tree = tree
         self._events = events
         self._nodes: list[Behaviour] = []
-        self._told: list[str] = []
+        self._reported: list[str] = []
 
     def begin(self) -> None:
         """Tell what the tree is made of; all its nodes are idle."""
         placed = list(_in_order(self._tree, 0))
         self._nodes = [node for node, _ in placed]
-        self._told = [IDLE] * len(placed)
+        self._reported = [IDLE] * len(placed)
         nodes = [{"name": node.name, "type": type(node).__name__, "depth": depth} for node, depth in placed]
         self._events.emit(EventKind.TREE, "tree", tree=self._tree.name, nodes=nodes)
 
     def report(self, tick: int) -> None:
         """Tell which nodes have changed since the last call, with their own words; nothing where none has."""
         now = [node.status.value for node in self._nodes]
-        if now == self._told:
+        if now == self._reported:
             return
         changes = [
             [index, status, self._nodes[index].feedback_message]
-            for index, (status, told) in enumerate(zip(now, self._told, strict=True))
-            if status != told
+            for index, (status, reported) in enumerate(zip(now, self._reported, strict=True))
+            if status != reported
         ]
-        self._told = now
+        self._reported = now
         self._events.emit(EventKind.TREE, "tree", tree=self._tree.name, tick=tick, changes=changes)
 
 

@@ -105,7 +105,7 @@ class TreeExecutive:
         while not self._cancel_reason:
             self.tree.tick_once()
             self._ticks += 1
-            self._tell_tip()
+            self._report_tip()
             self._reporter.report(self._ticks)
             for listener in self.on_tick:
                 listener(self._ticks)
@@ -127,7 +127,7 @@ class TreeExecutive:
             while not self._cancel_reason and clock.now() < stamp - TIME_RESOLUTION:
                 self._condition.wait(stamp - clock.now())
 
-    def _tell_tip(self) -> None:
+    def _report_tip(self) -> None:
         """Log which node is at work, so that a tree can be followed in the event log, live and in a replay."""
         tip = self.tree.tip()
         name = "" if tip is None else tip.name

@@ -2,7 +2,7 @@
 
 Strengths: reads the map of *now*, so it drives round obstacles seen after planning; knows slopes, costs and the robot's
 motion model (differential or Ackermann). Known failure: a local method with a horizon of ``time_steps * model_dt``;
-out of a pocket deeper than that only a new plan leads. An Ackermann robot cannot mend its heading
+out of a pocket deeper than that only a new plan leads. An Ackermann robot cannot correct its heading
 where it stands; it comes in on a curve along the goal's heading, if there is room for one. A path whose poses ask for
 reverse it drives as it is, cusp after cusp, where ``min_vel_x`` allows that, and refuses otherwise.
 Cost: about 3 ms a cycle with 400 samples of 30 steps; so many times more as a step is longer than half
@@ -100,8 +100,8 @@ class MPPIController(MeshController):
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
         self._shortest_edge = float(self.mesh_map.neighbour_lengths.min())
-        self._hardness_of: tuple[int, float] = (-1, 0.0)  # version of the map and cost limit
-        self._hardness: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
+        self._ranks_of: tuple[int, float] = (-1, 0.0)  # version of the map and cost limit
+        self._ranks: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the map's frame; not one in reverse for a car that may not."""
@@ -173,7 +173,7 @@ class MPPIController(MeshController):
             off = heading_error(pose, self._approach.goal)
             self._idle_cycles += p.motion_model == "ackermann"
             if self._idle_cycles > _IDLE_CYCLES:
-                message = f"the goal is reached but for {off:.2f} rad, which a car cannot mend where it stands"
+                message = f"the goal is reached but for {off:.2f} rad, which a car cannot correct where it stands"
                 return ControlResult(ExePathOutcome.NO_VALID_CMD, message)
             turn = clamp(2.0 * off, p.max_vel_theta)
             return ControlResult(ExePathOutcome.SUCCESS, "", self._as_command(0.0, turn))
@@ -286,7 +286,7 @@ class MPPIController(MeshController):
             mesh_map.face_neighbours,
             mesh_map.face_normals,
             snapshot.costs,
-            self._hardness_at(snapshot),
+            self._ranks_at(snapshot),
             spot.face,
             _vector(spot.point),
             tangent(_vector(pose.rotation[:, 0]), _vector(mesh_map.face_normals[spot.face])),
@@ -322,14 +322,14 @@ class MPPIController(MeshController):
 
     def _blocked(self) -> NDArray[np.bool_]:
         """Vertices (V,) no curve may come near."""
-        return np.asarray(self._hardness_at(self.mesh_map.snapshot()) > 0.0)
+        return np.asarray(self._ranks_at(self.mesh_map.snapshot()) > 0.0)
 
-    def _hardness_at(self, snapshot: MeshSnapshot) -> NDArray[np.float32]:
+    def _ranks_at(self, snapshot: MeshSnapshot) -> NDArray[np.float32]:
         """How forbidden the vertices (V,) are to the robot."""
         wanted = snapshot.version, self.parameters.cost_limit
-        if wanted != self._hardness_of:
-            self._hardness, self._hardness_of = snapshot.hardness(self.parameters.cost_limit), wanted
-        return self._hardness
+        if wanted != self._ranks_of:
+            self._ranks, self._ranks_of = snapshot.traversability_rank(self.parameters.cost_limit), wanted
+        return self._ranks
 
     def _as_motions(self, controls: NDArray[np.float64]) -> NDArray[np.float64]:
         """Turn controls (..., 2) into speed and yaw rate (..., 2), where a car has a steering angle."""

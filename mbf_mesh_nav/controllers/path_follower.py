@@ -20,7 +20,7 @@ from mbf_abstract.geometry.arcs import arc_to, in_robot_frame
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
-from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS, may_enter
+from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter
 from mbf_mesh_nav.mesh.borders import beyond_border
 from mbf_mesh_nav.motion.goal_approach import (
     GoalApproach,
@@ -125,10 +125,10 @@ class PathFollower(MeshController):
         places = np.concatenate([here[None], self._tracker.points_at(self._tracker.progress + ahead)])
         location = self.mesh_map.locate(places, self.parameters.max_surface_distance)
         corners = self.mesh_map.faces[location.faces]
-        hardness = self.mesh_map.snapshot().hardness(self.parameters.cost_limit, corners)
-        nearest = np.take_along_axis(hardness, np.argmax(location.barycentric, axis=1)[:, None], axis=1)[:, 0]
-        mixed = np.where(nearest > 0.0, (hardness * location.barycentric).sum(axis=1), 0.0)
-        mixed[(location.faces < 0) | beyond_border(self.mesh_map.topology, places, location)] = LETHAL_HARDNESS
+        ranks = self.mesh_map.snapshot().traversability_rank(self.parameters.cost_limit, corners)
+        nearest = np.take_along_axis(ranks, np.argmax(location.barycentric, axis=1)[:, None], axis=1)[:, 0]
+        mixed = np.where(nearest > 0.0, (ranks * location.barycentric).sum(axis=1), 0.0)
+        mixed[(location.faces < 0) | beyond_border(self.mesh_map.topology, places, location)] = LETHAL_RANK
         for distance, before, now in zip(ahead, mixed[:-1], mixed[1:], strict=True):
             if not may_enter(before, now):
                 return float(distance)

@@ -4,7 +4,7 @@ Strengths: needs no projection onto a path; from wherever a disturbance pushes t
 never has to return to a line. Known failure: knows only what the plan knew, obstacles seen later are not avoided
 (``mesh.mppi`` avoids them); a path without a field (``mesh.astar``) is refused. Cost: below 0.1 ms a cycle.
 
-The law is that of mesh_navigation's mesh controller, with its faults mended: the yaw rate is limited on both sides,
+The law is that of mesh_navigation's mesh controller, with its faults corrected: the yaw rate is limited on both sides,
 the speed fades towards the goal, rounding cannot break the angle, and the field is the plan's own.
 """
 

@@ -21,7 +21,7 @@ class BorderParameters(LayerParameters):
 
 
 class BorderLayer(MeshLayer):
-    """Marks the vertices at the rim of the mesh and of its holes."""
+    """Marks the vertices at the boundary of the mesh and of its holes."""
 
     Parameters = BorderParameters
     parameters: BorderParameters

@@ -106,13 +106,13 @@ class TiltLayer(MeshLayer):
         """Return the limits of roll, pitch up and pitch down [rad], the tip-over margin included; at least 1e-3."""
         settings = self.parameters
         height = settings.center_of_mass_height
-        arms = (
+        lever_arms = (
             0.5 * settings.track,
             0.5 * settings.wheelbase + settings.center_of_mass_x,
             0.5 * settings.wheelbase - settings.center_of_mass_x,
         )
         configured = (settings.max_roll, settings.max_pitch_up, settings.max_pitch_down)
-        steady = [math.atan2(arm, height) - settings.tip_over_margin for arm in arms]
+        steady = [math.atan2(lever_arm, height) - settings.tip_over_margin for lever_arm in lever_arms]
         roll, up, down = (max(min(pair), 1e-3) for pair in zip(configured, steady, strict=True))
         return roll, up, down
 

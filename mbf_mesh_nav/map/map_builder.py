@@ -87,8 +87,8 @@ class MeshMapParameters(ParameterModel):
     )
     join_distance: float = parameter(
         0.0,
-        "How far apart vertices at the rims of parts may be for duplicate_vertices to join them; 0 = a millionth of "
-        "the mesh's extent.",
+        "How far apart vertices at the boundaries of parts may be for duplicate_vertices to join them; "
+        "0 = a millionth of the extent of the mesh.",
         unit="m",
         ge=0.0,
         dynamic=False,

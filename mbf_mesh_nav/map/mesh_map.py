@@ -139,7 +139,7 @@ class MeshMap(LayeredMap):
         x0, y0 : float
             Position of ``heights[0, 0]`` [m].
         repair : sequence of str
-            As in ``from_arrays``; ``point_contacts`` parts regions that touch in a sample only.
+            As in ``from_arrays``; ``non_manifold_vertices`` parts regions that touch in a sample only.
 
         Raises
         ------
@@ -300,9 +300,9 @@ class MeshMap(LayeredMap):
         turns = command.speed == 0.0 and command.wz != 0.0
         if turns and (slope := slope_at(self.topology, place)) > self.max_turning_slope:
             return f"the ground slopes {slope:.2f} rad, turning is allowed up to {self.max_turning_slope:g} rad"
-        hardness = self.snapshot().hardness(FORBIDDEN_COST)
+        ranks = self.snapshot().traversability_rank(FORBIDDEN_COST)
         radius = self.inscribed_radius or UNKNOWN_RADIUS
-        return forbidden_ahead(self.topology, hardness, place, pose, command, duration, radius)
+        return forbidden_ahead(self.topology, ranks, place, pose, command, duration, radius)
 
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] to the nearest lethal vertex of the robot's storey; None if none is ``within`` [m]."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.kernels.layers.edge_weights import show_changes
-from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS
+from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK
 from mbf_mesh_nav.map.layer import CostArray, IntArray, LethalArray
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
@@ -55,15 +55,15 @@ class MeshSnapshot:
         np.logical_not(blocked, out=blocked)
         return np.logical_or(blocked, self.lethal, out=blocked)
 
-    def hardness(self, cost_limit: float, vertices: IntArray | None = None) -> CostArray:
-        """How forbidden vertices are, all or the given (k,): 0 where free, 1 to 2 by cost, LETHAL_HARDNESS if lethal.
+    def traversability_rank(self, cost_limit: float, vertices: IntArray | None = None) -> CostArray:
+        """How forbidden vertices are, all or the given (k,): 0 where free, 1 to 2 by cost, LETHAL_RANK if lethal.
 
         What is free is as in ``blocked``; infinite cost is lethal. See ``kernels.forbidden_ground`` for its use.
         """
         costs, lethal = (self.costs, self.lethal) if vertices is None else (self.costs[vertices], self.lethal[vertices])
         beyond = np.nan_to_num(costs - np.float32(min(cost_limit, 1e6)), nan=0.0, posinf=1.0)
         by_cost = np.where(costs < cost_limit, 0.0, 1.0 + np.clip(beyond, 0.0, 1.0))
-        return np.where(lethal | np.isposinf(costs), LETHAL_HARDNESS, by_cost).astype(np.float32)
+        return np.where(lethal | np.isposinf(costs), LETHAL_RANK, by_cost).astype(np.float32)
 
 
 class _Loan:

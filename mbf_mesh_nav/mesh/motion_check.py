@@ -17,7 +17,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned, walk
-from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS, hardness_at, may_enter
+from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter, rank_at
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
@@ -36,7 +36,7 @@ def slope_at(mesh: MeshTopology, place: SurfacePoint) -> float:
 
 def forbidden_ahead(
     mesh: MeshTopology,
-    hardness: NDArray[np.float32],
+    ranks: NDArray[np.float32],
     place: SurfacePoint,
     pose: Pose,
     command: Twist,
@@ -47,8 +47,8 @@ def forbidden_ahead(
 
     Parameters
     ----------
-    hardness : (V,) float32
-        How forbidden the vertices are, see ``MeshSnapshot.hardness``.
+    ranks : (V,) float32
+        How forbidden the vertices are, see ``MeshSnapshot.traversability_rank``.
     place : SurfacePoint
         Where the robot stands, at ``pose``.
     command : Twist
@@ -57,9 +57,9 @@ def forbidden_ahead(
         How far [m] the robot reaches beyond its centre.
     """
     face, point = place.face, (float(place.point[0]), float(place.point[1]), float(place.point[2]))
-    stands_on = hardness_at(mesh.vertices, mesh.faces, hardness, face, point)
+    stands_on = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
     if command.speed == 0.0:
-        blocked = command.wz != 0.0 and stands_on >= LETHAL_HARDNESS
+        blocked = command.wz != 0.0 and stands_on >= LETHAL_RANK
         return f"the robot stands on an obstacle at {_text(point)}" if blocked else ""
     ahead = pose.rotation[:, 0] * command.vx + pose.rotation[:, 1] * command.vy
     normal = mesh.face_normals[face]
@@ -74,7 +74,7 @@ def forbidden_ahead(
         )
         if done < stride - 1e-6:
             return f"the surface ends at {_text(point)}"
-        comes_to = hardness_at(mesh.vertices, mesh.faces, hardness, face, point)
+        comes_to = rank_at(mesh.vertices, mesh.faces, ranks, face, point)
         if not may_enter(stands_on, comes_to):
             return f"an obstacle is in the way: the robot would touch it at {_text(point)}"
         stands_on, walked = comes_to, walked + stride

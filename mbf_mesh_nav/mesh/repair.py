@@ -32,20 +32,20 @@ from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh, FloatArray, IntArray
 from mbf_mesh_nav.mesh.mesh_report import Finding, MeshError, MeshReport
 from mbf_mesh_nav.mesh.slivers import without_slivers
 from mbf_mesh_nav.mesh.topology import faces_of_vertices
-from mbf_mesh_nav.mesh.welding import close_rims, rounding_distance, same_position
+from mbf_mesh_nav.mesh.welding import join_boundaries, rounding_distance, same_position
 
 __all__ = ["REPAIRS", "CheckedMesh", "Finding", "MeshError", "MeshReport", "checked_mesh", "component_labels"]
 
 REPAIRS: dict[str, str] = {
     "non_finite": "drop vertices with NaN or inf and their faces",
     "index_out_of_range": "drop faces that name a vertex that does not exist",
-    "duplicate_vertices": "merge vertices at the same position, at the rims of parts also those nearly there",
+    "duplicate_vertices": "merge vertices at the same position, at the boundaries of parts also those nearly there",
     "zero_area": "flip faces without area away and join their neighbours; drop those that cannot be",
     "duplicate_faces": "drop faces with the same corners as an earlier one",
     "non_manifold": "drop the third and further faces at an edge, in index order",
     "flipped_winding": "turn faces round whose neighbours are wound the other way, also where not all can agree",
     "facing_down": "turn every component round that faces down",
-    "point_contacts": "give each of the groups of faces that touch in a point a vertex of its own",
+    "non_manifold_vertices": "give each of the groups of faces that touch in a point a vertex of its own",
     "unreferenced": "drop vertices without a face",
     "small_components": "keep only the component with the most vertices",
 }
@@ -80,7 +80,7 @@ def checked_mesh(
     file : str
         Named in the error.
     join_distance : float
-        How far apart [m] vertices at the rims of parts may be for the repair ``duplicate_vertices`` to join them;
+        How far apart [m] vertices at the boundaries of parts may be for the repair ``duplicate_vertices`` to join them;
         0 = a millionth of the mesh's extent.
 
     Raises
@@ -97,7 +97,7 @@ def checked_mesh(
     mesh = check.zero_area(mesh)
     mesh = check.edges(mesh)
     mesh = check.winding(mesh)
-    mesh = check.point_contacts(mesh)
+    mesh = check.non_manifold_vertices(mesh)
     mesh = check.components(mesh)
     mesh = check.unreferenced(mesh)
     reasons = [str(finding) for finding in check.report.refusals]
@@ -179,7 +179,9 @@ class _Check:
         moved = mesh.vertex_source[exact != np.arange(len(exact))]
         mesh = mesh.merged(exact)
         distance = self.join_distance or rounding_distance(mesh.vertices[mesh.used])
-        target = close_rims(mesh.vertices, faces_across_edges(mesh.faces, *self.incidence(mesh)), mesh.faces, distance)
+        target = join_boundaries(
+            mesh.vertices, faces_across_edges(mesh.faces, *self.incidence(mesh)), mesh.faces, distance
+        )
         near = mesh.vertex_source[target != np.arange(len(target))]
         text = "{count} vertices repeat a position"
         if len(near):
@@ -231,14 +233,14 @@ class _Check:
             return mesh
         return replace(mesh, faces=np.where(concerned[:, None], mesh.faces[:, ::-1], mesh.faces))
 
-    def point_contacts(self, mesh: CheckedMesh) -> CheckedMesh:
+    def non_manifold_vertices(self, mesh: CheckedMesh) -> CheckedMesh:
         offsets, incident = self.incidence(mesh)
         across = faces_across_edges(mesh.faces, offsets, incident)
         fans, counts = fans_at_vertices(mesh.faces, across, offsets, incident)
         several = counts > 1
         text = "{count} vertices join groups of faces that touch in this point only"
-        self.found("point_contacts", text, mesh.vertex_source[several], harmless=True)
-        if not several.any() or "point_contacts" not in self.repair:
+        self.found("non_manifold_vertices", text, mesh.vertex_source[several], harmless=True)
+        if not several.any() or "non_manifold_vertices" not in self.repair:
             return mesh
         entries = np.flatnonzero(fans > 0)
         vertex = np.repeat(np.arange(len(counts), dtype=np.int32), np.diff(offsets))[entries]

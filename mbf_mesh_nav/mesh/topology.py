@@ -84,7 +84,7 @@ class MeshTopology:
 
     @cached_property
     def border_vertices(self) -> NDArray[np.bool_]:
-        """Vertices (V,) at the rim of the mesh and of its holes."""
+        """Vertices (V,) at the boundary of the mesh and of its holes."""
         face, corner = np.nonzero(self.face_neighbours < 0)
         border = np.zeros(len(self.vertices), dtype=np.bool_)
         border[self.faces[face, corner]] = border[self.faces[face, (corner + 1) % 3]] = True

@@ -1,7 +1,7 @@
-"""Finding vertices that stand for one point: at the same position, or nearly so at the rims of parts that meet.
+"""Finding vertices that stand for one point: at the same position, or nearly so at the boundaries of parts that meet.
 
 Parts of a scene are moved into place by matrices, and files hold four bytes a coordinate: two tiles laid edge to edge
-then miss each other by a rounding error. Only vertices at a rim are compared with a tolerance, so however fine the
+then miss each other by a rounding error. Only vertices at a boundary are compared with a tolerance, so however fine the
 inside of a surface is, it stays as it is.
 """
 
@@ -34,8 +34,8 @@ def same_position(vertices: FloatArray) -> IntArray:
     return target
 
 
-def close_rims(vertices: FloatArray, face_neighbours: IntArray, faces: IntArray, distance: float) -> IntArray:
-    """Vertex that stands for each vertex (V,) when the ones at rims within ``distance`` [m] are joined.
+def join_boundaries(vertices: FloatArray, face_neighbours: IntArray, faces: IntArray, distance: float) -> IntArray:
+    """Vertex that stands for each vertex (V,) when the ones at boundaries within ``distance`` [m] are joined.
 
     Parameters
     ----------
@@ -47,13 +47,15 @@ def close_rims(vertices: FloatArray, face_neighbours: IntArray, faces: IntArray,
     """
     target = np.arange(len(vertices), dtype=np.int32)
     face, corner = np.nonzero(face_neighbours < 0)
-    rim = np.unique(np.concatenate([faces[face, corner], faces[face, (corner + 1) % 3]]))
-    pairs = cKDTree(vertices[rim]).query_pairs(distance, output_type="ndarray") if len(rim) else np.zeros((0, 2))
+    boundary = np.unique(np.concatenate([faces[face, corner], faces[face, (corner + 1) % 3]]))
+    pairs = (
+        cKDTree(vertices[boundary]).query_pairs(distance, output_type="ndarray") if len(boundary) else np.zeros((0, 2))
+    )
     if not len(pairs):
         return target
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(len(rim), len(rim)))
+    graph = coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(len(boundary), len(boundary)))
     _, first, group = np.unique(connected_components(graph, directed=False)[1], return_index=True, return_inverse=True)
-    target[rim] = rim[first[group]]
+    target[boundary] = boundary[first[group]]
     # Corners of one face that are this close are a fine detail and no seam: leave all of them where they are.
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     detail = target[start[(target[start] == target[end]) & (start != end)]]
@@ -61,6 +63,6 @@ def close_rims(vertices: FloatArray, face_neighbours: IntArray, faces: IntArray,
 
 
 def rounding_distance(vertices: FloatArray) -> float:
-    """Distance [m] within which rims are taken for one unless the user says otherwise."""
+    """Distance [m] within which boundaries are taken for one unless the user says otherwise."""
     extent = np.ptp(vertices, axis=0) if len(vertices) else np.zeros(3)
     return ROUNDING_SHARE * float(norm(extent))

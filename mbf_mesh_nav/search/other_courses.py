@@ -43,7 +43,7 @@ class OtherCourses:
     """Courses of one query; the traces lead down the fields of the waves from its goal and from its start."""
 
     def __init__(self, mesh_map: MeshMap, query: LegQuery, corridor: Corridor, to_goal: Trace, to_start: Trace) -> None:
-        self._mesh_map, self._query, self._strip = mesh_map, query, corridor
+        self._mesh_map, self._query, self._corridor = mesh_map, query, corridor
         self._to_goal, self._to_start = to_goal, to_start
 
     def best(self, course: Piece, from_goal: Distances, from_start: Distances) -> Piece:
@@ -55,27 +55,27 @@ class OtherCourses:
         from_goal, from_start : (V,) float32
             What the two waves say [m].
         """
-        reversed_course = self._strip.shorten(*_reversed(self._to_start(self._query.goal)))
+        reversed_course = self._corridor.shorten(*_reversed(self._to_start(self._query.goal)))
         best = min(course, reversed_course, key=lambda piece: self._cost(piece, course))
         beside = np.zeros(len(from_goal), dtype=np.bool_)
         for piece in (course, reversed_course):
             beside[self._mesh_map.faces[piece[1]]] = True
         lengths, tried = from_goal + from_start, 0
         for vertex in np.argsort(lengths, kind="stable").tolist():
-            if tried >= _COURSES or not lengths[vertex] <= _WORTH_A_TRY * self._strip.cost(*best):
+            if tried >= _COURSES or not lengths[vertex] <= _WORTH_A_TRY * self._corridor.cost(*best):
                 break
             place = None if beside[vertex] else self._free_place(vertex)
             if place is None:
                 continue
             tried += 1
-            through = self._strip.shorten(*_joined(_reversed(self._to_start(place)), self._to_goal(place)))
+            through = self._corridor.shorten(*_joined(_reversed(self._to_start(place)), self._to_goal(place)))
             beside[self._mesh_map.faces[through[1]]] = True
             best = min(best, through, key=lambda piece: self._cost(piece, course))
-        return min(best, self._strip.pass_vertices(*best), key=lambda piece: self._cost(piece, course))
+        return min(best, self._corridor.pass_vertices(*best), key=lambda piece: self._cost(piece, course))
 
     def _cost(self, piece: Piece, course: Piece) -> float:
         """Cost [m] of a piece; that of the given course is a little less than it is, so that it stays where it may."""
-        cost = self._strip.cost(*piece)
+        cost = self._corridor.cost(*piece)
         return _SHORTER * cost if piece is course else cost
 
     def _free_place(self, vertex: int) -> SurfacePoint | None:

@@ -82,7 +82,7 @@ class SurfacePlanner(MeshPlanner):
         snapshot = self.mesh_map.snapshot()
         blocked = self._blocked_vertices.at(snapshot, self.parameters.cost_limit)
 
-        # 2. Where on the surface is everything? Only a problem of the goal can be mended by a tolerance.
+        # 2. Where on the surface is everything? A tolerance helps with a problem of the goal only.
         stops, problem = self._locate_stops(request, snapshot, blocked)
         if problem is not None and (len(stops) <= len(request.via) or request.dist_tolerance <= 0.0):
             return problem

@@ -31,7 +31,7 @@ STEP_SAMPLE = 64
 COURSE_LOST = 0.005
 """A path so much costlier than its field, as a share, is looked for once more. Fields are right to 0.3 %."""
 
-AS_FORETOLD = 5e-4
+AS_PREDICTED = 5e-4
 """A path that differs by no more from what its field says, as a share, is the one that the wave meant."""
 
 
@@ -119,14 +119,14 @@ class WaveSearch:
         if corridor.has_costs(traced[1]):
             return corridor.shorten(*traced) if pull_over_costs else traced
         best = corridor.shorten(*traced)
-        foretold = min(
+        predicted = min(
             float(wave.distances[corner]) + math.dist(self._mesh_map.vertices[corner], start.point)
             for corner in self._mesh_map.faces[start.face].tolist()
         )
-        if corridor.cost(*best) > (1.0 + COURSE_LOST) * foretold:
+        if corridor.cost(*best) > (1.0 + COURSE_LOST) * predicted:
             other = corridor.shorten(*self._trace(query, wave, along_edges=True))
             best = min(best, other, key=lambda path: corridor.cost(*path))
-        if wave.along_edges or abs(corridor.cost(*best) - foretold) <= AS_FORETOLD * foretold:
+        if wave.along_edges or abs(corridor.cost(*best) - predicted) <= AS_PREDICTED * predicted:
             return best
         return self._other_course(query, wave, corridor, best)
 

@@ -71,13 +71,15 @@ def cut(centres: FloatArray, order: OrderArray, cuts: OrderArray) -> int:
 
 
 @kernel
-def write_box(box: FloatArray, lane: int, lower: FloatArray, upper: FloatArray, order: OrderArray, hair: float) -> None:
+def write_box(
+    box: FloatArray, lane: int, lower: FloatArray, upper: FloatArray, order: OrderArray, margin: float
+) -> None:
     """Write the box around the triangles of ``order`` into ``box`` (6, 8), one rounding step larger than they are."""
     for axis in range(3):
         low, high = lower[order[0], axis], upper[order[0], axis]
         for face in order:
             low, high = min(low, lower[face, axis]), max(high, upper[face, axis])
-        box[axis, lane], box[3 + axis, lane] = low - hair, high + hair
+        box[axis, lane], box[3 + axis, lane] = low - margin, high + margin
 
 
 @kernel
@@ -131,7 +133,7 @@ def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntAr
             a, b, c = vertices[faces[face, 0], axis], vertices[faces[face, 1], axis], vertices[faces[face, 2], axis]
             lower[face, axis], upper[face, axis] = min(a, b, c), max(a, b, c)
     centres, order = 0.5 * (lower + upper), np.arange(len(faces))
-    hair = 1e-9 * max(np.abs(vertices).max(), 1.0)
+    margin = 1e-9 * max(np.abs(vertices).max(), 1.0)
     leaf_count = (len(faces) + WIDTH - 1) // WIDTH
     most = leaf_count + 1  # a node has at least two children, but for the one above the root
     boxes, leaves = np.empty((most, 6, WIDTH), dtype=np.float64), np.zeros((leaf_count, 9, WIDTH), dtype=np.float64)
@@ -147,7 +149,7 @@ def build_tree(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntAr
         boxes[node] = np.nan
         for lane in range(parts):
             within = order[cuts[lane] : cuts[lane + 1]]
-            write_box(boxes[node], lane, lower, upper, within, hair)
+            write_box(boxes[node], lane, lower, upper, within, margin)
             if len(within) <= WIDTH:
                 write_leaf(leaves[written], vertices, faces, within)
                 written += 1

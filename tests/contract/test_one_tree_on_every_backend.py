@@ -28,7 +28,7 @@ class Story:
         self.made = made
         options = TreeOptions(clear="clear", out_of_collision="back_up", second_planner_pause=0.0)
         self.executive = TreeExecutive(navigation_tree(options), made.navigator)
-        self._told = 0
+        self._reported = 0
 
     def run(self, x, y, script):
         """Drive to a place while ``script(story)`` is called at every tick; status of the tree."""
@@ -43,7 +43,7 @@ class Story:
     def news(self):
         """Those since the last look."""
         ended = self.ended()
-        new, self._told = ended[self._told :], len(ended)
+        new, self._reported = ended[self._reported :], len(ended)
         return new
 
 

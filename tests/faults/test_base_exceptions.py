@@ -110,7 +110,7 @@ class Driver:
 
 
 @pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
-def test_a_driver_that_raises_it_is_told_zero_again_by_a_watchdog_that_lives_on(error):
+def test_a_driver_that_raises_it_is_sent_zero_again_by_a_watchdog_that_lives_on(error):
     driver = Driver(error)
     with Bench(robot=driver, command_timeout=0.2) as bench:
         driver.robot = bench.robot

@@ -162,7 +162,7 @@ def test_the_controller_is_free_for_the_next_goal_while_driver_or_map_still_hang
     assert len(site.bench.server.runtime.hanging) == 2
 
 
-def test_a_goal_whose_driver_hangs_from_an_earlier_one_is_told_so(drive_into):
+def test_a_goal_whose_driver_hangs_from_an_earlier_one_says_so(drive_into):
     site, handle = drive_into("send_command", SimClock(), controller_patience=1.0)
     handle.wait()
     again = site.bench.navigator.send(ExePathGoal(site.bench.path_to(60.0))).wait()

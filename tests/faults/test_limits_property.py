@@ -45,7 +45,7 @@ def test_within_the_limits_a_command_passes_untouched():
     assert LIMITS.apply(command) is command
 
 
-def test_the_robot_gets_the_limited_command_and_the_event_tells_both():
+def test_the_robot_gets_the_limited_command_and_the_event_reports_both():
     with Bench(max_vel_x=0.4, max_vel_theta=0.8) as bench:
         bench.controller.play(drive(2.0, 1.0))
         handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))

@@ -167,7 +167,7 @@ local_costmap: {rolling_window: true, width: 2.0, height: 2.0, layers: [{name: a
 """
 
 
-def test_a_server_refuses_a_malformed_map_before_it_starts_and_starts_with_the_mended_one(tmp_path):
+def test_a_server_refuses_a_malformed_map_before_it_starts_and_starts_with_the_repaired_one(tmp_path):
     (tmp_path / "robot.yaml").write_text(CONFIG)
     (tmp_path / "map.yaml").write_text(yaml.safe_dump(GOOD))
     (tmp_path / "map.pgm").write_bytes(BAD_IMAGES["short data"])

@@ -74,15 +74,17 @@ def all_faces_turned_over():
     return vertices, faces[:, ::-1].copy()
 
 
-def moebius_strip():
-    """A strip of squares, its end joined to its beginning with a half turn."""
+def moebius_band():
+    """A band of squares, its end joined to its beginning with a half turn."""
     turns = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
-    rims = [
+    boundaries = [
         np.stack([(2 + s * np.cos(turns / 2)) * np.cos(turns), (2 + s * np.cos(turns / 2)) * np.sin(turns)], axis=1)
         for s in (-0.4, 0.4)
     ]
     heights = [s * np.sin(turns / 2) for s in (-0.4, 0.4)]
-    vertices = np.vstack([np.column_stack([rim, height]) for rim, height in zip(rims, heights, strict=True)])
+    vertices = np.vstack(
+        [np.column_stack([boundary, height]) for boundary, height in zip(boundaries, heights, strict=True)]
+    )
     low, high = np.arange(24), np.arange(24) + 24
     next_low, next_high = np.append(low[1:], high[0]), np.append(high[1:], low[0])
     return vertices, np.vstack([np.stack([low, next_low, next_high], 1), np.stack([low, next_high, high], 1)])
@@ -126,7 +128,7 @@ def test_defect_is_repaired_on_request_and_the_input_is_left_alone(make, name, i
     assert not second.refusals
 
 
-def test_a_face_wound_against_its_neighbours_is_turned_round_unasked_and_told():
+def test_a_face_wound_against_its_neighbours_is_turned_round_unasked_and_reported():
     vertices, faces = one_face_turned_over()
 
     mesh, report = checked_mesh(vertices, faces)
@@ -137,8 +139,8 @@ def test_a_face_wound_against_its_neighbours_is_turned_round_unasked_and_told():
     np.testing.assert_array_equal(mesh.faces, good()[1])
 
 
-def test_a_one_sided_surface_is_refused_and_the_way_to_have_it_all_the_same_is_told():
-    vertices, faces = moebius_strip()
+def test_a_one_sided_surface_is_refused_and_the_message_names_the_option_that_accepts_it():
+    vertices, faces = moebius_band()
 
     with pytest.raises(MeshError, match="edges of a one-sided surface cannot agree") as error:
         checked_mesh(vertices, faces)
@@ -200,7 +202,7 @@ def damaged(seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 100_000))
-def test_damaged_mesh_is_mended_into_a_sound_map_or_refused(seed):
+def test_damaged_mesh_is_repaired_into_a_sound_map_or_refused(seed):
     vertices, faces = damaged(seed)
 
     try:

@@ -68,7 +68,7 @@ def test_start_and_goal_in_one_face_give_a_path_of_both(navigator, planner):
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_a_goal_off_the_surface_tells_the_distance(navigator, planner):
+def test_a_goal_off_the_surface_reports_the_distance(navigator, planner):
     result = navigator.get_path(Pose.planar(0.5, 0.5, z=1.2), planner=planner)
     assert result.outcome in (GetPathOutcome.OUT_OF_MAP, GetPathOutcome.INVALID_GOAL)
     assert "1.20 m" in result.message

@@ -77,7 +77,7 @@ def velocities(log):
 
 
 @pytest.mark.parametrize("end", ENDS)
-def test_however_the_process_ends_the_robot_is_told_to_stand(tmp_path, end):
+def test_however_the_process_ends_the_robot_is_sent_zero(tmp_path, end):
     log = tmp_path / "commands"
     with start(ENDS[end], log) as process:
         output, _ = process.communicate(timeout=20)
@@ -155,7 +155,7 @@ print(signal.getsignal(signal.SIGTERM) is signal.SIG_DFL, signal.getsignal(signa
     assert output.split() == ["driving", "mine", "False", "False", "True", "True"]
 
 
-def test_a_forked_child_that_is_told_to_end_ends_and_its_parents_robot_drives_on(tmp_path):
+def test_a_forked_child_that_is_terminated_ends_and_its_parents_robot_drives_on(tmp_path):
     log = tmp_path / "commands"
     program = """
 import time
@@ -175,10 +175,10 @@ bench.clock.sleep(0.2)
 """
     with start(program, log) as process:
         output, _ = process.communicate(timeout=20)
-    told = velocities(log)
+    reported = velocities(log)
     assert output.split() == ["driving", str(int(signal.SIGTERM))]
-    assert 0.0 not in told[: told.index(9.0)]
-    assert told[-1] == 0.0
+    assert 0.0 not in reported[: reported.index(9.0)]
+    assert reported[-1] == 0.0
 
 
 def test_a_forked_child_that_ends_does_not_stop_or_drive_the_robot(tmp_path):
@@ -194,10 +194,10 @@ bench.clock.sleep(0.2)
 """
     with start(program, log) as process:
         process.communicate(timeout=20)
-    told = velocities(log)
-    child_ended = told.index(9.0)
-    assert 0.0 not in told[:child_ended]
-    assert told[-1] == 0.0
+    reported = velocities(log)
+    child_ended = reported.index(9.0)
+    assert 0.0 not in reported[:child_ended]
+    assert reported[-1] == 0.0
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit])

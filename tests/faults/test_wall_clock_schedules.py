@@ -107,7 +107,7 @@ class Ledger:
     def take(self, handle):
         self.handles.append(handle)
         if isinstance(handle.goal, ExePathGoal):
-            handle.add_feedback_callback(lambda told: self.calls.append((handle.id, "feedback", True)))
+            handle.add_feedback_callback(lambda reported: self.calls.append((handle.id, "feedback", True)))
         self.add_done_callback(handle)
 
     def done_calls(self):

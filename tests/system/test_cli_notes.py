@@ -57,7 +57,7 @@ def test_a_robot_wider_than_its_inflation_is_not_led_through_a_gap_it_does_not_f
     assert planned.exit_code == 1 and NARROW in planned.stderr, planned.output
 
 
-def test_check_and_plan_and_run_tell_that_the_inflation_is_narrower_than_the_robot(folder):
+def test_check_and_plan_and_run_report_that_the_inflation_is_narrower_than_the_robot(folder):
     assert f"note: {NARROW}" in mbf("check", folder / "server.yaml").stdout
     assert f"note: {NARROW}" in mbf("plan", folder / "server.yaml", "--start", 2, 3, "--goal", 3, 3).stderr
     (folder / "scenario.yaml").write_text(SCENARIO)
@@ -69,7 +69,7 @@ def test_check_and_plan_and_run_tell_that_the_inflation_is_narrower_than_the_rob
     assert f"note: {NARROW}" in run.output, run.output
 
 
-def test_an_optional_plugin_that_was_left_out_is_told_too(folder):
+def test_an_optional_plugin_that_was_left_out_is_reported_too(folder):
     with (folder / "server.yaml").open("a") as file:
         file.write("controllers: [{name: gone, type: module_that_is_not:There, optional: true}]\n")
         file.write("allow_module_types: true\n")

@@ -36,7 +36,7 @@ def hill(tmp_path_factory):
     return file
 
 
-def test_a_plan_on_a_bare_map_is_told_and_succeeds():
+def test_a_plan_on_a_bare_map_is_reported_and_succeeds():
     result = mbf("plan", OFFICE, "--start", 3, 9.7, "--goal", 12, 9.7)
 
     assert result.exit_code == 0, result.output
@@ -112,7 +112,7 @@ def test_a_plan_over_a_hole_says_that_there_is_no_ground(two_storeys):
     assert any("no ground at the start" in note for note in answer["notes"])
 
 
-def test_a_plan_without_z_stays_on_the_lowest_free_floor_and_tells_of_the_others(two_storeys):
+def test_a_plan_without_z_stays_on_the_lowest_free_floor_and_names_the_others(two_storeys):
     result = mbf("plan", two_storeys, "--start", 1, 1, "--goal", 5, 1, "--json")
     answer = json.loads(result.stdout)
     assert (result.exit_code, answer["outcome_name"]) == (0, "SUCCESS"), answer
@@ -167,7 +167,7 @@ def test_a_file_that_is_neither_map_nor_mesh_is_refused(tmp_path):
         assert "Traceback" not in result.output
 
 
-def test_plan_and_check_tell_what_was_found_in_the_mesh_and_what_was_repaired(hill, tmp_path):
+def test_plan_and_check_report_what_was_found_in_the_mesh_and_what_was_repaired(hill, tmp_path):
     mesh = trimesh.load(hill, process=False)
     faces = np.vstack([mesh.faces, mesh.faces[-1]])
     trimesh.Trimesh(mesh.vertices, faces, process=False).export(tmp_path / "twice.ply")
@@ -188,7 +188,7 @@ def test_plan_and_check_tell_what_was_found_in_the_mesh_and_what_was_repaired(hi
     assert (plain.exit_code, checked.exit_code) == (0, 0)
 
 
-def test_check_tells_all_mistakes_with_file_and_line(tmp_path):
+def test_check_reports_all_mistakes_with_file_and_line(tmp_path):
     file = tmp_path / "robot.yaml"
     file.write_text(
         "backend: mesh\ncontroler_frequency: 20.0\nplanner_patience: -1\nplanners:\n  - {name: a, type: nope}\n"
@@ -250,7 +250,7 @@ def test_doctor_finds_this_installation_healthy():
     assert "python" in result.stdout and "kernel cache" in result.stdout
 
 
-def test_doctor_tells_which_package_is_too_old_and_how_to_mend_that(monkeypatch):
+def test_doctor_names_the_package_that_is_too_old_and_how_to_replace_it(monkeypatch):
     monkeypatch.setitem(doctor.oldest_versions(), "numpy", "99.1")
 
     result = mbf("doctor")

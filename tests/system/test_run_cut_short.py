@@ -68,7 +68,7 @@ def slow_run(tmp_path):
 def test_a_run_that_is_killed_is_replayed_as_far_as_it_came(slow_run, number):
     process, folder = slow_run
     os.kill(process.pid, number)
-    _, told = process.communicate()
+    _, reported = process.communicate()
 
     result = CliRunner().invoke(make_app(), ["replay", str(folder), "--no-open"])
 
@@ -80,7 +80,7 @@ def test_a_run_that_is_killed_is_replayed_as_far_as_it_came(slow_run, number):
     assert recording.duration > 2.9 and np.all(np.diff(recording.times) >= 0.0)
     assert recording.ground is not None and recording.paths and recording.scans and recording.grids
     assert any(event.kind is EventKind.GOAL_ACCEPTED for event in recording.events)
-    assert number is not signal.SIGINT or "mbf replay" in told
+    assert number is not signal.SIGINT or "mbf replay" in reported
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +155,7 @@ def test_a_new_run_in_the_same_folder_starts_from_nothing(recorded, tmp_path):
     assert not left & {"recording.npz", "metrics.json", "report.html", PARTS}
 
 
-def test_a_disk_that_takes_no_parts_is_told_once_and_the_run_goes_on(tmp_path):
+def test_a_disk_that_takes_no_parts_is_reported_once_and_the_run_goes_on(tmp_path):
     scenario = load_scenario("crowded_corridor").model_copy(
         update={"physics": "kinematic", "goals": (PlanarPose(x=4.0, y=9.7),), "actors": ()}
     )

@@ -79,7 +79,7 @@ MANOEUVRES = {
 
 
 @pytest.mark.parametrize(("start", "goal"), MANOEUVRES.values(), ids=MANOEUVRES)
-def test_a_car_drives_hybrid_plans_with_cusps_by_mppi_on_the_curves_its_driver_tells(tmp_path, start, goal):
+def test_a_car_drives_hybrid_plans_with_cusps_by_mppi_on_the_curves_of_its_driver(tmp_path, start, goal):
     start, goal = ("{{x: {}, y: {}, yaw: {}}}".format(*pose) for pose in (start, goal))
     text = SCENARIO.replace("{x: 7.0, y: 8.0}", start).replace("{x: 12.0, y: 11.0, yaw: 3.0}", goal)
     (tmp_path / "nav.yaml").write_text(MPPI)

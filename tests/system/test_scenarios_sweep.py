@@ -118,7 +118,7 @@ def test_a_cluster_that_loses_a_worker_at_work_does_every_run_once(arguments, sc
     with Client(scheduler, set_as_default=False) as client:
         client.wait_for_workers(len(workers), timeout=60)
         info = client.scheduler_info(n_workers=-1)["workers"]
-        processes = {where: workers[told["name"]] for where, told in info.items()}
+        processes = {where: workers[reported["name"]] for where, reported in info.items()}
         with subprocess.Popen([*arguments, "--scheduler", scheduler], stdout=subprocess.DEVNULL) as process:
             victim = None
             while victim is None:
@@ -136,7 +136,7 @@ def test_a_cluster_that_loses_a_worker_at_work_does_every_run_once(arguments, sc
     ]
 
 
-def test_a_scheduler_that_does_not_answer_is_told():
+def test_a_scheduler_that_does_not_answer_is_reported():
     with pytest.raises(ClusterError, match="no scheduler answers at nonsense://here"):
         list(run_on_cluster([], "nonsense://here"))
 

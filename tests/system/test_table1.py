@@ -26,14 +26,14 @@ def test_an_empty_world_costs_one_plan_one_hand_over_and_no_recovery(condition):
     assert tally.control_cycles > 15.0 / 0.6 * 20.0
 
 
-def test_both_arms_meet_the_same_traffic_and_a_run_repeats_bit_for_bit():
+def test_both_conditions_meet_the_same_traffic_and_a_run_repeats_bit_for_bit():
     crowded = replace(CONDITIONS["B"], surroundings=replace(CONDITIONS["B"].surroundings, robots=10))
     first, again = (run_repetition(crowded, WAREHOUSE, seed=101, legs=1) for _ in range(2))
     assert first.digest == again.digest
     assert (first.track == again.track).all()
 
 
-def test_the_outdoor_stage_drives_a_leg_on_the_mesh():
+def test_the_outdoor_environment_drives_a_leg_on_the_mesh():
     run = run_repetition(CONDITIONS["B"], OUTDOOR, seed=100, legs=1)
     assert run.tally.legs[0].end == "reached"
     assert run.tally.planner_calls["main_ok"] >= 1

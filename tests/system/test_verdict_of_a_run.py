@@ -43,7 +43,7 @@ def test_a_contact_while_the_robot_moves_fails_the_run_everywhere(rude, tmp_path
     assert said in compared.stdout and said in (tmp_path / "compare.html").read_text()
 
 
-def test_a_sweep_tells_the_verdict_and_counts_no_success(rude, tmp_path):
+def test_a_sweep_reports_the_verdict_and_counts_no_success(rude, tmp_path):
     swept = mbf("sweep", rude, "--seeds", "0:1", "--out", tmp_path / "sweep")
 
     with SweepLog(tmp_path / "sweep" / "runs.jsonl") as log:

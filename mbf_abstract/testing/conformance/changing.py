@@ -71,13 +71,13 @@ def a_layer_that_raises_holds_the_robot(site: Site) -> None:
     for layer in site.map.layers.values():
         handle = site.navigator.send(ExePathGoal(_long_path(site)))
         site.expect_moves(1.5, f"before the layer {layer.name!r} raises")
-        mend = _break(layer)
+        repair = _break(layer)
         site.rig.clock.sleep(1.0)
         site.expect_stands(2.5, f"the layer {layer.name!r} raises")
         problem = site.server.map_problem()
         for word in (repr(layer.name), "RuntimeError", "broken by the suite"):
             site.expect(word in problem, f"map_problem does not say {word}: {problem!r}")
-        mend()
+        repair()
         site.expect_moves(2.5, f"the layer {layer.name!r} works again")
         handle.cancel("next layer")
         site.rig.clock.sleep(0.5)
@@ -100,7 +100,7 @@ def _set_sensing_layers(site: Site, enabled: bool) -> None:
 
 
 def _break(layer: Any) -> Callable[[], None]:
-    """Let every method of a layer raise that its map calls to compute it; returns what mends it."""
+    """Let every method of a layer raise that its map calls to compute it; returns what repairs it."""
 
     def broken(*_: Any, **__: Any) -> Any:
         raise RuntimeError("broken by the suite")
@@ -111,8 +111,8 @@ def _break(layer: Any) -> Callable[[], None]:
     for name in methods:
         setattr(layer, name, broken)
 
-    def mend() -> None:
+    def repair() -> None:
         for name in methods:
             delattr(layer, name)
 
-    return mend
+    return repair

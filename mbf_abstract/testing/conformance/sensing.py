@@ -44,10 +44,12 @@ def an_unknown_source_is_reported_once(site: Site) -> None:
     for _ in range(3):
         site.sees(site.ray(2.0, 4.0, hit=True, source="stranger"))
     site.expect_free(FACE)
-    told = [event for event in site.rig.memory.of_kind(EventKind.FAULT) if "stranger" in str(event.data.get("message"))]
-    site.expect(len(told) == 1, f"expected one report of the unknown source, got {len(told)}")
-    if told:
-        text = str(told[0].data["message"])
+    reported = [
+        event for event in site.rig.memory.of_kind(EventKind.FAULT) if "stranger" in str(event.data.get("message"))
+    ]
+    site.expect(len(reported) == 1, f"expected one report of the unknown source, got {len(reported)}")
+    if reported:
+        text = str(reported[0].data["message"])
         site.expect(SENSOR in text, f"the report does not name the known source {SENSOR!r}: {text}")
 
 

@@ -151,7 +151,7 @@ def repair_distances(
                 state[other] = _TOUCHED
                 touched[size] = other
                 size += ONE
-    # 3. Offers come from the rim of new lethal regions, and from what is known beside the forgotten.
+    # 3. Offers come from the boundary of new lethal regions, and from what is known beside the forgotten.
     for index in range(size):
         vertex = Index(touched[index])
         for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):

@@ -21,7 +21,7 @@ CostArray = NDArray[np.float32]
 Borders = tuple[IntArray, IntArray, IntArray]
 """Offsets (P + 1,) of the entries of each patch, the vertices next to it (b,), where the next patch's begin (b,)."""
 
-_PATCH_SIZE = 48  # vertices; more of them make the rim of a neighbourhood dearer, fewer its inside
+_PATCH_SIZE = 48  # vertices; more of them make the boundary of a neighbourhood dearer, fewer its inside
 _SLACK = 1e-6  # of the lengths compared; far above their rounding
 
 

@@ -17,7 +17,7 @@ from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.surface_walk import turned, walk
 from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, cross, difference, dot, norm, row
 from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Float32Array, Int32Array
-from mbf_mesh_nav.kernels.search.forbidden_surface import hardness_at, may_enter
+from mbf_mesh_nav.kernels.search.forbidden_surface import may_enter, rank_at
 
 PATH, COST, TILT, TURN, GOAL, HEADING = range(6)
 """Positions of the critics in the weights array."""
@@ -30,7 +30,7 @@ def score_rollouts(
     face_neighbours: Int32Array,
     face_normals: Float64Array,
     costs: Float32Array,
-    hardness: Float32Array,
+    ranks: Float32Array,
     start_face: int,
     start: Vector,
     heading: Vector,
@@ -48,7 +48,7 @@ def score_rollouts(
     ----------
     vertices, faces, face_neighbours, face_normals
         The mesh.
-    costs, hardness : (V,) float32
+    costs, ranks : (V,) float32
         The current map; how ground is forbidden, and where a rollout that starts there may go, says
         ``forbidden_ground.py``.
     start_face, start, heading
@@ -77,7 +77,7 @@ def score_rollouts(
     sin_roll, sin_pitch = math.sin(tilt_limits[0]), math.sin(tilt_limits[1])
     for sequence in range(sequence_count):
         face, point, direction = start_face, start, heading
-        stands_on = hardness_at(vertices, faces, hardness, face, point)
+        stands_on = rank_at(vertices, faces, ranks, face, point)
         nearest = Count(0)
         score = 0.0
         for step in range(step_count):
@@ -90,7 +90,7 @@ def score_rollouts(
             face, point, way, walked = walk(vertices, faces, face_neighbours, face_normals, face, point, way, distance)
             direction = (sign * way[0], sign * way[1], sign * way[2])
             # 2. Collisions end the rollout.
-            comes_to = hardness_at(vertices, faces, hardness, face, point)
+            comes_to = rank_at(vertices, faces, ranks, face, point)
             if walked < distance - 1e-9 or not may_enter(stands_on, comes_to):
                 collided[sequence] = True
                 break

@@ -1,10 +1,10 @@
-"""The one rule for a robot that stands on forbidden ground: it may leave, never towards what is harder.
+"""The one rule for a robot that stands on forbidden ground: it may leave, never towards a higher rank.
 
 An obstacle that appears beside a robot forbids the ground it stands on. It has to get away from there, but a rule
 that only asks whether it stood on forbidden ground before lets it drive on through the obstacle. So ground has a
-*hardness*, see ``MeshSnapshot.hardness``, interpolated within a face: from forbidden ground a step leads to free
-ground, or to forbidden ground no harder, and never into what is wholly lethal. Where the nearest corner of the face is
-free, the ground is: so do planners see it, and a path of theirs can be driven.
+*rank*, see ``MeshSnapshot.traversability_rank``, interpolated within a face: from forbidden ground a step leads to
+free ground, or to forbidden ground of no higher rank, and never into what is wholly lethal. Where the nearest corner
+of the face is free, the ground is: planners treat it so, and their paths can be driven.
 
 Used by every controller and recovery that looks ahead. Planners do not use it: they answer BLOCKED_START.
 """
@@ -15,24 +15,24 @@ from mbf_mesh_nav.kernels.compiled import Index, kernel
 from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, difference, dot, triangle
 from mbf_mesh_nav.kernels.search.dijkstra import Float32Array, Int32Array
 
-LETHAL_HARDNESS = 4.0
-"""Hardness of a lethal vertex; twice that of any that is forbidden by its cost."""
+LETHAL_RANK = 4.0
+"""Rank of a lethal vertex; twice that of any that is forbidden by its cost."""
 _SLACK = 1e-3  # float32 costs along a ring of one cost differ by rounding
 
 
 @kernel
 def may_enter(before: float, now: float) -> bool:
-    """Whether a step may lead from ground of hardness ``before`` to ``now``; 0 is free ground."""
+    """Whether a step may lead from ground of rank ``before`` to ``now``; 0 is free ground."""
     if now <= 0.0:
         return True
-    return bool(before > 0.0 and now <= before + _SLACK and now < LETHAL_HARDNESS - _SLACK)
+    return bool(before > 0.0 and now <= before + _SLACK and now < LETHAL_RANK - _SLACK)
 
 
 @kernel
-def hardness_at(vertices: Float64Array, faces: Int32Array, hardness: Float32Array, face: int, point: Vector) -> float:
-    """Hardness of a point [m] in a face, between those (V,) of its corners; 0 where the nearest of them is free."""
+def rank_at(vertices: Float64Array, faces: Int32Array, ranks: Float32Array, face: int, point: Vector) -> float:
+    """Rank of a point [m] in a face, between those (V,) of its corners; 0 where the nearest of them is free."""
     a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
-    if hardness[a] == 0.0 and hardness[b] == 0.0 and hardness[c] == 0.0:
+    if ranks[a] == 0.0 and ranks[b] == 0.0 and ranks[c] == 0.0:
         return 0.0
     # Barycentric coordinates by dot products (Ericson, Real-Time Collision Detection, section 3.4).
     corner_a, corner_b, corner_c = triangle(vertices, faces, Index(face))
@@ -48,7 +48,7 @@ def hardness_at(vertices: Float64Array, faces: Int32Array, hardness: Float32Arra
     share_c = (aa * bp - ab * ap) / area if area > 0.0 else 0.0
     share_a = 1.0 - share_b - share_c
     nearest = a if share_a >= max(share_b, share_c) else (b if share_b >= share_c else c)
-    if hardness[nearest] == 0.0:
+    if ranks[nearest] == 0.0:
         return 0.0
-    mixed = share_a * hardness[a] + share_b * hardness[b] + share_c * hardness[c]
+    mixed = share_a * ranks[a] + share_b * ranks[b] + share_c * ranks[c]
     return float(max(mixed, 1e-6))

@@ -24,7 +24,7 @@ NO_BEND = -1
 """The way comes straight from the source."""
 NOBODY = -1
 OBTUSE: Any = np.float32(1.2)  # least ratio of the longest side squared to the others squared: 102 degrees if equal
-MISMATCH: Any = np.float32(0.1)  # of a side: how much later than foretold a front may reach the corner behind that side
+MISMATCH: Any = np.float32(0.1)  # of a side: by how much later than predicted a front may reach the corner behind
 SLACK: Any = np.float32(1.001)
 PASSING: Any = np.float32(0.3)  # of a side: how far past the corner behind it a front may go that reached that corner
 GRAZING: Any = np.float32(0.001)  # of a side: the same if the other way bends round that corner, so that it is an end
@@ -97,7 +97,7 @@ def corner_behind(
 
 
 @inner_kernel
-def foretold_behind(u1: float, u2: float, c: float, b: float, a: float) -> float:
+def predicted_behind(u1: float, u2: float, c: float, b: float, a: float) -> float:
     """Distance the virtual source of corners 1 and 2 foretells of the corner on its own side of side 12."""
     source_x, source_depth, corner_x, corner_depth = _unfolded(u1, u2, c, b, a)
     deeper, along = source_depth - corner_depth, source_x - corner_x
@@ -192,8 +192,8 @@ def distance_where_fronts_meet(
     # 2. One front has reached the corner behind about when its virtual source foretells.
     if bend == own_bend:
         to_bend = distances[bend] if bend != NO_BEND else _ZERO
-        foretold = foretold_behind(distances[vertex] - to_bend, distances[known] - to_bend, c, b, a)
-        if distances[behind] - to_bend - foretold < MISMATCH * c:
+        predicted = predicted_behind(distances[vertex] - to_bend, distances[known] - to_bend, c, b, a)
+        if distances[behind] - to_bend - predicted < MISMATCH * c:
             return virtual, 0, bend
     # 3. Of two fronts either may come through the side.
     for end in range(2):

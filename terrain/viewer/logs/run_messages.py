@@ -71,7 +71,7 @@ def messages_of(recording: Recording) -> list[Stamped]:
     """All messages of a run, in the order of time."""
     frame, height = recording.start.frame_id, recording.start.z + message.MAP_LIFT
     streams: list[Iterator[Stamped]] = [
-        ((0.0, "/scene", update) for update in _stage(recording)),
+        ((0.0, "/scene", update) for update in _static_scene(recording)),
         _transforms(recording),
         _track(recording),
         ((time, "/plan", message.poses_along(time, frame, line)) for time, line in recording.paths if len(line)),
@@ -86,7 +86,7 @@ def messages_of(recording: Recording) -> list[Stamped]:
     return sorted(itertools.chain(*streams), key=lambda stamped: stamped[0])
 
 
-def _stage(recording: Recording) -> Iterator[Any]:
+def _static_scene(recording: Recording) -> Iterator[Any]:
     """Shapes of what stands and what moves; the poses of moving things are on ``/tf``."""
     yield scene.world(recording)
     yield scene.robot(recording.robot)

@@ -28,24 +28,24 @@ def test_waypoints_are_visited_in_order_with_a_task_at_each(make_bench):
     def task(index, pose):
         visited.append((index, round(bench.navigator.robot_pose().distance_to(pose), 1)))
 
-    tour = bench.navigator.follow_waypoints([Pose.planar(0.5, 0), Pose.planar(0.5, 0.5)], loops=2, task=task)
-    assert tour.success
+    sequence = bench.navigator.follow_waypoints([Pose.planar(0.5, 0), Pose.planar(0.5, 0.5)], loops=2, task=task)
+    assert sequence.success
     assert [index for index, _ in visited] == [0, 1, 0, 1]
     assert max(distance for _, distance in visited) <= 0.1
 
 
 @pytest.mark.parametrize(("stop", "visits"), [(True, 2), (False, 3)])
-def test_a_failed_waypoint_ends_the_tour_or_not(make_bench, stop, visits):
+def test_a_failed_waypoint_ends_the_waypoint_sequence_or_not(make_bench, stop, visits):
     bench = make_bench(recovery_enabled=False, planner_max_retries=0)
     bench.planner.play(straight_plan, NO_PATH, straight_plan)
-    tour = bench.navigator.follow_waypoints(NEAR, stop_on_failure=stop)
-    assert len(tour.results) == visits
-    assert tour.failed == (1,)
-    assert (tour.success, tour.outcome) == (False, GetPathOutcome.NO_PATH_FOUND)
-    assert "1 of 3 visit(s) failed, first visit 1: walled in" in tour.message
+    sequence = bench.navigator.follow_waypoints(NEAR, stop_on_failure=stop)
+    assert len(sequence.results) == visits
+    assert sequence.failed == (1,)
+    assert (sequence.success, sequence.outcome) == (False, GetPathOutcome.NO_PATH_FOUND)
+    assert "1 of 3 visit(s) failed, first visit 1: walled in" in sequence.message
 
 
-def test_a_tour_of_no_loops_is_refused_and_one_of_no_waypoints_is_over_at_once(make_bench):
+def test_a_waypoint_sequence_of_no_loops_is_refused_and_one_of_no_waypoints_is_over_at_once(make_bench):
     bench = make_bench()
     with pytest.raises(ValueError, match="loops"):
         bench.navigator.follow_waypoints([], loops=0)
@@ -53,28 +53,33 @@ def test_a_tour_of_no_loops_is_refused_and_one_of_no_waypoints_is_over_at_once(m
 
 
 @pytest.mark.parametrize("fields", [{"planner": "none"}, {"controller": "none"}, {"dist_tolerance": -1.0}])
-def test_a_tour_whose_visits_would_be_rejected_is_rejected(make_bench, fields):
+def test_a_waypoint_sequence_whose_visits_would_be_rejected_is_rejected(make_bench, fields):
     handle = make_bench().navigator.send(FollowWaypointsGoal(NEAR, **fields))
     assert (handle.status, handle.result.outcome) == (GoalStatus.REJECTED, MoveBaseOutcome.FAILURE)
 
 
-def test_feedback_tells_the_visit_and_how_it_gets_on(make_bench):
+def test_feedback_reports_the_visit_and_how_it_gets_on(make_bench):
     bench = make_bench()
     seen = []
     handle = bench.navigator.send(FollowWaypointsGoal(NEAR[:2], loops=2))
     handle.add_feedback_callback(seen.append)
     handle.wait()
     bench.clock.sleep(0.1)
-    assert list(dict.fromkeys((told.visit, told.waypoint) for told in seen)) == [(0, 0), (1, 1), (2, 0), (3, 1)]
-    assert all(told.driving is not None or len(told.results) == told.visit + 1 for told in seen)
-    first = [told.driving.dist_to_goal for told in seen if told.driving is not None and told.visit == 0]
+    assert list(dict.fromkeys((reported.visit, reported.waypoint) for reported in seen)) == [
+        (0, 0),
+        (1, 1),
+        (2, 0),
+        (3, 1),
+    ]
+    assert all(reported.driving is not None or len(reported.results) == reported.visit + 1 for reported in seen)
+    first = [reported.driving.dist_to_goal for reported in seen if reported.driving is not None and reported.visit == 0]
     assert first[0] > first[-1]
 
 
 # ----------------------------------------------------------------------------------------------------- cancel
 @pytest.mark.parametrize("stop", EVERY_WAY)
 @pytest.mark.parametrize("end", ["cancel", "cancel_all", "preempt", "close", "asyncio"])
-def test_whatever_cancels_the_tour_the_robot_stands_and_sets_off_no_more(make_bench, stop, end):
+def test_whatever_cancels_the_waypoint_sequence_the_robot_stands_and_sets_off_no_more(make_bench, stop, end):
     bench = make_bench()
     handle = bench.navigator.send(FollowWaypointsGoal(FAR, stop_on_failure=stop))
     bench.clock.sleep(2.0)
@@ -104,7 +109,7 @@ def test_whatever_cancels_the_tour_the_robot_stands_and_sets_off_no_more(make_be
 
 
 @pytest.mark.parametrize("stop", EVERY_WAY)
-def test_a_goal_that_takes_the_robot_away_ends_the_tour(make_bench, stop):
+def test_a_goal_that_takes_the_robot_away_ends_the_waypoint_sequence(make_bench, stop):
     bench = make_bench()
     handle = bench.navigator.send(FollowWaypointsGoal(FAR, stop_on_failure=stop))
     bench.clock.sleep(2.0)
@@ -120,24 +125,24 @@ def test_a_visit_that_its_controller_gives_up_is_a_failure_not_a_cancel(make_ben
     bench = make_bench(recovery_enabled=False, controller_max_retries=0)
     blocked = ControlResult(ExePathOutcome.BLOCKED_PATH, "no")
     bench.controller.play(blocked, bench.controller.follow)
-    tour = bench.navigator.follow_waypoints(NEAR, stop_on_failure=False)
-    assert tour.failed == (0,)
-    assert len(tour.results) == 3
+    sequence = bench.navigator.follow_waypoints(NEAR, stop_on_failure=False)
+    assert sequence.failed == (0,)
+    assert len(sequence.results) == 3
 
 
-def test_a_rejected_visit_ends_the_tour_whatever_it_says(make_bench):
+def test_a_rejected_visit_ends_the_waypoint_sequence_whatever_it_says(make_bench):
     bench = make_bench(max_quarantined=1)
-    tour = bench.navigator.send(
+    sequence = bench.navigator.send(
         FollowWaypointsGoal(NEAR, 10**6, False, lambda *_: bench.server.runtime.hanging.add("a call"))
     )
-    result = tour.wait(60.0)
+    result = sequence.wait(60.0)
     assert [visit.success for visit in result.results] == [True, False]
     assert "plugin calls hang" in result.message
 
 
 # ------------------------------------------------------------------------------------------------------ pause
 @pytest.mark.parametrize("clock", [SimClock, WallClock])
-def test_a_paused_tour_holds_and_goes_on_also_after_pausing_all(make_bench, clock):
+def test_a_paused_waypoint_sequence_holds_and_goes_on_also_after_pausing_all(make_bench, clock):
     bench = make_bench(clock=clock())
     handle = bench.navigator.send(FollowWaypointsGoal(NEAR))
     for pause in (handle.pause, bench.server.pause_all):
@@ -151,7 +156,7 @@ def test_a_paused_tour_holds_and_goes_on_also_after_pausing_all(make_bench, cloc
     assert handle.wait(60.0).success
 
 
-def test_a_tour_paused_during_its_task_does_not_set_off(make_bench):
+def test_a_waypoint_sequence_paused_during_its_task_does_not_set_off(make_bench):
     bench = make_bench()
     handle = bench.navigator.send(FollowWaypointsGoal(NEAR, task=lambda index, pose: handle.pause()))
     for visit in range(2):
@@ -163,14 +168,14 @@ def test_a_tour_paused_during_its_task_does_not_set_off(make_bench):
 
 # ------------------------------------------------------------------------------------------------------- task
 @pytest.mark.parametrize("error", [ValueError("no box here"), SystemExit("no box here")])
-def test_a_task_that_raises_ends_the_tour_and_the_next_one_works(make_bench, error):
+def test_a_task_that_raises_ends_the_waypoint_sequence_and_the_next_one_works(make_bench, error):
     def task(index, pose):
         raise error
 
     bench = make_bench()
-    tour = bench.navigator.follow_waypoints(NEAR, task=task)
-    assert tour.outcome == MoveBaseOutcome.INTERNAL_ERROR
-    assert tour.message == f"the task at waypoint 0 raised {type(error).__name__}: no box here"
+    sequence = bench.navigator.follow_waypoints(NEAR, task=task)
+    assert sequence.outcome == MoveBaseOutcome.INTERNAL_ERROR
+    assert sequence.message == f"the task at waypoint 0 raised {type(error).__name__}: no box here"
     assert bench.navigator.follow_waypoints(NEAR).success
 
 
@@ -184,12 +189,12 @@ def test_a_task_may_use_the_navigator(make_bench):
     assert bench.navigator.follow_waypoints(NEAR, task=task).success
 
 
-def test_a_task_that_cancels_all_ends_the_tour_after_itself(make_bench):
+def test_a_task_that_cancels_all_ends_the_waypoint_sequence_after_itself(make_bench):
     bench = make_bench()
-    tour = bench.navigator.follow_waypoints(
+    sequence = bench.navigator.follow_waypoints(
         NEAR, stop_on_failure=False, task=lambda index, pose: bench.navigator.cancel_all()
     )
-    assert (tour.outcome, len(tour.results)) == (MoveBaseOutcome.CANCELED, 1)
+    assert (sequence.outcome, len(sequence.results)) == (MoveBaseOutcome.CANCELED, 1)
 
 
 def test_a_cancel_waits_for_a_hanging_task_no_longer_than_the_grace(make_bench):

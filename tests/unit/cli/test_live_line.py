@@ -16,7 +16,7 @@ from terrain.session.runner import Progress
 DRIVING = Progress(time=12.0, wall_time=3.0, distance_left=34.56, speed=0.8, tilt=math.radians(7.0), state="active")
 
 
-def test_the_line_tells_time_factor_state_distance_speed_and_tilt():
+def test_the_line_shows_time_factor_state_distance_speed_and_tilt():
     text = progress_text(DRIVING)
 
     for part in ("12.0 s", "4.0 x", "active", "34.6 m left", "0.80 m/s", "7.0°"):
@@ -44,7 +44,7 @@ def test_on_a_terminal_steps_and_the_drive_are_shown():
 
 
 @pytest.mark.parametrize(("show", "terminal"), [(True, False), (False, True)])
-def test_without_a_terminal_and_when_told_to_be_quiet_only_notes_are_printed(show, terminal):
+def test_without_a_terminal_and_when_asked_to_be_quiet_only_notes_are_printed(show, terminal):
     text = shown(show, terminal, step="building the world", progress=DRIVING, note="matplotlib is missing")
 
     assert text == "matplotlib is missing\n"
@@ -54,7 +54,7 @@ def test_without_a_terminal_and_when_told_to_be_quiet_only_notes_are_printed(sho
     ("step", "finished", "total"),
     [("warming up planner cvp (2 of 5)", 2, 5), ("building the world", 0, None)],
 )
-def test_a_step_that_tells_how_many_there_are_fills_the_bar(step, finished, total):
+def test_a_step_that_reports_how_many_there_are_fills_the_bar(step, finished, total):
     live = LiveLine(console=Console(file=io.StringIO()))
     for text in ("warming up planner astar (1 of 7)", step):
         live.step(text)

@@ -55,7 +55,7 @@ def test_a_map_far_from_zero_is_put_at_zero_where_the_physics_is_precise(tmp_pat
     assert all(grid.is_free(place.x, place.y) for place in (moved.start, *moved.goals))
 
 
-def test_a_scenario_that_leaves_a_map_far_from_zero_is_told_what_to_write(tmp_path):
+def test_the_message_for_a_scenario_that_leaves_a_map_far_from_zero_names_what_to_write(tmp_path):
     with pytest.raises(ConfigError, match=r"corner: \[0, 0\]"):
         MapWorld(type="map", file=far_room(tmp_path)).grid()
 

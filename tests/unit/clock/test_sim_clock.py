@@ -148,21 +148,21 @@ def test_join_waits_for_the_end_of_a_thread():
 
 def test_a_foreign_thread_can_wait_and_wake_others():
     clock = SimClock(external=True)
-    condition, told = clock.condition(), []
+    condition, reported = clock.condition(), []
 
     def outsider():
         with condition:
-            told.append(condition.wait(0.5))
-            told.append("done")
+            reported.append(condition.wait(0.5))
+            reported.append("done")
             condition.notify_all()
 
     thread = threading.Thread(target=outsider)
     thread.start()
     with condition:
-        while len(told) < 2:
+        while len(reported) < 2:
             condition.wait()
     thread.join()
-    assert told == [False, "done"]
+    assert reported == [False, "done"]
 
 
 def test_outside_lets_the_others_run_and_comes_back_in_turn():

@@ -51,7 +51,7 @@ def test_outside_is_the_way_out():
     assert clock.now() == 1000.0
 
 
-def test_a_plugin_that_waits_for_a_pool_of_its_own_is_told_too():
+def test_a_plugin_that_waits_for_a_pool_of_its_own_is_reported_too():
     with Bench(hang_guard=2.0) as bench, ThreadPoolExecutor(1) as pool:
 
         def plan(request):

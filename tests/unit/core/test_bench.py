@@ -24,7 +24,7 @@ def robot():
     clock.sleep(0.1)
 
 
-def test_the_robot_moves_as_it_is_told(robot):
+def test_the_robot_moves_as_commanded(robot):
     robot.send_command(Twist.planar(0.5, 0.1))
     robot.clock.sleep(2.0)
     assert robot.pose.position == pytest.approx((0.8, 3.0, 0.0))

@@ -82,7 +82,7 @@ def test_the_nearest_free_pose_within_the_tolerance_keeps_its_heading(queries):
     assert queries.find_valid_pose(wanted, 1.5, 0.0, PlaceQuery(safety_dist=0.25)).pose.x == pytest.approx(-0.8)
 
 
-def test_where_nothing_is_free_within_the_tolerance_the_place_itself_is_told(queries):
+def test_where_nothing_is_free_within_the_tolerance_the_place_itself_is_reported(queries):
     answer = queries.find_valid_pose(Pose.planar(0.5, 2.0), 0.9, 0.0)
 
     assert (answer.pose, answer.state) == (None, CellState.LETHAL)

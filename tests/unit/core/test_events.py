@@ -81,7 +81,7 @@ class RaisingMapping(dict):
 
 
 @pytest.mark.parametrize(
-    ("value", "told"),
+    ("value", "reported"),
     [
         (10**5000, "integer of 16610 bits"),
         (-(2**63) - 1, "integer of 64 bits"),
@@ -100,14 +100,14 @@ class RaisingMapping(dict):
     ],
     ids=lambda value: type(value).__name__,
 )
-def test_no_value_ends_the_record_of_the_run(value, told, tmp_path):
+def test_no_value_ends_the_record_of_the_run(value, reported, tmp_path):
     bus = bus_with(sink := JsonLinesSink(tmp_path / "events.jsonl"))
     bus.emit(EventKind.CUSTOM, "test", value=value)
     bus.emit(EventKind.CUSTOM, "test", value="the next one")
     assert bus.sinks == (sink,)
     bus.close()
     first, second = (tmp_path / "events.jsonl").read_text().splitlines()
-    assert told in first
+    assert reported in first
     assert len(first) < 500_000
     assert "the next one" in second
     assert len(list(read_events(tmp_path / "events.jsonl"))) == 2

@@ -97,11 +97,13 @@ local_costmap: *map
 def site(tmp_path):
     """A server on simulated time, and what it has told."""
     (tmp_path / "robot.yaml").write_text(CONFIG)
-    clock, transforms, told = SimClock(), TransformBuffer(), MemorySink()
+    clock, transforms, reported = SimClock(), TransformBuffer(), MemorySink()
     robot = LoopbackRobot(clock, transforms, Pose.planar(0.0, 0.0))
-    with Navigator.from_file(tmp_path / "robot.yaml", robot, clock, transforms, EventBus(clock.now, [told])) as made:
+    with Navigator.from_file(
+        tmp_path / "robot.yaml", robot, clock, transforms, EventBus(clock.now, [reported])
+    ) as made:
         clock.sleep(0.5)
-        yield made.server, clock, told
+        yield made.server, clock, reported
     robot.close()
 
 
@@ -109,14 +111,14 @@ def forbidden(costmap):
     return int(np.count_nonzero(costmap.snapshot().cells >= 253))
 
 
-def test_a_layer_of_one_map_changes_with_its_next_update_and_the_log_tells(site):
-    server, clock, told = site
+def test_a_layer_of_one_map_changes_with_its_next_update_and_the_log_reports(site):
+    server, clock, reported = site
     costs = [np.count_nonzero(costmap.snapshot().cells) for costmap in (server.global_costmap, server.local_costmap)]
     server.set_layer_parameters("global_costmap.around", inflation_radius=1.5, cost_scaling_factor=1.0)
     clock.sleep(0.5)
     assert np.count_nonzero(server.global_costmap.snapshot().cells) > costs[0]
     assert np.count_nonzero(server.local_costmap.snapshot().cells) == costs[1]
-    (event,) = told.of_kind(EventKind.PARAMETER_CHANGED)
+    (event,) = reported.of_kind(EventKind.PARAMETER_CHANGED)
     assert event.source == "global_costmap.around"
     assert event.data == {"inflation_radius": 1.5, "cost_scaling_factor": 1.0}
 
@@ -126,14 +128,17 @@ def test_a_layer_of_one_map_changes_with_its_next_update_and_the_log_tells(site)
     ["[[0.4, 0.4], [0.4, -0.4], [-0.4, -0.4], [-0.4, 0.4]]", 0.4, [(0.4, 0.4), (0.4, -0.4), (-0.4, -0.4), (-0.4, 0.4)]],
 )
 def test_a_robot_that_lifts_a_load_is_larger_on_both_maps(site, outline):
-    server, clock, told = site
+    server, clock, reported = site
     before = forbidden(server.global_costmap)
     server.set_footprint(outline)
     clock.sleep(0.5)
     for costmap in (server.global_costmap, server.local_costmap):
         assert costmap.inscribed_radius == pytest.approx(0.4, abs=0.02)
         assert forbidden(costmap) > before
-    assert [event.source for event in told.of_kind(EventKind.PARAMETER_CHANGED)] == ["global_costmap", "local_costmap"]
+    assert [event.source for event in reported.of_kind(EventKind.PARAMETER_CHANGED)] == [
+        "global_costmap",
+        "local_costmap",
+    ]
 
 
 def test_padding_and_age_of_one_map_change(site):
@@ -143,10 +148,10 @@ def test_padding_and_age_of_one_map_change(site):
     assert server.local_costmap.is_current(1e6) and not server.global_costmap.is_current(1e6)
 
 
-def test_a_robot_too_large_for_the_inflation_is_told_of(site):
-    server, _, told = site
+def test_a_robot_too_large_for_the_inflation_is_reported(site):
+    server, _, reported = site
     server.set_footprint(0.7)
-    notes = told.of_kind(EventKind.MAP)
+    notes = reported.of_kind(EventKind.MAP)
     assert [note.source for note in notes] == ["global_costmap", "local_costmap"]
     assert "smaller than the inscribed radius" in notes[0].data["message"]
 
@@ -171,10 +176,10 @@ def test_a_robot_too_large_for_the_inflation_is_told_of(site):
     ],
 )
 def test_a_change_that_is_not_legal_changes_nothing(site, change, error, text):
-    server, clock, told = site
+    server, clock, reported = site
     before = forbidden(server.global_costmap), forbidden(server.local_costmap)
     with pytest.raises(error, match=text):
         change(server)
     clock.sleep(0.5)
     assert (forbidden(server.global_costmap), forbidden(server.local_costmap)) == before
-    assert not told.of_kind(EventKind.PARAMETER_CHANGED)
+    assert not reported.of_kind(EventKind.PARAMETER_CHANGED)

@@ -128,15 +128,15 @@ def test_relaxing_leaves_every_cell_forbidden_on_which_the_robot_would_touch_som
     assert np.array_equal(costmap.snapshot().cells, before)
 
 
-def test_an_inflation_narrower_than_the_robot_is_widened_and_told_until_the_robot_is_smaller(build):
+def test_an_inflation_narrower_than_the_robot_is_widened_and_reported_until_the_robot_is_smaller(build):
     costmap = build("inflation", inflation={"inflation_radius": 0.3}, robot_radius=0.6)
-    (doubt,) = costmap.configuration_warnings()
-    assert doubt.startswith("layer 'inflation': inflation_radius 0.3 m is smaller than the inscribed radius")
+    (warning,) = costmap.configuration_warnings()
+    assert warning.startswith("layer 'inflation': inflation_radius 0.3 m is smaller than the inscribed radius")
     costmap.set_footprint(type(costmap.footprint).circle(0.3))
     assert costmap.configuration_warnings() == []
 
 
-def test_unknown_cells_are_inflated_only_where_told(build):
+def test_unknown_cells_are_inflated_only_on_request(build):
     edge = Costmap(np.array([[254, 255, 0, 0, 0, 0]], dtype=np.uint8), 1.0)
     results = []
     for block in ({}, {"inflate_unknown": True}, {"inflate_around_unknown": True}):
@@ -154,8 +154,8 @@ def test_unknown_cells_are_inflated_only_where_told(build):
     assert results[2][2:] == [e1, e2, 0, 0]
 
 
-@pytest.mark.parametrize(("free", "told"), [(0, True), (1, True), (10, False)])
-def test_a_map_nearly_all_occupied_is_told(free, told):
+@pytest.mark.parametrize(("free", "reported"), [(0, True), (1, True), (10, False)])
+def test_a_map_nearly_all_occupied_is_reported(free, reported):
     cells = np.full((10, 10), 254, dtype=np.uint8)
     cells.flat[:free] = 0
     cells[:, 9] = 255
@@ -163,12 +163,14 @@ def test_a_map_nearly_all_occupied_is_told(free, told):
         {"robot_radius": 0.0, "layers": [{"name": "walls", "type": "static"}]}
     )
     warnings = build_layered_costmap(parameters, static_map=Costmap(cells, 1.0)).configuration_warnings()
-    assert any("of the known cells are occupied, so hardly anything can be planned" in one for one in warnings) == told
+    assert (
+        any("of the known cells are occupied, so hardly anything can be planned" in one for one in warnings) == reported
+    )
 
 
-def test_a_robot_on_a_map_without_inflation_is_told_and_a_point_is_not(build):
-    (doubt,) = build("static", robot_radius=0.5).configuration_warnings()
-    assert doubt == "no inflation layer: grid planners take the robot, of inscribed radius 0.49 m, for a point"
+def test_a_robot_on_a_map_without_inflation_is_reported_and_a_point_is_not(build):
+    (warning,) = build("static", robot_radius=0.5).configuration_warnings()
+    assert warning == "no inflation layer: grid planners take the robot, of inscribed radius 0.49 m, for a point"
     assert build("static", "inflation", robot_radius=0.5).configuration_warnings() == []
     assert build("static").configuration_warnings() == build(robot_radius=0.5).configuration_warnings() == []
 

@@ -72,7 +72,7 @@ def test_a_point_in_another_frame_is_transformed(queries):
     assert queries.check_point(Pose.planar(2.5, 5.5)).state is CellState.FREE
 
 
-def test_the_local_map_is_asked_where_told(queries):
+def test_the_local_map_is_asked_where_named(queries):
     assert queries.check_point(Pose.planar(4.5, 5.5), local=True).state is CellState.FREE
 
 

@@ -192,7 +192,7 @@ def test_a_silent_sensor_makes_the_map_not_current_by_default(build):
 
 
 @pytest.mark.parametrize("layer", ["obstacle", "voxel", "range_sensor"])
-def test_a_stamp_from_the_future_is_told_and_does_not_cover_silence(build, layer):
+def test_a_stamp_from_the_future_is_reported_and_does_not_cover_silence(build, layer):
     costmap = build(layer, **{layer: {"sources": {"laser": {}}}})
 
     def see(stamp, now):

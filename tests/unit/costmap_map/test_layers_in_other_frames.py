@@ -117,7 +117,7 @@ def test_a_map_in_another_frame_does_not_give_the_costmap_its_grid():
 
 
 @pytest.mark.parametrize("frame", ["", "map"])
-def test_a_map_file_has_the_frame_it_is_told(frame, tmp_path):
+def test_a_map_file_has_the_frame_it_is_given(frame, tmp_path):
     save_map(tmp_path / "walls.yaml", OccupancyMap(np.zeros((4, 4), dtype=np.uint8), 1.0))
     block = {"map_file": "walls.yaml", "map_frame": frame}
     costmap = build_layered_costmap(

@@ -170,7 +170,7 @@ def test_a_path_check_accumulates_over_all_poses(costmap, path):
     assert (answer.last_checked, answer.state, answer.cost) == (7, CellState.LETHAL, 354.0)
 
 
-def test_a_path_check_stops_at_the_state_it_is_told(costmap, path):
+def test_a_path_check_stops_at_the_given_state(costmap, path):
     costmap.cells[5, 3] = 254
     answer = check_path(pose_check(costmap, Footprint([])), path, return_on=CellState.LETHAL)
     assert (answer.last_checked, answer.state) == (2, CellState.LETHAL)

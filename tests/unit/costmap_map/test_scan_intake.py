@@ -35,11 +35,15 @@ def site(tmp_path):
     """A server with a global map in map and a local one in drift, its transforms, and what it has told."""
     file = tmp_path / "robot.yaml"
     file.write_text(CONFIG)
-    clock, transforms, told = SimClock(), TransformBuffer(), MemorySink()
+    clock, transforms, reported = SimClock(), TransformBuffer(), MemorySink()
     robot = LoopbackRobot(clock, transforms, Pose.planar(0.0, 0.0))
-    events = EventBus(clock.now, [told])
+    events = EventBus(clock.now, [reported])
     with Navigator.from_file(file, robot, clock, transforms, events) as navigator:
-        yield navigator.server, transforms, lambda: [event.data["message"] for event in told.of_kind(EventKind.FAULT)]
+        yield (
+            navigator.server,
+            transforms,
+            lambda: [event.data["message"] for event in reported.of_kind(EventKind.FAULT)],
+        )
     robot.close()
 
 
@@ -88,17 +92,17 @@ def test_a_scan_of_a_time_nobody_knows_is_refused(site, stamp):
     assert seen(server.local_costmap) == []
 
 
-def test_a_map_that_cannot_place_a_scan_does_not_keep_it_from_the_other_and_tells_so_once(site):
-    server, transforms, told = site
+def test_a_map_that_cannot_place_a_scan_does_not_keep_it_from_the_other_and_reports_it_once(site):
+    server, transforms, reported = site
     transforms.set(turned(0.0, 0.0))
     for _ in range(3):
         server.take_scan(ahead(0.0))
     assert len(seen(server.local_costmap)) == 1 and seen(server.global_costmap) == []
-    (message,) = told()
+    (message,) = reported()
     assert "'lidar' cannot be placed" in message and "'map'" in message
     transforms.set(CONNECTED)
     server.take_scan(ahead(0.0))
-    assert len(seen(server.global_costmap)) == 1 and len(told()) == 1
+    assert len(seen(server.global_costmap)) == 1 and len(reported()) == 1
 
 
 def test_a_layer_that_raises_does_not_keep_a_scan_from_the_other_map_and_is_reported_once(site, monkeypatch):
@@ -120,18 +124,18 @@ def test_a_scan_that_no_map_can_place_is_refused_with_the_reason(site):
         server.take_scan(ahead(0.0, frame="nowhere"))
 
 
-def test_a_source_that_no_map_knows_is_told_once_whatever_its_frame(site):
-    server, _, told = site
+def test_a_source_that_no_map_knows_is_reported_once_whatever_its_frame(site):
+    server, _, reported = site
     for _ in range(3):
         server.take_scan(ahead(0.0, frame="nowhere", source="lidra"))
-    assert told() == ["no layer listens to the source 'lidra', known are ['lidar']"]
+    assert reported() == ["no layer listens to the source 'lidra', known are ['lidar']"]
 
 
-def test_the_number_of_told_names_is_bounded(site):
-    server, _, told = site
+def test_the_number_of_reported_names_is_bounded(site):
+    server, _, reported = site
     for number in range(300):
         server.take_scan(ahead(0.0, source=f"noise{number}"))
-    assert len(told()) == 100
+    assert len(reported()) == 100
 
 
 @pytest.mark.parametrize("frame", ["map", "laser"])

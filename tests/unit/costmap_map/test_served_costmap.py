@@ -157,7 +157,7 @@ def test_a_recovery_stands_while_its_map_is_not_current(start):
     assert handle.wait().success and navigator.robot_pose().x < -0.25
 
 
-def test_a_map_whose_inflation_is_narrower_than_the_robot_is_served_but_told_of(start):
+def test_a_map_whose_inflation_is_narrower_than_the_robot_is_served_with_a_warning(start):
     events = EventBus(lambda: 0.0, [MemorySink()])
     start(local="{robot_radius: 0.6, layers: [{name: i, type: inflation}], i: {inflation_radius: 0.3}}", events=events)
     (note,) = [one for one in events.memory.of_kind(EventKind.MAP) if one.source == "local_costmap"]

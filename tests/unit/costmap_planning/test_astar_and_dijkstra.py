@@ -119,7 +119,7 @@ def test_a_token_set_before_is_honoured(make_plugin, planner_class):
     assert result.outcome == GetPathOutcome.CANCELED
 
 
-def test_unknown_cells_block_only_if_told_so(make_plugin):
+def test_unknown_cells_block_only_on_request(make_plugin):
     cells = grid(".?.")
     assert plan(make_plugin(AStarPlanner, cells), (0.5, 0.5), (2.5, 0.5)).success
     strict = make_plugin(AStarPlanner, cells, allow_unknown=False)

@@ -101,7 +101,7 @@ EVERYTHING = set(PLACES)
         ("radius: 3.0, costmaps: local, layers: [front]", {"far", "behind"}, EVERYTHING),
     ],
 )
-def test_it_forgets_what_it_is_told(clear, block, local, in_global):
+def test_it_forgets_what_it_is_asked_to_forget(clear, block, local, in_global):
     result, left_local, left_global = clear(block)
     assert result.success
     assert (left_local, left_global) == (local, in_global)

@@ -110,7 +110,7 @@ def test_the_goal_tolerance_moves_a_goal_that_does_not_fit(make_plugin):
     assert result.success and result.path[-1].distance_to(Pose.planar(4.25, 2.75)) <= 1.0
 
 
-def test_start_walls_and_cancel_are_told(make_plugin):
+def test_start_walls_and_cancel_are_reported(make_plugin):
     cells = np.zeros((60, 60), dtype=np.uint8)
     cells[:, 30] = 254
     planner = make_plugin(HybridAStarPlanner, cells, resolution=0.1)
@@ -207,7 +207,7 @@ def test_where_the_car_cannot_turn_round_the_nearest_state_of_the_goals_heading_
     assert abs(result.path[len(result.path) - 1].yaw) <= math.pi / 72
 
 
-def test_giving_up_is_told_from_having_tried_everything(make_plugin):
+def test_giving_up_differs_from_having_tried_everything(make_plugin):
     cells = closet()
     cells[48, 57] = 0  # a hole that only a point gets through
     tired = plan(make_plugin(HybridAStarPlanner, cells, resolution=0.1, max_states=500), (1, 5, 0), (4.9, 4.9, 0))
@@ -254,7 +254,7 @@ def test_an_ordinary_route_through_an_office_takes_few_states_although_all_cells
     assert not any(closed_loop.lethal_under(grid, 0.999 * CAR.vertices, state) for state in states)
 
 
-def test_a_goal_in_a_closet_that_no_car_can_leave_is_told_by_the_few_states_around_it(make_plugin):
+def test_a_goal_in_a_closet_that_no_car_can_leave_is_found_by_the_few_states_around_it(make_plugin):
     cells = closet()
     cells[47:50, 57] = 0  # a point gets out, the car does not
     planner = make_plugin(HybridAStarPlanner, cells, resolution=0.1, footprint=CAR, max_states=200_000)

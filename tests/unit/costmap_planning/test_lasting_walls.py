@@ -50,14 +50,14 @@ def plan(make_plugin, planner_class, costmap, **request):
 
 
 @pytest.mark.parametrize("planner_class", PLANNERS)
-def test_a_goal_behind_a_wall_is_told_for_good(make_plugin, rooms, planner_class):
+def test_a_goal_behind_a_wall_is_a_permanent_failure(make_plugin, rooms, planner_class):
     result = plan(make_plugin, planner_class, rooms(gap=0, sensed=False))
     assert (result.outcome, result.permanent) == (GetPathOutcome.NO_PATH_FOUND, True)
     assert "walls of the static map separate them" in result.message
 
 
 @pytest.mark.parametrize("planner_class", PLANNERS)
-def test_a_goal_behind_a_gap_too_narrow_for_the_robot_is_told_for_good(make_plugin, rooms, planner_class):
+def test_a_goal_behind_a_gap_too_narrow_for_the_robot_is_a_permanent_failure(make_plugin, rooms, planner_class):
     assert plan(make_plugin, planner_class, rooms(gap=3, sensed=False)).permanent
 
 

@@ -152,7 +152,7 @@ def test_a_car_that_stands_beside_its_goal_asks_for_another_plan(make_plugin, cl
     assert outcome == ExePathOutcome.NO_VALID_CMD and seconds < 15.0
 
 
-def test_plugins_keep_to_the_curve_their_robot_tells_where_no_parameter_says_otherwise(make_plugin):
+def test_plugins_keep_to_the_curve_of_their_robot_where_no_parameter_differs(make_plugin):
     for plugin_class, parameters in (
         (HybridAStarPlanner, {}),
         (MppiController, {"motion_model": "ackermann"}),

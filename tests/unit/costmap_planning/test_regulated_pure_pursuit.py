@@ -111,7 +111,7 @@ def test_obstacle_on_the_path_is_blocked_path_and_says_where(pursuit):
 
 
 @pytest.mark.parametrize(("shortest", "gap"), [(0.0, 0.0), (0.3, 0.3)], ids=["by-time", "by-distance"])
-def test_a_robot_that_may_creep_does_so_up_to_the_distance_it_is_told_to_keep(pursuit, shortest, gap):
+def test_a_robot_that_may_creep_does_so_up_to_the_distance_it_has_to_keep(pursuit, shortest, gap):
     cells = np.zeros((200, 200), dtype=np.uint8)
     cells[:, 140:] = 254  # a wall at x = 2
     controller = pursuit(Costmap(cells, 0.05, -5.0, -5.0), min_distance_to_obstacle=shortest)

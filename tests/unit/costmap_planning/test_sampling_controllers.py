@@ -222,7 +222,7 @@ def test_an_ackermann_robot_gets_steering_angles_within_its_turning_circle(make_
     assert 0.0 < command.steering_angle <= math.atan(0.4 / 0.8) + 1e-3
 
 
-def test_mppi_tells_the_sequence_it_means_to_drive_next_and_dwa_tells_none(make_plugin):
+def test_mppi_reports_the_sequence_it_means_to_drive_next_and_dwa_reports_none(make_plugin):
     controller = make_plugin(MppiController, FREE_MAP, batch_size=500)
     controller.set_plan(straight())
     for _ in range(20):

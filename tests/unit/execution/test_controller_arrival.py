@@ -150,7 +150,7 @@ def test_the_lease_goes_to_one_goal_only(make_bench):
     first.wait()
 
 
-def test_feedback_tells_where_the_robot_is_on_its_path(make_bench):
+def test_feedback_reports_where_the_robot_is_on_its_path(make_bench):
     bench = make_bench()
     seen = []
     handle = bench.navigator.send(ExePathGoal(bench.path_to(2.0)))
@@ -171,7 +171,7 @@ def test_a_loop_ends_with_one_event_that_counts_its_cycles(make_bench):
     bench.controller.play(FAILS, FAILS, drive())
     bench.navigator.exe_path(bench.path_to(1.0))
 
-    (told,) = bench.memory.of_kind(EventKind.CONTROL_LOOP)
-    assert (told.source, told.data["failed"]) == ("controller", 2)
-    assert told.data["cycles"] == len(bench.controller.requests)
-    assert told.data["began"] < told.time
+    (reported,) = bench.memory.of_kind(EventKind.CONTROL_LOOP)
+    assert (reported.source, reported.data["failed"]) == ("controller", 2)
+    assert reported.data["cycles"] == len(bench.controller.requests)
+    assert reported.data["began"] < reported.time

@@ -77,12 +77,12 @@ def test_f267_without_retries_one_failure_is_the_end(make_bench, states, patienc
     assert end_state(states, bench) == "no_plan_found"
 
 
-@pytest.mark.parametrize(("said", "told"), [(0.0, 3.0), (7.5, 7.5)])
-def test_f268_a_cost_of_zero_becomes_the_paths_length(make_bench, said, told):
+@pytest.mark.parametrize(("said", "reported"), [(0.0, 3.0), (7.5, 7.5)])
+def test_f268_a_cost_of_zero_becomes_the_paths_length(make_bench, said, reported):
     bench = make_bench()
     path = Path.from_points([(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)])
     bench.planner.play(PlanResult(0, "", path, said))
-    assert bench.navigator.get_path(TARGET).cost == pytest.approx(told)
+    assert bench.navigator.get_path(TARGET).cost == pytest.approx(reported)
 
 
 def test_f269_a_call_that_outlasts_patience_and_fails_is_patience_exceeded(make_bench, states):

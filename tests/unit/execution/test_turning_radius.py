@@ -27,7 +27,7 @@ class Spinner(ScriptedController):
 
 
 @pytest.mark.parametrize(("given", "radius"), [({}, 1.5), ({"min_turning_radius": 3.0}, 3.0)])
-def test_the_gate_widens_curves_to_what_the_driver_tells_or_the_configuration_says(given, radius):
+def test_the_gate_widens_curves_to_the_limit_of_the_driver_or_the_configuration(given, radius):
     with Bench(robot=Car(), **given) as bench:
         assert bench.server.runtime.gate.limits.apply(Twist.planar(1.0, wz=2.0)) == Twist.planar(1.0, wz=1.0 / radius)
         assert bench.planner.min_turning_radius == bench.controller.min_turning_radius == radius
@@ -40,10 +40,10 @@ def test_a_configured_zero_lets_a_car_turn_on_the_spot():
         assert bench.server.runtime.gate.limits.apply(Twist.planar(wz=1.0)) == Twist.planar(wz=1.0)
 
 
-def test_a_controller_that_turns_on_the_spot_is_told_for_a_car_only():
+def test_a_controller_that_turns_on_the_spot_is_reported_for_a_car_only():
     plugins = {"planner": ScriptedPlanner, "spinner": Spinner}
     with Bench(plugins, robot=Car()) as bench:
-        told = "controller 'spinner' turns on the spot, which the robot cannot: its tightest curve is 1.50 m"
-        assert bench.server.notes == (told,)
+        reported = "controller 'spinner' turns on the spot, which the robot cannot: its tightest curve is 1.50 m"
+        assert bench.server.notes == (reported,)
     with Bench(plugins) as bench:
         assert bench.server.notes == ()

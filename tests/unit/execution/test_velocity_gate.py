@@ -129,8 +129,8 @@ def test_every_stop_and_every_change_of_the_lease_is_recorded_once(scene):
     lease.release()
     scene.gate.close("the end")
     scene.gate.close()
-    told = [(event.kind, event.data) for event in scene.memory.events]
-    assert told == [
+    reported = [(event.kind, event.data) for event in scene.memory.events]
+    assert reported == [
         (EventKind.LEASE_GRANTED, {"holder": "a"}),
         (EventKind.ROBOT_STOPPED, {"reason": "asked by the lease's owner"}),
         (EventKind.ROBOT_STOPPED, {"reason": "paused"}),
@@ -221,7 +221,7 @@ def test_a_command_within_the_limits_is_passed_as_it_is():
     assert LIMITS.apply(car) is car
 
 
-def test_a_robot_that_can_not_reverse_stands_when_told_to():
+def test_a_robot_that_can_not_reverse_stands_when_commanded_to():
     assert VelocityLimits(min_vel_x=0.0).apply(Twist.planar(-0.5, wz=0.3)) == Twist()
 
 

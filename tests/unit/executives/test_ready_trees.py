@@ -227,7 +227,7 @@ def test_the_control_tree_drives_a_path_given_to_it(make_bench):
     assert plans(bench) == 0
 
 
-def test_the_node_at_work_is_told_to_the_event_log(make_bench):
+def test_the_running_node_is_written_to_the_event_log(make_bench):
     bench = make_bench()
     run(bench, navigation_tree(OPTIONS))
     at_work = [event.data["new"] for event in bench.events(EventKind.STATE_CHANGED) if event.source == "tree"]

@@ -60,7 +60,7 @@ def test_memrec_starts_its_list_again_when_entered_again(scripted, tick):
     assert [child.ticks for child in tree.children] == [4, 2, 0]
 
 
-def test_memrec_gives_up_on_a_code_no_recovery_mends(scripted, tick):
+def test_memrec_gives_up_on_a_code_no_recovery_repairs(scripted, tick):
     tree = bind(MemRec("plan", scripted("F"), [], give_up_on=[53]), code=53)
     tree.add_child(recovery := scripted("S"))
     assert tick(tree) == "F"

@@ -65,7 +65,7 @@ def test_it_begins_with_its_first_state_each_time(scripted, tick):
     assert (first.ticks, second.ticks) == (2, 2)
 
 
-def test_all_mistakes_are_told_at_once(scripted):
+def test_all_mistakes_are_reported_at_once(scripted):
     with pytest.raises(ValueError) as error:
         StateMachine("m", {"a": State(scripted("S"), {S: "nowhere"}), "b": State(scripted("S"), {F: F})})
     text = str(error.value)

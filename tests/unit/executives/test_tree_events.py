@@ -29,7 +29,7 @@ def statuses(state):
     return {node.name: node.status for node in state.nodes}
 
 
-def test_the_log_tells_the_tree_once_and_then_only_ticks_that_change_something(make_bench, scripted):
+def test_the_log_reports_the_tree_once_and_then_only_ticks_that_change_something(make_bench, scripted):
     tree = Sequence("both", True, [scripted("RRRRS", "wait"), scripted("RRS", "then")])
 
     begin, *changes = run(make_bench, tree)

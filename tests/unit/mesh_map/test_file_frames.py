@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from mbf_abstract.commands.bench import standing_server
+from mbf_abstract.commands.standing_server import standing_server
 from mbf_abstract.server.factory import read_config
 from mbf_mesh_nav.files.file_frames import FileFrame, file_frame, on_the_map
 from mbf_mesh_nav.files.mesh_io import read_mesh
@@ -106,7 +106,7 @@ def test_an_elevation_model_is_not_turned(tmp_path):
         read_mesh(tmp_path / "hill.asc", up_axis="y")
 
 
-def test_what_was_turned_is_told(tmp_path):
+def test_what_was_turned_is_reported(tmp_path):
     found = build_mesh_map(MeshMapParameters(mesh_file=str(exported(tmp_path / "hill.glb", Y_UP)))).report
     assert "the file has y up, a unit of 1 m; it is turned" in found["file_frame"].text
     plain = build_mesh_map(MeshMapParameters(mesh_file=str(exported(tmp_path / "hill.ply", HILL)))).report

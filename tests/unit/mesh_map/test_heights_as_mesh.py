@@ -38,7 +38,7 @@ def test_samples_keep_their_numbers_in_the_grid_and_holes_have_none(seed):
     assert mesh.to_input_order(mesh.snapshot().costs).size == heights.size
 
 
-def test_one_hole_is_told_and_takes_the_faces_around_it():
+def test_one_hole_is_reported_and_takes_the_faces_around_it():
     heights = np.zeros((5, 6))
     heights[2, 3] = np.nan
 
@@ -54,7 +54,7 @@ def test_regions_that_touch_in_one_sample_are_parted_on_request():
     heights[:3, :3] = heights[2:, 2:] = 0.0
 
     assert MeshMap.from_heights(heights, 1.0, 1.0).components.max() == 0
-    assert MeshMap.from_heights(heights, 1.0, 1.0, repair=["point_contacts"]).components.max() == 1
+    assert MeshMap.from_heights(heights, 1.0, 1.0, repair=["non_manifold_vertices"]).components.max() == 1
 
 
 def test_heights_without_a_face_or_a_spacing_are_refused():

@@ -193,13 +193,13 @@ TILT = {"name": "tilt", "type": "tilt"}
         ([BORDER, TILT, INFLATION], 0.2, ""),
     ],
 )
-def test_a_robot_wider_than_what_the_layers_keep_off_it_is_told_unless_a_tilt_layer_looks_at_all_of_it(
+def test_a_robot_wider_than_what_the_layers_keep_off_it_is_reported_unless_a_tilt_layer_looks_at_all_of_it(
     layers, own, text
 ):
     vertices, faces = heightfield_mesh(np.zeros((11, 11)), 0.15, 0.15)
     parameters = MeshMapParameters(inscribed_radius=0.34, layers=layers)
     blocks = {} if own is None else {"inflation": {"inscribed_radius": own, "inflation_radius": 0.8}}
     mesh_map = build_mesh_map(parameters, blocks, vertices=vertices, faces=faces)
-    told = [str(found) for found in mesh_map.report.findings if found.name == "narrow"]
-    assert len(told) == bool(text)
-    assert all(text in one for one in told)
+    reported = [str(found) for found in mesh_map.report.findings if found.name == "narrow"]
+    assert len(reported) == bool(text)
+    assert all(text in one for one in reported)

@@ -133,16 +133,16 @@ def test_height_limit_keeps_the_cylinder_from_running_over_the_mesh():
     )
 
 
-def test_border_marks_the_rim_and_its_threshold_decides_what_is_lethal():
+def test_border_marks_the_boundary_and_its_threshold_decides_what_is_lethal():
     mesh = MeshMap.from_heights(np.zeros((5, 6)), 1.0, 1.0)
     x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
-    rim = (x == 0) | (x == 5) | (y == 0) | (y == 4)
+    boundary = (x == 0) | (x == 5) | (y == 0) | (y == 4)
 
     layer = computed(mesh, BorderLayer, border_cost=0.4, threshold=0.5)
 
-    np.testing.assert_allclose(layer.costs, np.where(rim, 0.4, 0.0))
+    np.testing.assert_allclose(layer.costs, np.where(boundary, 0.4, 0.0))
     assert not layer.lethal.any()
-    np.testing.assert_array_equal(computed(mesh, BorderLayer).lethal, rim)
+    np.testing.assert_array_equal(computed(mesh, BorderLayer).lethal, boundary)
 
 
 @pytest.mark.parametrize(("ceiling", "cost", "lethal"), [(0.9, 1.0, True), (1.15, 0.5, False), (1.4, 0.0, False)])
@@ -257,11 +257,11 @@ def test_a_keepout_region_drawn_along_the_edges_of_the_mesh_leaves_no_face_of_it
     assert len(free) > 0 and not inside.any()
 
 
-def test_a_forbidden_label_closes_a_strip_that_runs_between_the_vertices():
+def test_a_forbidden_label_closes_a_band_that_runs_between_the_vertices():
     mesh = MeshMap.from_heights(np.zeros((5, 5)), 1.0, 1.0)
-    strip = {"polygon": ((2.4, -1.0), (2.6, -1.0), (2.6, 9.0), (2.4, 9.0)), "label": "mud"}
-    forbidden = computed(mesh, LabelLayer, regions=[strip], lethal_labels=["mud"])
-    costly = computed(mesh, LabelLayer, regions=[strip], label_costs={"mud": 0.5})
+    band = {"polygon": ((2.4, -1.0), (2.6, -1.0), (2.6, 9.0), (2.4, 9.0)), "label": "mud"}
+    forbidden = computed(mesh, LabelLayer, regions=[band], lethal_labels=["mud"])
+    costly = computed(mesh, LabelLayer, regions=[band], label_costs={"mud": 0.5})
     crossing = (mesh.vertices[mesh.edges][:, :, 0] < 2.5).any(axis=1) & (mesh.vertices[mesh.edges][:, :, 0] > 2.5).any(
         axis=1
     )

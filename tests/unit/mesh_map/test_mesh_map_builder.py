@@ -33,10 +33,10 @@ def test_default_layers_leave_a_floor_free_inside_and_close_its_border():
 
     snapshot = mesh.snapshot()
     middle = np.linalg.norm(mesh.vertices[:, :2] - 1.45, axis=1) < 0.8
-    rim = (mesh.vertices[:, :2] == 0.0).any(axis=1)
+    boundary = (mesh.vertices[:, :2] == 0.0).any(axis=1)
     assert (snapshot.costs[middle] == 0.0).all()
-    assert snapshot.lethal[rim].all()
-    assert np.isinf(snapshot.costs[rim]).all()
+    assert snapshot.lethal[boundary].all()
+    assert np.isinf(snapshot.costs[boundary]).all()
 
 
 def test_every_mistake_in_the_layers_is_reported_at_once():
@@ -71,7 +71,7 @@ def test_unknown_repair_is_refused_with_the_configuration():
         MeshMapParameters(repair=("zero_area", "duplicate"))
 
 
-def three_sheets() -> tuple[np.ndarray, np.ndarray]:
+def three_patches() -> tuple[np.ndarray, np.ndarray]:
     """A floor, a wall on its edge and a wall below that edge, which touch without being joined."""
     floor, faces = heightfield_mesh(np.zeros((5, 5)), 1.0, 1.0)
     wall = floor[:, [0, 2, 1]] + [0.0, 4.0, 0.0]
@@ -96,7 +96,7 @@ def test_vertices_are_joined_where_the_format_shares_none_or_the_configuration_s
     tmp_path, ending, repair, joined
 ):
     file = tmp_path / f"sheets.{ending}"
-    trimesh.Trimesh(*three_sheets(), process=False).export(file)
+    trimesh.Trimesh(*three_patches(), process=False).export(file)
     parameters = MeshMapParameters(mesh_file=str(file), repair=repair)
 
     if joined:
@@ -221,7 +221,7 @@ def test_whatever_stands_in_a_cache_file_the_map_loads(tmp_path_factory, seed):
     assert not again.report.findings
 
 
-def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_map_loads(tmp_path):
+def test_a_cache_folder_that_cannot_be_used_is_reported_once_and_the_map_loads(tmp_path):
     (tmp_path / "file").write_text("no folder")
     layers = [{"name": "rough", "type": "roughness"}, {"name": "height", "type": "height_diff"}]
 
@@ -235,7 +235,7 @@ def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_map_loads(tmp_p
     assert set(mesh.layers) == {"rough", "height"}
 
 
-def test_a_robot_of_whose_size_only_an_inflation_knows_is_told_that_the_mesh_is_too_coarse_for_it():
+def test_a_mesh_too_coarse_for_a_robot_whose_size_only_an_inflation_knows_is_reported():
     layers = [{"name": "border", "type": "border"}, {"name": "near", "type": "inflation", "inputs": ["border"]}]
     blocks = {"near": {"inscribed_radius": 0.15}}
     unknown = build_mesh_map(MeshMapParameters(layers=layers), blocks, vertices=VERTICES, faces=FACES)
@@ -256,11 +256,11 @@ def test_layers_whose_radius_is_shorter_than_the_edges_are_reported_by_name():
 def test_a_map_whose_edges_are_longer_than_a_robot_is_reported_with_its_tilt_layer():
     vertices, faces = heightfield_mesh(np.zeros((9, 9)), 0.5, 0.5)
     layers = [{"name": "stance", "type": "tilt"}]
-    for wheelbase, told in ((0.512, True), (0.7, False)):
+    for wheelbase, reported in ((0.512, True), (0.7, False)):
         parameters = MeshMapParameters(layers=layers)
         mesh_map = build_mesh_map(parameters, {"stance": {"wheelbase": wheelbase}}, vertices=vertices, faces=faces)
         texts = [finding.text for finding in mesh_map.report.findings if finding.name == "coarse"]
-        assert any("the wheelbase of layer 'stance' (0.512 m)" in text for text in texts) is told
+        assert any("the wheelbase of layer 'stance' (0.512 m)" in text for text in texts) is reported
 
 
 @pytest.mark.parametrize("wheels", [False, True])
@@ -273,7 +273,7 @@ def test_the_radius_of_a_robot_says_what_is_coarse_unless_a_layer_stands_its_whe
     assert ("coarse" in mesh_map.report) is not wheels
 
 
-def test_coarse_mesh_is_reported_and_densify_mends_it():
+def test_coarse_mesh_is_reported_and_densify_repairs_it():
     vertices, faces = heightfield_mesh(np.zeros((3, 3)), 2.0, 2.0)
     coarse = MeshMapParameters(inscribed_radius=0.4)
 

@@ -52,9 +52,9 @@ def test_merged_vertices_share_one_internal_number():
     np.testing.assert_array_equal(mesh.vertices[mesh.input_to_internal], soup)
 
 
-def test_moebius_strip_cannot_be_wound_and_says_so():
+def test_moebius_band_cannot_be_wound_and_says_so():
     angle = np.linspace(0.0, 2.0 * np.pi, 20, endpoint=False)
-    rims = [
+    boundaries = [
         np.column_stack(
             [
                 (4 + s * np.cos(angle / 2)) * np.cos(angle),
@@ -64,7 +64,7 @@ def test_moebius_strip_cannot_be_wound_and_says_so():
         )
         for s in (-1.0, 1.0)
     ]
-    vertices = np.stack(rims, axis=1).reshape(-1, 3)
+    vertices = np.stack(boundaries, axis=1).reshape(-1, 3)
     faces = []
     for i in range(20):
         a, b = 2 * i, 2 * i + 1
@@ -153,15 +153,15 @@ def test_vertices_where_groups_of_faces_touch_in_a_point_are_reported_and_split(
     vertices, faces = touching(3)
 
     _, reported = checked_mesh(vertices, faces)
-    mesh = MeshMap.from_arrays(vertices, faces, repair=["point_contacts"])
+    mesh = MeshMap.from_arrays(vertices, faces, repair=["non_manifold_vertices"])
 
-    assert not reported["point_contacts"].repaired
-    assert reported["point_contacts"].indices.tolist() == [15, 30]
+    assert not reported["non_manifold_vertices"].repaired
+    assert reported["non_manifold_vertices"].indices.tolist() == [15, 30]
     assert len(mesh.vertices) == 48
     assert mesh.components.max() == 2
     assert (mesh.internal_to_input == -1).sum() == 2
     np.testing.assert_array_equal(mesh.vertices[mesh.input_to_internal], vertices)
-    assert "point_contacts" not in checked_mesh(mesh.vertices, mesh.faces)[1]
+    assert "non_manifold_vertices" not in checked_mesh(mesh.vertices, mesh.faces)[1]
 
 
 @settings(deadline=None, max_examples=40)
@@ -172,7 +172,7 @@ def test_after_splitting_faces_hang_together_over_edges_exactly_if_over_vertices
     heights[:2, :2] = 0.0
     vertices, faces = heightfield_mesh(heights, 1.0, 1.0)
 
-    mesh = MeshMap.from_arrays(vertices, faces, repair=["point_contacts"])
+    mesh = MeshMap.from_arrays(vertices, faces, repair=["non_manifold_vertices"])
 
     face, corner = np.nonzero(mesh.face_neighbours >= 0)
     pairs = face, mesh.face_neighbours[face, corner]
@@ -184,14 +184,14 @@ def test_after_splitting_faces_hang_together_over_edges_exactly_if_over_vertices
 
 
 def test_two_cones_that_touch_at_their_tips_are_split():
-    rim = np.array([[1.0, 0.0, 1.0], [-0.5, 0.9, 1.0], [-0.5, -0.9, 1.0]])
-    vertices = np.vstack([[0.0, 0.0, 0.0], rim, rim * [1.0, 1.0, -1.0]])
+    boundary = np.array([[1.0, 0.0, 1.0], [-0.5, 0.9, 1.0], [-0.5, -0.9, 1.0]])
+    vertices = np.vstack([[0.0, 0.0, 0.0], boundary, boundary * [1.0, 1.0, -1.0]])
     cone = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1]])
     faces = np.vstack([cone, np.where(cone > 0, cone + 3, 0)[:, ::-1]])
 
-    mesh, report = checked_mesh(vertices, faces, ["point_contacts", "facing_down"])
+    mesh, report = checked_mesh(vertices, faces, ["non_manifold_vertices", "facing_down"])
 
-    assert report["point_contacts"].indices.tolist() == [0]
+    assert report["non_manifold_vertices"].indices.tolist() == [0]
     assert len(mesh.vertices) == 8
 
 

@@ -123,7 +123,7 @@ def test_floor_is_lava_plateaus_are_joined_up_to_0_35_m_and_cut_at_0_4(
     assert (near_end == far_end) is connected
 
 
-def test_two_storeys_of_the_garage_are_told_apart(shared_data: Path):
+def test_two_storeys_of_the_garage_are_distinguished(shared_data: Path):
     vertices, faces = read_mesh(shared_data / "meshes/derived/parking_garage_1m.ply")
     mesh_map = MeshMap.from_arrays(vertices, faces)
     upward = np.flatnonzero(mesh_map.face_normals[:, 2] > 0.99)[::500]

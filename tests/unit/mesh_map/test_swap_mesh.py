@@ -48,26 +48,26 @@ def navigator(tmp_path):
     robot.close()
 
 
-def told(navigator) -> list[tuple[str, int, bool]]:
+def reported(navigator) -> list[tuple[str, int, bool]]:
     """What the events say of the meshes loaded so far."""
     events = navigator.server.runtime.events.memory.of_kind(EventKind.MAP)
     return [(event.data["finding"], event.data["count"], event.data["repaired"]) for event in events]
 
 
 def test_every_finding_in_a_mesh_is_an_event_when_it_is_loaded_and_when_it_is_swapped(navigator, tmp_path):
-    assert told(navigator) == [("coarse", 441, False), ("narrow", 0, False)]
+    assert reported(navigator) == [("coarse", 441, False), ("narrow", 0, False)]
     vertices, faces = heightfield_mesh(np.zeros((21, 21)), 0.2, 0.2)
     far = np.vstack([vertices, vertices + np.array([10.0, 0.0, 0.0])])
     turned = np.vstack([faces, faces[:, ::-1] + len(vertices)])
     trimesh.Trimesh(far, turned, process=False).export(tmp_path / "two.ply")
     with pytest.raises(MeshError):
         navigator.server.swap_mesh("broken.ply")
-    assert len(told(navigator)) == 2
+    assert len(reported(navigator)) == 2
 
     navigator.server.swap_mesh("two.ply")
 
     defects = [("facing_down", 800, False), ("components", 2, False)]
-    assert told(navigator)[2:] == [*defects, ("coarse", 882, False), ("narrow", 0, False)]
+    assert reported(navigator)[2:] == [*defects, ("coarse", 882, False), ("narrow", 0, False)]
     messages = [event.data["message"] for event in navigator.server.runtime.events.memory.of_kind(EventKind.MAP)]
     assert messages[3].startswith("components: 2 components, the largest with 441 of 882 vertices (indices 0, 441)")
 
@@ -126,8 +126,8 @@ def test_layer_parameters_change_at_run_time_and_are_an_event(navigator):
     server.set_map_parameters("mesh_map", edge_cost_factor=0.5)
     assert server.mesh_map.layers["slopes"].parameters.threshold == 0.4
     assert server.mesh_map.edge_cost_factor == 0.5
-    told = server.runtime.events.memory.of_kind(EventKind.PARAMETER_CHANGED)
-    assert told[-2].data["threshold"] == 0.4 and told[-1].data["edge_cost_factor"] == 0.5
+    reported = server.runtime.events.memory.of_kind(EventKind.PARAMETER_CHANGED)
+    assert reported[-2].data["threshold"] == 0.4 and reported[-1].data["edge_cost_factor"] == 0.5
 
 
 @pytest.mark.parametrize(

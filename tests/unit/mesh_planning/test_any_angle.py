@@ -15,7 +15,7 @@ from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
 
 
-def random_strip(mesh_map, rng, length):
+def random_corridor(mesh_map, rng, length):
     """A walk over faces that never turns straight back."""
     corridor = [int(rng.integers(len(mesh_map.faces)))]
     while len(corridor) < length:
@@ -86,9 +86,9 @@ def shortest_length(mesh_map, corridor, points):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_the_taut_path_is_the_shortest_through_its_strip(hills, seed):
+def test_the_taut_path_is_the_shortest_through_its_corridor(hills, seed):
     rng = np.random.default_rng(seed)
-    corridor = random_strip(hills, rng, 14)
+    corridor = random_corridor(hills, rng, 14)
     ends = hills.vertices[hills.faces[corridor[[0, -1]]]].mean(axis=1)
     points = pull_string(hills.vertices, hills.faces, corridor, *(tuple(end) for end in ends))
     length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()

@@ -108,8 +108,8 @@ def offer(mesh_map, length, u, bends, v1, v2, v3, near):
     if behind not in u:
         return along
     ends = length[v1, behind], length[v2, behind]
-    foretold = to_bend + from_virtual_source(u[v1] - to_bend, u[v2] - to_bend, sides[0], *ends, below=True)
-    if one_bend and u[behind] - foretold < 0.1 * sides[0]:
+    predicted = to_bend + from_virtual_source(u[v1] - to_bend, u[v2] - to_bend, sides[0], *ends, below=True)
+    if one_bend and u[behind] - predicted < 0.1 * sides[0]:
         return virtual, bends[v1]
     ways = [along]
     for end, other in ((v1, v2), (v2, v1)):

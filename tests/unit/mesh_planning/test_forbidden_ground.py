@@ -15,7 +15,7 @@ from mbf_abstract.plugins import ControlRequest, PlanRequest, RecoveryRequest
 from mbf_abstract.time.cancel import CancelToken
 from mbf_mesh_nav.controllers.mppi import MPPIController
 from mbf_mesh_nav.controllers.path_follower import PathFollower
-from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_HARDNESS, hardness_at, may_enter
+from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter, rank_at
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.astar import AStarPlanner
@@ -129,16 +129,16 @@ def test_escape_leaves_the_lethal_patch_the_robot_stands_on(make_plugin, walled)
 
 @given(st.floats(0, 1), st.floats(0, 1), st.integers(0, 2**32 - 1))
 @settings(max_examples=50, deadline=None)
-def test_hardness_is_that_between_the_corners_of_a_face_but_none_where_the_nearest_is_free(u, v, seed):
+def test_rank_is_that_between_the_corners_of_a_face_but_none_where_the_nearest_is_free(u, v, seed):
     rng = np.random.default_rng(seed)
     vertices, faces = rng.uniform(-1, 1, (3, 3)), np.array([[0, 1, 2]], np.int32)
-    hardness = rng.choice([0.0, 1.0, 1.5, LETHAL_HARDNESS], 3).astype(np.float32)
+    ranks = rng.choice([0.0, 1.0, 1.5, LETHAL_RANK], 3).astype(np.float32)
     weights = np.array([1.0 - max(u, v), max(u, v) - min(u, v), min(u, v)])
     assume(np.diff(np.sort(weights))[-1] > 1e-6)
     point = tuple((weights @ vertices).tolist())
-    found = hardness_at(vertices, faces, hardness, 0, point)
-    free = hardness[weights.argmax()] == 0.0
-    assert found == (0.0 if free else pytest.approx(weights @ hardness, abs=1e-3))
+    found = rank_at(vertices, faces, ranks, 0, point)
+    free = ranks[weights.argmax()] == 0.0
+    assert found == (0.0 if free else pytest.approx(weights @ ranks, abs=1e-3))
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def test_seams_and_vertices_count_once():
     assert ground_heights(mesh_map, 1.0, 1.0) == pytest.approx((0.0, 3.0))  # a vertex of six faces on each floor
 
 
-def test_a_pose_off_the_ground_is_told_where_the_ground_is(make_plugin):
+def test_the_message_for_a_pose_off_the_ground_names_where_the_ground_is(make_plugin):
     planner = make_plugin(AStarPlanner, storeys(1.5, 4.5))
     result = planner.make_plan(PlanRequest(Pose.planar(1.1, 1.2), Pose.planar(2.1, 1.2, 0.0, 1.5)))
     assert result.outcome == GetPathOutcome.OUT_OF_MAP

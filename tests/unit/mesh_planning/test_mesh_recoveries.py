@@ -208,11 +208,11 @@ def test_escaping_ends_where_it_is_safe_even_if_the_end_of_the_way_becomes_forbi
 
 
 def test_a_robot_beside_a_thin_wall_does_not_escape_through_it(run, plain, paint):
-    def wall_with_a_wide_forbidden_strip(v):
+    def wall_with_a_wide_forbidden_band(v):
         corridor = np.where((v[:, 0] > 1.55) & (v[:, 0] < 3.25), 0.95, 0.0)
         return np.where(np.abs(v[:, 0] - 3.0) < 0.05, np.inf, corridor)
 
-    mesh_map = paint(plain(spacing=0.1), wall_with_a_wide_forbidden_strip)
+    mesh_map = paint(plain(spacing=0.1), wall_with_a_wide_forbidden_band)
     result, motion = run(EscapeRecovery, mesh_map, (2.93, 3.03, 0.0), (-1, 0, 0))
     assert result.success, result.message
     assert motion.current.x < 1.65

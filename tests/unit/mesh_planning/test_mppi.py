@@ -122,7 +122,7 @@ def test_a_car_at_the_goal_with_a_wrong_heading_says_so_instead_of_standing_ther
 
 
 @pytest.mark.parametrize("model", ["differential", "ackermann"])
-def test_it_tells_what_it_means_to_drive_next_with_the_turns_of_a_car_as_yaw_rates(make_plugin, plain, model):
+def test_it_reports_what_it_means_to_drive_next_with_the_turns_of_a_car_as_yaw_rates(make_plugin, plain, model):
     controller = make_plugin(MPPIController, plain(), motion_model=model, wheelbase=0.4)
     assert controller.planned_motion() is None
     controller.set_plan(Path.from_points([(0.8, 1.0, 0.0), (3.0, 3.2, 0.0), (3.0, 5.0, 0.0)]))
@@ -141,7 +141,7 @@ def test_it_tells_what_it_means_to_drive_next_with_the_turns_of_a_car_as_yaw_rat
         assert (np.abs(motion.velocities[:, 2]) <= limit + 1e-9).all()
 
 
-def coarse_with_a_fine_strip():
+def coarse_with_a_fine_band():
     """A flat mesh of 6 m x 6 m with edges of 1 m and, around x = 3 m, of 0.06 m."""
     xs = np.concatenate([np.arange(3.0), 3.0 + 0.06 * np.arange(-5, 6), np.arange(4.0, 7.0)])
     grid = MeshMap.from_heights(np.zeros((7, len(xs))), 1.0, 1.0)
@@ -150,7 +150,7 @@ def coarse_with_a_fine_strip():
 
 @pytest.mark.parametrize("refined", [False, True])
 def test_a_wall_thinner_than_a_step_is_not_jumped_over(make_plugin, plain, paint, refined):
-    mesh_map = coarse_with_a_fine_strip() if refined else plain(spacing=0.1)
+    mesh_map = coarse_with_a_fine_band() if refined else plain(spacing=0.1)
     paint(mesh_map, lambda v: np.where(np.abs(v[:, 0] - 3.0) < 0.01, np.inf, 0.0))
     controller = make_plugin(MPPIController, mesh_map, model_dt=0.5, time_steps=8, max_vel_x=2.0)
     controller.set_plan(straight_path())

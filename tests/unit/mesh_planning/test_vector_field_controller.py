@@ -1,4 +1,4 @@
-"""The vector-field controller: its law cycle by cycle, its faults mended, and a closed loop on hills."""
+"""The vector-field controller: its law cycle by cycle, its faults corrected, and a closed loop on hills."""
 
 import dataclasses
 import math

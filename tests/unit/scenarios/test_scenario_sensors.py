@@ -50,12 +50,12 @@ def test_wheel_odometry_drifts_in_odom_and_the_localisation_corrects_it(sensing)
         drive(session, 4.0)
         believed, truth = place(session, "map", "base_link"), session.robot.pose()
         travelled = place(session, "odom", "base_link")
-        told, true = session.navigator.server.runtime.robot.velocity(), session.robot.velocity()
+        reported, true = session.navigator.server.runtime.robot.velocity(), session.robot.velocity()
     assert believed.translation == pytest.approx(truth.position, abs=0.03)  # one period of odometry old
     assert travelled.translation[0] == pytest.approx(truth.distance_to(session.recorder.start), rel=0.1)
     assert travelled.translation[1] == pytest.approx(0.0, abs=0.2)  # odom lies along the robot's first heading
-    assert told.vx != true.vx
-    assert told.vx == pytest.approx(true.vx, rel=0.2)
+    assert reported.vx != true.vx
+    assert reported.vx == pytest.approx(true.vx, rel=0.2)
 
 
 def test_a_jump_of_the_localisation_moves_odom_in_the_map_and_not_the_robot_in_odom(sensing):
@@ -90,7 +90,7 @@ def test_every_sensor_can_be_made_silent_stale_and_wrong_by_the_scenario(sensing
         assert honest.hits.any() and wrong.hits.all()
 
 
-def test_a_robot_whose_odometry_falls_silent_loses_its_pose_and_is_told_so(sensing):
+def test_a_robot_whose_odometry_falls_silent_loses_its_pose_and_that_is_reported(sensing):
     silent = SensorFault(type="silent", sensor="odometry", start=1.0)
     with Session(sensing(silent), SessionOptions(backend="mesh")) as session:
         result = session.navigator.go_to(session.goals[0])

@@ -17,7 +17,7 @@ def end_once(marker):
         return os.getpid()
 
 
-def test_a_job_whose_worker_is_told_to_end_is_given_to_another(tmp_path):
+def test_a_job_whose_worker_is_terminated_is_given_to_another(tmp_path):
     marker = tmp_path / "first"
     ((job, process),) = run_in_workers(end_once, [str(marker)], 1)
     assert job == str(marker)

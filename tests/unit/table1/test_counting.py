@@ -56,7 +56,7 @@ def test_a_recovery_was_useless_if_the_same_failure_comes_back_within_five_secon
     assert tally.useless == useless
 
 
-def test_lost_legs_and_contacts_are_told_apart(log):
+def test_lost_legs_and_contacts_are_distinguished(log):
     log.own(11.0, "contact", touched="robot", moved="they")
     log.own(15.0, "contact", touched="rack", moved="we")
     tally = one_leg(log, end="timed_out")

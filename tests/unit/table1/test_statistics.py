@@ -28,7 +28,7 @@ def test_pairs_stay_together():
     assert paired_ratio([10.0, 1000.0], [1.0, 100.0]).high == pytest.approx(10.0)
 
 
-def test_nothing_in_arm_b_gives_an_infinite_ratio():
+def test_nothing_in_condition_b_gives_an_infinite_ratio():
     assert paired_ratio([2.0, 3.0], [0.0, 0.0]).value == math.inf
 
 

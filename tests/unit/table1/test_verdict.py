@@ -48,7 +48,7 @@ def test_each_criterion_can_fail_by_itself(runs, changes, holds, expected):
     assert judged(*runs(**changes)) == (holds, expected)
 
 
-def test_one_contact_more_than_arm_a_is_allowed_and_two_are_not(runs, tally):
+def test_one_contact_more_than_condition_a_is_allowed_and_two_are_not(runs, tally):
     a, b = runs()
     for extra, holds in ((1, True), (2, False)):
         touched = tally(planner=29, controller=24, clear=9, other=9, time=420.0, contacts=extra)

@@ -28,7 +28,7 @@ def test_roughness_is_the_root_mean_square_of_the_bumps() -> None:
     assert np.std(generate.add_roughness(flat, rng(), 0.03).heights) == pytest.approx(0.03, rel=1e-3)
 
 
-def test_the_report_tells_steep_ground_from_rough_ground() -> None:
+def test_the_report_separates_steep_ground_from_rough_ground() -> None:
     reports = {}
     for slope, roughness in ((5.0, 0.0), (15.0, 0.0), (5.0, 0.03)):
         rng = np.random.default_rng(3)

@@ -121,7 +121,7 @@ def test_the_fast_single_query_equals_the_array_queries(seed: int, u: float, v: 
 
 
 @given(st.integers(0, 5), st.floats(0.05, 0.95), st.floats(-3.1, 3.1))
-def test_a_pose_stands_on_the_ground_and_looks_where_it_was_told(seed: int, u: float, yaw: float) -> None:
+def test_a_pose_stands_on_the_ground_and_looks_where_it_should(seed: int, u: float, yaw: float) -> None:
     field = random_field(seed)
     x, y = field.x0 + u * field.size[0], field.y0 + (1.0 - u) * field.size[1]
     pose = field.pose_at(x, y, yaw)

@@ -137,7 +137,7 @@ def test_perfect_wheel_odometry_follows_an_arc_and_a_real_one_drifts() -> None:
     assert 0.01 < drifted.pose.distance_to(truth) < 0.5
 
 
-def test_localisation_jumps_when_told_to() -> None:
+def test_localisation_jumps_when_asked_to() -> None:
     localization = Localization(PosedRobot(Pose.planar(1.0, 2.0, 0.5)), rng())
     before = localization.measure(0.0)
     localization.offset = (0.5, 0.0, 0.1)

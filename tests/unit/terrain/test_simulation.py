@@ -235,7 +235,7 @@ def test_a_door_closes_at_its_time_and_stops_the_robot() -> None:
 
 
 @pytest.mark.parametrize("thing", [Thing.PERSON, Thing.ROBOT])
-def test_whom_the_robot_hits_is_told(thing: Thing) -> None:
+def test_whom_the_robot_hits_is_reported(thing: Thing) -> None:
     route = np.array([[1.0, 0.0], [1.0, 0.01]])
     with BulletWorld() as world:
         world.add_ground_plane(-5.0, 5.0, -5.0, 5.0)

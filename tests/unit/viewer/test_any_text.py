@@ -68,7 +68,7 @@ def test_a_name_or_message_ruins_no_result(text, tmp_path):
     assert (tmp_path / "report.html").read_text(encoding="utf-8").endswith("</html>")
 
 
-def test_what_cannot_be_made_is_told_and_the_rest_is_made(hill_recording, tmp_path, monkeypatch):
+def test_what_cannot_be_made_is_reported_and_the_rest_is_made(hill_recording, tmp_path, monkeypatch):
     def broken(file, recording):
         with replacing(file) as part:
             part.write_text("half a pict")
@@ -106,7 +106,7 @@ def test_notes_and_steps_are_no_markup():
 
 
 @pytest.mark.parametrize(
-    ("error", "told"),
+    ("error", "reported"),
     [
         (MemoryError(), "error: not enough memory for that\n"),
         (MemoryError("Unable to allocate 5 GiB"), "error: not enough memory for that: Unable to allocate 5 GiB\n"),
@@ -116,10 +116,10 @@ def test_notes_and_steps_are_no_markup():
     ],
     ids=repr,
 )
-def test_every_error_says_something(error, told, capsys):
+def test_every_error_says_something(error, reported, capsys):
     with pytest.raises(BaseException, match="2"), readable_errors():
         raise error
-    assert capsys.readouterr().err == told
+    assert capsys.readouterr().err == reported
 
 
 def test_folders_with_odd_names_are_compared(hill_recording, tmp_path):

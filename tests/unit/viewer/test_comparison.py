@@ -74,9 +74,9 @@ def test_equal_digests_are_one_drive_and_equal_numbers_are_not(hill_recording, t
         hill_recording.save(tmp_path / name / "recording.npz")
         (tmp_path / name / "metrics.json").write_text(json.dumps({"digest": digest} if digest else {}))
 
-    def told(name):
+    def reported(name):
         return compare(tmp_path / "first", tmp_path / name, "--out", tmp_path / "page.html").stdout
 
-    assert "digest: equal" in told("again") and "digest: equal" in (tmp_path / "page.html").read_text()
-    assert "digest: differs" in told("other")
-    assert "digest: at least one run has none" in told("old")
+    assert "digest: equal" in reported("again") and "digest: equal" in (tmp_path / "page.html").read_text()
+    assert "digest: differs" in reported("other")
+    assert "digest: at least one run has none" in reported("old")

@@ -184,7 +184,7 @@ def test_a_run_on_a_mesh_keeps_the_costs_it_was_planned_on(meadow):
     np.testing.assert_allclose(recorded[0].costs, view.costs, rtol=1e-3, atol=1e-3)
 
 
-def test_events_and_the_log_tell_what_events_jsonl_tells(log, office):
+def test_events_and_the_log_hold_what_events_jsonl_holds(log, office):
     levels = {message.message.split(":")[0]: message.level for message in log["/log"]}
 
     assert [Event.from_json(json.dumps(values)) for values in log["/events"]] == list(office.events)

@@ -66,7 +66,7 @@ def test_metrics_are_plain_json(office_recording):
     assert json.loads(json.dumps(values, allow_nan=False)) == values
 
 
-def test_roll_and_pitch_agree_with_the_mishap_monitor(hill_recording):
+def test_roll_and_pitch_agree_with_the_incident_monitor(hill_recording):
     metrics = measure(hill_recording)
 
     angles = [roll_pitch(Pose(tuple(row[:3]), tuple(row[3:]))) for row in hill_recording.poses]

@@ -50,7 +50,7 @@ def test_wheels_turn_against_each_other_when_the_robot_turns_on_the_spot():
     np.testing.assert_array_equal(np.sign(angles), -np.sign(shape.wheels[:, 1]))
 
 
-def test_the_text_over_the_robot_tells_time_speed_and_tilt(hill_recording):
+def test_the_text_over_the_robot_shows_time_speed_and_tilt(hill_recording):
     assert status_text(hill_recording, 100).startswith("10 s   1.2 m/s   tilt ")
 
 

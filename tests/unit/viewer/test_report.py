@@ -22,7 +22,7 @@ def report_of(recording):
     return report_html(recording, measure(recording).to_json())
 
 
-def test_the_report_tells_outcome_metrics_and_stops(office_recording):
+def test_the_report_reports_outcome_metrics_and_stops(office_recording):
     page = report_of(office_recording)
 
     for words in ("BLOCKED_PATH: a box stands on the path", "max_tilt_deg", "no command for 0.5 s", "turtlebot"):

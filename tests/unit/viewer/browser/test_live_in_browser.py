@@ -80,7 +80,7 @@ def test_the_page_shows_the_run_and_steers_it(chromium, served_run, tmp_path):
 
     (tmp_path / "live_view.png").write_bytes(png)
     assert errors == []
-    assert_the_log_tells_what_was_asked_for(list(read_events(folder / "events.jsonl")))
+    assert_the_log_holds_what_was_asked_for(list(read_events(folder / "events.jsonl")))
     assert answer["outcome"] == "CANCELED"
     assert (folder / "replay.html").is_file()
     assert_the_ground_and_the_person_are_seen(png)
@@ -104,7 +104,7 @@ def test_a_page_for_watching_only_shows_the_run_without_a_button_that_could_be_p
     assert not [word for word in ("Cancel", "Pause", "End the run", "Inject", "a click is a new goal") if word in text]
 
 
-def assert_the_log_tells_what_was_asked_for(events):
+def assert_the_log_holds_what_was_asked_for(events):
     asked = [event for event in events if event.source == "live_view"]
     assert [event.data["what"] for event in asked] == ["new goal", "pause", "resume", "cancel", "end"]
     assert 0.0 < asked[0].data["x"] < 12.0 and 0.0 < asked[0].data["y"] < 10.0

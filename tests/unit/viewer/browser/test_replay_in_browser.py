@@ -33,7 +33,7 @@ def test_a_replay_opens_from_disk_and_plays(chromium, hill_recording, tmp_path):
     assert greenish.mean() > 0.05, "the hills fill a good part of the picture"
 
 
-def test_a_replay_tells_the_state_of_the_tree_along_its_time_bar(chromium, hill_recording, tmp_path):
+def test_a_replay_reports_the_state_of_the_tree_along_its_time_bar(chromium, hill_recording, tmp_path):
     nodes = [{"name": "get there", "type": "Sequence", "depth": 0}, {"name": "plan", "type": "GetPath", "depth": 1}]
     events = [
         Event(0.0, EventKind.TREE, "tree", {"tree": "get there", "nodes": nodes}),

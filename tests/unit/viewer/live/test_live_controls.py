@@ -18,7 +18,7 @@ def end(run):
     return lambda: run.controls.end("enough")
 
 
-def told(run):
+def reported(run):
     return [event.data["what"] for event in run.events(EventKind.CUSTOM, source="live_view")]
 
 
@@ -34,7 +34,7 @@ def test_the_robot_goes_where_the_click_hits_the_ground_instead_of_to_the_scenar
     assert clicked.z == pytest.approx(run.session.world.height_at(5.0, 7.0), abs=1e-3)
     finished = [event.data["outcome_name"] for event in run.events(EventKind.GOAL_FINISHED, source="move_base")]
     assert finished == ["CANCELED", "SUCCESS"]
-    assert told(run) == ["new goal"]
+    assert reported(run) == ["new goal"]
 
 
 def test_a_click_beside_the_ground_changes_nothing(steered):
@@ -42,7 +42,7 @@ def test_a_click_beside_the_ground_changes_nothing(steered):
     run.at(2.0, lambda: run.controls.go_to(above(500.0, 0.0), DOWN))
 
     assert run.visit_goals().success
-    assert told(run) == ["there is no ground where the click was"]
+    assert reported(run) == ["there is no ground where the click was"]
     assert len(run.session.recorder.goals) == 1
 
 
@@ -103,7 +103,7 @@ def test_injected_faults_befall_the_sensor_and_the_localisation_and_end(steered)
 
     assert stamps[2.9] < 2.01 and stamps[3.5] > 3.2
     assert (offsets[1.9][0], offsets[2.5][0], offsets[3.5][0]) == (0.0, 0.3, 0.0)
-    assert told(run) == ["fault", "fault", "end"]
+    assert reported(run) == ["fault", "fault", "end"]
 
 
 def test_a_clicked_goal_has_the_scenarios_time_limit_of_its_own(steered, meadow):

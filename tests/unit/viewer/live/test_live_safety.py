@@ -45,8 +45,8 @@ def test_a_command_that_fails_is_noted_and_the_run_goes_on(steered):
     result = run.visit_goals()
 
     assert result.success, result.message
-    told = refused(run.events(EventKind.CUSTOM))
-    assert len(told) == 3 and told[0] == "ZeroDivisionError: division by zero"
+    reported = refused(run.events(EventKind.CUSTOM))
+    assert len(reported) == 3 and reported[0] == "ZeroDivisionError: division by zero"
 
 
 def test_what_a_client_sends_neither_raises_nor_stops_a_run_that_ends_in_order(meadow, tmp_path):
@@ -93,7 +93,7 @@ def served(meadow, folder, **view):
     return addresses, notes
 
 
-def test_who_serves_a_page_is_told_an_address_to_steer_and_one_to_watch(meadow, tmp_path):
+def test_who_serves_a_page_gets_an_address_to_steer_and_one_to_watch(meadow, tmp_path):
     addresses, notes = served(meadow, tmp_path, port=18620)
     (address,), (note,) = addresses, notes
     assert address.startswith("http://127.0.0.1:1862") and len(address.split("/")[3]) >= 22

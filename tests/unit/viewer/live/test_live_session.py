@@ -61,8 +61,8 @@ def test_ctrl_c_ends_a_run_that_waits_for_goals_and_its_results_are_written(mead
 
     assert result.success and pressed
     assert (tmp_path / "metrics.json").is_file()
-    told = [event.data["reason"] for event in read_events(tmp_path / "events.jsonl") if event.source == "live_view"]
-    assert told == ["Ctrl-C"]
+    reported = [event.data["reason"] for event in read_events(tmp_path / "events.jsonl") if event.source == "live_view"]
+    assert reported == ["Ctrl-C"]
 
 
 def test_a_page_that_breaks_down_is_reported_once_and_the_run_goes_on(meadow):
@@ -76,7 +76,7 @@ def test_a_page_that_breaks_down_is_reported_once_and_the_run_goes_on(meadow):
         assert len(faults) == 1
 
 
-def test_an_interface_that_does_not_exist_is_told_in_one_line(meadow, tmp_path):
+def test_an_interface_that_does_not_exist_is_reported_in_one_line(meadow, tmp_path):
     with pytest.raises(ViewerMissing, match=r"203\.0\.113\.1"):
         run(meadow, tmp_path, watch=page(host="203.0.113.1"))
 

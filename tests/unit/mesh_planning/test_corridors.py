@@ -23,7 +23,7 @@ def faces_along(mesh_map, curve):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_on_flat_free_ground_a_winding_strip_becomes_the_straight_line(seed):
+def test_on_flat_free_ground_a_winding_corridor_becomes_the_straight_line(seed):
     mesh_map = MeshMap.from_heights(np.zeros((21, 31)), 0.2, 0.3)
     waves, phase = np.random.default_rng(seed).uniform(0.5, 2.5, 2)
     x = np.linspace(0.7, 5.3, 2000)
@@ -40,7 +40,7 @@ def test_on_flat_free_ground_a_winding_strip_becomes_the_straight_line(seed):
     assert all(neighbours)
 
 
-def test_a_strip_is_not_turned_over_blocked_faces():
+def test_a_corridor_is_not_turned_over_blocked_faces():
     mesh_map = MeshMap.from_heights(np.zeros((9, 9)), 0.5, 0.5)
     blocked = np.linalg.norm(mesh_map.vertices - [2.0, 2.0, 0.0], axis=1) < 0.1
     angles = np.linspace(np.pi, 0.0, 500)

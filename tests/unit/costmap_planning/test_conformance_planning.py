@@ -212,7 +212,7 @@ def test_parameters_out_of_range_are_refused(planner_class, wrong):
 
 
 @pytest.mark.parametrize("planner_class", [*PLANNERS, HybridAStarPlanner], ids=lambda c: f"F166-{c.__name__}")
-def test_a_start_outside_the_map_is_told(make_plugin, planner_class):
+def test_a_start_outside_the_map_is_reported(make_plugin, planner_class):
     result = plan(make_plugin(planner_class, np.zeros((100, 100)), resolution=0.1), (-1.0, 5.0), (5.0, 5.0))
     assert result.outcome == GetPathOutcome.OUT_OF_MAP and "start" in result.message
 

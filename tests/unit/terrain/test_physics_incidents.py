@@ -48,6 +48,6 @@ def test_a_rail_under_the_belly_lifts_the_wheels_and_the_robot_is_stuck() -> Non
     assert IncidentKind.TIPPED_OVER not in kinds and IncidentKind.COLLISION not in kinds
 
 
-def test_level_ground_is_free_of_mishaps() -> None:
+def test_level_ground_is_free_of_incidents() -> None:
     flat, _, _ = ground()
     assert drive_along_x(flat, Twist.planar(0.8), 4.0).incidents == []
