@@ -136,7 +136,7 @@ class HybridAStarPlanner(CostmapPlanner):
             if request.cancel_token.cancelled:
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if leg is None or len(leg.poses) == 0:
-                failure = failure or self._no_way(world, start, goal, leg, tolerance)
+                failure = failure or self._no_path(world, start, goal, leg, tolerance)
                 return unless_lasting(failure, self.costmap, start, goal, tolerance)
             legs.append(leg)
         poses = np.concatenate([legs[0].poses, *(leg.poses[1:] for leg in legs[1:])])
@@ -197,7 +197,7 @@ class HybridAStarPlanner(CostmapPlanner):
             pieces=math.ceil(step / resolution - 1e-9),
         )
 
-    def _no_way(self, world: _World, start: Pose, goal: Pose, leg: _Leg | None, tolerance: float) -> PlanResult:
+    def _no_path(self, world: _World, start: Pose, goal: Pose, leg: _Leg | None, tolerance: float) -> PlanResult:
         """Failure with its cause: the goal is walled off, the car cannot get there, or the search gave up."""
         ends = f"from ({start.x:.2f}, {start.y:.2f}) to ({goal.x:.2f}, {goal.y:.2f})"
         if leg is None and not world.fits(goal):
