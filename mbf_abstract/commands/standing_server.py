@@ -40,7 +40,7 @@ class StandingRobot:
 
 @contextmanager
 def standing_server(cls: type[AbstractNavigationServer], config: Config) -> Iterator[AbstractNavigationServer]:
-    """Build a server around a robot that stands at the origin; closed on the way out."""
+    """Build a server around a robot that stands at the origin; it is closed at the end."""
     clock = SimClock()
     with cls(config, StandingRobot(clock), clock, events=EventBus(clock.now, [MemorySink()])) as server:
         place_robot(server, Pose.planar(0.0, 0.0, frame_id=config.parameters.global_frame))

@@ -1,4 +1,4 @@
-"""Fault table, rows 22 and 30: malformed and hostile maps: descriptions, images, a server that is told to use one."""
+"""Fault table, rows 22 and 30: malformed and hostile maps: descriptions, images, a server that is asked to use one."""
 
 from pathlib import Path
 

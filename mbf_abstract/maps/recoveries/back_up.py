@@ -1,4 +1,4 @@
-"""Drive back the way the robot came, over ground that was free a moment ago: the simplest way out of a dead end.
+"""Drive back the way the robot came, over ground that was free a moment ago: the simplest escape from a dead end.
 
 Follows the driven track by pure pursuit in reverse; where the track ends, is unknown or does not lie behind the robot
 (it turned on the spot since) it backs up straight. Ends (IMPASSABLE) before what the robot would touch behind it.
