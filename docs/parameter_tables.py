@@ -24,7 +24,7 @@ A configuration is one YAML file. `backend` chooses the server. Navigation param
 `planners`, `controllers`, `recovery_behaviors` and `refiners` name plugins; each plugin's parameters stand in a block
 of its name. The map has a section of its own, with a list of layers and a block for each layer.
 
-`mbf check FILE` tells every mistake at once. *While running* says whether a change takes effect on goals that run
+`mbf check FILE` reports every mistake at once. *While running* says whether a change takes effect on goals that run
 already; otherwise it is read when a goal starts or when the server is made. A default of **required** must be given.
 Range brackets: `[` includes the bound, `(` does not.
 
