@@ -27,12 +27,12 @@ MAX_INTEGER_BITS = 63
 
 
 def error_text(error: BaseException) -> str:
-    """Return what an exception says of itself, cut to ``MAX_TEXT``; its ``__str__`` may do what it likes."""
+    """Return the text of an exception, cut to ``MAX_TEXT``; its ``__str__`` may do what it likes."""
     return well_formed(shortened(_text_of(error)))
 
 
 def shortened(text: str) -> str:
-    """Return ``text``, cut off after ``MAX_TEXT`` characters with a word on how many are missing."""
+    """Return ``text``, cut off after ``MAX_TEXT`` characters with the number of missing ones."""
     missing = len(text) - MAX_TEXT
     return text if missing <= 0 else f"{text[:MAX_TEXT]} ... ({missing} more characters)"
 

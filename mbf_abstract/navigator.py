@@ -1,4 +1,4 @@
-"""What most scripts import: one object for everything a robot can be told to do.
+"""What most scripts import: one object for everything a robot can be asked to do.
 
 Every call comes in three forms. ``navigator.get_path(...)`` blocks and returns the result; ``navigator.send(goal)``
 returns a handle at once; ``await navigator.send(goal)`` suits asyncio. The same script runs on every map: which

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 class PluginKind(Enum):
-    """The four kinds of plugins a server loads; the value is the entry-point group's last word."""
+    """The four kinds of plugins a server loads; the value is the last part of the entry-point group's name."""
 
     PLANNER = "planners"
     CONTROLLER = "controllers"

@@ -155,7 +155,7 @@ class Action(ABC, Generic[G, R, F]):
 
     @abstractmethod
     def _goal_data(self, goal: G) -> dict[str, Any]:
-        """Return what the log shall say of an accepted goal."""
+        """Data of an accepted goal for the event log."""
 
     def _slot(self, goal: G) -> int:
         return int(getattr(goal, "concurrency_slot", 0))

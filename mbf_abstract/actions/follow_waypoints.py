@@ -1,8 +1,8 @@
-"""The ``follow_waypoints`` action: a tour over poses, each reached with a ``move_base`` goal of its own.
+"""The ``follow_waypoints`` action: a sequence of waypoints, each reached with a ``move_base`` goal of its own.
 
-Steps of one visit: wait while paused - send the goal - let it follow the tour's cancel and pause - run the task, while
+Steps of one visit: wait while paused - send the goal - pass cancel and pause on to it - run the task, while
 the robot stands there - next. A visit that somebody else cancels, or takes the robot away from with another goal, ends
-the tour as CANCELED; one that is rejected ends it whatever ``stop_on_failure`` says.
+the sequence as CANCELED; one that is rejected ends it whatever ``stop_on_failure`` says.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Drive = GoalHandle[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
 
 
 class FollowWaypointsAction(Action[FollowWaypointsGoal, FollowWaypointsResult, FollowWaypointsFeedback]):
-    """Makes tours; one at a time, a new one ends the old one."""
+    """Drives waypoint sequences; one at a time, a new one ends the old one."""
 
     name = "follow_waypoints"
     canceled_outcome = MoveBaseOutcome.CANCELED
@@ -95,7 +95,7 @@ class _Run:
         return self._judged()
 
     def _make_visit(self, visit: int) -> Drive:
-        """Drive to one waypoint; the drive is paused and canceled as the tour is."""
+        """Drive to one waypoint; the drive is paused and canceled as the sequence is."""
         drive = self._action.move_base.send(self._goal.visit(visit))
         drive.on_wake(self._wake)
         drive.subscribe(lambda drive: self._on_drive(visit, drive))
@@ -112,7 +112,7 @@ class _Run:
         return drive
 
     def _is_ahead_of(self, drive: Drive) -> bool:
-        """Whether the drive has not heard yet what became of the tour."""
+        """Whether a cancel or pause of the sequence has not reached the drive yet."""
         canceled = self._handle.cancel_requested and not drive.cancel_requested
         return canceled or self._handle.paused != drive.paused
 
@@ -168,7 +168,7 @@ class _TaskRun:
         self._abandoned = False
 
     def run(self, pose: Pose) -> str:
-        """Call the task and return what went wrong; raises Abandoned if the tour has ended meanwhile."""
+        """Call the task and return what went wrong; raises Abandoned if the sequence has ended meanwhile."""
         supervisor, problem = self._runtime.supervisor, ""
         watch = supervisor.watch(self._check, 0.0)
         self._job.handle.on_wake(lambda: supervisor.poke(watch))

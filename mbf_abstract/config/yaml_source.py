@@ -25,7 +25,7 @@ MAX_BYTES = 1_000_000
 MAX_DEPTH = 32
 MAX_ALIASES = 100
 MAX_VALUES = 100_000
-MAX_INT_BITS = 63  # what a longer one means nobody can tell, and Python refuses to print the longest
+MAX_INT_BITS = 63  # a longer one is a mistake, and Python refuses to print the longest
 
 _PLAIN_TAGS = {
     f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "timestamp", "map", "seq")

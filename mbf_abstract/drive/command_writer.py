@@ -1,7 +1,7 @@
 """Hands commands to the robot's driver, never under a lock: a driver that blocks holds up its caller only.
 
 One call runs at a time. A stop that is asked for during a call is sent by whoever is in that call as soon as it
-returns, so zero is the last word after every call that came back late. While a call lasts, no motion is begun.
+returns, so zero is the last command after every call that came back late. While a call lasts, no motion is begun.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class CommandWriter:
     Attributes
     ----------
     last_command : Command
-        What the robot was told last; a motion counts from the start of its call, a stop once it is delivered.
+        The last command to the robot; a motion counts from the start of its call, a stop once it is delivered.
     last_time : float
         When the last command was delivered, or the first motion after a stand begun [s].
     problem : str
@@ -53,7 +53,7 @@ class CommandWriter:
 
     @property
     def stands(self) -> bool:
-        """Whether the robot was told to stand, and nothing else since."""
+        """Whether zero was the last command to the robot."""
         return stands_still(self.last_command)
 
     def wait_until_free(self, limit: float) -> bool:
@@ -71,7 +71,7 @@ class CommandWriter:
         """Announce a motion that ``deliver`` is to send; only while not ``busy``."""
         if self.stands:
             self.last_time = self._clock.now()
-            self._condition.notify_all()  # the watchdog sleeps while the robot is told to stand
+            self._condition.notify_all()  # the watchdog sleeps while zero is commanded
         self._calls += 1
         self.last_command = command
         return command
@@ -97,7 +97,7 @@ class CommandWriter:
                 problem = self._call(command)
             except ThreadDetached as error:  # what is due is still to be sent before this thread ends
                 problem, passing = "send_command kept the processor busy for too long", error
-            except BaseException as error:  # Ctrl-C or SIGTERM: passed on, but not before the robot was told to stand
+            except BaseException as error:  # Ctrl-C or SIGTERM: passed on, but not before zero was sent
                 problem, again, passing = f"{type(error).__name__} came in between", passing is None, error
             with self._condition:
                 following = self._end_call(command, problem, again)

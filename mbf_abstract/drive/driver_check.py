@@ -53,7 +53,7 @@ def _method_problem(method: object, arguments: int) -> str:
         inspect.signature(method).bind(*[None] * arguments)
     except TypeError:
         return f"must take {arguments} argument(s), but its signature is {inspect.signature(method)}"
-    except ValueError:  # a function of an extension module that does not tell its signature
+    except ValueError:  # a function of an extension module without a readable signature
         return ""
     return ""
 

@@ -1,4 +1,4 @@
-"""The only writer to the robot: leases, limits, a watchdog, and zero velocity on every way out.
+"""The only writer to the robot: leases, limits, a watchdog, and zero velocity at every end.
 
 A controller or recovery drives through a *lease*. One lease exists at a time; a command through a lease that was
 released or revoked is dropped, so nothing a late thread does can move the robot (promise P1). When commands stop
@@ -92,7 +92,7 @@ class VelocityGate:
 
     @property
     def last_command(self) -> Command:
-        """What the robot was told last."""
+        """The last command sent to the robot."""
         return self._writer.last_command
 
     @property

@@ -27,7 +27,7 @@ class ArrivalCheck:
     goal : Pose
         Last pose of the path, in the global frame.
     dist_tolerance, angle_tolerance : float
-        Largest 3D distance [m] and rotation [rad], exclusive; told to the controller whoever decides, so that it does
+        Largest 3D distance [m] and rotation [rad], exclusive; passed to the controller whoever decides, so that it does
         not stop short. With an area the distance is at most what keeps a robot at the end of the path inside.
     check : {"plugin", "either", "exclusive"}
         Who decides: the controller; the controller or the server; the server alone.

@@ -87,7 +87,7 @@ class LoadedPlugin(Generic[P]):
     def acquire(self, user: object, give_up: Callable[[], bool]) -> bool:
         """Wait for exclusive use; False once ``give_up()``, asked 20 times a second, says so.
 
-        ``str(user)`` is what others are told who wait meanwhile.
+        ``str(user)`` appears in the messages of those who wait meanwhile.
 
         Raises
         ------

@@ -81,7 +81,7 @@ class Composite(MissionNode, PyTreesComposite):  # type: ignore[misc, unused-ign
         return child.status
 
     def tick(self) -> Iterator[Behaviour]:
-        """Tick as ``tick_children`` says."""
+        """Tick as ``tick_children`` prescribes."""
         if self.status != Status.RUNNING:
             self.initialise()
         status = yield from self.tick_children()

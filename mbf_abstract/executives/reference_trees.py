@@ -1,4 +1,4 @@
-"""Ready trees after the Move Base Flex paper (Figures 5, 6 and 7): navigation, and its parts planning and control.
+"""Reference trees after the Move Base Flex paper (Figures 5, 6 and 7): navigation, and its parts planning and control.
 
 - *planning*: plan; where that fails, run the next recovery of a list and plan again.
 - *control*: follow the path while a second planner keeps updating it; where driving fails, run a recovery that fits the
@@ -42,7 +42,7 @@ SECOND_PLANNER_SLOT = 1
 
 @dataclass(frozen=True)
 class TreeOptions:
-    """Names of plugins and limits of the ready trees.
+    """Names of plugins and limits of the reference trees.
 
     Attributes
     ----------

@@ -50,7 +50,7 @@ class StateMachine(Composite):
     Raises
     ------
     ValueError
-        A transition leads nowhere, or a state says nothing about its success or failure; all of them at once.
+        A transition leads nowhere, or a state has no transition for its success or failure; all of them at once.
     """
 
     def __init__(self, name: str, states: Mapping[str, State]) -> None:

@@ -45,7 +45,7 @@ class TreeReporter:
         self._events.emit(EventKind.TREE, "tree", tree=self._tree.name, nodes=nodes)
 
     def report(self, tick: int) -> None:
-        """Tell which nodes have changed since the last call, with their own words; nothing where none has."""
+        """Report the nodes that have changed since the last call, with their messages."""
         now = [node.status.value for node in self._nodes]
         if now == self._reported:
             return
@@ -67,7 +67,7 @@ def _in_order(node: Behaviour, depth: int) -> Iterator[tuple[Behaviour, int]]:
 
 @dataclass
 class NodeState:
-    """One node: its name, class and depth (0 = root), the name of its status and what it last said."""
+    """One node: its name, class and depth (0 = root), the name of its status and its last message."""
 
     name: str
     type: str
@@ -77,7 +77,7 @@ class NodeState:
 
 
 class TreeState:
-    """A tree as its events tell it.
+    """A tree as its events describe it.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
-"""Watchdogs: stop a running child when the robot gets nowhere, and say so with a code a recovery can be picked by.
+"""Watchdogs: stop a running child when the robot gets nowhere, and fail with a code that selects a recovery.
 
 Three independent questions: does the robot come closer to the end of its path (progress), does it leave the place it is
-at (oscillation), and do its wheels do what they are told (motors)? A lost pose or odometry raises no alarm here: the
+at (oscillation), and do its wheels follow the commands (motors)? A lost pose or odometry raises no alarm here: the
 actions end with their own code then.
 """
 
@@ -22,7 +22,7 @@ from mbf_abstract.time.clock import Stopwatch
 
 
 class Watchdog(Decorator):
-    """Fail and make the child idle once ``alarm`` has something to say; a goal that is paused starts it anew."""
+    """Fail and make the child idle once ``alarm`` returns a message; a goal that is paused starts it anew."""
 
     outcome: ExePathOutcome = ExePathOutcome.ROBOT_STUCK
 
@@ -107,7 +107,7 @@ class OscillationWatchdog(Watchdog):
 
 
 class MotorWatchdog(Watchdog):
-    """Alarm when for ``timeout`` [s] the robot is told to move and stands; never for a robot without odometry."""
+    """Alarm when for ``timeout`` [s] the robot is commanded to move and stands; never for a robot without odometry."""
 
     def initialise(self) -> None:
         """Start the time."""

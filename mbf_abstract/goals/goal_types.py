@@ -114,10 +114,10 @@ class FollowWaypointsGoal:
     loops : int
         How often the whole list is visited; ValueError if it is not at least 1.
     stop_on_failure : bool
-        End the tour at the first visit that fails; otherwise go on to the next pose.
+        End the sequence at the first visit that fails; otherwise go on to the next pose.
     task : callable, optional
         Called as ``task(index, pose)`` at every pose that was reached, while the robot stands there. It may take its
-        time; one that raises ends the tour with INTERNAL_ERROR.
+        time; one that raises ends the sequence with INTERNAL_ERROR.
     planner, controller, recovery_behaviors, dist_tolerance, angle_tolerance
         As in ``MoveBaseGoal``.
     """
@@ -139,7 +139,7 @@ class FollowWaypointsGoal:
 
     @property
     def visits(self) -> int:
-        """How many visits the tour has."""
+        """Number of visits of the sequence."""
         return len(self.waypoints) * self.loops
 
     def visit(self, number: int) -> MoveBaseGoal:
@@ -180,7 +180,7 @@ class ActionResult:
 class GetPathResult(ActionResult):
     """Path in the global frame and its cost (the path's length where the planner gives none).
 
-    ``plugin_outcome`` and ``plugin_message`` are the planner's own last words, also where patience ran out.
+    ``plugin_outcome`` and ``plugin_message`` are the planner's last result, also where patience ran out.
     ``permanent`` says of a failure that planning anew cannot change it.
     """
 
@@ -236,10 +236,10 @@ class MoveBaseResult(ActionResult):
 
 @dataclass(frozen=True)
 class FollowWaypointsResult(ActionResult):
-    """What became of a tour: one result per visit, in order of visits.
+    """Result of a waypoint sequence: one result per visit, in order of visits.
 
     The outcome is SUCCESS if every visit succeeded, else that of the first one that failed; CANCELED and INTERNAL_ERROR
-    are the tour's own.
+    are those of the sequence.
     """
 
     results: tuple[MoveBaseResult, ...] = ()
@@ -280,7 +280,7 @@ class ExePathFeedback:
 
 @dataclass(frozen=True)
 class FollowWaypointsFeedback:
-    """Where a tour is.
+    """Progress of a waypoint sequence.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
 """Stops the robots of this process when it ends: by the end of the program, an exception, SIGTERM or SIGHUP.
 
-The two signals would end Python without a word, and the robot would keep its last command. While a gate is watched they
+The two signals would end Python at once, and the robot would keep its last command. While a gate is watched they
 stop the robot first and then raise ``SystemExit(128 + signal)`` in the main thread, so that ``with`` blocks and
 ``finally`` run as after Ctrl-C. A handler that the program has set itself is left alone, and so is a signal it ignores.
 

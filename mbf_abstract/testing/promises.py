@@ -10,7 +10,7 @@ from mbf_abstract.testing.scripted import Scripted, straight_plan
 
 
 def assert_stops(bench: Bench, fault_time: float) -> None:
-    """P1: from ``command_timeout`` plus one period after the fault on, the robot is only told to stand.
+    """P1: from ``command_timeout`` plus one period after the fault on, the robot receives zero only.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def assert_ended_once(bench: Bench, handle: AnyGoalHandle) -> None:
 
 
 def assert_next_goals_work(bench: Bench) -> None:
-    """P3: the scripted plugins, told to behave, serve the next get_path and exe_path goals."""
+    """P3: the scripted plugins, reset to their defaults, serve the next get_path and exe_path goals."""
     for plugin, answer in ((bench.planner, straight_plan), (bench.controller, bench.controller.follow)):
         assert isinstance(plugin, Scripted)
         plugin.play(answer)

@@ -90,10 +90,10 @@ class Clock(Protocol):
         """Start a daemon thread that this clock knows."""
 
     def settle(self) -> None:
-        """Let threads that were told to end do so, where they need this thread to wait for it; moves no time."""
+        """Let threads that were asked to end do so, where they need this thread to wait for it; moves no time."""
 
     def guarded(self, label: str, on_hang: Callable[[], None] | None = None) -> AbstractContextManager[None]:
-        """Mark foreign code (a plugin call) in which the thread may hang; ``on_hang`` is told if the clock gives up.
+        """Mark foreign code (a plugin call) in which the thread may hang; ``on_hang`` is called if the clock gives up.
 
         ``ThreadDetached`` leaves the section only where the clock has really given up on the thread; one that the
         foreign code made itself becomes a RuntimeError.

@@ -2,7 +2,7 @@
 
 What a layer must keep depends on its map: cells and boxes here, vertices and lethal flags there. So the base class of a
 map's layers names the check of its map as ``contract_check = "module:function"``, and this runs it; the core itself
-knows no layer. The parameters of the checks are told by ``mbf_costmap_nav.testing.check_layer`` and
+knows no layer. The parameters of the checks are documented in ``mbf_costmap_nav.testing.check_layer`` and
 ``mbf_mesh_nav.testing.check_layer``.
 """
 

@@ -114,7 +114,7 @@ class _PlannerCheck:
         return duration
 
     def unreachable(self, start: Pose, goal: Pose) -> None:
-        """Expect a failure that says why."""
+        """Expect a failure with a message."""
         situation = f"unreachable, from {_short(start)} to {_short(goal)}"
         with self._fresh(start) as planner:
             result = self._plan(planner, situation, start, goal)

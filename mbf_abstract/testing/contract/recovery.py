@@ -29,7 +29,7 @@ _LONGEST_RUN = 120.0  # s of simulated time
 
 
 class RigMotion:
-    """The ``Motion`` of a behaviour under test: drives the loopback robot, and can be told to refuse.
+    """The ``Motion`` of a behaviour under test: drives the loopback robot, and refuses on request.
 
     Attributes
     ----------
