@@ -55,7 +55,7 @@ def to_json_value(value: Any) -> JsonValue:
     try:
         return _Converter().convert(value, 0)
     except Exception as error:  # e.g. a mapping whose items raise
-        return f"{type(value).__name__} that cannot be told: {type(error).__name__}"
+        return f"{type(value).__name__} that cannot be described: {type(error).__name__}"
 
 
 class _Converter:

@@ -74,7 +74,7 @@ class Event:
         Time [s] of the injected clock, rounded to a nanosecond.
     kind : EventKind
     source : str
-        Who tells it, e.g. ``"get_path"``, ``"velocity_gate"`` or a plugin's name.
+        Who reports it, e.g. ``"get_path"``, ``"velocity_gate"`` or a plugin's name.
     data : mapping of str to JSON value
         The fields listed at the kind.
     """
@@ -118,7 +118,7 @@ class EventBus:
 
     Notes
     -----
-    A sink that raises is closed and removed; one ``SINK_FAILED`` event tells the others. If no memory sink is left
+    A sink that raises is closed and removed; one ``SINK_FAILED`` event informs the others. If no memory sink is left
     to keep the rest of the run, one is added, so the newest events are never lost (``bus.memory``).
     """
 

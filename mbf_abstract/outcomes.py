@@ -1,6 +1,6 @@
 """Outcome codes of the actions, with the numbers of ``mbf_msgs``.
 
-The ranges are disjoint, so one integer tells which action produced it. Success is any value below 10:
+The ranges are disjoint, so one integer identifies the action that produced it. Success is any value below 10:
 0 is plain success, 1..9 are a plugin's own variants of it. The upper part of each range (71..99, 121..149,
 171..199, 221..249) is reserved for plugin-specific failures.
 """

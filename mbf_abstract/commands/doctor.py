@@ -72,7 +72,7 @@ def examine() -> Iterator[Finding]:
     for name in MESH_FILES:
         yield _package(name, "only for meshes in .h5 and .dae files: pip install 'mbf-flex[mesh-files]'", optional=True)
     yield _package("rerun", "only for mbf replay --rrd, Python >= 3.11: pip install 'mbf-flex[rerun]'", optional=True)
-    yield _check("plugins", _plugins, "mbf plugins tells which and why")
+    yield _check("plugins", _plugins, "mbf plugins lists which and why")
     yield _check("kernel cache", _kernel_cache, "set NUMBA_CACHE_DIR to a folder that can be written")
     yield _check("loopback port", _loopback_port, "a firewall or sandbox forbids sockets: no replay, no live view")
 

@@ -85,7 +85,7 @@ def plan(
 
 
 def _pose(name: str, place: Place, server: AbstractNavigationServer, notes: list[str]) -> Pose:
-    """Pose at a place; a note tells which storey was taken where there are several, or that there is no ground."""
+    """Pose at a place; a note names which storey was taken where there are several, or that there is no ground."""
     from mbf_abstract.geometry import Pose
 
     if server.ground_is_level:

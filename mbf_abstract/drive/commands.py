@@ -1,4 +1,4 @@
-"""Commands as the velocity gate sees them: what is one, what stands still, and what an event tells of them."""
+"""Commands as the velocity gate sees them: what is one, what stands still, and what an event records of them."""
 
 from __future__ import annotations
 

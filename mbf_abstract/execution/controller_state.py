@@ -1,4 +1,4 @@
-"""What a controller execution takes and tells: its states, its plan, what a cycle knew, how it ended."""
+"""What a controller execution takes and reports: its states, its plan, what a cycle knew, how it ended."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ class TreeExecutive:
         return Status.INVALID
 
     def _stop_tree(self) -> None:
-        """Make every node idle. The log keeps how a tree ended by itself; where it was broken off, it tells that."""
+        """Make every node idle. The log keeps how a tree ended by itself; where it was broken off, it records that."""
         broken_off = self.tree.status == Status.RUNNING
         self.tree.stop(Status.INVALID)
         if broken_off:

@@ -112,7 +112,7 @@ class AbstractNavigationServer(PluginHost):
     def config_for_map(cls, file: FilePath, unknown_is_free: bool = True) -> str | None:
         """YAML text of a sane configuration for a bare map file; None if this server does not read such files.
 
-        ``unknown_is_free`` tells whether plans may lead over what the map does not know, where it can say so.
+        ``unknown_is_free`` states whether plans may lead over what the map does not know, where it can say so.
         """
         return None
 

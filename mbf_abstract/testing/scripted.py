@@ -1,4 +1,4 @@
-"""Plugins that do what a test tells them, and three honest ones that need no map.
+"""Plugins that do what a test scripts, and three honest ones that need no map.
 
 ``play`` gives a plugin its answers, one per call; the last one is repeated for ever. An answer is a result, an
 exception to raise, or a function of the request that makes either. ``mbf_abstract.testing.faulty`` has bad ones.
@@ -77,7 +77,7 @@ def _straight_leg(a: Any, b: Any) -> Any:
 
 
 class ScriptedPlanner(AbstractPlanner, Scripted[PlanRequest]):
-    """Plans straight lines until it is told to ``play`` something else."""
+    """Plans straight lines until it is set to ``play`` something else."""
 
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
@@ -89,7 +89,7 @@ class ScriptedPlanner(AbstractPlanner, Scripted[PlanRequest]):
 
 
 class ScriptedController(AbstractController, Scripted[ControlRequest]):
-    """Follows the path as a robot that can move sideways, until it is told to ``play`` something else.
+    """Follows the path as a robot that can move sideways, until it is set to ``play`` something else.
 
     Attributes
     ----------
@@ -157,7 +157,7 @@ class ScriptedController(AbstractController, Scripted[ControlRequest]):
 
 
 class ScriptedRecovery(AbstractRecovery, Scripted[RecoveryRequest]):
-    """Succeeds at once until it is told to ``play`` something else."""
+    """Succeeds at once until it is set to ``play`` something else."""
 
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
@@ -169,7 +169,7 @@ class ScriptedRecovery(AbstractRecovery, Scripted[RecoveryRequest]):
 
 
 class ScriptedRefiner(AbstractRefiner, Scripted[Path]):
-    """Gives back the path it got until it is told to ``play`` something else."""
+    """Gives back the path it got until it is set to ``play`` something else."""
 
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)

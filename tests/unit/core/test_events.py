@@ -94,7 +94,7 @@ class RaisingMapping(dict):
         ([["x" * 9_000] * 100] * 100, "more values left out"),
         (holding_itself(), "list nested deeper than 30"),
         (Unspeakable(), "Unspeakable whose text raises SystemExit"),
-        ([RaisingMapping()], "list that cannot be told: RuntimeError"),
+        ([RaisingMapping()], "list that cannot be described: RuntimeError"),
         (np.longdouble(0.5), "0.5"),
         ("\ud800", "ud800"),
     ],
