@@ -111,7 +111,7 @@ def compare_field(mesh_map: MeshMap, vertices: Sequence[int] = ()) -> list[float
     for source in vertices or [len(mesh_map.vertices) // 2]:
         exact, _ = solver.geodesicDistances(np.array([source]), None)
         goal = surface_point_at_vertex(mesh_map, int(source))
-        wave = search.spread(replace(query, goal=goal), overshoot=1e9)
+        wave = search.propagate(replace(query, goal=goal), overshoot=1e9)
         assert wave is not None
         far = (exact > 5.0 * mesh_map.neighbour_lengths.mean()) & np.isfinite(wave.distances)
         ratios += list(wave.distances[far] / exact[far])

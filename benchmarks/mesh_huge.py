@@ -35,7 +35,7 @@ def small_map_compiles() -> None:
     query = corner_query(mesh_map)
     propagate_from(mesh_map, query.snapshot, query.blocked, query.goal, NEVER)
     plugin(AStarPlanner, mesh_map).find_leg(query)
-    WaveSearch(mesh_map).spread(query, overshoot=1e9)
+    WaveSearch(mesh_map).propagate(query, overshoot=1e9)
 
 
 def measure(side: int) -> dict[str, float]:
@@ -63,7 +63,7 @@ def measure_ours(terrain: Terrain) -> tuple[dict[str, float], dict[str, float]]:
     begin = time.thread_time()
     search = WaveSearch(mesh_map)
     ours["corner_records"] = time.thread_time() - begin
-    ours["cvp"] = seconds_of(lambda: search.spread(query, overshoot=1e9))
+    ours["cvp"] = seconds_of(lambda: search.propagate(query, overshoot=1e9))
     figures["resident_with_wave_gb"] = resident_gigabytes()
     return figures, ours
 

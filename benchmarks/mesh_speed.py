@@ -115,7 +115,7 @@ def measure_fields(terrain: Terrain, mesh_map: MeshMap, peer: Callable[[], objec
 
     return {
         "dijkstra": ratio_to(peer, full_dijkstra, rounds),
-        "cvp": ratio_to(peer, lambda: search.spread(query, overshoot=1e9), rounds),
+        "cvp": ratio_to(peer, lambda: search.propagate(query, overshoot=1e9), rounds),
         "inflation": ratio_to(peer, inflation.compute, rounds),
     }
 
@@ -154,7 +154,7 @@ def measure_potpourri3d(terrain: Terrain, mesh_map: MeshMap, rounds: int) -> flo
     bare = MeshMap(mesh_map.topology)
     query, search = corner_query(bare), WaveSearch(bare)
     peer = lambda: solver.compute_distance([[(0, [])]])  # noqa: E731 - one more task of the table
-    return ratio_to(peer, lambda: search.spread(query, overshoot=1e9), rounds)
+    return ratio_to(peer, lambda: search.propagate(query, overshoot=1e9), rounds)
 
 
 def inflated_map(terrain: Terrain, mesh_map: MeshMap) -> tuple[MeshMap, MeshLayer, InflationLayer]:

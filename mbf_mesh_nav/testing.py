@@ -35,17 +35,17 @@ def check_layer(
     """Check a mesh layer against the contract.
 
     Legal values of the right shape, two instances that agree, a second computation that changes nothing, changes
-    reported as they are, inputs and mesh left alone, parameters that can be set again, ``clear`` that forgets points.
+    reported as they are, inputs and mesh left alone, parameters that can be set again, ``clear`` that drops points.
 
     Parameters
     ----------
     layer_class : type
     mesh_map : MeshMap
-        A mesh on which the layer has something to say.
+        A mesh on which the layer has an effect.
     parameters : LayerParameters, optional
         The class's defaults if not given.
     inputs : sequence of MeshLayer
-        Computed layers of the same mesh, as many as the class asks for.
+        Computed layers of the same mesh, as many as the class requires.
     points : (n, 3) float, optional
         A cloud [m] in the map's frame, for layers that are fed by a sensor.
     sensor_origin : (3,) float
@@ -99,7 +99,7 @@ class _LayerCheck:
         self._expect_same(computed, "the same parameters, set at run time, gave other values")
 
     def sensing(self, points: NDArray[np.float64], origin: NDArray[np.float64]) -> None:
-        """Hand over a cloud, let it grow old, forget it; the state without sensors must come back."""
+        """Hand over a cloud, let it expire, clear it; the state without sensors must come back."""
         unseen = _values(self.layer)
         scan = RangeScan("sensor", "map", origin, points, np.ones(len(points), dtype=np.bool_), 1.0)
         for layer in (self.layer, self.twin):

@@ -2,9 +2,9 @@
 
 Strengths: reads the map of *now*, so it drives round obstacles seen after planning; knows slopes, costs and the robot's
 motion model (differential or Ackermann). Known failure: a local method with a horizon of ``time_steps * model_dt``;
-out of a pocket deeper than that only a new plan leads. An Ackermann robot cannot correct its heading
-where it stands; it comes in on a curve along the goal's heading, if there is room for one. A path whose poses ask for
-reverse it drives as it is, cusp after cusp, where ``min_vel_x`` allows that, and refuses otherwise.
+a deeper pocket needs a new plan. An Ackermann robot cannot correct its heading on the spot; it
+arrives on a curve along the goal's heading, if free space allows one. It drives a path whose poses require reversing
+as it is, cusp after cusp, where ``min_vel_x`` allows that, and refuses otherwise.
 Cost: about 3 ms a cycle with 400 samples of 30 steps; so many times more as a step is longer than half
 the shortest edge of the mesh, or than 0.05 m if that is more.
 
@@ -65,7 +65,7 @@ class MPPIParameters(PluginParameters):
     temperature: float = parameter(0.15, "How much worse a motion may be and still count.", gt=0.0)
     max_vel_x: float = parameter(0.8, "Forward speed limit.", unit="m/s", gt=0.0, le=5.0)
     min_vel_x: float = parameter(0.0, "Least forward speed; negative allows reversing.", unit="m/s", le=0.0)
-    max_vel_theta: float = parameter(1.0, "Yaw rate limit, both ways.", unit="rad/s", gt=0.0, le=5.0)
+    max_vel_theta: float = parameter(1.0, "Yaw rate limit, in both directions.", unit="rad/s", gt=0.0, le=5.0)
     wheelbase: float = parameter(0.5, "Distance of the axles (Ackermann).", unit="m", gt=0.0)
     max_steering_angle: float = parameter(0.5, "Steering limit (Ackermann).", unit="rad", gt=0.0, lt=1.5)
     linear_noise: float = parameter(0.25, "Standard deviation of the speed samples.", unit="m/s", gt=0.0)
@@ -124,7 +124,7 @@ class MPPIController(MeshController):
 
     @property
     def turns_on_the_spot(self) -> bool:
-        """Whether its motion model does."""
+        """Whether its motion model can turn on the spot."""
         return self.parameters.motion_model == "differential"
 
     @property
@@ -144,7 +144,7 @@ class MPPIController(MeshController):
         self._tracker = tracker_on_surface(self.mesh_map, path, self.parameters.max_surface_distance)
 
     def _begin(self, spot: SurfacePoint, pose: Pose) -> None:
-        """Lead a car that looks elsewhere onto its path on a curve, now that its pose is known."""
+        """Prepend a curve that leads a car of another heading onto its path, now that its pose is known."""
         p, path = self.parameters, self._tracker.path
         self._begun = True
         if p.motion_model == "ackermann" and not self._reverses:
@@ -179,7 +179,7 @@ class MPPIController(MeshController):
             return ControlResult(ExePathOutcome.SUCCESS, "", self._as_command(0.0, turn))
         motion = self._best_motion(spot, pose)
         if motion is None:
-            return ControlResult(ExePathOutcome.NO_VALID_CMD, "no sampled motion is free and gets on")
+            return ControlResult(ExePathOutcome.NO_VALID_CMD, "no sampled motion is collision-free and makes progress")
         self._nominal = np.concatenate([motion[1:], motion[-1:]])
         return ControlResult(ExePathOutcome.SUCCESS, "", self._as_command(float(motion[0, 0]), float(motion[0, 1])))
 
@@ -197,12 +197,12 @@ class MPPIController(MeshController):
         return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
 
     def _best_motion(self, spot: SurfacePoint, pose: Pose) -> NDArray[np.float64] | None:
-        """Blend the sampled motions by their scores; (time_steps, 2), or None if the robot cannot get on."""
+        """Blend the sampled motions by their scores; (time_steps, 2), or None if no motion makes progress."""
         max_speed = min(
             self.parameters.max_vel_x,
             max(braking_speed(self._tracker.to_cusp, self.parameters.decel_lim_x), 0.1),
         )
-        # A robot beside its goal or past it has no path ahead of it, but still a way to go.
+        # A robot beside its goal or past it has no path ahead of it, but still a distance to drive.
         end = self._tracker.point_at(self._tracker.next_cusp)
         to_end = float(norm(end - spot.point))
         controls = self._sample(max_speed, max(self._tracker.to_cusp, to_end))
@@ -321,7 +321,7 @@ class MPPIController(MeshController):
         return math.ceil(stride / max(0.5 * self._shortest_edge, _LEAST_STRIDE))
 
     def _blocked(self) -> NDArray[np.bool_]:
-        """Vertices (V,) no curve may come near."""
+        """Vertices (V,) that no curve may pass near."""
         return np.asarray(self._ranks_at(self.mesh_map.snapshot()) > 0.0)
 
     def _ranks_at(self, snapshot: MeshSnapshot) -> NDArray[np.float32]:

@@ -1,9 +1,9 @@
 """Pure pursuit in the robot's tangent plane: steers along the arc through a point ahead on the path.
 
-Strengths: needs only poses (any planner's path), a dozen lines of law, forgiving: a skid-steered robot that turns
-slower than told converges all the same, since the arc is computed anew every cycle. Slows down on slopes, in bends and
+Strengths: needs only poses (any planner's path), a dozen lines of law, robust: a skid-steered robot that turns
+slower than commanded still converges, since the arc is computed anew every cycle. Slows down on slopes, in bends and
 towards the goal, and turns on the spot when the path leads elsewhere. Known failure: cuts corners by about
-``lookahead``² / (8 x bend radius); stops before what the plan did not know (BLOCKED_PATH) but does not drive around
+``lookahead``² / (8 x bend radius); stops before new obstacles (BLOCKED_PATH) but does not drive around
 it: plan anew while driving, or use ``mesh.mppi``.
 Cost: below 0.2 ms a cycle. Law: Coulter, "Implementation of the pure pursuit path tracking algorithm", CMU, 1992.
 """
@@ -39,9 +39,9 @@ class PathFollowerParameters(PluginParameters):
     """Parameters of ``mesh.path_follower``."""
 
     lookahead: float = parameter(0.6, "Distance of the pursued point along the path.", unit="m", gt=0.0, le=10.0)
-    max_vel_x: float = parameter(0.8, "Forward speed on flat, straight ground.", unit="m/s", gt=0.0, le=5.0)
+    max_vel_x: float = parameter(0.8, "Forward speed on a flat, straight path.", unit="m/s", gt=0.0, le=5.0)
     min_speed: float = parameter(0.08, "Lowest forward speed while driving.", unit="m/s", gt=0.0, le=1.0)
-    max_vel_theta: float = parameter(1.0, "Yaw rate limit, both ways.", unit="rad/s", gt=0.0, le=5.0)
+    max_vel_theta: float = parameter(1.0, "Yaw rate limit, in both directions.", unit="rad/s", gt=0.0, le=5.0)
     decel_lim_x: float = parameter(0.4, "Deceleration planned before the goal.", unit="m/s^2", gt=0.0)
     max_lateral_acceleration: float = parameter(0.6, "Limits the speed in bends.", unit="m/s^2", gt=0.0)
     turn_in_place_angle: float = parameter(
@@ -49,7 +49,7 @@ class PathFollowerParameters(PluginParameters):
     )
     turn_gain: float = parameter(2.0, "Yaw rate per heading error when turning on the spot.", unit="1/s", gt=0.0)
     slow_slope: float = parameter(
-        0.5, "Slope of the ground at which the speed is down to slope_speed_factor.", unit="rad", gt=0.0, le=1.5
+        0.5, "Slope of the surface at which the speed is down to slope_speed_factor.", unit="rad", gt=0.0, le=1.5
     )
     slope_speed_factor: float = parameter(0.5, "Share of the speed left on slow_slope and beyond.", gt=0.0, le=1.0)
     goal_distance: float = parameter(
@@ -59,9 +59,9 @@ class PathFollowerParameters(PluginParameters):
         1.0, "Farther from the path than this the path is missed.", unit="m", gt=0.0, allow_inf=True
     )
     obstacle_distance: float = parameter(
-        1.0, "The path is looked at this far ahead on the current map; 0 = never.", unit="m", ge=0.0, le=20.0
+        1.0, "The path is checked this far ahead on the current map; 0 = never.", unit="m", ge=0.0, le=20.0
     )
-    cost_limit: float = parameter(1.0, "Ground whose cost reaches this is an obstacle.", gt=0.0, allow_inf=True)
+    cost_limit: float = parameter(1.0, "Surface whose cost reaches this is an obstacle.", gt=0.0, allow_inf=True)
     max_surface_distance: float = parameter(
         1.0, "Farther from the surface than this the robot is out of the map.", unit="m", gt=0.0
     )
@@ -77,7 +77,7 @@ class PathFollower(MeshController):
 
     @property
     def turns_on_the_spot(self) -> bool:
-        """It does."""
+        """Always true."""
         return True
 
     def set_plan(self, path: Path) -> bool:
@@ -118,7 +118,7 @@ class PathFollower(MeshController):
     def _distance_to_obstacle(self, here: NDArray[np.float64]) -> float | None:
         """Distance [m] along the path to where the current map forbids to go on; None if that is not in sight.
 
-        A robot that stands on forbidden ground itself may leave it, see ``kernels.forbidden_ground``. Where the path
+        A robot that stands on forbidden surface may leave it, see ``kernels.search.forbidden_surface``. Where the path
         leads off the surface it is blocked too.
         """
         ahead = np.arange(0.0, self.parameters.obstacle_distance / self.limit_factor, OBSTACLE_STEP)
@@ -143,8 +143,8 @@ class PathFollower(MeshController):
         if abs(bearing) > p.turn_in_place_angle:
             return self._command(0.0, p.turn_gain * bearing)
         slope_factor = 1.0 - (1.0 - p.slope_speed_factor) * min(slope / p.slow_slope, 1.0)
-        # A robot that ran past the goal has no path left, but still the way back to it; how high its frame is above
-        # the ground does not count.
+        # A robot that ran past the goal has no path left, but still a distance to drive back; the height of its frame
+        # above the surface does not count.
         left = max(tracker.to_cusp, math.hypot(*in_robot_frame(pose, target)[:2]))
         speed = min(
             p.max_vel_x * slope_factor,

@@ -1,7 +1,7 @@
 """Drive along the vector field a planner hands on with its path: turn towards the local direction, slow by the error.
 
-Strengths: needs no projection onto a path; from wherever a disturbance pushes the robot the field leads on, so it
-never has to return to a line. Known failure: knows only what the plan knew, obstacles seen later are not avoided
+Strengths: needs no projection onto a path; the field leads to the goal from wherever a disturbance pushes the robot, so
+it never has to return to a line. Known failure: knows only what the plan knew, obstacles seen later are not avoided
 (``mesh.mppi`` avoids them); a path without a field (``mesh.astar``) is refused. Cost: below 0.1 ms a cycle.
 
 The law is that of mesh_navigation's mesh controller, with its faults corrected: the yaw rate is limited on both sides,
@@ -32,7 +32,7 @@ class VectorFieldParameters(PluginParameters):
     """Parameters of ``mesh.vector_field``."""
 
     max_vel_x: float = parameter(1.0, "Forward speed limit.", unit="m/s", gt=0.0, le=5.0)
-    max_vel_theta: float = parameter(0.5, "Yaw rate limit, both ways.", unit="rad/s", gt=0.0, le=2.0)
+    max_vel_theta: float = parameter(0.5, "Yaw rate limit, in both directions.", unit="rad/s", gt=0.0, le=2.0)
     max_angle: float = parameter(
         math.radians(20.0), "Beyond this heading error the robot turns on the spot.", unit="rad", gt=0.0, le=math.pi
     )
@@ -59,7 +59,7 @@ class VectorFieldController(MeshController):
 
     @property
     def turns_on_the_spot(self) -> bool:
-        """It does."""
+        """Always true."""
         return True
 
     def set_plan(self, path: Path) -> bool:

@@ -5,7 +5,7 @@ This package parses no raster. One that does offers a function by an entry point
 [m], NaN where the survey has none, with the southern row first, and the distances dx and dy [m] between samples. It
 refuses a raster of more than ``max_samples`` heights before it reads them. Whatever it raises becomes a ``MeshError``.
 
-A void stays a hole in the mesh: where nothing was measured, there is no ground to drive on.
+A void stays a hole in the mesh: where nothing was measured, there is no surface to drive on.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Which axis of a mesh file points up and how long its unit is; the map has z up and metres.
 
-glTF is y up and in metres by its specification (Khronos Group, glTF 2.0, section 3.4). A COLLADA file says both
-(COLLADA 1.4.1, ``asset``); without a word its y axis points up and its unit is a metre. PLY, STL, OBJ, OFF and HDF5
-files have no place to say anything: z up and metres is the custom of robotics, while tools of computer graphics write
-y up. Then the configuration says it.
+glTF is y up and in metres by its specification (Khronos Group, glTF 2.0, section 3.4). A COLLADA file may
+state both (COLLADA 1.4.1, ``asset``); by default its y axis points up and its unit is a metre. PLY, STL, OBJ, OFF and
+HDF5 files cannot state either: z up and metres is the convention of robotics, while tools of computer graphics write
+y up. The configuration then states it.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def file_frame(path: Path, up_axis: str = "", unit: float = 0.0) -> FileFrame:
     Raises
     ------
     MeshError
-        The file says something that cannot be.
+        The file states an invalid axis or unit.
     """
     ending = path.suffix.lower()
     if ending in GLTF_FORMATS:

@@ -41,14 +41,14 @@ def read_mesh(
     max_faces : int
         Larger meshes are refused before anything is built from them.
     up_axis : str
-        Axis of the file that points up, "x", "y" or "z"; "" = what the file or its format says.
+        Axis of the file that points up, "x", "y" or "z"; "" = as the file or its format states.
     unit : float
-        Length of the file's unit [m]; 0 = what the file says.
+        Length of the file's unit [m]; 0 = as the file states.
 
     Returns
     -------
     vertices : (V, 3) float64
-        In the coordinates of the scene, turned to z up [m].
+        In the coordinates of the scene, rotated to z up [m].
     faces : (F, 3) int64
 
     Raises

@@ -32,7 +32,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
     ".gltf": {"ignore_broken": False, **BARE},
     ".glb": {"ignore_broken": False, **BARE},
 }
-"""What trimesh's readers of the single formats are asked for."""
+"""Options of trimesh's readers by format."""
 
 
 def read_scene(path: Path, part: str, max_faces: int) -> MeshArrays:

@@ -1,9 +1,9 @@
-"""Refusing files that end too early, of the formats whose readers would take them for smaller meshes.
+"""Refuses truncated files of the formats whose readers would accept them as smaller meshes.
 
-A download that broke off, a full disk: the file is there, its text is legal up to its end, and the robot drives on
-half a map. PLY and OFF say in their header how much is to come, a binary STL too, a text STL ends with a word. OBJ
-says nothing of the kind: a cut one is told from a whole one only if its last line is too short. Binary PLY, glTF and
-DAE need no check, their readers notice.
+After an interrupted download or on a full disk the text of a file may be legal up to its end, and the robot would drive
+on half a map. The headers of PLY, OFF and binary STL hold the number of elements, a text STL ends with a keyword. OBJ
+has neither: a truncated file is detected only if its last line is too short. The readers of binary PLY, glTF and DAE
+check this themselves.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def refuse_cut_file(path: Path) -> None:
     Raises
     ------
     MeshError
-        The file is cut off; says what was expected and what was found.
+        The file is truncated; the text names what was expected and found.
     ValueError
         The header has no numbers where they belong.
     """
@@ -57,7 +57,7 @@ def _check_off(path: Path, file: BinaryIO) -> None:
     lines = (line for raw in file if (line := raw.split(b"#")[0].strip()))
     first = next(lines, b"")
     if b"OFF" not in first:
-        return  # the reader says what is wrong
+        return  # the reader reports the error
     counts = (first.split(b"OFF", 1)[1].strip() or next(lines, b"")).split()
     if len(counts) < 2:
         raise MeshError(str(path), ["the file is cut off before the numbers of vertices and faces"])

@@ -1,6 +1,6 @@
 """Height difference: how far the surface around a vertex reaches above and below its tangent plane [m].
 
-When to use: steps, kerbs, walls and holes that are small against the slope of the ground; pair it with ``steepness``,
+When to use: steps, kerbs, walls and holes that are small against the slope of the surface; pair it with ``steepness``,
 because a smooth slope costs nothing here. When not: meshes whose edges are as long as the radius (nothing lies within
 it) and noisy scans with random normals.
 Rule of mesh_navigation: the neighbourhood is a cylinder about the vertex normal. It has no bound along the normal

@@ -4,7 +4,7 @@ When to use: below every planner; it keeps the robot's body off what its centre 
 long narrow robot (the inscribed radius is a circle; use ``tilt`` or a footprint check besides).
 Rule of mesh_navigation: ``lethal_value`` at the lethal vertices, ``inscribed_value`` up to the inscribed radius, then
 ``inscribed_value * exp(-cost_scaling_factor (d - inscribed_radius))`` up to the inflation radius, 0 beyond. Deviations:
-isolated lethal vertices spread too, and a change of the input repairs the distances instead of starting over. The
+isolated lethal vertices are inflated too, and a change of the input repairs the distances instead of starting over. The
 repulsive vectors are not offered; our planners do not steer by them.
 Cost: linear in the vertices within the radius; an update in the vertices whose distance changes.
 """
@@ -68,11 +68,11 @@ class InflationLayer(MeshLayer):
 
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
-        self._forget_all()
+        self._drop_all()
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Distances from scratch, costs from distances, lethal as the input."""
-        self._forget_all()
+        self._drop_all()
         count = self.topology.vertex_count
         costs, lethal = np.zeros(count, dtype=np.float32), np.zeros(count, dtype=np.bool_)
         self._repair(np.flatnonzero(self.inputs[0].lethal).astype(np.int32), costs, lethal)
@@ -82,7 +82,7 @@ class InflationLayer(MeshLayer):
         """Repair the distances around the vertices whose lethal flag changed, and the costs."""
         return np.sort(self._repair(changed, self._costs, self._lethal))
 
-    def _forget_all(self) -> None:
+    def _drop_all(self) -> None:
         self.distances = np.full(self.topology.vertex_count, np.inf, dtype=np.float32)
         self._sources = np.full((self.topology.vertex_count, 2), -1, dtype=np.int32)
 

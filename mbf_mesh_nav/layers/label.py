@@ -1,4 +1,4 @@
-"""Label: costs by kind of ground, drawn as labelled polygons.
+"""Label: costs by kind of surface, drawn as labelled polygons.
 
 When to use: lawn costs more than path, mud is forbidden. When not: shapes known from the mesh itself. Where regions
 overlap the last one in the list counts. Forbidden regions are closed as those of ``keepout`` are.
@@ -15,9 +15,9 @@ from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, Mesh
 
 
 class LabelledRegion(Region):
-    """A polygon with the name of its ground."""
+    """A polygon with the name of its kind of surface."""
 
-    label: str = parameter(..., "Kind of ground, a key of ``label_costs``.")
+    label: str = parameter(..., "Kind of surface, a key of ``label_costs``.")
 
 
 class LabelParameters(LayerParameters):
@@ -53,7 +53,7 @@ class LabelLayer(MeshLayer):
         lethal = np.zeros(mesh.vertex_count, dtype=np.bool_)
         for region in self.parameters.regions:
             forbidden = region.label in self.parameters.lethal_labels
-            # What must not be entered is closed between the vertices too; a cost there would reach beyond its ground.
+            # What must not be entered is closed between the vertices too; a cost there would extend beyond its region.
             closed = region.closed_mask(mesh.vertices, mesh.edges, mesh.faces) if forbidden else None
             inside = region.mask(mesh.vertices) if closed is None else closed
             costs[inside] = self.parameters.label_costs.get(region.label, 1.0)

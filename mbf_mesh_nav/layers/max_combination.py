@@ -1,4 +1,4 @@
-"""Maximum of the inputs: the worst of several opinions.
+"""Maximum of the inputs.
 
 When to use: to join inflated maps (static and sensed obstacles). When not: to weigh raw layers with different units.
 Rule of mesh_navigation: start at 0, ignore the combination weights; lethal is the union.

@@ -45,7 +45,7 @@ class ObstacleParameters(LayerParameters):
     """Parameters of ``obstacle``."""
 
     sources: tuple[str, ...] = parameter(
-        (), "Names of the sensors it listens to, each of which must speak; without any: all that speak."
+        (), "Names of the sensors it listens to, each of which must send scans; empty = all that send any."
     )
     robot_height: float = parameter(1.0, "Points higher above the surface are no obstacle.", unit="m", gt=0.0)
     min_obstacle_dist: float = parameter(
@@ -58,7 +58,7 @@ class ObstacleParameters(LayerParameters):
     decay_time: float = parameter(
         0.0, "How long an unseen hit is kept; 0 = until the next cloud.", unit="s", ge=0.0, allow_inf=True
     )
-    clearing: bool = parameter(True, "Forget kept hits that later rays pass through.")
+    clearing: bool = parameter(True, "Remove kept hits that later rays pass through.")
     expected_update_rate: float = parameter(
         1.0, "Longest allowed time between two clouds; 0 switches the check off.", unit="s", ge=0.0
     )
@@ -111,7 +111,7 @@ class ObstacleLayer(MeshLayer):
         self._hits = Hits.none()
 
     def compute(self) -> tuple[CostArray, LethalArray]:
-        """Cost inf and lethal at the corners of the marked faces; forget those of sensors not listened to any more."""
+        """Cost inf and lethal at the corners of the marked faces; drop those of sensors no longer listened to."""
         unheard = [number for number, name in enumerate(self._watches) if not self.listens_to(name)]
         self._hits = self._hits.where(~np.isin(self._hits.sources, unheard))
         lethal = np.zeros(self.topology.vertex_count, dtype=np.bool_)
@@ -124,7 +124,7 @@ class ObstacleLayer(MeshLayer):
         self._waiting.append(scan)
 
     def update(self, now: float) -> IntArray:
-        """Mark the faces below what was hit, forget what is too old or seen through.
+        """Mark the faces below the hits, drop hits that are too old or seen through.
 
         With a ``decay_time`` of 0 hits stay until the next cloud.
         """
@@ -147,11 +147,11 @@ class ObstacleLayer(MeshLayer):
         return seen.joined_with(hits.where(self._still_valid(hits, scan, sensor)))
 
     def clear(self) -> IntArray:
-        """Forget all hits; the map is stale until every source has seen it again."""
+        """Drop all hits; the map is stale until every source has sent a new scan."""
         return self._keep_only(Hits.none())
 
     def clear_area(self, center: FloatArray, size: float, inside: bool) -> IntArray:
-        """Forget the hits in, or out of, a cube; as stale then as when all are forgotten."""
+        """Drop the hits inside, or outside, a cube; the map is then stale as after dropping all."""
         within = (np.abs(self._hits.points - center) <= size / 2.0).all(axis=1)
         return self._keep_only(self._hits.where(within != inside))
 
@@ -172,7 +172,7 @@ class ObstacleLayer(MeshLayer):
 
     @property
     def source_names(self) -> tuple[str, ...]:
-        """Names of the scan sources that the layer asks for; empty if it takes all."""
+        """Names of the scan sources that the layer requires; empty if it takes all."""
         return tuple(self.parameters.sources)
 
     def listens_to(self, source: str) -> bool:

@@ -13,7 +13,7 @@ from mbf_mesh_nav.map.layer import FloatArray, IntArray, LethalArray
 ON_OUTLINE = 1e-6
 """A vertex this near [m] to a side of a polygon lies on it."""
 CORNER_SHARE = 1e-6
-"""How far from its corner, in lengths of the side, a polygon is asked where it leads."""
+"""Distance of a probe point from its corner, in lengths of the side."""
 
 
 class Region(ParameterModel):
@@ -86,9 +86,9 @@ def _on_outline(vertices: FloatArray, outline: FloatArray) -> LethalArray:
 
 
 def _beside_corners(outline: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Points (n, 2) on the sides of a polygon, a hair after and before its corners.
+    """Points (n, 2) on the sides of a polygon, just after and before its corners.
 
-    A corner may lie on an edge of the mesh: these tell which faces the polygon reaches into from there.
+    A corner may lie on an edge of the mesh: these points find the faces the polygon enters there.
     """
     sides = np.roll(outline, -1, axis=0) - outline
     return outline + CORNER_SHARE * sides, outline + (1.0 - CORNER_SHARE) * sides

@@ -1,9 +1,8 @@
 """Ridge: large on convex ridges, small in furrows; meant for driving between crop beds.
 
-When to use: to keep a robot in the furrow by cost. When not: as a guard; its value is about the radius on flat ground
-and has no meaning in metres of step height.
-Rule of mesh_navigation: mean distance of the tips of unit normals planted on a vertex and on its neighbourhood. A
-vertex without a neighbour within the radius gets ``threshold + 0.1``.
+When to use: to keep a robot in the furrow by cost. When not: as a guard; its value is about the radius on a flat
+surface and has no meaning in metres of step height. Rule of mesh_navigation: mean distance of the tips of unit normals
+planted on a vertex and on its neighbourhood. A vertex without a neighbour within the radius gets ``threshold + 0.1``.
 """
 
 from __future__ import annotations

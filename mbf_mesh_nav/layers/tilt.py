@@ -2,7 +2,7 @@
 
 When to use: slopes near the robot's limits. It may drive straight up what it must not cross sideways, and it does not
 fall into a ditch narrower than its wheelbase that ``steepness`` forbids. When not: flat floors, tracked or legged
-robots, and meshes coarser than half the footprint. It replaces the guard of the border: where a wheel has no ground,
+robots, and meshes coarser than half the footprint. It replaces the guard of the border: where a wheel has no support,
 the heading is not allowed. Planners that know no headings may come with any: let them need all (``needed_headings``).
 Rule: the four wheels stand on the surface, the body takes their plane of least squares (``footprint_settling``); a
 ``rigid`` one stands on three of them, which on a skew ledge is some degrees steeper, and counts the worse stance. A
@@ -33,7 +33,7 @@ class TiltParameters(LayerParameters):
     wheelbase: float = parameter(0.5, "Distance of the front from the rear wheels.", unit="m", gt=0.0, le=10.0)
     track: float = parameter(0.4, "Distance of the left from the right wheels.", unit="m", gt=0.0, le=10.0)
     rigid: bool = parameter(
-        False, "Whether no axle can swing and no spring gives: on uneven ground the robot stands on three wheels."
+        False, "Whether no axle can swing and no spring gives: on an uneven surface the robot stands on three wheels."
     )
     max_roll: float = parameter(0.3, "Greatest slope across the heading.", unit="rad", gt=0.0, lt=1.57)
     max_pitch_up: float = parameter(0.45, "Greatest slope to climb.", unit="rad", gt=0.0, lt=1.57)
@@ -64,7 +64,7 @@ class TiltLayer(MeshLayer):
     Attributes
     ----------
     roll, pitch : (V, 16) float32
-        Angles [rad] at heading ``2 pi h / 16``, left side up and nose up positive, inf where a wheel has no ground.
+        Angles [rad] at heading ``2 pi h / 16``, left side up and nose up positive, inf where a wheel has no support.
     allowed : (V, 16) bool
         Whether the robot may stand there with that heading.
     """

@@ -1,4 +1,4 @@
-"""A mesh on its way through checks, repairs and densifying, which knows where each of its parts came from.
+"""A mesh during checks, repairs and densifying, with the origin of each of its parts.
 
 Use it between reading a mesh and ``topology.build_topology``. It is no map: it has no neighbours and no layers.
 """

@@ -65,7 +65,7 @@ def _edge_keys(faces: IntArray, count: int) -> NDArray[np.int64]:
 
 
 def _split(faces: IntArray, middles: IntArray) -> tuple[IntArray, NDArray[np.intp]]:
-    """Replace every face by one to four, and tell the parent of each.
+    """Replace every face by one to four; return them and the parent of each.
 
     ``middles`` (F, 3) holds the new vertex on the edge corner k -> k+1, or -1. Faces are turned until the pattern of
     split edges is (no, no, no), (yes, no, no), (yes, yes, no) or (yes, yes, yes).

@@ -1,4 +1,4 @@
-"""How high the ground is at a place seen from above: all surfaces there, and which of them a robot may stand on."""
+"""Heights of all surfaces at a place in the plan view, and which of them a robot may stand on."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from mbf_abstract.maps.queries import CellState
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 ONE_SURFACE = 0.01
-"""Surfaces so near [m] above each other are one: seams of a scan, the two sides of a sheet."""
+"""Surfaces so near [m] above each other are one: seams of a scan, the two sides of a thin patch."""
 LEAST_UPWARD = 0.05
 """z of the normal below which a face is a wall or a ceiling."""
 
@@ -15,7 +15,7 @@ LEAST_UPWARD = 0.05
 def ground_heights(mesh_map: MeshMap, x: float, y: float) -> tuple[float, ...]:
     """Heights [m] of the surfaces above and below (x, y); empty over a hole and past the border.
 
-    Those the robot may stand on come first, then blocked ground, then ceilings; each from the lowest to the highest.
+    Those the robot may stand on come first, then blocked surfaces, then ceilings; each from the lowest to the highest.
     """
     top, bottom = float(mesh_map.vertices[:, 2].max()), float(mesh_map.vertices[:, 2].min())
     check_point = mesh_map.point_check()

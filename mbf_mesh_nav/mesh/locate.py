@@ -1,4 +1,4 @@
-"""Which face am I on, and what do rays hit: exact queries over a box tree of the faces.
+"""Nearest-face and ray queries: exact, over a box tree of the faces.
 
 The nearest surface point is found over all faces, not only those around the nearest vertex, so long thin triangles
 and stacked storeys give the right face, and a point within the distance limit always gets one. Where two faces are

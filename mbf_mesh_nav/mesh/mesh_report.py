@@ -1,4 +1,4 @@
-"""What checks of a mesh say: single findings, the report they make up, and the error that refuses a mesh.
+"""Findings of mesh checks, the report that lists them, and the error that refuses a mesh.
 
 Use it to read the report of a loaded map (``mesh_map.report``). What the checks are and what repairs them stands in
 ``repair``.
@@ -76,7 +76,7 @@ class MeshError(ValueError):
         The file, or "arrays".
     reasons : list of str
     hint : str
-        How the mesh could be used all the same; empty if there is no way.
+        How the mesh could be used all the same; empty if it cannot.
     """
 
     def __init__(self, file: str, reasons: Sequence[str], hint: str = "") -> None:
@@ -86,5 +86,5 @@ class MeshError(ValueError):
         super().__init__(f"{file}: " + "; ".join(self.reasons) + (f". {hint}" if hint else ""))
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        """Survive the way back from a worker process."""
+        """Support pickling, for errors raised in worker processes."""
         return type(self), (self.file, self.reasons, self.hint)

@@ -1,9 +1,9 @@
 """What a robot on a mesh would touch along a motion, and where the nearest obstacle lies.
 
 The robot's centre is walked over the surface along the arc of its command, and on by its radius in the direction it
-then has. Ground that is forbidden ends the motion, and so does the end of the surface; a robot that stands on forbidden
-ground may leave it, see ``kernels.search.forbidden_surface``. What its sides would touch is in the costs: on a map that
-is not inflated only what lies straight ahead counts. Turning on the spot tips or slides a robot on a steep slope.
+then has. Forbidden surface ends the motion, and so does a border; a robot that stands on forbidden
+surface may leave it, see ``kernels.search.forbidden_surface``. What its sides would touch is in the costs: on a map
+that is not inflated only what lies straight ahead counts. Turning on the spot tips or slides a robot on a steep slope.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def forbidden_ahead(
     duration: float,
     radius: float,
 ) -> str:
-    """Say where the motion would lead onto forbidden ground or past a border; empty: the motion is free.
+    """Where the motion would lead onto forbidden surface or past a border, as a text; empty if it is free.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def forbidden_ahead(
     place : SurfacePoint
         Where the robot stands, at ``pose``.
     command : Twist
-        What is kept for ``duration`` [s].
+        Kept for ``duration`` [s].
     radius : float
         How far [m] the robot reaches beyond its centre.
     """

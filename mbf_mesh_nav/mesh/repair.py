@@ -1,8 +1,8 @@
 """What is wrong with a mesh, and the repairs a configuration may allow.
 
 A mesh with a defect is refused unless its name stands in the configuration's ``repair`` list; only faces wound against
-their neighbours are turned round unasked, if all can agree. The report says what was found and done, with counts and
-indices in the caller's numbering. The caller's arrays and files are never changed.
+their neighbours are flipped without being listed, if all can agree. The report says what was found and done, with
+counts and indices in the caller's numbering. The caller's arrays and files are never changed.
 
 ``REPAIRS`` maps each defect that can be repaired to what the repair does. Harmless findings (unreferenced vertices,
 vertices of holes, several components, a component that faces down, groups of faces that touch in a point) never
@@ -172,7 +172,7 @@ class _Check:
         return mesh.without_faces(np.asarray(broken[mesh.faces].any(axis=1))).without_vertices(broken)
 
     def duplicate_vertices(self, mesh: CheckedMesh) -> CheckedMesh:
-        # Merging is an offer, not a duty: two walls may touch without being joined.
+        # Merging is optional: two walls may touch without being joined.
         if "duplicate_vertices" not in self.repair:
             return mesh
         exact = same_position(mesh.vertices)

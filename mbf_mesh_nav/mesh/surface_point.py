@@ -62,7 +62,7 @@ def corner_distances(
             length * (1.0 + factor * 0.5 * (at_point + float(costs[corner])))
             for length, corner in zip(lengths, corners, strict=True)
         ]
-    # A hair longer than the line, so that rounding cannot make it shorter than a straight-line bound.
+    # Slightly longer than the line, so that rounding cannot make it shorter than a straight-line bound.
     return np.array(corners, dtype=np.int32), np.nextafter(np.array(lengths, dtype=np.float32), INFINITELY_FAR)
 
 
@@ -77,7 +77,7 @@ def _cost_at(point: SurfacePoint, corner_costs: list[float]) -> float:
 
 
 def describe_blockage(mesh_map: MeshMap, snapshot: MeshSnapshot, vertex: int, cost_limit: float) -> str:
-    """Say why a vertex is blocked: its cost, the limit, and the layers that call it lethal."""
+    """Why a vertex is blocked: its cost, the limit, and the layers that call it lethal."""
     names = [name for name, layer in mesh_map.layers.items() if layer.lethal[vertex]]
     layers = f" (lethal in layer {', '.join(names)})" if names else ""
     return f"cost {snapshot.costs[vertex]:.3g}, limit {cost_limit:g}{layers}"

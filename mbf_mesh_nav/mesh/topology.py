@@ -1,4 +1,4 @@
-"""The geometry of a mesh map as flat arrays: who touches whom, how long the edges are, where up is.
+"""The geometry of a mesh map as flat arrays: adjacency, edge lengths and normals.
 
 Vertices and faces are renumbered along a Morton curve first: neighbours on the surface then lie close in memory,
 which makes every wave over the mesh three to four times faster on files with a random order. Callers see their own

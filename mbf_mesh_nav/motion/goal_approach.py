@@ -27,8 +27,8 @@ def heading_error(pose: Pose, other: Pose) -> float:
 def ground_distance(pose: Pose, goal: Pose) -> float:
     """Distance [m] to the goal in the robot's tangent plane.
 
-    A goal given a little above or below the ground, and a robot frame above it, do not count; a goal more than
-    ``_SAME_STOREY`` off the plane is on other ground, then the distance is the straight one.
+    A goal given a little above or below the surface, and a robot frame above it, do not count; a goal more than
+    ``_SAME_STOREY`` off the plane is on another storey, then the distance is Euclidean.
     """
     x, y, z = in_robot_frame(pose, np.asarray(goal.position))
     return math.hypot(x, y) if abs(z) <= _SAME_STOREY else math.hypot(x, y, z)
@@ -38,7 +38,7 @@ def is_at_goal(pose: Pose, goal: Pose, dist_tolerance: float, angle_tolerance: f
     """Whether ``pose`` is within ``dist_tolerance`` [m] and its heading within ``angle_tolerance`` [rad] of the goal.
 
     Distances and headings are those in the robot's tangent plane, so a goal given without the height and slope of
-    the ground can be reached.
+    the surface can be reached.
     """
     return ground_distance(pose, goal) <= dist_tolerance and abs(heading_error(pose, goal)) <= angle_tolerance
 
@@ -60,12 +60,12 @@ def missed_path(tracker: PathTracker, allowed: float) -> ControlResult | None:
 
 
 class GoalApproach:
-    """How a robot comes to the end of its path: along the path, then to the position, then to the heading.
+    """How a robot approaches the end of its path: along the path, then to the position, then to the heading.
 
     Parameters
     ----------
     goal : Pose
-        Last pose of the path as it was asked for.
+        Last pose of the path as requested.
     reach : float
         Distance [m] at which the position counts as reached, unless the goal's tolerance is less.
     straying : float

@@ -33,7 +33,7 @@ class VectorField:
     map_version : int
         Version of the snapshot it was computed on.
     topology : MeshTopology
-        The mesh it belongs to; on another one its vectors mean nothing.
+        The mesh it belongs to; on another one its vectors are invalid.
     """
 
     directions: NDArray[np.float32]

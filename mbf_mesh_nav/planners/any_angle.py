@@ -1,11 +1,11 @@
-"""Any-angle paths: the way down a continuous wave, pulled taut, without the field.
+"""Any-angle paths: the descent of a continuous wave, shortened by string pulling, without the field.
 
 Strengths: the path of ``mesh.cvp``, a geodesic where nothing on it has a cost, without computing a vector field; over
-costs it is pulled taut as far as that costs no more, where ``mesh.cvp`` keeps the way down the field. Known failure: a
+costs it is shortened as far as that costs no more, where ``mesh.cvp`` keeps the descent of the field. Known failure: a
 local optimum over costs, there it passes ridges and obstacles on the side on which the wave did; where nothing costs
 and faces are large, other courses are looked for (``other_courses``). Cost: little more than that of a wave, twice that
 for the short paths of which other courses are looked at. When not: with a controller that wants a field; over costs on
-coarse meshes, with faces as long as the way around an obstacle, densify the map (``mesh_map.densify``).
+coarse meshes, with faces as long as the path around an obstacle, densify the map (``mesh_map.densify``).
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ class AnyAnglePlanner(SurfacePlanner):
         self._search = WaveSearch(self.mesh_map)
 
     def find_leg(self, query: LegQuery) -> Leg | None:
-        """Spread the wave until the start is reached, take the shortened way down its field."""
-        wave = self._search.spread(query, overshoot=0.0)
+        """Propagate the wave until the start is reached, take the shortened descent of its field."""
+        wave = self._search.propagate(query, overshoot=0.0)
         if wave is None:
             return None
         positions, point_faces = self._search.path(query, wave, pull_over_costs=True)

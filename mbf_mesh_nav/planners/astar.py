@@ -14,7 +14,7 @@ from mbf_mesh_nav.search.surface_planner import SurfacePlanner
 
 
 class AStarPlanner(SurfacePlanner):
-    """Cheapest way along edges, searched towards the goal."""
+    """Cheapest path along edges, searched towards the goal."""
 
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Search from the start's corners to the goal's corners."""

@@ -2,9 +2,9 @@
 
 Strengths: paths cross faces freely and are geodesics, as short as the surface allows (within 0.2 % on average),
 whatever the triangulation; every pair ``mesh.dijkstra`` finds a path for gets one; the field lets a controller correct
-deviations. Without a way over whole free faces the wave walks along single edges, and the message says so.
+deviations. Without a path over whole free faces the wave walks along single edges, and the message says so.
 Known failure: on rough meshes one vertex in 5,000 or so is 2 to 4 % off in the field, where two fronts meet; over
-costs, where faces are as long as the way to the goal, the path may pass a ridge or an obstacle on the longer side, by
+costs, where faces are as long as the path to the goal, the path may pass a ridge or an obstacle on the longer side, by
 some percent; densify such a map (``mesh_map.densify``). The field is the wave's, also where the path is shorter.
 Cost: about 0.4 us a vertex nearer than the goal. The C++ original's rule and defaults; the path is traced exactly here.
 """
@@ -38,8 +38,8 @@ class CVPPlanner(SurfacePlanner):
         self._search = WaveSearch(self.mesh_map)
 
     def find_leg(self, query: LegQuery) -> Leg | None:
-        """Spread the wave until the robot's face is settled, take the shortened way down its field, keep the field."""
-        wave = self._search.spread(query, self.parameters.goal_dist_offset)
+        """Propagate the wave until the robot's face is settled, take the shortened descent, keep the field."""
+        wave = self._search.propagate(query, self.parameters.goal_dist_offset)
         if wave is None:
             return None
         positions, point_faces = self._search.path(query, wave, pull_over_costs=False)

@@ -13,10 +13,10 @@ from mbf_mesh_nav.search.surface_planner import SurfacePlanner
 
 
 class DijkstraPlanner(SurfacePlanner):
-    """Cheapest way along edges, found without a heuristic."""
+    """Cheapest path along edges, found without a heuristic."""
 
     def find_leg(self, query: LegQuery) -> Leg | None:
-        """Spread from the start until the goal is settled, then walk back."""
+        """Expand from the start until the goal is settled, then trace back."""
         distances, predecessors, finished = propagate_from(
             self.mesh_map, query.snapshot, query.blocked, query.start, query.cancel_flag, query.goal
         )

@@ -43,11 +43,11 @@ class HeadingAStarParameters(SurfacePlannerParameters):
     max_roll: float = parameter(0.35, "Greatest slope across the heading (without a layer).", unit="rad", gt=0.0)
     max_pitch: float = parameter(0.5, "Greatest slope along the heading (without a layer).", unit="rad", gt=0.0)
     roll_cost: float = parameter(1.0, "Extra length per length and rad of roll.", unit="1/rad", ge=0.0)
-    turning_cost: float = parameter(0.1, "Extra length per rad turned.", unit="m/rad", ge=0.0)
+    turning_cost: float = parameter(0.1, "Extra length per rad of turning.", unit="m/rad", ge=0.0)
 
 
 class HeadingAStarPlanner(SurfacePlanner):
-    """Cheapest way along edges that no heading on it forbids."""
+    """Cheapest path along edges with allowed headings only."""
 
     Parameters = HeadingAStarParameters
     parameters: HeadingAStarParameters
@@ -141,12 +141,12 @@ class HeadingAStarPlanner(SurfacePlanner):
         return best, cost, distances, predecessors
 
     def _no_path(self, start: SurfacePoint, goal: SurfacePoint, blocked: NDArray[np.bool_]) -> PlanResult:
-        """Name the tilt where it, and not a blocked vertex, closes the way."""
+        """Name the tilt where it, and not a blocked vertex, makes the goal unreachable."""
         result = super()._no_path(start, goal, blocked)
         return replace(result, message=result.message + self._tilt_at_ends)
 
     def _describe_ends(self, query: LegQuery, limits: HeadingLimits) -> str:
-        """Which of the two poses the tilt forbids, else that it may close ways in between."""
+        """Which of the two poses the tilt forbids, else that it may block paths in between."""
         asked = query.goal_pose if headings_within(query.goal_pose, query.angle_tolerance) else None
         ends = (("start", query.start, query.start_pose), ("goal", query.goal, asked))
         tilted = [
@@ -170,7 +170,7 @@ class HeadingAStarPlanner(SurfacePlanner):
 
 
 def may_turn_to(allowed: NDArray[np.bool_], heading: int) -> NDArray[np.bool_]:
-    """From which headings (V, 16) the robot may turn on the spot to ``heading``: all on the short way ``allowed``."""
+    """Headings (V, 16) from which the robot may turn on the spot to ``heading``: all between must be ``allowed``."""
     may_turn = np.ones_like(allowed)
     for away in range(1, HEADINGS // 2 + 1):
         for side in (1, -1):

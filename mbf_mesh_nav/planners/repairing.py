@@ -42,19 +42,19 @@ class RememberedWave:
 
 
 class RepairingPlanner(SurfacePlanner):
-    """Cheapest way along edges, replanned at the price of the change."""
+    """Cheapest path along edges; replanning costs as much as the change is large."""
 
     _wave: RememberedWave | None = None
 
     def find_leg(self, query: LegQuery) -> Leg | None:
-        """Bring the remembered wave up to date, or start a new one, and read the way off it."""
+        """Bring the remembered wave up to date, or start a new one, and trace the path."""
         wave, self._wave = self._wave, None  # a cancelled repair leaves no half-finished wave behind
         changed = self._changes_since(wave, query) if wave is not None else None
         if wave is None or changed is None:
             wave = self._new_wave(query)
             seeds = wave.roots
         else:
-            seeds = self._forget(changed, wave, query)
+            seeds = self._invalidate(changed, wave, query)
             wave.version = query.snapshot.version
         finished = propagate_distances(
             self.mesh_map.neighbour_offsets,
@@ -94,8 +94,8 @@ class RepairingPlanner(SurfacePlanner):
             goal, self.parameters.cost_limit, version, seeds, distances[seeds], distances, predecessors
         )
 
-    def _forget(self, changed: NDArray[np.int32], wave: RememberedWave, query: LegQuery) -> NDArray[np.int32]:
-        """Forget what hung on changed vertices; return the seeds of the repair."""
+    def _invalidate(self, changed: NDArray[np.int32], wave: RememberedWave, query: LegQuery) -> NDArray[np.int32]:
+        """Invalidate the subtrees of changed vertices; return the seeds of the repair."""
         return invalidate_subtrees(
             self.mesh_map.neighbour_offsets,
             self.mesh_map.neighbours,

@@ -1,10 +1,10 @@
-"""Leave ground that has become forbidden: drive slowly to the nearest free vertex over the surface.
+"""Leave surface that has become forbidden: drive slowly to the nearest free vertex over the surface.
 
 For a robot that stands in an inflated or lethal area (a new obstacle, a pushed robot), where every planner answers
-BLOCKED_START. It crosses costly ground on purpose, so it is slow, short (``max_distance``) and measures distance on the
-surface, never across a gap or to another storey. Lethal ground it crosses only where the robot stands on it, and does
-not know what that really is: order it after ``clear`` and ``back_up``. Where something appears on its
-way while it drives, or the end of the way is safe no more, it looks for another way and stops if there is none.
+BLOCKED_START. It crosses costly surface on purpose, so it is slow, short (``max_distance``) and measures distance on
+the surface, never across a gap or to another storey. It crosses lethal surface only where the robot stands on it,
+without knowing the obstacle: order it after ``clear`` and ``back_up``. Where an obstacle appears on the escape path
+while it drives, or the end of the path is no longer safe, it searches for another path and stops if there is none.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, seeded_arrays
 class EscapeParameters(GuardedMotionParameters):
     """Parameters of ``mesh.escape``."""
 
-    cost_limit: float = parameter(0.9, "Ground is safe below this cost.", gt=0.0, allow_inf=True)
-    max_distance: float = parameter(2.0, "Longest way over forbidden ground.", unit="m", gt=0.0, le=20.0)
+    cost_limit: float = parameter(0.9, "Surface is safe below this cost.", gt=0.0, allow_inf=True)
+    max_distance: float = parameter(2.0, "Longest path over forbidden surface.", unit="m", gt=0.0, le=20.0)
     speed: float = parameter(0.2, "Driving speed.", unit="m/s", gt=0.0, le=1.0)
     yaw_rate: float = parameter(0.6, "Yaw rate limit.", unit="rad/s", gt=0.0, le=3.0)
     reach: float = parameter(0.1, "The free vertex is reached within this distance.", unit="m", gt=0.0)
@@ -44,7 +44,7 @@ class EscapeParameters(GuardedMotionParameters):
 
 @dataclass(frozen=True)
 class EscapePath:
-    """A way to safe ground.
+    """A path to safe surface.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class EscapePath:
 
 
 class EscapeRecovery(MeshRecovery, GuardedRecovery):
-    """Drives to the nearest safe ground."""
+    """Drives to the nearest safe surface."""
 
     Parameters = EscapeParameters
     parameters: EscapeParameters
@@ -77,7 +77,7 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
             return RecoveryResult(RecoveryOutcome.FAILURE, "the robot is more than 1 m from the surface")
         snapshot = mesh_map.snapshot()
         if not snapshot.blocked(p.cost_limit)[mesh_map.faces[spot.face]].any():
-            return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on safe ground")
+            return RecoveryResult(RecoveryOutcome.SUCCESS, "the robot stands on safe surface")
         own_patch = self._patch_below(spot, snapshot, flag)
         way = self._escape_path(spot, own_patch, request)
 
@@ -90,44 +90,44 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
                     here = mesh_map.locate_one(pose.position, 1.0)
                     way = None if here is None else self._escape_path(here, own_patch, request)
             if way is None:
-                message = f"no safe ground within {p.max_distance:g} m over the surface"
+                message = f"no safe surface within {p.max_distance:g} m over the surface"
                 return RecoveryResult(RecoveryOutcome.IMPASSABLE, message)
             return self._drive(pose, way.tracker)
 
         return self.drive(request, velocity)
 
     def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
-        """Nothing: it looks along its path itself, which leads over forbidden ground on purpose."""
+        """Always empty: it checks its path itself, which leads over forbidden surface on purpose."""
         return ""
 
     def _drive(self, pose: Pose, tracker: PathTracker) -> Twist | RecoveryResult:
-        """Pursue the way, or say that its end is reached."""
+        """Pursue the escape path; success at its end."""
         p = self.parameters
         x, y, z = tracker.points[-1].tolist()
         if ground_distance(pose, Pose((x, y, z), frame_id=pose.frame_id)) <= p.reach:
-            return RecoveryResult(RecoveryOutcome.SUCCESS, f"reached safe ground after {tracker.length:.2f} m")
+            return RecoveryResult(RecoveryOutcome.SUCCESS, f"reached safe surface after {tracker.length:.2f} m")
         bearing, curvature = arc_to(pose, tracker.point_at(tracker.progress + 0.3))
         if abs(bearing) > 0.6:
             return Twist.planar(wz=math.copysign(p.yaw_rate, bearing))
         return Twist.planar(vx=p.speed, wz=clamp(p.speed * curvature, p.yaw_rate))
 
     def _patch_below(self, spot: SurfacePoint, snapshot: MeshSnapshot, flag: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """Lethal vertices (V,) that hang together with the one the robot stands on; none if it stands beside them."""
+        """Lethal vertices (V,) connected to the one the robot stands on; none if it stands beside them."""
         lethal = _lethal(snapshot)
         if not lethal[nearest_corner(self.mesh_map, spot)]:
             return np.zeros_like(lethal)
-        return np.isfinite(self._spread(spot, ~lethal, flag)[0])
+        return np.isfinite(self._propagate(spot, ~lethal, flag)[0])
 
     def _escape_path(
         self, spot: SurfacePoint, own_patch: NDArray[np.bool_], request: RecoveryRequest
     ) -> EscapePath | None:
-        """Way over the mesh to the nearest vertex around which no face is forbidden, on the map of now.
+        """Path over the mesh to the nearest vertex around which no face is forbidden, on the current map.
 
-        It leads over costly ground, and of lethal vertices (V,) only over those of ``own_patch``.
+        It leads over costly surface, and of lethal vertices (V,) only over those of ``own_patch``.
         """
         mesh_map, snapshot = self.mesh_map, self.mesh_map.snapshot()
         blocked = snapshot.blocked(self.parameters.cost_limit)
-        distances, predecessors = self._spread(spot, _lethal(snapshot) & ~own_patch, request.cancel_token.flag)
+        distances, predecessors = self._propagate(spot, _lethal(snapshot) & ~own_patch, request.cancel_token.flag)
         beside_blocked = blocked[mesh_map.edges].any(axis=1)
         safe = ~blocked
         safe[mesh_map.edges[beside_blocked].ravel()] = False
@@ -139,10 +139,10 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
         points = np.concatenate([[spot.point], mesh_map.vertices[chain]])
         return EscapePath(chain, PathTracker(Path.from_points(points, frame_id=mesh_map.frame_id)))
 
-    def _spread(
+    def _propagate(
         self, spot: SurfacePoint, closed: NDArray[np.bool_], flag: NDArray[np.uint8]
     ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """Lengths of the ways from the robot to all vertices without those ``closed``, and their predecessors."""
+        """Lengths of the paths from the robot to all vertices but the ``closed`` ones, and their predecessors."""
         mesh_map = self.mesh_map
         distances, predecessors, seeds = seeded_arrays(mesh_map, closed, spot)
         graph = (mesh_map.neighbour_offsets, mesh_map.neighbours, mesh_map.neighbour_lengths, closed)

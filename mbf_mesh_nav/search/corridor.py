@@ -14,7 +14,7 @@ from mbf_mesh_nav.search.path_cost import cost_along
 _MIN_PIECE = 10  # points; shorter pieces are not split further
 
 Piece = tuple[NDArray[np.float64], NDArray[np.int32]]
-"""Points (n, 3) [m], and the face (n,) in which the way to each lies."""
+"""Points (n, 3) [m], and the face (n,) in which the segment to each lies."""
 
 
 class Corridor:
@@ -32,16 +32,16 @@ class Corridor:
         self._blocked = blocked
 
     def shorten(self, positions: NDArray[np.float64], point_faces: NDArray[np.int32]) -> Piece:
-        """Pull a traced path taut, piece by piece; a piece keeps its old course where the taut one costs more.
+        """Shorten a traced path by string pulling; a piece keeps its old course where the shorter one costs more.
 
-        Where nothing on the way has a cost the corridors are turned, too, and the path becomes a geodesic.
+        Where nothing along the path has a cost the corridors are changed, too, and the path becomes a geodesic.
 
         Parameters
         ----------
         positions : (n, 3) float64
             Points from start to goal [m].
         point_faces : (n,) int32
-            The face in which the way to each point lies; the start's face first.
+            The face in which the segment to each point lies; the start's face first.
 
         Returns
         -------
@@ -64,12 +64,12 @@ class Corridor:
         """Take the geodesic near the corridor if it is not more expensive, else try its halves."""
         mesh_map = self._mesh_map
         ends = tuple(positions[0].tolist()), tuple(positions[-1].tolist())
-        taut, faces = straighten(
+        shortened, faces = straighten(
             mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, self._blocked, corridor, *ends, turn
         )
         pulled_faces = np.concatenate([point_faces[:1], faces])
-        if self.cost(taut, pulled_faces) <= self.cost(positions, point_faces):
-            return taut, pulled_faces
+        if self.cost(shortened, pulled_faces) <= self.cost(positions, point_faces):
+            return shortened, pulled_faces
         middle = len(positions) // 2
         cut = np.flatnonzero(corridor == point_faces[middle])
         if middle < _MIN_PIECE or len(cut) == 0:
@@ -93,7 +93,7 @@ class Corridor:
         return points, np.concatenate([point_faces[:1], faces])
 
     def has_costs(self, faces: NDArray[np.int32]) -> bool:
-        """Whether costs on faces (n,) make some ways over them longer than others; infinite ones do not count."""
+        """Whether costs on faces (n,) make some paths over them longer than others; infinite ones do not count."""
         costs = self._snapshot.costs[self._mesh_map.faces[faces]]
         return self._snapshot.edge_cost_factor > 0.0 and bool((np.isfinite(costs) & (costs > 0.0)).any())
 

@@ -1,7 +1,7 @@
-"""The first and the last stretch of a way along edges: from the start to a corner of its face, from one to the goal.
+"""The first and the last stretch of a path along edges: from the start to a corner of its face, from one to the goal.
 
 A stretch is driven straight, so the robot turns to it, drives it with that heading and turns again; all of that has to
-keep the tilt's limits, as on the way between. Where the robot stands beyond them already, it may leave as it stands.
+keep the tilt's limits, as on the path between. Where the robot stands beyond them already, it may leave as it stands.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class EndStretches:
         return *_columns(corners), np.array(headings, dtype=np.int32)
 
     def may_drive_straight(self) -> bool:
-        """Whether the line to the goal, in the same face, keeps the limits and free ground, and its turns."""
+        """Whether the line to the goal, in the same face, keeps the limits, the free surface and the allowed turns."""
         query = self._query
         heading = None if query.start_pose is None else heading_index(query.start_pose.yaw)
         if math.dist(query.start.point, query.goal.point) <= AT_ONE_PLACE:
@@ -97,7 +97,7 @@ class EndStretches:
         return begins and self._turn_at_goal(driven) is not None
 
     def _turn_at_goal(self, driven: int) -> int | None:
-        """Least turn at the goal, in steps, to a heading that is asked for; None if none is allowed."""
+        """Least turn at the goal, in steps, to a requested heading; None if none is allowed."""
         turns = [shortest_turn(driven, heading) for heading in sorted(self._goal_headings)] or [0]
         for turn in sorted(turns, key=abs):
             passed = [driven + math.copysign(step, turn) for step in range(1, abs(turn) + 1)]
@@ -106,21 +106,21 @@ class EndStretches:
         return None
 
     def _stands_at_goal(self, heading: int) -> bool:
-        """Whether the goal allows a heading; the one asked for is taken as it is, not rounded."""
+        """Whether the goal allows a heading; the requested one is taken as it is, not rounded."""
         pose = self._query.goal_pose
         is_asked = pose is not None and heading == heading_index(pose.yaw)
         yaw = pose.yaw if is_asked and pose is not None else heading * HEADING_STEP
         return self._limits.standing(self._query.goal, yaw) <= 1.0
 
     def _may_turn(self, place: SurfacePoint, pose: Pose | None, heading: int, turn: int) -> bool:
-        """Whether all headings passed at the start are bearable; the last one, the stretch's, is looked at with it."""
+        """Whether all headings passed at the start are allowed; the last one, the stretch's, is looked at with it."""
         passed = [heading + math.copysign(step, turn) for step in range(1, abs(turn))]
         return pose is None or all(
             self._limits.standing(place, step * HEADING_STEP) <= self._bearable for step in passed
         )
 
     def _corners(self, place: SurfacePoint) -> list[tuple[int, float]]:
-        """Free corners of a point's face and what the ways to them cost [m]."""
+        """Free corners of a point's face and the costs of the lines to them [m]."""
         corners, offsets = corner_distances(self._mesh_map, self._query.blocked, place, self._query.snapshot)
         return list(zip(corners.tolist(), offsets.tolist(), strict=True))
 
@@ -134,7 +134,7 @@ def heading_towards(start: NDArray[np.float64], end: NDArray[np.float64]) -> int
 
 
 def shortest_turn(heading: int, new_heading: int) -> int:
-    """Steps to turn from one heading to another the short way, left positive; half a turn goes left."""
+    """Steps to turn from one heading to another on the shorter side, left positive; half a turn goes left."""
     turn = (new_heading - heading) % HEADINGS
     return turn if turn <= HEADINGS // 2 else turn - HEADINGS
 

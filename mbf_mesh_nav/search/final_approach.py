@@ -34,7 +34,7 @@ def with_first_turn(
 ) -> Path:
     """Bend the begin of a path so that a car at ``pose`` drives onto it; the path itself where it leads ahead anyway.
 
-    That is the approach of the way back: from the goal to the pose of the robot, turned about.
+    That is the approach of the reversed path: from the goal to the pose of the robot, turned about.
     """
     backward = np.concatenate([path.positions[:0:-1], [pose.position]])
     turned_about = quaternion_multiply(pose.orientation, quaternion_from_yaw(math.pi))
@@ -83,7 +83,7 @@ def with_final_approach(
 
 
 def _fits(mesh_map: MeshMap, blocked: NDArray[np.bool_], curve: NDArray[np.float64], spots: Location) -> bool:
-    """Whether a curve (n, 3) lies over free ground all along: past no border, and not with a part on another storey."""
+    """Whether a curve (n, 3) lies on free surface throughout: past no border, and no part on another storey."""
     if (spots.faces < 0).any() or blocked[mesh_map.faces[spots.faces]].any():
         return False
     steps = norm(np.diff(spots.points, axis=0))

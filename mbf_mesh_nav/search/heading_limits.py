@@ -1,7 +1,7 @@
-"""What the tilt allows a robot with a heading: to stand at a point, to drive straight within a face, along an edge.
+"""Headings that the tilt allows: at a point, straight within a face, along an edge.
 
 Two sources: the footprint of a ``tilt`` layer, settled anywhere, or normals of the surface where a map has no such
-layer. Both tell a *use*, the greatest share of a limit: at most 1 is allowed.
+layer. Both give a *use*, the greatest share of a limit: at most 1 is allowed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NO_CHASSIS = Chassis(1.0, 1.0, False, 1.0, 1.0, 1.0, math.inf)
 
 
 class HeadingLimits(Protocol):
-    """What a planner with headings asks.
+    """Limits as a planner with headings queries them.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class HeadingLimits(Protocol):
         """Use at a point with a heading [rad]."""
 
     def driving(self, face: int, start: FloatArray, end: FloatArray, ends: list[FloatArray]) -> float:
-        """Greatest use on the straight way between two points of a face; ``ends`` are the normals at both."""
+        """Greatest use on the straight line between two points of a face; ``ends`` are the normals at both."""
 
 
 class FootprintLimits:

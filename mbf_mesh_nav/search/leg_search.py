@@ -1,6 +1,6 @@
 """One leg of a plan, and the searches over the vertex graph that find it.
 
-The arrays of a search are made here and relaxed in place by the kernels; a way found is turned into positions and
+The arrays of a search are made here and relaxed in place by the kernels; a path found is converted to positions and
 surface normals here as well, so a planner is only the choice of a kernel.
 """
 
@@ -69,14 +69,14 @@ def propagate_from(
     Parameters
     ----------
     target : SurfacePoint, optional
-        Stop as soon as the way to it is known; without it the whole field is computed.
+        Stop as soon as the path to it is known; without it the whole field is computed.
 
     Returns
     -------
     distances : (V,) float32
         Weighted length [m], inf where not reached.
     predecessors : (V,) int32
-        Previous vertex on the way from the source, -1 at its seeds and where not reached.
+        Previous vertex on the path from the source, -1 at its seeds and where not reached.
     finished : bool
         False if cancelled.
     """
@@ -108,7 +108,7 @@ def seeded_arrays(
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
     """Start state of a search from a surface point: distances (V,), predecessors (V,), seed vertices.
 
-    A ``snapshot`` weighs the ways to the seeds, see ``corner_distances``.
+    A ``snapshot`` weighs the lines to the seeds, see ``corner_distances``.
     """
     vertex_count = len(mesh_map.vertices)
     distances = np.full(vertex_count, np.inf, dtype=np.float32)
@@ -130,7 +130,7 @@ def vertex_path_leg(
     predecessors: NDArray[np.int32],
     rooted_at_goal: bool = False,
 ) -> Leg | None:
-    """Leg along the predecessors of a search from ``query.start``, or from the goal; None without a way.
+    """Leg along the predecessors of a search from ``query.start``, or from the goal; None without a path.
 
     Start and goal in one face are joined by the straight line within it.
     """

@@ -1,9 +1,9 @@
 """Other courses between two points of a coarse mesh: faces so long that a wave misjudges on which side to pass.
 
-A geodesic through faces is shortest among its neighbours only, so which one is found depends on the way the wave chose.
-Two waves, from the goal and from the start, tell for every vertex how long a way through it is; the ways through the
-most promising vertices that no course found so far comes by are shortened as well. The shortest of all is led round the
-other side of every vertex beside it (``kernels.strip_detours``).
+A geodesic through faces is shortest among its neighbours only, so which one is found depends on the wave.
+Two waves, from the goal and from the start, give for every vertex the length of a path through it; the paths through
+the most promising vertices that no course found so far passes are shortened as well. The shortest of all is led round
+the other side of every vertex beside it (``kernels.wave.corridor_detours``).
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ FEW_FACES = 150
 """A path through more faces than this is no matter of single faces."""
 _COURSES = 12
 _WORTH_A_TRY = 1.15
-"""Ways through a vertex so many times longer than the best course are not looked at."""
+"""Paths through a vertex so many times longer than the best course are not tried."""
 _SHORTER = 0.999
 """A course is another one only if it is shorter than so many times the length of the best before."""
 
 Distances = NDArray[np.float32]
 Trace = Callable[[SurfacePoint], Piece]
-"""The way down a field from a surface point."""
+"""The descent of a field from a surface point."""
 
 
 def is_worth_a_search(query: LegQuery, course: Piece, corridor: Corridor) -> bool:
@@ -53,7 +53,7 @@ class OtherCourses:
         ----------
         course : positions (n, 3), faces (n,)
         from_goal, from_start : (V,) float32
-            What the two waves say [m].
+            Distances of the two waves [m].
         """
         reversed_course = self._corridor.shorten(*_reversed(self._to_start(self._query.goal)))
         best = min(course, reversed_course, key=lambda piece: self._cost(piece, course))
@@ -90,7 +90,7 @@ class OtherCourses:
 
 
 def _reversed(piece: Piece) -> Piece:
-    """The same way back; the face of the way to a point is that of the way from the one before it."""
+    """The path reversed; the face of the segment to a point is that of the segment from the one before it."""
     positions, faces = piece
     return positions[::-1], np.concatenate([faces[-1:], faces[:0:-1]])
 
@@ -100,5 +100,5 @@ def _joined(head: Piece, tail: Piece) -> Piece:
 
 
 def reversed_query(query: LegQuery) -> LegQuery:
-    """The way back."""
+    """The path reversed."""
     return replace(query, start=query.goal, goal=query.start, start_pose=query.goal_pose, goal_pose=query.start_pose)

@@ -1,7 +1,7 @@
-"""What a way over the surface costs: its length plus what the map's costs collect along it.
+"""Cost of a path over the surface: its length plus the map's costs integrated along it.
 
-Along edges that is the sum of their weights; a way through faces has the costs of their corners interpolated in
-between, so both agree where a way follows an edge.
+Along edges that is the sum of their weights; a path through faces has the costs of their corners interpolated in
+between, so both agree where a path follows an edge.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def cost_along(
     positions : (n, 3) float64
         Points on the surface [m].
     point_faces : (n,) int32
-        The face in which the way to each point lies. Corners of infinite cost, which only the faces of a start or a
+        The face in which the segment to each point lies. Corners of infinite cost, which only the faces of a start or a
         goal have, do not count.
     """
     return way_cost(

@@ -67,7 +67,7 @@ class SurfacePlanner(MeshPlanner):
         """Return the best leg, None if there is none (or the search was cancelled)."""
 
     def reach(self, query: LegQuery) -> NDArray[np.float32] | None:
-        """Distances (V,) [m] from the query's start to all this planner finds a way to, inf elsewhere; None: cancelled.
+        """Distances (V,) [m] from the query's start to every vertex with a path, inf elsewhere; None: cancelled.
 
         Here: along the edges of free vertices.
         """
@@ -132,7 +132,7 @@ class SurfacePlanner(MeshPlanner):
     def _locate(
         self, name: str, pose: Pose, snapshot: MeshSnapshot, blocked: NDArray[np.bool_]
     ) -> SurfacePoint | PlanResult:
-        """Put a pose on the surface, or say why that fails."""
+        """Put a pose on the surface, or return why that fails."""
         reach = self.parameters.max_surface_distance
         point = on_surface(self.mesh_map.topology, self.mesh_map.locator, pose.position, reach)
         if point is None:
@@ -150,7 +150,7 @@ class SurfacePlanner(MeshPlanner):
         return point
 
     def _heights_text(self, pose: Pose) -> str:
-        """Say where the ground is at a pose that is not on it."""
+        """Heights of the surface at a pose that is not on it, as a text."""
         heights = sorted(ground_heights(self.mesh_map, pose.x, pose.y))
         if not heights:
             return "there is no surface above or below it"
@@ -173,7 +173,7 @@ class SurfacePlanner(MeshPlanner):
         component = self.mesh_map.components == self.mesh_map.components[nearest_corner(self.mesh_map, start)]
         share = float(np.mean(blocked[component]))
         message = (
-            f"no free way from {position_text(start.point)} to {position_text(goal.point)}: {share:.1%} of "
+            f"no free path from {position_text(start.point)} to {position_text(goal.point)}: {share:.1%} of "
             f"the surface between them is lethal or has cost >= {self.parameters.cost_limit:g}"
         )
         return PlanResult(GetPathOutcome.NO_PATH_FOUND, message)

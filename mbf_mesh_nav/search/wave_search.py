@@ -1,4 +1,4 @@
-"""One continuous wave from a goal, and the exact way down its field: what planners over faces share."""
+"""One continuous wave from a goal, and the exact descent of its field: shared by planners over faces."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class Wave:
     distances : (V,) float32
         Weighted distance [m] to the goal, inf where the wave did not come.
     predecessors, cut_records, bends : (V,) int32
-        See ``kernels.cvp.propagate_wave``.
+        See ``kernels.wave.cvp.propagate_wave``.
     along_edges : bool
-        Whether no way over free faces leads to the start, so that the wave also walked along edges.
+        Whether no path over free faces leads to the start, so that the wave also walked along edges.
     """
 
     distances: NDArray[np.float32]
@@ -77,10 +77,10 @@ class WaveSearch:
         """Bytes of the corner records and their weights."""
         return self._corner_ends.nbytes + (self._weights.of_corners.nbytes if self._weights is not None else 0)
 
-    def spread(self, query: LegQuery, overshoot: float) -> Wave | None:
-        """Spread a wave from the goal until it is ``overshoot`` [m] past the start; None: not reached, or cancelled.
+    def propagate(self, query: LegQuery, overshoot: float) -> Wave | None:
+        """Propagate a wave from the goal until it is ``overshoot`` [m] past the start; None: not reached, or cancelled.
 
-        Where no way over free faces leads to the start, the wave also walks along single edges of free vertices.
+        Where no path over free faces leads to the start, the wave also walks along single edges of free vertices.
         """
         corners = self._mesh_map.faces[query.start.face]
         targets = np.ascontiguousarray(corners[~query.blocked[corners]])
@@ -94,22 +94,22 @@ class WaveSearch:
     def edges_text(
         self, query: LegQuery, wave: Wave, positions: NDArray[np.float64], point_faces: NDArray[np.int32]
     ) -> str:
-        """Say that a path follows edges where no whole face is free, and how far; empty if it need not."""
+        """Note that a path follows edges where no whole face is free, with the length; empty if it does not."""
         if not wave.along_edges:
             return ""
         between_ends = (point_faces[1:] != query.start.face) & (point_faces[1:] != query.goal.face)
         blocked = query.blocked[self._mesh_map.faces[point_faces[1:]]].any(axis=1) & between_ends
         length = math.fsum(math.dist(positions[index], positions[index + 1]) for index in np.flatnonzero(blocked))
-        return f"no way over whole free faces: {length:.2f} m lead along edges between blocked faces"
+        return f"no path over whole free faces: {length:.2f} m lead along edges between blocked faces"
 
     def path(self, query: LegQuery, wave: Wave, pull_over_costs: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-        """Positions (n, 3) from start to goal, and the face (n,) the way to each of them lies in.
+        """Positions (n, 3) from start to goal, and the face (n,) the segment to each of them lies in.
 
-        The way down the field, shortened to a geodesic. Where that is longer than the field says, it has lost its
-        course between two fronts: then the way along which the wave came is shortened, too, and the shorter one taken.
-        Where it leads through few large faces, other courses are looked for.
-        Over costs the cheapest path is no geodesic: there the way down the field stays, or is pulled taut as far as
-        that costs no more (``pull_over_costs``).
+        The descent of the field, shortened to a geodesic. Where that is longer than the field's distance, it has lost
+        its course between two fronts: then the chain of predecessors is shortened, too, and the shorter one taken.
+        Where it leads through few large faces, other courses are looked for. Over costs the cheapest path is no
+        geodesic: there the descent of the field stays, or is shortened as far as that costs no more
+        (``pull_over_costs``).
         """
         start, goal = query.start, query.goal
         if start.face == goal.face:
@@ -131,11 +131,11 @@ class WaveSearch:
         return self._other_course(query, wave, corridor, best)
 
     def _other_course(self, query: LegQuery, wave: Wave, corridor: Corridor, best: Piece) -> Piece:
-        """A shorter way than the best so far through few large faces, see ``other_courses``; else that one."""
+        """A shorter path than the best so far through few large faces, see ``other_courses``; else that one."""
         if not is_worth_a_search(query, best, corridor):
             return best
         back = reversed_query(query)
-        wave_back = self.spread(back, overshoot=0.0)
+        wave_back = self.propagate(back, overshoot=0.0)
         if wave_back is None or wave_back.along_edges:
             return best
         to_goal, to_start = partial(self._trace_from, query, wave), partial(self._trace_from, back, wave_back)
@@ -143,13 +143,13 @@ class WaveSearch:
         return courses.best(best, wave.distances, wave_back.distances)
 
     def _trace_from(self, query: LegQuery, wave: Wave, place: SurfacePoint) -> Piece:
-        """Way down the field from any place the wave came to."""
+        """Descent of the field from any place the wave reached."""
         if place.face == query.goal.face:
             return np.array([place.point, query.goal.point]), np.array([place.face] * 2, dtype=np.int32)
         return self._trace(replace(query, start=place), wave, along_edges=False)
 
     def _trace(self, query: LegQuery, wave: Wave, along_edges: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-        """Way down the field, see ``kernels.descent``."""
+        """Descent of the field, see ``kernels.wave.descent``."""
         start, goal = query.start, query.goal
         return trace_descent(
             self._mesh_map.topology.surface,

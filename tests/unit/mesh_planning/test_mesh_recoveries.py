@@ -162,7 +162,7 @@ def test_escaping_leaves_a_lethal_disc_by_the_shortest_way(run, plain, paint):
     assert result.success, result.message
     assert motion.current.x < 2.25
     result, motion = run(EscapeRecovery, mesh_map, tuple(motion.current.position))
-    assert result.success and "safe ground" in result.message
+    assert result.success and "safe surface" in result.message
     result, _ = run(EscapeRecovery, mesh_map, (2.6, 3.0, 0.0), max_distance=0.2)
     assert result.outcome == RecoveryOutcome.IMPASSABLE
 

@@ -39,19 +39,19 @@ def test_after_any_changes_of_costs_the_wave_equals_that_of_a_new_search(paint, 
             mesh_map.set_edge_cost_factor(1.0)  # what changed is not remembered
         query = query_between_corners(mesh_map)
 
-        wave = search.spread(query, 100.0)
+        wave = search.propagate(query, 100.0)
 
-        np.testing.assert_array_equal(wave.distances, WaveSearch(mesh_map).spread(query, 100.0).distances)
+        np.testing.assert_array_equal(wave.distances, WaveSearch(mesh_map).propagate(query, 100.0).distances)
 
 
 def test_a_field_is_read_with_the_weights_its_wave_was_spread_on(plain, paint):
     # Two threads may plan with one planner: between wave and field of one the other asks for newer weights.
     mesh_map = paint(plain(), lambda v: 0.9 * (np.abs(v[:, 0] - 3.0) < 1.0), edge_cost_factor=3.0)
     search, query = WaveSearch(mesh_map), query_between_corners(mesh_map)
-    wave = search.spread(query, 100.0)
+    wave = search.propagate(query, 100.0)
     expected = WaveSearch(mesh_map).field(query, wave)
     change_some_costs(mesh_map, np.random.default_rng(0))
-    other = search.spread(query_between_corners(mesh_map), 100.0)
+    other = search.propagate(query_between_corners(mesh_map), 100.0)
 
     field = search.field(query, wave)
 
