@@ -1,7 +1,9 @@
-"""Drive back the way the robot came, over ground that was free a moment ago: the simplest escape from a dead end.
+"""Back up: straight, or along the track that the robot has driven; the simplest escape from a dead end.
 
-Follows the driven track by pure pursuit in reverse; where the track ends, is unknown or does not lie behind the robot
-(it turned on the spot since) it backs up straight. Ends (IMPASSABLE) before what the robot would touch behind it.
+With ``along_track`` it follows the driven track by pure pursuit in reverse, over ground that was free a moment ago;
+where the track ends, is unknown or does not lie behind the robot (it turned on the spot since) it backs up straight. A
+long robot in a narrow place should not: steering backward swings its front outward. Ends (IMPASSABLE) before what the
+robot would touch behind it.
 
 When to use: the robot stands too close to something in front to turn. When not: it is hemmed in;
 what came up behind it unseen is not in the map.
@@ -33,11 +35,12 @@ class BackUpParameters(GuardedMotionParameters):
 
     distance: float = parameter(0.5, "How far to back up.", unit="m", gt=0.0, le=10.0)
     speed: float = parameter(0.2, "Backward speed.", unit="m/s", gt=0.0, le=2.0)
-    yaw_rate: float = parameter(0.6, "Yaw rate limit.", unit="rad/s", gt=0.0, le=3.0)
+    along_track: bool = parameter(False, "Follow the track that the robot has driven instead of a straight line.")
+    yaw_rate: float = parameter(0.6, "Yaw rate limit along the track.", unit="rad/s", gt=0.0, le=3.0)
 
 
 class BackUpRecovery(GuardedRecovery):
-    """Backs up along the driven track."""
+    """Backs up straight, or along the driven track."""
 
     Parameters: ClassVar[type[PluginParameters]] = BackUpParameters
     parameters: BackUpParameters
@@ -53,6 +56,8 @@ class BackUpRecovery(GuardedRecovery):
             return tracker.progress >= p.distance
 
         def velocity(pose: Pose) -> Twist:
+            if not p.along_track:
+                return Twist.planar(vx=-p.speed)
             _, curvature = arc_to(pose, tracker.point_at(tracker.progress + LOOKAHEAD))
             return Twist.planar(vx=-p.speed, wz=max(-p.yaw_rate, min(p.yaw_rate, -p.speed * curvature)))
 
@@ -62,7 +67,7 @@ class BackUpRecovery(GuardedRecovery):
     def _track_back(self, pose: Pose) -> NDArray[np.float64]:
         """Points (n, 3) behind the robot: its track from the newest point on, then straight on for ``distance``."""
         beyond, position = self.parameters.distance + LOOKAHEAD, np.asarray(pose.position)
-        track = self.robot.recent_track()[::-1]
+        track = self.robot.recent_track()[::-1] if self.parameters.along_track else np.zeros((0, 3))
         far_enough = norm(track - position) >= LOOKAHEAD / 2.0
         track = track[np.argmax(far_enough) :] if far_enough.any() else track[:0]
         if len(track) == 0 or norm(track[0] - position) > TRACK_GAP or in_robot_frame(pose, track[0])[0] >= 0:

@@ -93,16 +93,22 @@ def test_backing_up_follows_the_driven_curve(run, plain):
     angles = np.linspace(0.0, 1.2, 25)  # a left turn about (1.5, 4.5), radius 1.5
     arc = np.column_stack([1.5 + 1.5 * np.sin(angles), 4.5 - 1.5 * np.cos(angles), np.zeros(25)])
     heading = (math.cos(1.2), math.sin(1.2), 0)
-    result, motion = run(BackUpRecovery, plain(), tuple(arc[-1]), heading, track=arc, distance=1.5)
+    result, motion = run(BackUpRecovery, plain(), tuple(arc[-1]), heading, track=arc, distance=1.5, along_track=True)
     assert result.success, result.message
     assert np.linalg.norm(np.asarray(motion.current.position) - arc[4]) < 0.15
     off_the_arc = np.hypot(motion.current.x - 1.5, motion.current.y - 4.5) - 1.5
     assert abs(off_the_arc) < 0.06
 
 
+def test_backing_up_is_straight_unless_the_track_is_asked_for(run, plain):
+    track = [(3.0 - 0.1 * step, 3.0 - 0.05 * step, 0.0) for step in range(10, 0, -1)]
+    result, motion = run(BackUpRecovery, plain(), track=track, distance=0.6)
+    assert result.success and motion.current.y == pytest.approx(3.0, abs=1e-6)
+
+
 def test_a_track_that_does_not_lie_behind_is_ignored(run, plain):
     ahead = [(3.0 + 0.1 * step, 3.0, 0.0) for step in range(10, 0, -1)]
-    result, motion = run(BackUpRecovery, plain(), track=ahead, distance=0.6)
+    result, motion = run(BackUpRecovery, plain(), track=ahead, distance=0.6, along_track=True)
     assert result.success and motion.current.x == pytest.approx(2.4, abs=0.05)
 
 
