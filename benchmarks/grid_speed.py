@@ -213,7 +213,7 @@ def rolling_local_map(repeats: int) -> float:
         x = 0.5 * step  # the window moves by ten cells
         ends = np.column_stack([x + ranges * np.cos(angles), ranges * np.sin(angles), np.zeros(720)])
         begin = thread_time()
-        costmap.insert_scan("scan", (x, 0.0, 0.0), ends, np.ones(720, dtype=bool), 0.1 * step)
+        costmap.insert_points("scan", ends, (x, 0.0, 0.0), 0.1 * step)
         box = costmap.update(Pose.planar(x, 0.0), 0.1 * step)
         times.append((thread_time() - begin) * 1e3)
         assert box == costmap.geometry.box, "the window moves, so all of it must be made anew"
