@@ -2,7 +2,7 @@
 
 ``rotate``, ``back_up``, ``drive_on_heading``, ``move_away``, ``clear`` and ``relax`` know their map by this contract
 only. A map of a backend derives ``NavigationMap``; a server hands it to its plugins in a ``MapContext``. A map without
-sensors or layers writes ``obstacle_ahead`` and ``nearest_obstacle`` and inherits the rest.
+sensors or layers answers for motions and places and inherits the rest.
 """
 
 from __future__ import annotations
@@ -75,22 +75,22 @@ class NavigationMap(ABC):
         raise ValueError(f"the map listens to no source, got a scan of {scan.source!r}")
 
     # -------------------------------------------------------------------------------------------------- places
+    @abstractmethod
     def point_check(self) -> PlaceCheck:
         """Return a function that gives state and cost of points, on the map as it is now."""
-        raise NotImplementedError(f"{type(self).__name__} cannot be asked about points")
 
+    @abstractmethod
     def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
         """Return a function that gives state and summed cost of the robot's outline, on the map as it is now.
 
         With ``center_only`` only the point below the robot's origin is looked at.
         """
-        raise NotImplementedError(f"{type(self).__name__} cannot be asked about poses")
 
+    @abstractmethod
     def find_valid_pose(
         self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
     ) -> PoseAnswer:
         """Return the nearest pose within the tolerances [m, rad] where the robot fits; both are 0 or more."""
-        raise NotImplementedError(f"{type(self).__name__} cannot be asked where the robot fits")
 
     # -------------------------------------------------------------------------------------------------- motion
     @abstractmethod

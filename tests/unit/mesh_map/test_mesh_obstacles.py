@@ -109,8 +109,7 @@ def test_points_beyond_the_range_limit_are_ignored():
 
 def test_points_at_the_sensor_itself_mark_nothing_and_keep_nothing_from_being_cleared():
     mesh = floor_map(decay_time=5.0)
-    nothing = np.tile(SENSOR, (20, 1))
-    see(mesh, nothing, 1.0)
+    see(mesh, nothing := np.tile(SENSOR, (20, 1)), 1.0)
     assert not mesh.snapshot().lethal.any()
 
     hit, origin = np.array([[2.0, 2.0, 0.5]]), np.array(SENSOR)
@@ -287,11 +286,11 @@ def test_rays_that_hit_nothing_clear_what_they_pass_through():
 
 def test_one_sensor_does_not_make_another_ones_obstacles_forgotten():
     mesh = floor_map()
-    see(mesh, post(1.0, 1.0), 1.0, SENSOR, source="front")
+    see(mesh, post(1.0, 1.0), 1.0, source="front")
     seen = mesh.snapshot().lethal.copy()
-    see(mesh, post(3.0, 3.0), 1.01, SENSOR, source="rear")
+    see(mesh, post(3.0, 3.0), 1.01, source="rear")
     assert mesh.snapshot().lethal[seen].all() and mesh.snapshot().lethal.sum() > seen.sum()
-    see(mesh, post(3.0, 3.0), 1.02, SENSOR, source="front")
+    see(mesh, post(3.0, 3.0), 1.02, source="front")
     assert not (mesh.snapshot().lethal & seen).any(), "its own next cloud replaces what it had seen"
 
 
@@ -338,22 +337,22 @@ def test_obstacles_of_a_sensor_that_is_no_longer_listened_to_are_forgotten():
 
 def test_a_silent_sensor_is_noticed_while_another_speaks():
     mesh = floor_map(expected_update_rate=0.5)
-    see(mesh, post(1.0, 1.0), 1.0, SENSOR, source="front")
-    see(mesh, post(3.0, 3.0), 1.0, SENSOR, source="rear")
-    see(mesh, post(3.0, 3.0), 2.0, SENSOR, source="rear")
+    see(mesh, post(1.0, 1.0), 1.0, source="front")
+    see(mesh, post(3.0, 3.0), 1.0, source="rear")
+    see(mesh, post(3.0, 3.0), 2.0, source="rear")
     assert not mesh.is_current(2.0)
-    see(mesh, post(1.0, 1.0), 2.0, SENSOR, source="front")
+    see(mesh, post(1.0, 1.0), 2.0, source="front")
     assert mesh.is_current(2.0)
 
 
 def test_a_layer_listens_to_its_own_sensors_only_and_waits_for_each():
     mesh = floor_map(sources=("front", "rear"))
     with pytest.raises(ValueError, match=r"'ceiling', known are \['front', 'rear'\]"):
-        see(mesh, post(1.0, 1.0), 1.0, SENSOR, source="ceiling")
+        see(mesh, post(1.0, 1.0), 1.0, source="ceiling")
     assert not mesh.snapshot().lethal.any()
-    see(mesh, post(1.0, 1.0), 1.0, SENSOR, source="front")
+    see(mesh, post(1.0, 1.0), 1.0, source="front")
     assert mesh.snapshot().lethal.any() and not mesh.is_current(1.0)
-    see(mesh, post(1.0, 1.0), 1.0, SENSOR, source="rear")
+    see(mesh, post(1.0, 1.0), 1.0, source="rear")
     assert mesh.is_current(1.0)
 
 
@@ -388,12 +387,12 @@ def test_a_scan_of_another_frame_is_refused():
 
 def test_a_disabled_layer_leaves_the_map_free_and_fresh_until_it_is_enabled_again():
     mesh = floor_map(sources=("front",))
-    see(mesh, post(2.0, 2.0), 1.0, SENSOR, source="front")
+    see(mesh, post(2.0, 2.0), 1.0, source="front")
     seen = mesh.snapshot().lethal.copy()
     settings = mesh.layers["seen"].parameters
     mesh.set_layer_parameters("seen", settings.model_copy(update={"enabled": False}))
     assert seen.any() and not mesh.snapshot().lethal.any() and mesh.is_current(100.0)
-    see(mesh, post(1.0, 1.0), 2.0, SENSOR, source="front")
+    see(mesh, post(1.0, 1.0), 2.0, source="front")
     assert not mesh.snapshot().lethal.any()
     mesh.set_layer_parameters("seen", settings)
     assert np.array_equal(mesh.snapshot().lethal, seen)
