@@ -19,8 +19,8 @@ from mbf_abstract.events import MemorySink
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.plugins import PlanResult
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive
+from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 
 WARM_UP = 500
@@ -35,33 +35,33 @@ def resident_megabytes() -> float:
     return int(fields[1]) * 4096 / 1e6
 
 
-def measure_latency(bench: Bench, goals: int) -> np.ndarray:
+def measure_latency(session: ScriptedSession, goals: int) -> np.ndarray:
     """Seconds from ``send`` to the result, one per goal."""
-    bench.planner.play(PlanResult(0, "", PATH))
+    session.planner.play(PlanResult(0, "", PATH))
     seconds = np.empty(goals)
     for i in range(goals):
-        begin = bench.clock.now()
-        bench.navigator.send(GetPathGoal(TARGET)).wait()
-        seconds[i] = bench.clock.now() - begin
-        bench.planner.requests.clear()
+        begin = session.clock.now()
+        session.navigator.send(GetPathGoal(TARGET)).wait()
+        seconds[i] = session.clock.now() - begin
+        session.planner.requests.clear()
     return seconds
 
 
-def measure_jitter(bench: Bench, seconds: float) -> np.ndarray:
+def measure_jitter(session: ScriptedSession, seconds: float) -> np.ndarray:
     """How far [s] each 20 Hz control cycle begins from its due time."""
     stamps: list[float] = []
 
     def stamp(request: object) -> object:
-        stamps.append(bench.clock.now())
+        stamps.append(session.clock.now())
         return drive(0.1)
 
-    bench.controller.play(stamp)
-    handle = bench.navigator.send(ExePathGoal(FAR))
-    bench.clock.sleep(seconds)
+    session.controller.play(stamp)
+    handle = session.navigator.send(ExePathGoal(FAR))
+    session.clock.sleep(seconds)
     handle.cancel()
     handle.wait()
     periods = np.diff(stamps)
-    return np.abs(periods - 1.0 / bench.server.runtime.parameters.controller_frequency)
+    return np.abs(periods - 1.0 / session.server.runtime.parameters.controller_frequency)
 
 
 def main() -> None:
@@ -70,14 +70,14 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print the JSON line only")
     options = parser.parse_args()
     goals, driving = (1_000, 3.0) if options.quick else (10_000, 20.0)
-    with Bench(clock=WallClock()) as bench:
-        bench.bus.remove_sink(bench.memory)  # it would keep 100,000 events
-        bench.bus.add_sink(MemorySink(1000))
-        measure_latency(bench, WARM_UP)
+    with ScriptedSession(clock=WallClock()) as session:
+        session.events.remove_sink(session.memory)  # it would keep 100,000 events
+        session.events.add_sink(MemorySink(1000))
+        measure_latency(session, WARM_UP)
         threads, memory = threading.active_count(), resident_megabytes()
-        latency = 1e3 * measure_latency(bench, goals)
+        latency = 1e3 * measure_latency(session, goals)
         threads_growth, rss_growth = threading.active_count() - threads, resident_megabytes() - memory
-        jitter = 1e3 * measure_jitter(bench, driving)
+        jitter = 1e3 * measure_jitter(session, driving)
     answer = {
         "goals": goals,
         "latency_ms_p50": round(float(np.percentile(latency, 50)), 4),

@@ -13,13 +13,13 @@ from mbf_abstract.config.configuration import Config
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.config.yaml_source import read_yaml
 from mbf_abstract.drive.robot import Odometry
-from mbf_abstract.events import EventBus, MemorySink
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.view import UNKNOWN_OCCUPANCY, FloorMap
 from mbf_abstract.server.factory import installed_servers, read_config
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
-from mbf_abstract.time.sim_clock import SimClock
+from mbf_abstract.session import NavigationSession
+from mbf_abstract.time.clock import Clock
 
 YAML_SUFFIXES = {".yaml", ".yml"}
 
@@ -27,7 +27,7 @@ YAML_SUFFIXES = {".yaml", ".yml"}
 class StandingRobot:
     """A robot that never moves; commands to it are a mistake of the caller and have no effect."""
 
-    def __init__(self, clock: SimClock) -> None:
+    def __init__(self, clock: Clock) -> None:
         self._clock = clock
 
     def send_command(self, command: Command) -> None:
@@ -41,8 +41,8 @@ class StandingRobot:
 @contextmanager
 def standing_server(cls: type[AbstractNavigationServer], config: Config) -> Iterator[AbstractNavigationServer]:
     """Build a server around a robot that stands at the origin; it is closed at the end."""
-    clock = SimClock()
-    with cls(config, StandingRobot(clock), clock, events=EventBus(clock.now, [MemorySink()])) as server:
+    with NavigationSession() as session:
+        server = session.serve(cls, config, StandingRobot(session.clock))
         place_robot(server, Pose.planar(0.0, 0.0, frame_id=config.parameters.global_frame))
         yield server
 

@@ -1,7 +1,8 @@
-"""For tests of plugins, executives and map backends: scripted plugins, a loopback robot, a bench, the contracts.
+"""For tests of plugins, executives and map backends: scripted plugins, a loopback robot, sessions, the contracts.
 
-Nothing here is meant for a real robot. Start with ``bench.Bench`` to run goals, with ``check_planner`` and its siblings
-in ``contract`` to test a plugin of your own, and with ``check_map_backend`` to test a map backend of your own.
+Nothing here is meant for a real robot. Start with ``scripted_session.ScriptedSession`` to run goals, with
+``check_planner`` and its siblings in ``contract`` to test a plugin of your own, and with ``check_map_backend`` to test
+a map backend of your own.
 """
 
 from __future__ import annotations

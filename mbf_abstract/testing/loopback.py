@@ -13,6 +13,7 @@ from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import AckermannCommand, Command, Pose, Twist, quaternion_from_yaw
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import Clock, Priority
 
 MAX_LOGGED_COMMANDS = 100_000
@@ -125,3 +126,23 @@ class LoopbackRobot:
         T = self.T_map_odom
         self._transforms.set(Transform(T.translation, T.rotation, T.parent, T.child, now))
         self._transforms.set(Transform((self._x, self._y, self._z), rotation, "odom", "base_link", now))
+
+
+class LoopbackSession(NavigationSession):
+    """A session with a loopback robot; give ``robot`` and ``transforms`` to ``serve``.
+
+    Parameters
+    ----------
+    start : Pose
+        Where the robot stands.
+    clock : Clock, optional
+        A new ``SimClock`` if not given.
+    period : float
+        Time of one step of the robot [s].
+    """
+
+    def __init__(self, start: Pose, clock: Clock | None = None, period: float = 0.02) -> None:
+        super().__init__(clock)
+        self.transforms = TransformBuffer()
+        self.robot = LoopbackRobot(self.clock, self.transforms, start, period)
+        self.on_close(self.robot.close)

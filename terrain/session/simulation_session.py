@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from mbf_abstract.events import EventBus, EventSink, MemorySink
+from mbf_abstract.events import EventSink
 from mbf_abstract.geometry import Command, Pose
-from mbf_abstract.navigator import Navigator
-from mbf_abstract.server.factory import make_server
-from mbf_abstract.time.clock import Clock, WallClock
+from mbf_abstract.server.factory import read_config
+from mbf_abstract.session import NavigationSession
+from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
 from terrain.physics.simulation import Simulation
 from terrain.recording.run_digest import RunDigest
@@ -22,7 +22,6 @@ from terrain.session.drive_loop import DEFAULT_RATES, ClockedRobot, DriveLoop
 S = TypeVar("S", bound="SimulationSession")
 
 SENSE_FIRST = 0.5  # s; by then every sensor has measured and every map has been updated
-TIME_TO_END = 1.0  # s of simulated time for threads to end; it passes only while a thread waits
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class SessionOptions:
     on_step: Callable[[str], None] = lambda text: None
 
 
-class SimulationSession(ABC):
+class SimulationSession(NavigationSession, ABC):
     """Wires simulation, server and navigator on one clock; a context manager in which time passes.
 
     Parameters
@@ -73,11 +72,6 @@ class SimulationSession(ABC):
 
     Attributes
     ----------
-    clock : Clock
-    navigator : Navigator
-    events : EventBus
-    memory : MemorySink
-        Its events so far.
     digest : RunDigest
         Of every pose, command and event.
     loop : DriveLoop
@@ -100,15 +94,14 @@ class SimulationSession(ABC):
         send: Callable[[Command], None] | None = None,
     ) -> None:
         self.simulation = simulation
-        self.clock: Clock = WallClock() if options.wall_clock else SimClock()
-        self.memory = MemorySink(maxlen=self.max_events)
-        self.digest = RunDigest(self.clock.now)
-        self.events = EventBus(self.clock.now, [self.memory, self.digest, *options.sinks])
+        clock = WallClock() if options.wall_clock else SimClock()
+        self.digest = RunDigest(clock.now)
+        super().__init__(clock, [self.digest, *options.sinks], self.max_events)
         robot = ClockedRobot(simulation, send or simulation.robot.send_command, self.digest)
         options.on_step("building the map")
-        server = make_server(config_file, robot, self.clock, events=self.events, seed=options.seed or 0)
-        self.navigator = Navigator(server)
+        server = self.serve(*read_config(config_file), robot, seed=options.seed or 0)
         self.loop = DriveLoop(simulation, robot, localization, server, self.digest, self.rates)
+        self.on_close(self.loop.stop)
         self.loop.publish()
         options.on_step("compiling kernels (first run only)")
         server.warm_up(simulation.robot.pose(), self.goals[0], options.on_step)
@@ -123,17 +116,6 @@ class SimulationSession(ABC):
         self.loop.start()
         self.clock.sleep(SENSE_FIRST)
 
-    def close(self) -> None:
-        """Stop the robot, the server and the simulator."""
-        self.loop.stop()
-        self.navigator.close()
-        if isinstance(self.clock, SimClock):
-            self.clock.sleep(TIME_TO_END)
-        self.events.close()
-
     def __enter__(self: S) -> S:
         self.run()
         return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()

@@ -1,9 +1,9 @@
 """Fault table, row 31: clocks that stand still, and long pauses."""
 
 from mbf_abstract.goals.goal_types import ExePathGoal
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.promises import assert_ended_once, assert_stops
+from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
 
@@ -19,18 +19,18 @@ def test_the_clocks_never_run_backwards():
 
 def test_after_a_huge_pause_nothing_is_commanded_on_the_old_pose():
     """A laptop that sleeps: for an hour nothing runs, then everything is due at once."""
-    with Bench(tf_timeout=0.5, controller_patience=2.0) as bench:
+    with ScriptedSession(tf_timeout=0.5, controller_patience=2.0) as session:
 
         def sleep_for_an_hour(request):
-            bench.robot.publishes_pose = False
-            bench.clock.sleep(3600.0)
+            session.robot.publishes_pose = False
+            session.clock.sleep(3600.0)
             return drive(3.0)
 
-        bench.controller.play(drive(), drive(), sleep_for_an_hour)
-        handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
+        session.controller.play(drive(), drive(), sleep_for_an_hour)
+        handle = session.navigator.send(ExePathGoal(session.path_to(50.0)))
         result = handle.wait()
         assert not result.success
-        bench.clock.sleep(4000.0)
-        assert_stops(bench, 0.1)
-        assert all(command.vx < 3.0 for _, command in bench.robot.commands)
-        assert_ended_once(bench, handle)
+        session.clock.sleep(4000.0)
+        assert_stops(session, 0.1)
+        assert all(command.vx < 3.0 for _, command in session.robot.commands)
+        assert_ended_once(session, handle)

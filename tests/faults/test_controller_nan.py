@@ -6,37 +6,37 @@ from mbf_abstract.geometry import Twist
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlResult
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive, nan_command, no_command
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 INFINITE = [lambda request: ControlResult(0, "go", Twist.planar(wz=float("inf")))]
 
 
 @pytest.mark.parametrize("bad", [nan_command, no_command, *INFINITE])
 def test_it_counts_as_no_valid_command_and_the_robot_stands(bad):
-    with Bench(controller_max_retries=0) as bench:
-        bench.controller.play(drive(), bad)
-        handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
+    with ScriptedSession(controller_max_retries=0) as session:
+        session.controller.play(drive(), bad)
+        handle = session.navigator.send(ExePathGoal(session.path_to(50.0)))
         result = handle.wait()
-        assert len(bench.controller.requests) == 2
+        assert len(session.controller.requests) == 2
         assert result.outcome == ExePathOutcome.NO_VALID_CMD
-        assert bench.robot.command.is_stopped()
-        assert_ended_once(bench, handle)
-        assert_next_goals_work(bench)
+        assert session.robot.command.is_stopped()
+        assert_ended_once(session, handle)
+        assert_next_goals_work(session)
 
 
 def test_retries_and_patience_apply_and_the_robot_stands_meanwhile():
-    with Bench(controller_max_retries=-1, controller_patience=1.0) as bench:
-        bench.controller.play(drive(), nan_command)
-        result = bench.navigator.exe_path(bench.path_to(50.0))
-        assert len(bench.controller.requests) > 15
+    with ScriptedSession(controller_max_retries=-1, controller_patience=1.0) as session:
+        session.controller.play(drive(), nan_command)
+        result = session.navigator.exe_path(session.path_to(50.0))
+        assert len(session.controller.requests) > 15
         assert result.outcome == ExePathOutcome.PAT_EXCEEDED
         assert "must be finite, got nan" in result.message
-        assert_stops(bench, 0.05)
+        assert_stops(session, 0.05)
 
 
 def test_one_bad_cycle_is_forgiven():
-    with Bench() as bench:
-        bench.controller.play(drive(0.1), nan_command, bench.controller.follow)
-        assert bench.navigator.exe_path(bench.path_to(2.0)).success
+    with ScriptedSession() as session:
+        session.controller.play(drive(0.1), nan_command, session.controller.follow)
+        assert session.navigator.exe_path(session.path_to(2.0)).success

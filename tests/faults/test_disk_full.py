@@ -5,7 +5,7 @@ import os
 import pytest
 
 from mbf_abstract.events import EventKind, JsonLinesSink, read_events
-from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 
 class FillingDisk(JsonLinesSink):
@@ -23,13 +23,13 @@ class FillingDisk(JsonLinesSink):
 
 
 def test_the_run_goes_on_and_the_log_degrades_to_memory_with_one_warning(tmp_path):
-    with Bench() as bench:
+    with ScriptedSession() as session:
         disk = FillingDisk(tmp_path / "events.jsonl")
-        bench.bus.remove_sink(bench.memory)
-        bench.bus.add_sink(disk)
-        assert bench.navigator.exe_path(bench.path_to(2.0)).success
+        session.events.remove_sink(session.memory)
+        session.events.add_sink(disk)
+        assert session.navigator.exe_path(session.path_to(2.0)).success
         assert disk.refused == 1  # the fault happened, once
-        memory = bench.bus.memory
+        memory = session.events.memory
         assert [event.data["sink"] for event in memory.of_kind(EventKind.SINK_FAILED)] == ["FillingDisk"]
         assert memory.of_kind(EventKind.GOAL_FINISHED)
         on_disk = list(read_events(tmp_path / "events.jsonl"))
@@ -38,8 +38,8 @@ def test_the_run_goes_on_and_the_log_degrades_to_memory_with_one_warning(tmp_pat
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs the device of a full disk")
 def test_a_device_without_space_is_survived():
-    with Bench() as bench:
-        bench.bus.add_sink(JsonLinesSink("/dev/full"))
-        assert bench.navigator.exe_path(bench.path_to(1.0)).success
-        (failed,) = bench.events(EventKind.SINK_FAILED)
+    with ScriptedSession() as session:
+        session.events.add_sink(JsonLinesSink("/dev/full"))
+        assert session.navigator.exe_path(session.path_to(1.0)).success
+        (failed,) = session.recorded(EventKind.SINK_FAILED)
         assert "No space left on device" in failed.data["message"]

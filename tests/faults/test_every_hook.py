@@ -10,18 +10,18 @@ from mbf_abstract.execution.runtime import MapHooks
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, RecoveryGoal, RefinePathGoal
 from mbf_abstract.plugins import PLUGIN_BASES, PluginKind
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 LIMITS = {"planner_patience": 2.0, "controller_patience": 2.0, "recovery_patience": 2.0, "cancel_grace": 0.5}
 ENDS_WITHIN = 8.0  # s: driving, patience, grace, and a call that is late by LATE
 LATE = 3.0  # s
 GOALS = {
-    PluginKind.PLANNER: lambda bench: GetPathGoal(Pose.planar(3.0, 0.0)),
-    PluginKind.CONTROLLER: lambda bench: ExePathGoal(bench.path_to(1.0)),
-    PluginKind.RECOVERY: lambda bench: RecoveryGoal(),
-    PluginKind.REFINER: lambda bench: RefinePathGoal(bench.path_to(3.0)),
+    PluginKind.PLANNER: lambda session: GetPathGoal(Pose.planar(3.0, 0.0)),
+    PluginKind.CONTROLLER: lambda session: ExePathGoal(session.path_to(1.0)),
+    PluginKind.RECOVERY: lambda session: RecoveryGoal(),
+    PluginKind.REFINER: lambda session: RefinePathGoal(session.path_to(3.0)),
 }
 CALLED_OTHERWISE = {"parameters_changed"}  # by the client's own thread, which gets what it raises
 
@@ -83,7 +83,7 @@ PLUGIN_HOOKS = [(kind, name) for kind, base in PLUGIN_BASES.items() for name in 
 
 
 class PassingOn:
-    """A driver in front of the bench's own."""
+    """A driver in front of the session's own."""
 
     def __init__(self):
         self.robot = None
@@ -96,62 +96,64 @@ class PassingOn:
         return self.robot.odometry() if self.robot is not None else None
 
 
-def drive_with(bench, owner, hook, fault, goal, monkeypatch):
+def drive_with(session, owner, hook, fault, goal, monkeypatch):
     """Send a goal while ``hook`` of ``owner`` is at fault, cancel it on its way; healthy again, the next ones work."""
-    faulty = FAULTS[fault](getattr(owner, hook), bench.clock)
+    faulty = FAULTS[fault](getattr(owner, hook), session.clock)
     monkeypatch.setattr(owner, hook, faulty)
-    handle = bench.navigator.send(goal)
-    bench.clock.sleep(1.0)
+    handle = session.navigator.send(goal)
+    session.clock.sleep(1.0)
     handle.cancel()
-    begun = bench.clock.now()
+    begun = session.clock.now()
     handle.wait(ENDS_WITHIN)
-    assert handle.done, f"{handle.status} after {bench.clock.now() - begun:.2f} s"
-    assert_ended_once(bench, handle)
+    assert handle.done, f"{handle.status} after {session.clock.now() - begun:.2f} s"
+    assert_ended_once(session, handle)
     monkeypatch.undo()
     getattr(faulty, "release", lambda: None)()
-    ended = bench.clock.now()
-    bench.clock.sleep(LATE + 1.0)
+    ended = session.clock.now()
+    session.clock.sleep(LATE + 1.0)
     if hook == "send_command":
-        assert bench.robot.command.is_stopped()  # the driver holds a command back as long as it likes; zero follows it
+        assert (
+            session.robot.command.is_stopped()
+        )  # the driver holds a command back as long as it likes; zero follows it
     else:
-        assert_stops(bench, ended)
-    assert_next_goals_work(bench)
+        assert_stops(session, ended)
+    assert_next_goals_work(session)
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize(("kind", "hook"), PLUGIN_HOOKS, ids=lambda value: getattr(value, "name", value))
 def test_every_hook_of_every_plugin_keeps_the_promises(kind, hook, fault, monkeypatch):
-    with Bench(**LIMITS) as bench:
-        plugin = getattr(bench, kind.name.lower())
-        drive_with(bench, plugin, hook, fault, GOALS[kind](bench), monkeypatch)
+    with ScriptedSession(**LIMITS) as session:
+        plugin = getattr(session, kind.name.lower())
+        drive_with(session, plugin, hook, fault, GOALS[kind](session), monkeypatch)
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("hook", hooks(Robot))
 def test_every_hook_of_a_driver_keeps_the_promises(hook, fault, monkeypatch):
     driver = PassingOn()
-    with Bench(robot=driver, **LIMITS) as bench:
-        driver.robot = bench.robot
-        drive_with(bench, driver, hook, fault, ExePathGoal(bench.path_to(1.0)), monkeypatch)
+    with ScriptedSession(robot=driver, **LIMITS) as session:
+        driver.robot = session.robot
+        drive_with(session, driver, hook, fault, ExePathGoal(session.path_to(1.0)), monkeypatch)
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("hook", hooks(MapHooks))
 def test_every_hook_of_a_map_keeps_the_promises(hook, fault, monkeypatch):
-    with Bench(**LIMITS) as bench:
-        drive_with(bench, bench.server, hook, fault, ExePathGoal(bench.path_to(1.0)), monkeypatch)
+    with ScriptedSession(**LIMITS) as session:
+        drive_with(session, session.server, hook, fault, ExePathGoal(session.path_to(1.0)), monkeypatch)
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("method", ["add_done_callback", "add_feedback_callback"])
 def test_callbacks_at_fault_hold_up_nothing(method, fault):
-    with Bench(**LIMITS) as bench:
-        faulty = FAULTS[fault](lambda *arguments: None, bench.clock)
-        handle = bench.navigator.send(ExePathGoal(bench.path_to(1.0)))
+    with ScriptedSession(**LIMITS) as session:
+        faulty = FAULTS[fault](lambda *arguments: None, session.clock)
+        handle = session.navigator.send(ExePathGoal(session.path_to(1.0)))
         getattr(handle, method)(faulty)
         assert handle.wait(ENDS_WITHIN).success
-        assert_ended_once(bench, handle)
-        assert_next_goals_work(bench)
+        assert_ended_once(session, handle)
+        assert_next_goals_work(session)
         getattr(faulty, "release", lambda: None)()
 
 

@@ -8,21 +8,21 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.promises import assert_next_goals_work
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 GOAL = GetPathGoal(Pose.planar(1.0, 0.0))
 
 
 def test_of_a_flood_one_goal_runs_one_waits_and_the_rest_end_with_a_reason():
-    with Bench(planner_patience=0.0) as bench:
-        hang = Hang(bench.clock, then=straight_plan)
-        bench.planner.play(hang)
-        handles = [bench.navigator.send(GOAL) for _ in range(1)]
-        bench.clock.sleep(0.0)
-        handles += [bench.navigator.send(GOAL) for _ in range(2000)]
+    with ScriptedSession(planner_patience=0.0) as session:
+        hang = Hang(session.clock, then=straight_plan)
+        session.planner.play(hang)
+        handles = [session.navigator.send(GOAL) for _ in range(1)]
+        session.clock.sleep(0.0)
+        handles += [session.navigator.send(GOAL) for _ in range(2000)]
         ended = [handle for handle in handles if handle.done]
         assert hang.entered == 1
         assert len(handles) - len(ended) <= 2
@@ -30,21 +30,21 @@ def test_of_a_flood_one_goal_runs_one_waits_and_the_rest_end_with_a_reason():
         assert all(handle.result.outcome == GetPathOutcome.CANCELED and handle.result.message for handle in ended)
         hang.release()
         assert handles[-1].wait().success
-        assert_next_goals_work(bench)
+        assert_next_goals_work(session)
 
 
 def test_1000_goals_leave_no_thread_and_no_handle_behind():
-    with Bench() as bench:
-        bench.navigator.get_path(GOAL.target_pose)
+    with ScriptedSession() as session:
+        session.navigator.get_path(GOAL.target_pose)
         threads = threading.active_count()
         handles = []
         for _ in range(1000):
-            handle = bench.navigator.send(GOAL)
+            handle = session.navigator.send(GOAL)
             handle.wait()
             handles.append(weakref.ref(handle))
         del handle
-        bench.planner.requests.clear()
-        bench.clock.sleep(1.0)
+        session.planner.requests.clear()
+        session.clock.sleep(1.0)
         gc.collect()
         assert threading.active_count() <= threads
         assert sum(reference() is not None for reference in handles) <= 2

@@ -8,36 +8,36 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanResult
-from mbf_abstract.testing.bench import SCRIPTED, Bench
 from mbf_abstract.testing.faulty import BusyHang, Hang, drive, obedient
 from mbf_abstract.testing.promises import assert_next_goals_work
 from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
+from mbf_abstract.testing.scripted_session import SCRIPTED, ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
 
 GOAL = GetPathGoal(Pose.planar(3.0, 0.0))
 
 
-def wait_until_nothing_hangs(bench):
+def wait_until_nothing_hangs(session):
     """Let the late threads, which are on the real processor's time, come back."""
-    while bench.server.runtime.hanging:
-        bench.clock.sleep(0.01)
+    while session.server.runtime.hanging:
+        session.clock.sleep(0.01)
 
 
 def test_plugins_that_the_wall_clock_guard_gave_up_are_back_after_their_calls_return():
-    with Bench(hang_guard=0.1, max_quarantined=2) as bench:
+    with ScriptedSession(hang_guard=0.1, max_quarantined=2) as session:
         for _ in range(3):  # more than max_quarantined
             hang = BusyHang()
-            bench.planner.play(hang)
-            assert bench.navigator.send(GOAL).wait().outcome == GetPathOutcome.PAT_EXCEEDED
+            session.planner.play(hang)
+            assert session.navigator.send(GOAL).wait().outcome == GetPathOutcome.PAT_EXCEEDED
             hang.release.cancel()
-            wait_until_nothing_hangs(bench)
+            wait_until_nothing_hangs(session)
             hang = BusyHang()
-            bench.controller.play(drive(), hang)
-            assert not bench.navigator.send(ExePathGoal(bench.path_to(50.0))).wait().success
+            session.controller.play(drive(), hang)
+            assert not session.navigator.send(ExePathGoal(session.path_to(50.0))).wait().success
             hang.release.cancel()
-            wait_until_nothing_hangs(bench)
-            assert_next_goals_work(bench)
+            wait_until_nothing_hangs(session)
+            assert_next_goals_work(session)
 
 
 class DeafPlanner(ScriptedPlanner):
@@ -54,22 +54,22 @@ class DeafPlanner(ScriptedPlanner):
 
 
 def test_a_cancel_that_hangs_costs_one_thread_however_many_goals_are_canceled():
-    with Bench({**SCRIPTED, "planner": DeafPlanner}, clock=WallClock(), planner_patience=0.0) as bench:
+    with ScriptedSession({**SCRIPTED, "planner": DeafPlanner}, clock=WallClock(), planner_patience=0.0) as session:
         canceled = PlanResult(GetPathOutcome.CANCELED, "canceled")
-        bench.planner.play(obedient(bench.clock, 60.0, straight_plan, canceled))
+        session.planner.play(obedient(session.clock, 60.0, straight_plan, canceled))
         threads = []
         for _ in range(20):
-            handle = bench.navigator.send(GOAL)
-            while not bench.planner.requests:
-                bench.clock.sleep(0.001)
-            bench.planner.requests.clear()
+            handle = session.navigator.send(GOAL)
+            while not session.planner.requests:
+                session.clock.sleep(0.001)
+            session.planner.requests.clear()
             handle.cancel()
             assert handle.wait(5.0).outcome == GetPathOutcome.CANCELED
             threads.append(threading.active_count())
         assert max(threads) - min(threads) <= 1
-        assert bench.planner.entered == 1
-        bench.planner.released.set()
-        assert_next_goals_work(bench)
+        assert session.planner.entered == 1
+        session.planner.released.set()
+        assert_next_goals_work(session)
 
 
 @pytest.mark.parametrize("still_runs", [True, False])
@@ -83,18 +83,18 @@ def test_a_cancel_that_comes_back_late_is_made_up_for_only_while_its_goal_still_
                 self.clock.sleep(3.0)
             return True
 
-    with Bench(
+    with ScriptedSession(
         {**SCRIPTED, "planner": SlowToCancel}, clock=SimClock(), planner_patience=0.0, cancel_grace=9.0
-    ) as bench:
-        ignored = Hang(bench.clock, then=straight_plan)
-        bench.planner.play(obedient(bench.clock, 60.0, straight_plan, straight_plan), ignored, straight_plan)
+    ) as session:
+        ignored = Hang(session.clock, then=straight_plan)
+        session.planner.play(obedient(session.clock, 60.0, straight_plan, straight_plan), ignored, straight_plan)
         for _ in range(2):
-            handle = bench.navigator.send(GOAL)
-            bench.clock.sleep(0.5)
+            handle = session.navigator.send(GOAL)
+            session.clock.sleep(0.5)
             handle.cancel()
-            bench.clock.sleep(0.5)
+            session.clock.sleep(0.5)
         if not still_runs:
             ignored.release()
-        bench.clock.sleep(5.0)
+        session.clock.sleep(5.0)
         assert SlowToCancel.calls == (2 if still_runs else 1)
         ignored.release()

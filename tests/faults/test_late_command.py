@@ -4,23 +4,23 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Twist
 from mbf_abstract.goals.goal_types import ExePathGoal, RecoveryGoal
 from mbf_abstract.plugins import RecoveryResult
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive, slow
 from mbf_abstract.testing.promises import assert_next_goals_work, assert_stops
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 
 def test_a_command_computed_during_the_cancel_does_not_reach_the_robot():
-    with Bench(cancel_grace=1.0) as bench:
-        bench.controller.play(drive(), slow(bench.clock, 0.4, drive(3.0)))
-        handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
-        bench.clock.sleep(0.1)
+    with ScriptedSession(cancel_grace=1.0) as session:
+        session.controller.play(drive(), slow(session.clock, 0.4, drive(3.0)))
+        handle = session.navigator.send(ExePathGoal(session.path_to(50.0)))
+        session.clock.sleep(0.1)
         handle.cancel()
         handle.wait()
-        bench.clock.sleep(2.0)
-        assert len(bench.controller.requests) == 2
-        assert all(command.vx < 3.0 for _, command in bench.robot.commands)
-        assert_stops(bench, 0.1)
-        assert_next_goals_work(bench)
+        session.clock.sleep(2.0)
+        assert len(session.controller.requests) == 2
+        assert all(command.vx < 3.0 for _, command in session.robot.commands)
+        assert_stops(session, 0.1)
+        assert_next_goals_work(session)
 
 
 def test_a_recovery_that_keeps_its_motion_cannot_drive_after_its_end():
@@ -31,12 +31,12 @@ def test_a_recovery_that_keeps_its_motion_cannot_drive_after_its_end():
         assert request.motion.send(Twist.planar(0.2))
         return RecoveryResult(0, "done")
 
-    with Bench() as bench:
-        bench.recovery.play(keep_motion)
-        bench.navigator.send(RecoveryGoal()).wait()
-        end = bench.clock.now()
+    with ScriptedSession() as session:
+        session.recovery.play(keep_motion)
+        session.navigator.send(RecoveryGoal()).wait()
+        end = session.clock.now()
         assert not kept[0].send(Twist.planar(0.7))
-        assert not bench.robot.moved_after(end)
-        dropped = bench.events(EventKind.COMMAND_DROPPED)
+        assert not session.robot.moved_after(end)
+        dropped = session.recorded(EventKind.COMMAND_DROPPED)
         assert [event.data["command"] for event in dropped] == [[0.7, 0.0, 0.0]]
-        assert_next_goals_work(bench)
+        assert_next_goals_work(session)

@@ -10,9 +10,9 @@ from mbf_abstract.config.configuration import load_config
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.goal_types import ExePathGoal
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
+from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_costmap_nav.files.map_description import MapError
 from mbf_costmap_nav.files.map_io import load_image, load_map
 from mbf_mesh_nav.files.mesh_io import read_mesh
@@ -78,18 +78,18 @@ def test_a_mesh_that_claims_a_billion_faces_is_refused_before_they_get_memory(tm
 
 def test_a_path_of_100000_poses_is_followed_in_bounded_memory():
     path = Path.from_points(np.linspace((0.0, 0.0, 0.0), (POSES * 0.05, 0.0, 0.0), POSES))
-    with Bench() as bench:
-        bench.controller.play(drive(0.3))
+    with ScriptedSession() as session:
+        session.controller.play(drive(0.3))
         tracemalloc.start()
-        handle = bench.navigator.send(ExePathGoal(path))
-        bench.clock.sleep(1.0)
+        handle = session.navigator.send(ExePathGoal(path))
+        session.clock.sleep(1.0)
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         handle.cancel()
         handle.wait()
-        assert len(bench.controller.paths[0]) == POSES
-        assert len(bench.controller.requests) >= 19  # from the first cycle on, at 20 Hz
-        assert bench.robot.moved_after(0.0)
-        assert_ended_once(bench, handle)
+        assert len(session.controller.paths[0]) == POSES
+        assert len(session.controller.requests) >= 19  # from the first cycle on, at 20 Hz
+        assert session.robot.moved_after(0.0)
+        assert_ended_once(session, handle)
         assert peak < 3 * (path.positions.nbytes + path.orientations.nbytes)
-        assert_next_goals_work(bench)
+        assert_next_goals_work(session)

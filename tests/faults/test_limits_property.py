@@ -11,8 +11,8 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import AckermannCommand, Twist
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.plugins import ControlResult
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 LIMITS = VelocityLimits(max_vel_x=1.0, min_vel_x=-0.3, max_vel_y=0.5, max_vel_theta=2.0, max_steering_angle=0.6)
 number = st.floats(-50.0, 50.0).map(lambda value: round(value, 6))
@@ -46,35 +46,35 @@ def test_within_the_limits_a_command_passes_untouched():
 
 
 def test_the_robot_gets_the_limited_command_and_the_event_reports_both():
-    with Bench(max_vel_x=0.4, max_vel_theta=0.8) as bench:
-        bench.controller.play(drive(2.0, 1.0))
-        handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
-        bench.clock.sleep(1.0)
+    with ScriptedSession(max_vel_x=0.4, max_vel_theta=0.8) as session:
+        session.controller.play(drive(2.0, 1.0))
+        handle = session.navigator.send(ExePathGoal(session.path_to(50.0)))
+        session.clock.sleep(1.0)
         handle.cancel()
         handle.wait()
-        moving = bench.robot.moved_after(-1.0)
+        moving = session.robot.moved_after(-1.0)
         assert len(moving) >= 20
         assert all((command.vx, command.wz) == (0.4, 0.2) for _, command in moving)
-        clamped = bench.events(EventKind.COMMAND_CLAMPED)
+        clamped = session.recorded(EventKind.COMMAND_CLAMPED)
         assert clamped[0].data == {"requested": [2.0, 0.0, 1.0], "sent": [0.4, 0.0, 0.2]}
 
 
 def test_a_car_that_is_driven_with_twists_gets_no_curve_tighter_than_its_own():
-    with Bench(min_turning_radius=1.0) as bench:
-        bench.controller.play(drive(0.5, 1.0))
-        handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
-        bench.clock.sleep(0.5)
+    with ScriptedSession(min_turning_radius=1.0) as session:
+        session.controller.play(drive(0.5, 1.0))
+        handle = session.navigator.send(ExePathGoal(session.path_to(50.0)))
+        session.clock.sleep(0.5)
         handle.cancel()
         handle.wait()
-        assert {(command.vx, command.wz) for _, command in bench.robot.moved_after(-1.0)} == {(0.5, 0.5)}
+        assert {(command.vx, command.wz) for _, command in session.robot.moved_after(-1.0)} == {(0.5, 0.5)}
 
 
 def test_a_car_is_limited_in_speed_and_steering_angle():
-    with Bench(max_vel_x=0.4, max_steering_angle=0.3) as bench:
-        bench.controller.play(ControlResult(0, "go", AckermannCommand(2.0, 1.0)))
-        handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
-        bench.clock.sleep(0.5)
+    with ScriptedSession(max_vel_x=0.4, max_steering_angle=0.3) as session:
+        session.controller.play(ControlResult(0, "go", AckermannCommand(2.0, 1.0)))
+        handle = session.navigator.send(ExePathGoal(session.path_to(50.0)))
+        session.clock.sleep(0.5)
         handle.cancel()
         handle.wait()
-        assert {command for _, command in bench.robot.moved_after(-1.0)} == {AckermannCommand(0.4, 0.3)}
-        assert bench.robot.command == AckermannCommand(0.0, 0.3)
+        assert {command for _, command in session.robot.moved_after(-1.0)} == {AckermannCommand(0.4, 0.3)}
+        assert session.robot.command == AckermannCommand(0.0, 0.3)

@@ -17,10 +17,10 @@ from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.plugins import PluginKind
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.testing.promises import assert_next_goals_work, assert_stops
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.sim_clock import SimClock
 from mbf_costmap_nav.plugins import CostmapPlanner
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
@@ -110,33 +110,33 @@ def test_a_planner_that_writes_into_the_map_fails_and_the_map_stays_as_it_was(na
 
 
 def test_a_controller_that_writes_into_its_path_stops_the_robot_and_the_senders_path_stays_as_it_was():
-    with Bench() as bench:
-        path = bench.path_to(5.0)
+    with ScriptedSession() as session:
+        path = session.path_to(5.0)
         before = path.positions.copy()
 
         def bend(request):
-            bench.controller.paths[-1].positions[:, 1] += 1.0
+            session.controller.paths[-1].positions[:, 1] += 1.0
 
-        bench.controller.play(bend)
-        result = bench.navigator.send(ExePathGoal(path)).wait()
+        session.controller.play(bend)
+        result = session.navigator.send(ExePathGoal(path)).wait()
         assert result.outcome == ExePathOutcome.INTERNAL_ERROR
         assert "read-only" in result.message
-        assert_stops(bench, bench.clock.now())
+        assert_stops(session, session.clock.now())
         assert np.array_equal(path.positions, before)
-        assert_next_goals_work(bench)
+        assert_next_goals_work(session)
 
 
 def test_a_planner_that_changes_its_request_fails():
-    with Bench() as bench:
+    with ScriptedSession() as session:
 
         def move_the_goal(request):
             request.goal = Pose.planar(0.0, 0.0)
 
-        bench.planner.play(move_the_goal)
-        result = bench.navigator.get_path(Pose.planar(3.0, 0.0))
+        session.planner.play(move_the_goal)
+        result = session.navigator.get_path(Pose.planar(3.0, 0.0))
         assert result.outcome == GetPathOutcome.INTERNAL_ERROR
         assert dataclasses.FrozenInstanceError.__name__ in result.message
-        assert_next_goals_work(bench)
+        assert_next_goals_work(session)
 
 
 def test_a_path_does_not_change_with_the_arrays_it_was_made_of():

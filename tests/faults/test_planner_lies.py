@@ -10,9 +10,9 @@ from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome, is_success
 from mbf_abstract.plugins import PlanResult
 from mbf_abstract.testing import faulty
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 
 def outcome(code, message="found"):
@@ -38,31 +38,31 @@ def outcome(code, message="found"):
     ],
 )
 def test_a_lie_becomes_a_failure_that_names_it(lie, outcome, text):
-    with Bench() as bench:
-        bench.planner.play(lie)
-        handle = bench.navigator.send(GetPathGoal(Pose.planar(3.0, 0.0)))
+    with ScriptedSession() as session:
+        session.planner.play(lie)
+        handle = session.navigator.send(GetPathGoal(Pose.planar(3.0, 0.0)))
         result = handle.wait()
-        assert len(bench.planner.requests) == 1  # the lie was told
+        assert len(session.planner.requests) == 1  # the lie was told
         assert (result.outcome, result.path) == (outcome, None)
         assert text in result.message
-        assert_ended_once(bench, handle)
-        assert_next_goals_work(bench)
+        assert_ended_once(session, handle)
+        assert_next_goals_work(session)
 
 
 def test_an_outcome_of_another_action_does_not_pass_as_success():
-    with Bench(planner_max_retries=0) as bench:
-        bench.planner.play(PlanResult(999, "strange"))
-        assert not is_success(bench.navigator.get_path(Pose.planar(3.0, 0.0)).outcome)
+    with ScriptedSession(planner_max_retries=0) as session:
+        session.planner.play(PlanResult(999, "strange"))
+        assert not is_success(session.navigator.get_path(Pose.planar(3.0, 0.0)).outcome)
 
 
 def test_no_outcome_and_no_message_ends_the_record_of_the_run(tmp_path):
-    with Bench() as bench:
-        bench.bus.add_sink(JsonLinesSink(tmp_path / "events.jsonl"))
+    with ScriptedSession() as session:
+        session.events.add_sink(JsonLinesSink(tmp_path / "events.jsonl"))
         huge = "x" * 30_000_000
-        bench.planner.play(outcome(10**5000), outcome(0, huge), RuntimeError(huge), straight_plan)
+        session.planner.play(outcome(10**5000), outcome(0, huge), RuntimeError(huge), straight_plan)
         for _ in range(4):
-            bench.navigator.get_path(Pose.planar(3.0, 0.0))
-        bench.bus.close()
+            session.navigator.get_path(Pose.planar(3.0, 0.0))
+        session.events.close()
         ends = [event for event in read_events(tmp_path / "events.jsonl") if event.kind is EventKind.GOAL_FINISHED]
         assert [event.data["outcome"] for event in ends] == [62, 0, 62, 0]
         assert (tmp_path / "events.jsonl").stat().st_size < 100_000

@@ -6,29 +6,29 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 
 @pytest.mark.parametrize("error", [RuntimeError("boom"), KeyError("x"), ZeroDivisionError(), RecursionError("deep")])
 def test_a_raising_planner_ends_the_goal_with_type_message_and_plugin(error):
-    with Bench() as bench:
-        bench.planner.play(error)
-        handle = bench.navigator.send(GetPathGoal(Pose.planar(3.0, 0.0)))
+    with ScriptedSession() as session:
+        session.planner.play(error)
+        handle = session.navigator.send(GetPathGoal(Pose.planar(3.0, 0.0)))
         result = handle.wait()
-        assert len(bench.planner.requests) == 1  # the fault happened, and is not retried
+        assert len(session.planner.requests) == 1  # the fault happened, and is not retried
         assert result.outcome == GetPathOutcome.INTERNAL_ERROR
         assert "planner" in result.message
         assert type(error).__name__ in result.message
         assert str(error) in result.message
-        assert_ended_once(bench, handle)
-        assert_next_goals_work(bench)
+        assert_ended_once(session, handle)
+        assert_next_goals_work(session)
 
 
 def test_the_traceback_is_in_the_event():
-    with Bench() as bench:
-        bench.planner.play(RuntimeError("boom"))
-        bench.navigator.get_path(Pose.planar(3.0, 0.0))
-        (fault,) = bench.events(EventKind.FAULT)
+    with ScriptedSession() as session:
+        session.planner.play(RuntimeError("boom"))
+        session.navigator.get_path(Pose.planar(3.0, 0.0))
+        (fault,) = session.recorded(EventKind.FAULT)
         assert fault.data["type"] == "RuntimeError"
         assert any("scripted.py" in line for line in fault.data["traceback"])

@@ -9,9 +9,9 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.server.plugin_host import ServerError
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.testing.scripted import ScriptedPlanner
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 BAD_PLANNERS = """\
 backend: none
@@ -63,7 +63,7 @@ def test_optional_plugins_are_left_out_with_their_reason(tmp_path):
 )
 def test_a_raising_constructor_refuses_the_server_and_names_the_plugin(plugin, text):
     with pytest.raises(ServerError, match=rf"planner 'broken' \({plugin.__name__}\): {text}"):
-        Bench({"broken": plugin})
+        ScriptedSession({"broken": plugin})
 
 
 def test_a_module_that_exits_on_import_is_a_finding(tmp_path, monkeypatch):
@@ -76,9 +76,9 @@ def test_a_module_that_exits_on_import_is_a_finding(tmp_path, monkeypatch):
 
 def test_after_a_refused_start_a_good_one_works():
     with pytest.raises(ServerError):
-        Bench({"good": ScriptedPlanner, "broken": BrokenConstructor})
-    with Bench({"good": ScriptedPlanner}) as bench:
-        assert isinstance(bench.robot, LoopbackRobot)
-        assert isinstance(bench.transforms, TransformBuffer)
-        assert bench.navigator.get_path(Pose.planar(1.0, 0.0)).success
-        assert not bench.events(EventKind.FAULT)
+        ScriptedSession({"good": ScriptedPlanner, "broken": BrokenConstructor})
+    with ScriptedSession({"good": ScriptedPlanner}) as session:
+        assert isinstance(session.robot, LoopbackRobot)
+        assert isinstance(session.transforms, TransformBuffer)
+        assert session.navigator.get_path(Pose.planar(1.0, 0.0)).success
+        assert not session.recorded(EventKind.FAULT)

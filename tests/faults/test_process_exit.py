@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from mbf_abstract.goals.goal_types import ExePathGoal
-from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 PROGRAM = """
 import os, signal, sys
@@ -23,7 +23,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell lets its bac
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # and nohup lets its program ignore this one
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal
 from mbf_abstract.time.clock import WallClock
-from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.testing.faulty import BusyHang, Hang, drive
 
 class Robot:
@@ -36,26 +36,26 @@ class Robot:
         return None
 
 def run(path, hang=False):
-    bench = Bench(clock=WallClock(), robot=Robot(path), tf_timeout=60.0)
+    session = ScriptedSession(clock=WallClock(), robot=Robot(path), tf_timeout=60.0)
     if hang:
-        bench.controller.play(drive(), drive(), Hang(bench.clock))
+        session.controller.play(drive(), drive(), Hang(session.clock))
     else:
-        bench.controller.play(drive())
-    bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
-    bench.clock.sleep(0.3)
+        session.controller.play(drive())
+    session.navigator.send(ExePathGoal(session.path_to(50.0)))
+    session.clock.sleep(0.3)
     print("driving", flush=True)
-    return bench
+    return session
 
-def plan_for_long(bench):
-    bench.planner.play(Hang(bench.clock))
-    return bench.navigator.send(GetPathGoal(bench.robot.pose))
+def plan_for_long(session):
+    session.planner.play(Hang(session.clock))
+    return session.navigator.send(GetPathGoal(session.robot.pose))
 """
 ENDS = {
-    "end of the program": "bench = run(sys.argv[1])",
-    "sys.exit": "bench = run(sys.argv[1]); sys.exit(3)",
-    "exception": "bench = run(sys.argv[1]); raise RuntimeError('user code')",
-    "hanging plugin": "bench = run(sys.argv[1], hang=True)",
-    "context manager": "\nwith run(sys.argv[1]) as bench:\n    raise RuntimeError('user code')",
+    "end of the program": "session = run(sys.argv[1])",
+    "sys.exit": "session = run(sys.argv[1]); sys.exit(3)",
+    "exception": "session = run(sys.argv[1]); raise RuntimeError('user code')",
+    "hanging plugin": "session = run(sys.argv[1], hang=True)",
+    "context manager": "\nwith run(sys.argv[1]) as session:\n    raise RuntimeError('user code')",
 }
 
 
@@ -88,7 +88,7 @@ def test_however_the_process_ends_the_robot_is_sent_zero(tmp_path, end):
 
 def test_ctrl_c_stops_the_robot(tmp_path):
     log = tmp_path / "commands"
-    with start("bench = run(sys.argv[1]); bench.clock.sleep(60.0)", log) as process:
+    with start("session = run(sys.argv[1]); session.clock.sleep(60.0)", log) as process:
         assert process.stdout.readline().strip() == "driving"
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=20)
@@ -96,26 +96,26 @@ def test_ctrl_c_stops_the_robot(tmp_path):
 
 
 WAITS = {
-    "sleep": "bench = run(sys.argv[1]); bench.clock.sleep(60.0)",
-    "context manager": "\nwith run(sys.argv[1]) as bench:\n    bench.clock.sleep(60.0)",
-    "wait": "bench = run(sys.argv[1]); plan_for_long(bench).wait()",
-    "hanging plugin": "bench = run(sys.argv[1], hang=True); bench.clock.sleep(60.0)",
+    "sleep": "session = run(sys.argv[1]); session.clock.sleep(60.0)",
+    "context manager": "\nwith run(sys.argv[1]) as session:\n    session.clock.sleep(60.0)",
+    "wait": "session = run(sys.argv[1]); plan_for_long(session).wait()",
+    "hanging plugin": "session = run(sys.argv[1], hang=True); session.clock.sleep(60.0)",
     "asyncio": """
 import asyncio
 async def main():
-    await plan_for_long(bench)
-bench = run(sys.argv[1])
+    await plan_for_long(session)
+session = run(sys.argv[1])
 asyncio.run(main())
 """,
     "lock of the gate": """
-bench = run(sys.argv[1])
-with bench.server.runtime.gate._condition:  # as if the signal came in the middle of a command
-    bench.clock.sleep(60.0)
+session = run(sys.argv[1])
+with session.server.runtime.gate._condition:  # as if the signal came in the middle of a command
+    session.clock.sleep(60.0)
 """,
     "exit that is refused": """
 clock = WallClock()
 try:
-    bench = run(sys.argv[1])
+    session = run(sys.argv[1])
     clock.sleep(60.0)
 except SystemExit:
     clock.sleep(1.0)
@@ -141,11 +141,11 @@ def test_a_handler_of_the_program_itself_is_left_alone_and_comes_back_after_the_
     program = """
 own = lambda number, frame: os.write(1, b"mine\\n")
 signal.signal(signal.SIGHUP, own)
-bench = run(sys.argv[1])
+session = run(sys.argv[1])
 os.kill(os.getpid(), signal.SIGHUP)
-other = Bench(clock=WallClock())
+other = ScriptedSession(clock=WallClock())
 print(signal.getsignal(signal.SIGTERM) is signal.SIG_DFL, flush=True)
-bench.close()
+session.close()
 print(signal.getsignal(signal.SIGTERM) is signal.SIG_DFL, flush=True)
 other.close()
 print(signal.getsignal(signal.SIGTERM) is signal.SIG_DFL, signal.getsignal(signal.SIGHUP) is own, flush=True)
@@ -159,7 +159,7 @@ def test_a_forked_child_that_is_terminated_ends_and_its_parents_robot_drives_on(
     log = tmp_path / "commands"
     program = """
 import time
-bench = run(sys.argv[1])
+session = run(sys.argv[1])
 begun, begin = os.pipe()
 child = os.fork()
 if child == 0:
@@ -170,8 +170,8 @@ os.read(begun, 1)
 os.kill(child, signal.SIGTERM)
 _, status = os.waitpid(child, 0)
 print(os.WTERMSIG(status), flush=True)
-os.write(bench.server.runtime.gate._writer._robot.file, b"9\\n")
-bench.clock.sleep(0.2)
+os.write(session.server.runtime.gate._writer._robot.file, b"9\\n")
+session.clock.sleep(0.2)
 """
     with start(program, log) as process:
         output, _ = process.communicate(timeout=20)
@@ -184,13 +184,13 @@ bench.clock.sleep(0.2)
 def test_a_forked_child_that_ends_does_not_stop_or_drive_the_robot(tmp_path):
     log = tmp_path / "commands"
     program = """
-bench = run(sys.argv[1])
+session = run(sys.argv[1])
 child = os.fork()
 if child == 0:
     sys.exit(0)
 os.waitpid(child, 0)
-os.write(bench.server.runtime.gate._writer._robot.file, b"9\\n")
-bench.clock.sleep(0.2)
+os.write(session.server.runtime.gate._writer._robot.file, b"9\\n")
+session.clock.sleep(0.2)
 """
     with start(program, log) as process:
         process.communicate(timeout=20)
@@ -216,15 +216,15 @@ def test_ctrl_c_in_the_middle_of_the_last_command_is_passed_on_and_zero_follows(
             return self.robot.odometry()
 
     driver = Driver()
-    bench = Bench(robot=driver, command_timeout=0.2)
-    driver.robot = bench.robot
-    handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
-    bench.clock.sleep(1.0)
+    session = ScriptedSession(robot=driver, command_timeout=0.2)
+    driver.robot = session.robot
+    handle = session.navigator.send(ExePathGoal(session.path_to(50.0)))
+    session.clock.sleep(1.0)
     with pytest.raises(error):
-        bench.server.close()
+        session.server.close()
     assert driver.interrupted
     assert handle.wait(2.0).message == "the server is shut down"
-    bench.clock.sleep(1.0)
-    assert bench.robot.command.is_stopped()
-    bench.close()
-    assert set(bench.clock.thread_names) == {"main"}
+    session.clock.sleep(1.0)
+    assert session.robot.command.is_stopped()
+    session.close()
+    assert set(session.clock.thread_names) == {"main"}

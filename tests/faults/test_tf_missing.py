@@ -5,8 +5,8 @@ import pytest
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 NOWHERE = Pose.planar(1.0, 0.0, frame_id="nowhere")
 
@@ -21,29 +21,29 @@ NOWHERE = Pose.planar(1.0, 0.0, frame_id="nowhere")
     ],
 )
 def test_a_goal_in_an_unknown_frame_names_both_frames_and_what_exists(goal, outcome):
-    with Bench() as bench:
-        handle = bench.navigator.send(goal)
+    with ScriptedSession() as session:
+        handle = session.navigator.send(goal)
         result = handle.wait()
         assert result.outcome == outcome
         assert "from 'nowhere' to 'map'" in result.message
         assert "map->odom" in result.message
-        assert not bench.robot.moved_after(-1.0)
-        assert_ended_once(bench, handle)
-        assert_next_goals_work(bench)
+        assert not session.robot.moved_after(-1.0)
+        assert_ended_once(session, handle)
+        assert_next_goals_work(session)
 
 
 def test_a_robot_without_a_pose_gets_no_plan_and_no_command():
-    with Bench(tf_timeout=0.5, controller_patience=1.0) as bench:
-        path = bench.path_to(3.0)
-        bench.robot.publishes_pose = False
-        bench.transforms.clear()
-        plan = bench.navigator.get_path(Pose.planar(3.0, 0.0))
+    with ScriptedSession(tf_timeout=0.5, controller_patience=1.0) as session:
+        path = session.path_to(3.0)
+        session.robot.publishes_pose = False
+        session.transforms.clear()
+        plan = session.navigator.get_path(Pose.planar(3.0, 0.0))
         assert plan.outcome == GetPathOutcome.TF_ERROR
         assert "'base_link'" in plan.message
         assert "'map'" in plan.message
-        assert bench.navigator.exe_path(path).outcome == ExePathOutcome.TF_ERROR
-        assert not bench.robot.moved_after(-1.0)
-        assert not bench.planner.requests
-        bench.robot.publishes_pose = True
-        bench.clock.sleep(0.1)
-        assert_next_goals_work(bench)
+        assert session.navigator.exe_path(path).outcome == ExePathOutcome.TF_ERROR
+        assert not session.robot.moved_after(-1.0)
+        assert not session.planner.requests
+        session.robot.publishes_pose = True
+        session.clock.sleep(0.1)
+        assert_next_goals_work(session)

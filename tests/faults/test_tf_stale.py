@@ -4,38 +4,38 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.controller_state import ControllerState
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.promises import assert_ended_once, assert_next_goals_work, assert_stops
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 
 def test_the_robot_holds_and_the_goal_ends_with_the_age_after_patience():
-    with Bench(tf_timeout=0.5, controller_patience=2.0) as bench:
-        handle = bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
-        bench.clock.sleep(1.0)
-        bench.robot.publishes_pose = False
-        silent_since = bench.clock.now()
+    with ScriptedSession(tf_timeout=0.5, controller_patience=2.0) as session:
+        handle = session.navigator.send(ExePathGoal(session.path_to(50.0)))
+        session.clock.sleep(1.0)
+        session.robot.publishes_pose = False
+        silent_since = session.clock.now()
         result = handle.wait()
         assert result.outcome == ExePathOutcome.TF_ERROR
         assert "s old, limit 0.500 s" in result.message
         assert "odom->base_link" in result.message
-        assert not bench.robot.moved_after(silent_since + 0.6)  # P6: no command on an old pose
-        assert_stops(bench, silent_since + 0.5)
-        assert_ended_once(bench, handle)
-        assert bench.navigator.get_path(bench.path_to(1.0)[-1]).outcome == GetPathOutcome.TF_ERROR
-        bench.robot.publishes_pose = True
-        bench.clock.sleep(0.1)
-        assert_next_goals_work(bench)
+        assert not session.robot.moved_after(silent_since + 0.6)  # P6: no command on an old pose
+        assert_stops(session, silent_since + 0.5)
+        assert_ended_once(session, handle)
+        assert session.navigator.get_path(session.path_to(1.0)[-1]).outcome == GetPathOutcome.TF_ERROR
+        session.robot.publishes_pose = True
+        session.clock.sleep(0.1)
+        assert_next_goals_work(session)
 
 
 def test_the_robot_drives_on_if_the_pose_comes_back_within_patience():
-    with Bench(tf_timeout=0.5, controller_patience=3.0) as bench:
-        handle = bench.navigator.send(ExePathGoal(bench.path_to(3.0)))
-        bench.clock.sleep(1.0)
-        bench.robot.publishes_pose = False
-        bench.clock.sleep(2.0)
-        assert bench.robot.command.is_stopped()
+    with ScriptedSession(tf_timeout=0.5, controller_patience=3.0) as session:
+        handle = session.navigator.send(ExePathGoal(session.path_to(3.0)))
+        session.clock.sleep(1.0)
+        session.robot.publishes_pose = False
+        session.clock.sleep(2.0)
+        assert session.robot.command.is_stopped()
         assert not handle.done
-        bench.robot.publishes_pose = True
+        session.robot.publishes_pose = True
         assert handle.wait().success
-        states = [event.data["new"] for event in bench.events(EventKind.STATE_CHANGED)]
+        states = [event.data["new"] for event in session.recorded(EventKind.STATE_CHANGED)]
         assert ControllerState.HOLDING.value in states

@@ -9,15 +9,15 @@ import pytest
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import ExePathGoal, GetPathGoal, MoveBaseGoal
 from mbf_abstract.goals.handle import GoalStatus
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import Hang
 from mbf_abstract.testing.promises import assert_ended_once
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 
 def start_plan_and_stop():
     """Run one server and return whether it planned, and a weak reference to it."""
-    with Bench() as bench:
-        return bench.navigator.get_path(Pose.planar(1.0, 0.0)).success, weakref.ref(bench.server)
+    with ScriptedSession() as session:
+        return session.navigator.get_path(Pose.planar(1.0, 0.0)).success, weakref.ref(session.server)
 
 
 def test_100_starts_and_stops_leave_nothing_behind():
@@ -33,45 +33,45 @@ def test_100_starts_and_stops_leave_nothing_behind():
 
 
 def test_closing_twice_changes_nothing():
-    bench = Bench()
-    bench.close()
-    bench.close()
-    assert bench.robot.command.is_stopped()
+    session = ScriptedSession()
+    session.close()
+    session.close()
+    assert session.robot.command.is_stopped()
 
 
 def test_shutdown_while_driving_stops_the_robot_and_ends_every_goal():
-    with Bench() as bench:
+    with ScriptedSession() as session:
         handles = [
-            bench.navigator.send(MoveBaseGoal(Pose.planar(50.0, 0.0))),
-            bench.navigator.send(GetPathGoal(Pose.planar(1.0, 0.0), concurrency_slot=5)),
+            session.navigator.send(MoveBaseGoal(Pose.planar(50.0, 0.0))),
+            session.navigator.send(GetPathGoal(Pose.planar(1.0, 0.0), concurrency_slot=5)),
         ]
-        bench.clock.sleep(2.0)
-        assert not bench.robot.command.is_stopped()
-        bench.server.close()
-        closed_at = bench.clock.now()
-        bench.clock.sleep(3.0)
-        assert not bench.robot.moved_after(closed_at)
+        session.clock.sleep(2.0)
+        assert not session.robot.command.is_stopped()
+        session.server.close()
+        closed_at = session.clock.now()
+        session.clock.sleep(3.0)
+        assert not session.robot.moved_after(closed_at)
         for handle in handles:
-            assert_ended_once(bench, handle)
+            assert_ended_once(session, handle)
 
 
 @pytest.mark.parametrize("goal", [GetPathGoal(Pose.planar(1.0, 0.0)), MoveBaseGoal(Pose.planar(1.0, 0.0))])
 def test_a_goal_after_the_shutdown_is_rejected(goal):
-    with Bench() as bench:
-        bench.server.close()
-        handle = bench.navigator.send(goal)
+    with ScriptedSession() as session:
+        session.server.close()
+        handle = session.navigator.send(goal)
         assert handle.status is GoalStatus.REJECTED
         assert handle.result.message
 
 
 def test_shutdown_with_a_hanging_controller_does_not_wait_for_it():
-    with Bench() as bench:
-        hang = Hang(bench.clock)
-        bench.controller.play(hang)
-        bench.navigator.send(ExePathGoal(bench.path_to(50.0)))
-        bench.clock.sleep(0.5)
-        before = bench.clock.now()
-        bench.server.close()
-        assert (hang.entered, bench.clock.now() - before) == (1, 0.0)
-        assert bench.robot.command.is_stopped()
+    with ScriptedSession() as session:
+        hang = Hang(session.clock)
+        session.controller.play(hang)
+        session.navigator.send(ExePathGoal(session.path_to(50.0)))
+        session.clock.sleep(0.5)
+        before = session.clock.now()
+        session.server.close()
+        assert (hang.entered, session.clock.now() - before) == (1, 0.0)
+        assert session.robot.command.is_stopped()
         hang.release()

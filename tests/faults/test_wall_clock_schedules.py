@@ -18,9 +18,9 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.goals.goal_types import ExePathGoal, FollowWaypointsGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
-from mbf_abstract.testing.bench import SCRIPTED, Bench
 from mbf_abstract.testing.faulty import drive, obedient, slow
 from mbf_abstract.testing.scripted import ScriptedController, straight_plan
+from mbf_abstract.testing.scripted_session import SCRIPTED, ScriptedSession
 from mbf_abstract.time.clock import WallClock
 
 GOALS_PER_SERVER = 40
@@ -125,15 +125,15 @@ class Ledger:
                 over.add(goal)
 
 
-def prepare(bench, rng):
-    clock = bench.clock
+def prepare(session, rng):
+    clock = session.clock
     canceled, no = PlanResult(GetPathOutcome.CANCELED, ""), PlanResult(GetPathOutcome.NO_PATH_FOUND, "no")
     plans = [straight_plan, no, slow(clock, 0.01, straight_plan), obedient(clock, 0.02, straight_plan, canceled)]
     plans += [RuntimeError("planner"), SystemExit("planner"), slow(clock, 0.25, no)]  # the last one is abandoned
-    bench.planner.play(*[plans[rng.choice(7, p=[0.4, 0.1, 0.2, 0.2, 0.04, 0.03, 0.03])] for _ in range(50)])
+    session.planner.play(*[plans[rng.choice(7, p=[0.4, 0.1, 0.2, 0.2, 0.04, 0.03, 0.03])] for _ in range(50)])
     blocked, enough = ControlResult(ExePathOutcome.BLOCKED_PATH, "no"), ControlResult(ExePathOutcome.CANCELED, "")
     for name in ("controller", "other"):
-        controller = bench.plugin(name, ScriptedController)
+        controller = session.plugin(name, ScriptedController)
         controller.stops_itself = bool(rng.random() < 0.3)
         answers = [controller.follow, drive(0.3), blocked, slow(clock, 0.02, drive(0.2)), enough]
         answers += [RuntimeError("controller"), slow(clock, 0.25, drive(0.2))]
@@ -144,7 +144,7 @@ def prepare(bench, rng):
         request.motion.send(Twist.planar(0.1))
         return RecoveryResult(0 if request.motion.sleep(0.02) else RecoveryOutcome.CANCELED, "")
 
-    bench.recovery.play(creep, RecoveryResult(RecoveryOutcome.FAILURE, ""), RuntimeError("recovery"), creep)
+    session.recovery.play(creep, RecoveryResult(RecoveryOutcome.FAILURE, ""), RuntimeError("recovery"), creep)
 
 
 def random_goal(rng):
@@ -159,13 +159,13 @@ def random_goal(rng):
     ][rng.choice(5, p=[0.4, 0.25, 0.1, 0.15, 0.1])]
 
 
-def client(bench, ledger, rng, goals):
+def client(session, ledger, rng, goals):
     """Send goals, and cancel, pause, resume and ask about those of all clients at random moments."""
-    server = bench.server
+    server = session.server
     while goals > 0:
         time.sleep(float(rng.choice([0.0, 0.0, 1e-3, 5e-3, 2e-2])))
         if rng.random() < 0.5 or not ledger.handles:
-            ledger.take(bench.navigator.send(random_goal(rng)))
+            ledger.take(session.navigator.send(random_goal(rng)))
             goals -= 1
             continue
         handle = ledger.handles[int(rng.integers(len(ledger.handles)))]
@@ -180,13 +180,15 @@ def run_schedule(seed):
     clock = DelayingClock(seed)
     plugins = {**SCRIPTED, "other": ScriptedController}
     limits = dict.fromkeys(("planner_patience", "controller_patience", "recovery_patience"), 0.1)
-    bench = Bench(plugins, clock, cancel_grace=0.05, max_quarantined=100, controller_frequency=100.0, **limits)
-    bench.bus.add_sink(DelayingSink(clock.delay))
-    prepare(bench, rng)
+    session = ScriptedSession(
+        plugins, clock, cancel_grace=0.05, max_quarantined=100, controller_frequency=100.0, **limits
+    )
+    session.events.add_sink(DelayingSink(clock.delay))
+    prepare(session, rng)
     ledger = Ledger()
     seeds = rng.integers(2**31, size=CLIENTS)
     clients = [
-        threading.Thread(target=client, args=(bench, ledger, np.random.default_rng(s), GOALS_PER_SERVER // CLIENTS))
+        threading.Thread(target=client, args=(session, ledger, np.random.default_rng(s), GOALS_PER_SERVER // CLIENTS))
         for s in seeds
     ]
     for thread in clients:
@@ -199,22 +201,22 @@ def run_schedule(seed):
             handle.cancel()
     elif rng.random() < 0.5:
         ledger.handles[-1].resume()
-    bench.server.close()
+    session.server.close()
     try:
-        return verify(bench, ledger)
+        return verify(session, ledger)
     finally:
-        bench.robot.close()
+        session.robot.close()
 
 
-def verify(bench, ledger):
+def verify(session, ledger):
     handles = ledger.handles
     for handle in handles:
         handle.wait(30.0)
     until = time.monotonic() + 30.0  # parts of move_base may end a little later, and callbacks too
-    while (ledger.missing() or any(a.busy for a in bench.server._actions())) and time.monotonic() < until:
+    while (ledger.missing() or any(a.busy for a in session.server._actions())) and time.monotonic() < until:
         time.sleep(0.01)
-    ends = Counter(event.data["goal_id"] for event in bench.events(EventKind.GOAL_FINISHED))
-    accepted = {event.data["goal_id"] for event in bench.events(EventKind.GOAL_ACCEPTED)}
+    ends = Counter(event.data["goal_id"] for event in session.recorded(EventKind.GOAL_FINISHED))
+    accepted = {event.data["goal_id"] for event in session.recorded(EventKind.GOAL_ACCEPTED)}
     problems = {
         "ended twice": [goal for goal, count in ends.items() if count > 1],
         "never ended": [goal for goal in accepted if goal not in ends],
@@ -223,8 +225,8 @@ def verify(bench, ledger):
         "done callbacks too many": list(ledger.done_calls() - Counter(ledger.added)),
         "called before the end": [goal for goal, _, over in ledger.calls if not over],
         "feedback after the end": list(ledger.late_feedback()),
-        "driving": [] if bench.robot.command.is_stopped() else [bench.robot.command],
-        "faults of the framework": [e.data for e in bench.events(EventKind.FAULT) if "where" not in e.data],
+        "driving": [] if session.robot.command.is_stopped() else [session.robot.command],
+        "faults of the framework": [e.data for e in session.recorded(EventKind.FAULT) if "where" not in e.data],
     }
     return {name: found for name, found in problems.items() if found}
 

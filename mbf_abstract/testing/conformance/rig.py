@@ -12,17 +12,14 @@ from typing import Any, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.events import EventBus, MemorySink
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.rotations import quaternion_from_yaw
 from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.server.factory import make_server as server_of_file
+from mbf_abstract.server.factory import read_config
 from mbf_abstract.server.map_server import MapServer
-from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.time.clock import Priority
-from mbf_abstract.time.sim_clock import SimClock
 
 GROUND_X, GROUND_Y = 12.0, 8.0
 """The ground is flat, empty and known from (0, 0) to here [m]; beyond is none."""
@@ -56,18 +53,11 @@ class Box:
         return math.hypot(max(self.x0 - x, 0.0, x - self.x1), max(self.y0 - y, 0.0, y - self.y1))
 
 
-class BackendRig:
-    """Clock, robot, frames, events and the world of one situation.
+class BackendRig(LoopbackSession):
+    """The session of one situation and its world; its frames are ``map -> odom -> base_link -> lidar, map -> dock``.
 
     Attributes
     ----------
-    clock : SimClock
-    transforms : TransformBuffer
-        ``map -> odom -> base_link -> lidar``, and ``map -> dock``.
-    robot : LoopbackRobot
-    events : EventBus
-    memory : MemorySink
-        All events.
     folder : path
         An empty folder, for files of maps.
     boxes : list of Box
@@ -81,32 +71,32 @@ class BackendRig:
     """
 
     def __init__(self, folder: FilePath) -> None:
-        self.clock = SimClock()
-        self.transforms = TransformBuffer()
+        super().__init__(START, period=0.05)
         self.transforms.set(T_map_dock)
         self.transforms.set(Transform((0.0, 0.0, SENSOR_HEIGHT), parent="base_link", child=SENSOR, static=True))
-        self.robot = LoopbackRobot(self.clock, self.transforms, START, period=0.05)
-        self.memory = MemorySink(100_000)
-        self.events = EventBus(self.clock.now, [self.memory])
         self.folder = folder
         self.boxes: list[Box] = []
         self.sensing = True
         self.track: list[tuple[float, float, float]] = []
         self.sensor_errors: list[str] = []
         self._over = False
+        self.on_close(self._stop_sensor)
 
     def server(self, config: str, parameters: Mapping[str, Any]) -> MapServer:
         """Make the server of a configuration's text, with parameters that the text does not set.
 
         Raises
         ------
-        ConfigError, ServerError
-            As ``mbf_abstract.server.factory.make_server``.
+        ConfigError
+            With all findings.
+        ServerError
+            A plugin's constructor failed.
         """
         file = self.folder / "navigation.yaml"
         lines = (f"{name}: {json.dumps(value)}" for name, value in parameters.items())  # JSON is legal YAML
         file.write_text("\n".join([config, *lines]), "utf-8")
-        return cast(MapServer, server_of_file(file, self.robot, self.clock, self.transforms, self.events))
+        server_class, checked = read_config(file)
+        return cast(MapServer, self.serve(server_class, checked, self.robot, self.transforms))
 
     def start_sensor(self, server: MapServer) -> None:
         """Scan from now on."""
@@ -129,11 +119,8 @@ class BackendRig:
         """Least distance [m] between the robot's middle and a box on the whole track."""
         return min((box.gap(x, y) for box in self.boxes for _, x, y in self.track), default=math.inf)
 
-    def close(self) -> None:
-        """End the threads."""
+    def _stop_sensor(self) -> None:
         self._over = True
-        self.robot.close()
-        self.clock.sleep(1.0)
 
     def _loop(self, server: MapServer) -> None:
         start, ticks = self.clock.now(), 0

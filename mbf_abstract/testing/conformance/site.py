@@ -209,18 +209,12 @@ def situation(**parameters: Any) -> Callable[[Callable[[Site], None]], Situation
 @contextmanager
 def site(make_server: MakeServer, report: Report | None = None, **parameters: Any) -> Iterator[Site]:
     """Make a server in a world of its own, wait until its map is current, and close both afterwards."""
-    with TemporaryDirectory() as folder:
-        rig = BackendRig(FilePath(folder))
-        try:
-            server = make_server(rig, **{**PARAMETERS, **parameters})
-            rig.start_sensor(server)
-            rig.clock.sleep(0.55)
-            try:
-                yield Site(rig, server, report or Report("site"))
-            finally:
-                server.close()
-        finally:
-            rig.close()
+    with TemporaryDirectory() as folder, BackendRig(FilePath(folder)) as rig:
+        server = make_server(rig, **{**PARAMETERS, **parameters})
+        rig.on_close(server.close)  # also where make_server has not asked the rig for it
+        rig.start_sensor(server)
+        rig.clock.sleep(0.55)
+        yield Site(rig, server, report or Report("site"))
 
 
 def somewhere(x: float, y: float, frame_id: str = "map") -> Pose:

@@ -11,13 +11,11 @@ import numpy as np
 
 from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import Plugin, PluginContext
-from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.testing.loopback import LoopbackRobot, LoopbackSession
 from mbf_abstract.time.cancel import CancelToken
-from mbf_abstract.time.clock import WallClock, wall_seconds
-from mbf_abstract.time.sim_clock import SimClock
+from mbf_abstract.time.clock import Clock, WallClock, wall_seconds
 
 P = TypeVar("P", bound=Plugin)
 ContextMaker = Callable[[PluginContext], PluginContext]
@@ -36,9 +34,8 @@ class Rig(Generic[P]):
     """A plugin with its clock and robot."""
 
     plugin: P
-    clock: SimClock
+    clock: Clock
     robot: LoopbackRobot
-    information: RobotInformation
 
 
 @contextmanager
@@ -46,16 +43,11 @@ def rig(
     plugin_class: type[P], make_context: ContextMaker, parameters: PluginParameters | None, start: Pose
 ) -> Iterator[Rig[P]]:
     """Make a fresh plugin, always with the same seed, and end the robot's thread afterwards."""
-    clock, transforms = SimClock(), TransformBuffer()
-    robot = LoopbackRobot(clock, transforms, start)
-    information = RobotInformation(robot, transforms, clock, start.frame_id)
-    chosen = plugin_class.Parameters() if parameters is None else parameters
-    base = PluginContext("dut", chosen, clock, np.random.default_rng(0), information)
-    try:
-        yield Rig(plugin_class(make_context(base)), clock, robot, information)
-    finally:
-        robot.close()
-        clock.sleep(0.1)
+    with LoopbackSession(start) as session:
+        information = RobotInformation(session.robot, session.transforms, session.clock, start.frame_id)
+        chosen = plugin_class.Parameters() if parameters is None else parameters
+        base = PluginContext("dut", chosen, session.clock, np.random.default_rng(0), information)
+        yield Rig(plugin_class(make_context(base)), session.clock, session.robot)
 
 
 def cancel_latency(call: Callable[[CancelToken], Any], after: float) -> tuple[float, Any]:

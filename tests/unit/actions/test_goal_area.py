@@ -19,76 +19,76 @@ STATIONS = PoseSetArea((Pose.planar(5.0, 0.0), Pose.planar(0.0, 2.0), Pose.plana
 L_SHAPE = ((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (3.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 3.0, 0.0))
 
 
-def send(bench, area, kind=GetPathGoal):
-    return bench.navigator.send(kind(NOT_LOOKED_AT, goal_area=area))
+def send(session, area, kind=GetPathGoal):
+    return session.navigator.send(kind(NOT_LOOKED_AT, goal_area=area))
 
 
 @pytest.mark.parametrize(("area", "length"), [(DISC, 7 / 3), (SQUARE, 2.6), (STATIONS, 2.0)])
-def test_the_path_leads_to_the_nearest_member(make_bench, area, length):
-    bench = make_bench()
-    result = send(bench, area).wait()
+def test_the_path_leads_to_the_nearest_member(make_session, area, length):
+    session = make_session()
+    result = send(session, area).wait()
     assert result.success
     assert area.contains(result.path[-1])
     assert result.path.length == pytest.approx(length)
     assert result.cost == pytest.approx(result.path.length)
 
 
-def test_the_cheapest_member_wins(make_bench):
-    bench = make_bench()
-    assert send(bench, STATIONS).wait().path[-1].y == pytest.approx(2.0)
-    assert [request.goal for request in bench.planner.requests] == list(STATIONS.poses)
+def test_the_cheapest_member_wins(make_session):
+    session = make_session()
+    assert send(session, STATIONS).wait().path[-1].y == pytest.approx(2.0)
+    assert [request.goal for request in session.planner.requests] == list(STATIONS.poses)
 
 
-def test_members_that_can_not_be_reached_do_not_count(make_bench):
-    bench = make_bench(planner_max_retries=0)
+def test_members_that_can_not_be_reached_do_not_count(make_session):
+    session = make_session(planner_max_retries=0)
     blocked = PlanResult(GetPathOutcome.BLOCKED_GOAL, "occupied")
-    bench.planner.play(lambda request: blocked if request.goal.x < 1.0 else straight_plan(request))
-    assert send(bench, STATIONS).wait().path[-1].x == pytest.approx(5.0)
-    bench.planner.play(blocked)
-    assert send(bench, STATIONS).wait().outcome == GetPathOutcome.BLOCKED_GOAL
+    session.planner.play(lambda request: blocked if request.goal.x < 1.0 else straight_plan(request))
+    assert send(session, STATIONS).wait().path[-1].x == pytest.approx(5.0)
+    session.planner.play(blocked)
+    assert send(session, STATIONS).wait().outcome == GetPathOutcome.BLOCKED_GOAL
 
 
-def test_a_cancel_ends_the_search_between_two_members(make_bench):
-    bench = make_bench()
-    handle = send(bench, STATIONS)
-    bench.planner.play(lambda request: (handle.cancel(), straight_plan(request))[1])
+def test_a_cancel_ends_the_search_between_two_members(make_session):
+    session = make_session()
+    handle = send(session, STATIONS)
+    session.planner.play(lambda request: (handle.cancel(), straight_plan(request))[1])
     assert handle.wait().outcome == GetPathOutcome.CANCELED
-    assert len(bench.planner.requests) == 1
+    assert len(session.planner.requests) == 1
 
 
-def test_a_robot_that_is_inside_already_stays_where_it_is(make_bench):
-    bench = make_bench()
-    result = send(bench, DiscArea(Pose.planar(0.2, 0.0), 1.0), MoveBaseGoal).wait()
+def test_a_robot_that_is_inside_already_stays_where_it_is(make_session):
+    session = make_session()
+    result = send(session, DiscArea(Pose.planar(0.2, 0.0), 1.0), MoveBaseGoal).wait()
     assert result.success
-    assert not bench.robot.moved_after(-1.0)
+    assert not session.robot.moved_after(-1.0)
 
 
 @pytest.mark.parametrize("area", [DISC, SQUARE, STATIONS])
-def test_move_base_stops_inside_the_area(make_bench, area):
-    bench = make_bench()
-    result = send(bench, area, MoveBaseGoal).wait()
+def test_move_base_stops_inside_the_area(make_session, area):
+    session = make_session()
+    result = send(session, area, MoveBaseGoal).wait()
     assert result.success
-    assert area.contains(bench.robot.pose)
-    assert bench.robot.command == Twist()
+    assert area.contains(session.robot.pose)
+    assert session.robot.command == Twist()
 
 
-def test_exe_path_stops_where_the_path_enters_the_area(make_bench):
-    bench = make_bench()
-    assert bench.navigator.send(ExePathGoal(bench.path_to(9.0), goal_area=DISC)).wait().success
-    assert 2.0 <= bench.robot.pose.x < 2.1
+def test_exe_path_stops_where_the_path_enters_the_area(make_session):
+    session = make_session()
+    assert session.navigator.send(ExePathGoal(session.path_to(9.0), goal_area=DISC)).wait().success
+    assert 2.0 <= session.robot.pose.x < 2.1
 
 
 @pytest.mark.parametrize("kind", [GetPathGoal, MoveBaseGoal])
-def test_an_area_in_another_frame_is_rejected(make_bench, kind):
-    handle = send(make_bench(), DiscArea(Pose.planar(1, 0, frame_id="odom"), 1.0), kind)
+def test_an_area_in_another_frame_is_rejected(make_session, kind):
+    handle = send(make_session(), DiscArea(Pose.planar(1, 0, frame_id="odom"), 1.0), kind)
     assert handle.status is GoalStatus.REJECTED
     assert "must be given in the global frame 'map', got 'odom'" in handle.result.message
 
 
-def test_an_exe_path_area_in_another_frame_is_rejected(make_bench):
-    bench = make_bench()
+def test_an_exe_path_area_in_another_frame_is_rejected(make_session):
+    session = make_session()
     area = DiscArea(Pose.planar(1, 0, frame_id="odom"), 1.0)
-    assert bench.navigator.send(ExePathGoal(bench.path_to(1.0), goal_area=area)).status is GoalStatus.REJECTED
+    assert session.navigator.send(ExePathGoal(session.path_to(1.0), goal_area=area)).status is GoalStatus.REJECTED
 
 
 @pytest.mark.parametrize(

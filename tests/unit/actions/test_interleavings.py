@@ -16,9 +16,9 @@ from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.goals.goal_types import ExePathGoal, FollowWaypointsGoal, GetPathGoal, MoveBaseGoal, RecoveryGoal
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import ControlResult, PlanResult, RecoveryResult
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.faulty import drive, obedient, slow
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, straight_plan
+from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.sim_clock import SimClock
 
 SCHEDULES = int(os.environ.get("MBF_SCHEDULES", "2000"))
@@ -71,13 +71,13 @@ def recovery_answer(rng, clock):
     ]
 
 
-def prepare(bench, rng):
-    bench.planner.play(*[planner_answer(rng, bench.clock) for _ in range(4)])
+def prepare(session, rng):
+    session.planner.play(*[planner_answer(rng, session.clock) for _ in range(4)])
     for name in ("controller", "other"):
-        controller = bench.plugin(name, ScriptedController)
+        controller = session.plugin(name, ScriptedController)
         controller.stops_itself = bool(rng.random() < 0.3)
-        controller.play(*[controller_answer(rng, bench.clock, controller) for _ in range(4)])
-    bench.recovery.play(*[recovery_answer(rng, bench.clock) for _ in range(3)])
+        controller.play(*[controller_answer(rng, session.clock, controller) for _ in range(4)])
+    session.recovery.play(*[recovery_answer(rng, session.clock) for _ in range(3)])
 
 
 def random_goal(rng):
@@ -92,16 +92,16 @@ def random_goal(rng):
     ][int(rng.choice(5, p=[0.15, 0.3, 0.1, 0.35, 0.1]))]
 
 
-def client(bench, rng, handles, steps):
+def client(session, rng, handles, steps):
     """One client: sends, cancels, pauses and resumes at random moments."""
     for _ in range(steps):
-        bench.clock.sleep(float(rng.choice([0.0, 0.0, 0.01, 0.05, 0.1, 0.3])))
+        session.clock.sleep(float(rng.choice([0.0, 0.0, 0.01, 0.05, 0.1, 0.3])))
         act = rng.random()
         if act < 0.45 or not handles:
-            handles.append(bench.navigator.send(random_goal(rng)))
-            handles[-1].add_done_callback(lambda handle: bench.called.append(handle.id))
+            handles.append(session.navigator.send(random_goal(rng)))
+            handles[-1].add_done_callback(lambda handle: session.called.append(handle.id))
         else:
-            handle, server = handles[int(rng.integers(len(handles)))], bench.server
+            handle, server = handles[int(rng.integers(len(handles)))], session.server
             acts = [handle.cancel, handle.pause, handle.resume, server.pause_all, server.resume_all, server.cancel_all]
             acts[int(rng.choice(6, p=[0.45, 0.2, 0.2, 0.06, 0.06, 0.03]))]()
 
@@ -109,7 +109,7 @@ def client(bench, rng, handles, steps):
 def run_schedule(seed):
     rng = np.random.default_rng(seed)
     clock = SimClock(schedule=np.random.default_rng(seed + 1_000_000_007))
-    bench = Bench(
+    session = ScriptedSession(
         PLUGINS,
         clock,
         planner_patience=0.5,
@@ -122,35 +122,37 @@ def run_schedule(seed):
         max_quarantined=100,
         controller_frequency=10.0,
     )
-    bench.robot._period = 0.2
-    bench.called = []
-    prepare(bench, rng)
+    session.robot._period = 0.2
+    session.called = []
+    prepare(session, rng)
     handles, helper_rng = [], np.random.default_rng(seed + 1)
-    second = clock.spawn(lambda: client(bench, helper_rng, handles, 3), "second client")
-    client(bench, rng, handles, 4)
+    second = clock.spawn(lambda: client(session, helper_rng, handles, 3), "second client")
+    client(session, rng, handles, 4)
     second.join()
     if rng.random() < 0.7:  # else shut down in the middle of everything
         for handle in list(handles):
             handle.resume()
             handle.cancel()
         clock.sleep(0.9)
-    bench.server.close()
-    bench.robot.close()
+    session.server.close()
+    session.robot.close()
     clock.sleep(2.5)
-    return bench, handles
+    return session, handles
 
 
-def verify(seed, bench, handles):
-    ends = [event.data["goal_id"] for event in bench.events(EventKind.GOAL_FINISHED)]
+def verify(seed, session, handles):
+    ends = [event.data["goal_id"] for event in session.recorded(EventKind.GOAL_FINISHED)]
     assert len(ends) == len(set(ends)), f"schedule {seed}: a goal ended twice"
-    accepted = {event.data["goal_id"] for event in bench.events(EventKind.GOAL_ACCEPTED)}
+    accepted = {event.data["goal_id"] for event in session.recorded(EventKind.GOAL_ACCEPTED)}
     assert accepted <= set(ends), f"schedule {seed}: goals without an end: {accepted - set(ends)}"
     assert all(handle.done and handle.result.message for handle in handles), f"schedule {seed}: {handles}"
-    assert sorted(bench.called) == sorted(handle.id for handle in handles), f"schedule {seed}: callbacks {bench.called}"
-    assert bench.robot.command.is_stopped(), f"schedule {seed}: the robot still drives"
-    waiting = set(bench.clock.thread_names) - {"main"}
+    assert sorted(session.called) == sorted(handle.id for handle in handles), (
+        f"schedule {seed}: callbacks {session.called}"
+    )
+    assert session.robot.command.is_stopped(), f"schedule {seed}: the robot still drives"
+    waiting = set(session.clock.thread_names) - {"main"}
     assert not waiting, f"schedule {seed}: threads left: {waiting}"
-    framework = [event for event in bench.events(EventKind.FAULT) if "where" not in event.data]
+    framework = [event for event in session.recorded(EventKind.FAULT) if "where" not in event.data]
     assert not framework, f"schedule {seed}: {framework[0].data}"
 
 
@@ -158,6 +160,6 @@ def verify(seed, bench, handles):
 @pytest.mark.timeout(600)
 def test_every_goal_ends_once_and_the_robot_stands_whatever_the_order(part):
     for seed in range(FIRST + part * SCHEDULES // PARTS, FIRST + (part + 1) * SCHEDULES // PARTS):
-        bench, handles = run_schedule(seed)
-        verify(seed, bench, handles)
+        session, handles = run_schedule(seed)
+        verify(seed, session, handles)
     gc.collect()

@@ -68,44 +68,44 @@ def test_a_parameter_is_dynamic_as_in_mbf(name):
         {"controller_frequency": 1.0, "command_timeout": 0.5},
     ],
 )
-def test_a_value_out_of_range_is_refused_and_nothing_changes(make_bench, bad):
-    bench = make_bench()
-    before = bench.server.runtime.parameters
+def test_a_value_out_of_range_is_refused_and_nothing_changes(make_session, bad):
+    session = make_session()
+    before = session.server.runtime.parameters
     with pytest.raises(ValidationError):
-        bench.server.set_parameters(**bad)
-    assert bench.server.runtime.parameters is before
+        session.server.set_parameters(**bad)
+    assert session.server.runtime.parameters is before
 
 
-def test_a_change_is_recorded_and_restore_defaults_brings_the_configured_values_back(make_bench):
-    bench = make_bench(planner_patience=7.0)
-    bench.server.set_parameters(planner_patience=1.0, max_vel_x=0.3)
-    assert bench.server.runtime.parameters.planner_patience == 1.0
-    assert bench.server.runtime.gate.limits.max_vel_x == 0.3
-    assert bench.events(EventKind.PARAMETER_CHANGED)[0].data == {"planner_patience": 1.0, "max_vel_x": 0.3}
-    bench.server.set_parameters(restore_defaults=True)
-    assert bench.server.runtime.parameters.planner_patience == 7.0
-    assert bench.server.runtime.gate.limits.max_vel_x == math.inf
+def test_a_change_is_recorded_and_restore_defaults_brings_the_configured_values_back(make_session):
+    session = make_session(planner_patience=7.0)
+    session.server.set_parameters(planner_patience=1.0, max_vel_x=0.3)
+    assert session.server.runtime.parameters.planner_patience == 1.0
+    assert session.server.runtime.gate.limits.max_vel_x == 0.3
+    assert session.recorded(EventKind.PARAMETER_CHANGED)[0].data == {"planner_patience": 1.0, "max_vel_x": 0.3}
+    session.server.set_parameters(restore_defaults=True)
+    assert session.server.runtime.parameters.planner_patience == 7.0
+    assert session.server.runtime.gate.limits.max_vel_x == math.inf
 
 
-def test_parameters_that_a_part_keeps_reach_it(make_bench):
-    bench = make_bench()
-    bench.server.set_parameters(command_timeout=0.2, tf_timeout=0.7, hang_guard=9.0, max_vel_z=0.1)
-    runtime = bench.server.runtime
+def test_parameters_that_a_part_keeps_reach_it(make_session):
+    session = make_session()
+    session.server.set_parameters(command_timeout=0.2, tf_timeout=0.7, hang_guard=9.0, max_vel_z=0.1)
+    runtime = session.server.runtime
     assert (runtime.gate.command_timeout, runtime.robot.max_pose_age, runtime.robot.max_velocity_age) == (0.2, 0.7, 0.7)
-    assert (bench.clock.hang_guard, runtime.gate.limits.max_vel_z) == (9.0, 0.1)
+    assert (session.clock.hang_guard, runtime.gate.limits.max_vel_z) == (9.0, 0.1)
 
 
 @pytest.mark.parametrize("name", ["global_frame", "robot_frame", "use_odometry", "tf_cache_time"])
-def test_a_parameter_that_is_read_once_is_not_accepted_without_effect(make_bench, name):
-    bench = make_bench()
-    before = bench.server.runtime.parameters
+def test_a_parameter_that_is_read_once_is_not_accepted_without_effect(make_session, name):
+    session = make_session()
+    before = session.server.runtime.parameters
     with pytest.raises(ValueError, match=f"{name}: read once, at the start"):
-        bench.server.set_parameters(
+        session.server.set_parameters(
             **{name: {"use_odometry": False, "tf_cache_time": 3.0}.get(name, "other")}, planner_patience=1.0
         )
-    assert bench.server.runtime.parameters is before
+    assert session.server.runtime.parameters is before
 
 
-def test_a_robot_without_odometry_counts_as_standing(make_bench):
-    bench = make_bench(use_odometry=False)
-    assert not bench.server.runtime.robot.has_odometry
+def test_a_robot_without_odometry_counts_as_standing(make_session):
+    session = make_session(use_odometry=False)
+    assert not session.server.runtime.robot.has_odometry

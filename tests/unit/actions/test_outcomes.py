@@ -73,52 +73,52 @@ def plugin_codes(action, first, last):
 
 
 @pytest.mark.parametrize("code", plugin_codes("get_path", 71, 100))
-def test_a_planners_code_and_text_arrive_as_they_were_given(make_bench, code):
-    bench = make_bench(planner_max_retries=0)
-    bench.planner.play(PlanResult(code, "my words"))
-    result = bench.navigator.get_path(Pose.planar(1.0, 0.0))
+def test_a_planners_code_and_text_arrive_as_they_were_given(make_session, code):
+    session = make_session(planner_max_retries=0)
+    session.planner.play(PlanResult(code, "my words"))
+    result = session.navigator.get_path(Pose.planar(1.0, 0.0))
     assert (result.outcome, result.message) == (code, "my words")
     assert result.outcome_name == outcome_name(code)
 
 
 @pytest.mark.parametrize("code", plugin_codes("exe_path", 121, 150))
-def test_a_controllers_code_and_text_arrive_as_they_were_given(make_bench, code):
-    bench = make_bench(controller_max_retries=0)
-    bench.controller.play(ControlResult(code, "my words"))
-    result = bench.navigator.exe_path(bench.path_to(1.0))
+def test_a_controllers_code_and_text_arrive_as_they_were_given(make_session, code):
+    session = make_session(controller_max_retries=0)
+    session.controller.play(ControlResult(code, "my words"))
+    result = session.navigator.exe_path(session.path_to(1.0))
     assert (result.outcome, result.message) == (code, "my words")
 
 
 @pytest.mark.parametrize("code", plugin_codes("recovery", 171, 200))
-def test_a_behaviours_code_and_text_arrive_as_they_were_given(make_bench, code):
-    bench = make_bench()
-    bench.recovery.play(RecoveryResult(code, "my words"))
-    result = bench.navigator.recover()
+def test_a_behaviours_code_and_text_arrive_as_they_were_given(make_session, code):
+    session = make_session()
+    session.recovery.play(RecoveryResult(code, "my words"))
+    result = session.navigator.recover()
     assert (result.outcome, result.message) == (code, "my words")
 
 
 @pytest.mark.parametrize("code", plugin_codes("refine_path", 221, 250))
-def test_a_refiners_code_and_text_arrive_as_they_were_given(make_bench, code):
-    bench = make_bench()
-    bench.refiner.play(RefineResult(code, "my words"))
-    result = bench.navigator.refine_path(Path.from_points([(0, 0, 0), (1, 0, 0)]))
+def test_a_refiners_code_and_text_arrive_as_they_were_given(make_session, code):
+    session = make_session()
+    session.refiner.play(RefineResult(code, "my words"))
+    result = session.navigator.refine_path(Path.from_points([(0, 0, 0), (1, 0, 0)]))
     assert (result.outcome, result.message) == (code, "my words")
 
 
 @pytest.mark.parametrize("code", range(1, 10))
-def test_one_to_nine_are_a_planners_own_successes(make_bench, code):
-    bench = make_bench()
+def test_one_to_nine_are_a_planners_own_successes(make_session, code):
+    session = make_session()
     path = Path.from_points([(0, 0, 0), (1, 0, 0)])
-    bench.planner.play(PlanResult(code, "", path))
-    result = bench.navigator.get_path(Pose.planar(1.0, 0.0))
+    session.planner.play(PlanResult(code, "", path))
+    result = session.navigator.get_path(Pose.planar(1.0, 0.0))
     assert result.success
     assert (result.outcome, result.outcome_name) == (code, f"SUCCESS ({code})")
 
 
-def test_a_goal_for_a_server_that_is_shut_down_is_rejected_with_an_internal_error(make_bench):
-    bench = make_bench()
-    bench.server.close()
-    handle = bench.navigator.send(MoveBaseGoal(Pose.planar(1.0, 0.0)))
+def test_a_goal_for_a_server_that_is_shut_down_is_rejected_with_an_internal_error(make_session):
+    session = make_session()
+    session.server.close()
+    handle = session.navigator.send(MoveBaseGoal(Pose.planar(1.0, 0.0)))
     assert handle.status is GoalStatus.REJECTED
     assert handle.result.outcome == MoveBaseOutcome.INTERNAL_ERROR
 

@@ -17,16 +17,16 @@ from mbf_abstract.time.sim_clock import SimClock
 GOAL = MoveBaseGoal(Pose.planar(0.5, 0.0))
 
 
-def recovering(bench):
-    bench.planner.play(RuntimeError("no"), straight_plan)
-    bench.recovery.play(slow(bench.clock, 0.3, RecoveryResult(0, "")))
+def recovering(session):
+    session.planner.play(RuntimeError("no"), straight_plan)
+    session.recovery.play(slow(session.clock, 0.3, RecoveryResult(0, "")))
 
 
-def planning(bench):
-    bench.planner.play(slow(bench.clock, 0.3, straight_plan))
+def planning(session):
+    session.planner.play(slow(session.clock, 0.3, straight_plan))
 
 
-def following(bench):
+def following(session):
     pass
 
 
@@ -34,36 +34,36 @@ PHASES = [planning, following, recovering]
 
 
 @pytest.mark.parametrize(("phase", "clock"), product(PHASES, [SimClock, WallClock]))
-def test_a_move_base_goal_resumed_after_pausing_all_goes_on(make_bench, phase, clock):
-    bench = make_bench(clock=clock())
-    phase(bench)
-    handle = bench.navigator.send(GOAL)
-    bench.clock.sleep(0.15)
+def test_a_move_base_goal_resumed_after_pausing_all_goes_on(make_session, phase, clock):
+    session = make_session(clock=clock())
+    phase(session)
+    handle = session.navigator.send(GOAL)
+    session.clock.sleep(0.15)
     for _ in range(5):
-        bench.server.pause_all()
+        session.server.pause_all()
         handle.resume()
     assert handle.wait(20.0).success
 
 
 @pytest.mark.parametrize("phase", PHASES)
-def test_resumed_part_by_part_in_any_order_it_stays_as_its_own_handle_says(make_bench, phase):
+def test_resumed_part_by_part_in_any_order_it_stays_as_its_own_handle_says(make_session, phase):
     for seed in range(20):
         rng = np.random.default_rng(seed)
-        bench = make_bench(clock=SimClock(schedule=rng))
-        phase(bench)
-        handle = bench.navigator.send(GOAL)
-        bench.clock.sleep(float(rng.choice([0.0, 0.1, 0.2])))
+        session = make_session(clock=SimClock(schedule=rng))
+        phase(session)
+        handle = session.navigator.send(GOAL)
+        session.clock.sleep(float(rng.choice([0.0, 0.1, 0.2])))
         for _ in range(6):
-            parts = [handle, *bench.server.get_path.unfinished, *bench.server.exe_path.unfinished]
+            parts = [handle, *session.server.get_path.unfinished, *session.server.exe_path.unfinished]
             part = parts[rng.integers(len(parts))]
-            [part.pause, part.resume, bench.server.pause_all, bench.server.resume_all][rng.integers(4)]()
-            bench.clock.sleep(float(rng.choice([0.0, 0.01, 0.1])))
-        bench.clock.sleep(0.1)
+            [part.pause, part.resume, session.server.pause_all, session.server.resume_all][rng.integers(4)]()
+            session.clock.sleep(float(rng.choice([0.0, 0.01, 0.1])))
+        session.clock.sleep(0.1)
         if handle.paused:
-            here = bench.robot.pose
-            bench.clock.sleep(2.0)
+            here = session.robot.pose
+            session.clock.sleep(2.0)
             assert handle.status is GoalStatus.PAUSED
-            assert bench.robot.pose.position == here.position
+            assert session.robot.pose.position == here.position
         handle.resume()
         assert handle.wait(20.0).success, seed
-        bench.close()
+        session.close()

@@ -20,44 +20,44 @@ ANSWERS = [
 
 @pytest.mark.parametrize("answer", ANSWERS, ids=lambda answer: answer.message)
 @pytest.mark.parametrize("retries", [-1, 0, 5])
-def test_get_path_asks_once_and_ends_with_the_planners_own_words(make_bench, answer, retries):
-    bench = make_bench(planner_max_retries=retries)
-    bench.planner.play(answer)
-    result = bench.navigator.send(GetPathGoal(FAR)).wait()
+def test_get_path_asks_once_and_ends_with_the_planners_own_words(make_session, answer, retries):
+    session = make_session(planner_max_retries=retries)
+    session.planner.play(answer)
+    result = session.navigator.send(GetPathGoal(FAR)).wait()
     assert (result.outcome, result.message, result.permanent) == (answer.outcome, answer.message, True)
-    assert len(bench.planner.requests) == 1
-    assert bench.clock.now() == 0.0
+    assert len(session.planner.requests) == 1
+    assert session.clock.now() == 0.0
 
 
 @pytest.mark.parametrize("answer", ANSWERS, ids=lambda answer: answer.message)
-def test_move_base_ends_at_once_without_recoveries(make_bench, answer):
-    bench = make_bench()
-    bench.planner.play(answer)
-    result = bench.navigator.send(MoveBaseGoal(FAR)).wait()
+def test_move_base_ends_at_once_without_recoveries(make_session, answer):
+    session = make_session()
+    session.planner.play(answer)
+    result = session.navigator.send(MoveBaseGoal(FAR)).wait()
     assert (result.outcome, result.message) == (answer.outcome, answer.message)
-    assert not bench.events(EventKind.RECOVERY)
-    assert bench.clock.now() == 0.0
+    assert not session.recorded(EventKind.RECOVERY)
+    assert session.clock.now() == 0.0
 
 
-def test_a_new_goal_that_can_never_be_reached_stops_the_robot_and_ends(make_bench):
-    bench = make_bench()
-    bench.navigator.send(MoveBaseGoal(Pose.planar(50.0, 0.0)))
-    bench.clock.sleep(1.0)
-    bench.planner.play(ANSWERS[0])
-    result = bench.navigator.send(MoveBaseGoal(FAR)).wait()
+def test_a_new_goal_that_can_never_be_reached_stops_the_robot_and_ends(make_session):
+    session = make_session()
+    session.navigator.send(MoveBaseGoal(Pose.planar(50.0, 0.0)))
+    session.clock.sleep(1.0)
+    session.planner.play(ANSWERS[0])
+    result = session.navigator.send(MoveBaseGoal(FAR)).wait()
     assert result.outcome == GetPathOutcome.OUT_OF_MAP
-    assert bench.robot.command.is_stopped()
-    assert not bench.events(EventKind.RECOVERY)
+    assert session.robot.command.is_stopped()
+    assert not session.recorded(EventKind.RECOVERY)
 
 
-def test_a_replanning_that_fails_so_while_the_robot_drives_keeps_the_path(make_bench):
-    bench = make_bench(planner_frequency=2.0)
-    bench.planner.play(straight_plan, ANSWERS[0])
-    assert bench.navigator.send(MoveBaseGoal(Pose.planar(2.0, 0.0))).wait().success
+def test_a_replanning_that_fails_so_while_the_robot_drives_keeps_the_path(make_session):
+    session = make_session(planner_frequency=2.0)
+    session.planner.play(straight_plan, ANSWERS[0])
+    assert session.navigator.send(MoveBaseGoal(Pose.planar(2.0, 0.0))).wait().success
 
 
-def test_what_may_change_is_tried_again(make_bench):
-    bench = make_bench()
-    bench.planner.play(PlanResult(GetPathOutcome.NO_PATH_FOUND, "somebody is in the way"), straight_plan)
-    assert bench.navigator.send(GetPathGoal(Pose.planar(2.0, 0.0))).wait().success
-    assert len(bench.planner.requests) == 2
+def test_what_may_change_is_tried_again(make_session):
+    session = make_session()
+    session.planner.play(PlanResult(GetPathOutcome.NO_PATH_FOUND, "somebody is in the way"), straight_plan)
+    assert session.navigator.send(GetPathGoal(Pose.planar(2.0, 0.0))).wait().success
+    assert len(session.planner.requests) == 2

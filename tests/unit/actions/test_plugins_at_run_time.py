@@ -46,29 +46,29 @@ def source(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def bench(make_bench, source):
-    bench = make_bench(planner_max_retries=0)
-    bench.server.load_plugin_type(PluginKind.PLANNER, "refuser", "reloaded_planner:Refuser", code=75)
-    return bench
+def session(make_session, source):
+    session = make_session(planner_max_retries=0)
+    session.server.load_plugin_type(PluginKind.PLANNER, "refuser", "reloaded_planner:Refuser", code=75)
+    return session
 
 
-def answer(bench):
-    result = bench.navigator.get_path(TARGET, planner="refuser")
+def answer(session):
+    result = session.navigator.get_path(TARGET, planner="refuser")
     return result.outcome, result.message
 
 
-def test_a_plugin_loaded_by_its_type_serves_goals_with_its_parameters(bench):
-    assert answer(bench) == (75, "one")
-    assert bench.server.plugins.names(PluginKind.PLANNER) == ["planner", "refuser"]
+def test_a_plugin_loaded_by_its_type_serves_goals_with_its_parameters(session):
+    assert answer(session) == (75, "one")
+    assert session.server.plugins.names(PluginKind.PLANNER) == ["planner", "refuser"]
 
 
-def test_a_reloaded_plugin_runs_the_new_source_with_the_present_parameters(bench, source):
-    bench.server.set_plugin_parameters(PluginKind.PLANNER, "refuser", code=80)
+def test_a_reloaded_plugin_runs_the_new_source_with_the_present_parameters(session, source):
+    session.server.set_plugin_parameters(PluginKind.PLANNER, "refuser", code=80)
     source(SOURCE.replace("VERSION", "number two"))
-    assert answer(bench) == (80, "one")
-    bench.server.reload_plugin(PluginKind.PLANNER, "refuser")
-    assert answer(bench) == (80, "number two")
-    assert bench.server.plugins.names(PluginKind.PLANNER) == ["planner", "refuser"]
+    assert answer(session) == (80, "one")
+    session.server.reload_plugin(PluginKind.PLANNER, "refuser")
+    assert answer(session) == (80, "number two")
+    assert session.server.plugins.names(PluginKind.PLANNER) == ["planner", "refuser"]
 
 
 @pytest.mark.parametrize(
@@ -80,25 +80,25 @@ def test_a_reloaded_plugin_runs_the_new_source_with_the_present_parameters(bench
         (SOURCE + "\n    def __init__(self, context):\n        raise OSError('no model file')\n", ServerError),
     ],
 )
-def test_a_reload_that_goes_wrong_leaves_the_old_plugin_at_work(bench, source, text, error):
+def test_a_reload_that_goes_wrong_leaves_the_old_plugin_at_work(session, source, text, error):
     source(text)
     with pytest.raises(error):
-        bench.server.reload_plugin(PluginKind.PLANNER, "refuser")
-    assert answer(bench) == (75, "one")
+        session.server.reload_plugin(PluginKind.PLANNER, "refuser")
+    assert answer(session) == (75, "one")
 
 
-def test_a_plugin_in_use_is_not_reloaded(bench):
-    plugin = bench.server.plugins.get(PluginKind.PLANNER, "refuser").instance
-    plugin.make_plan = slow(bench.clock, 1.0, straight_plan)
-    handle = bench.navigator.send(GetPathGoal(TARGET, planner="refuser"))
-    bench.clock.sleep(0.5)
+def test_a_plugin_in_use_is_not_reloaded(session):
+    plugin = session.server.plugins.get(PluginKind.PLANNER, "refuser").instance
+    plugin.make_plan = slow(session.clock, 1.0, straight_plan)
+    handle = session.navigator.send(GetPathGoal(TARGET, planner="refuser"))
+    session.clock.sleep(0.5)
     with pytest.raises(ServerError, match="in use"):
-        bench.server.reload_plugin(PluginKind.PLANNER, "refuser")
+        session.server.reload_plugin(PluginKind.PLANNER, "refuser")
     assert handle.wait().success
 
 
-def test_what_can_not_be_loaded_is_refused_with_the_reason(bench):
-    load = bench.server.load_plugin_type
+def test_what_can_not_be_loaded_is_refused_with_the_reason(session):
+    load = session.server.load_plugin_type
     with pytest.raises(ServerError, match="named 'refuser' is loaded already"):
         load(PluginKind.PLANNER, "refuser", "reloaded_planner:Refuser")
     with pytest.raises(PluginError, match="unknown type"):
@@ -106,15 +106,15 @@ def test_what_can_not_be_loaded_is_refused_with_the_reason(bench):
     with pytest.raises(ValidationError, match="code"):
         load(PluginKind.PLANNER, "new", "reloaded_planner:Refuser", code=1)
     with pytest.raises(ServerError, match="no planner named 'nobody'"):
-        bench.server.reload_plugin(PluginKind.PLANNER, "nobody")
+        session.server.reload_plugin(PluginKind.PLANNER, "nobody")
 
 
-def test_a_plugin_that_refuses_its_new_parameters_keeps_the_old_ones(bench, monkeypatch):
+def test_a_plugin_that_refuses_its_new_parameters_keeps_the_old_ones(session, monkeypatch):
     def refuse(plugin):
         raise ValueError("this one is read once only")
 
-    instance = bench.server.plugins.get(PluginKind.PLANNER, "refuser").instance
+    instance = session.server.plugins.get(PluginKind.PLANNER, "refuser").instance
     monkeypatch.setattr(type(instance), "parameters_changed", refuse)
     with pytest.raises(ValueError, match="read once only"):
-        bench.server.set_plugin_parameters(PluginKind.PLANNER, "refuser", code=80)
-    assert answer(bench) == (75, "one")
+        session.server.set_plugin_parameters(PluginKind.PLANNER, "refuser", code=80)
+    assert answer(session) == (75, "one")

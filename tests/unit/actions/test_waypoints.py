@@ -21,50 +21,50 @@ FAR = tuple(Pose.planar(x, 0.0) for x in (50.0, 100.0, 150.0))
 EVERY_WAY = [True, False]
 
 
-def test_waypoints_are_visited_in_order_with_a_task_at_each(make_bench):
-    bench = make_bench()
+def test_waypoints_are_visited_in_order_with_a_task_at_each(make_session):
+    session = make_session()
     visited = []
 
     def task(index, pose):
-        visited.append((index, round(bench.navigator.robot_pose().distance_to(pose), 1)))
+        visited.append((index, round(session.navigator.robot_pose().distance_to(pose), 1)))
 
-    sequence = bench.navigator.follow_waypoints([Pose.planar(0.5, 0), Pose.planar(0.5, 0.5)], loops=2, task=task)
+    sequence = session.navigator.follow_waypoints([Pose.planar(0.5, 0), Pose.planar(0.5, 0.5)], loops=2, task=task)
     assert sequence.success
     assert [index for index, _ in visited] == [0, 1, 0, 1]
     assert max(distance for _, distance in visited) <= 0.1
 
 
 @pytest.mark.parametrize(("stop", "visits"), [(True, 2), (False, 3)])
-def test_a_failed_waypoint_ends_the_waypoint_sequence_or_not(make_bench, stop, visits):
-    bench = make_bench(recovery_enabled=False, planner_max_retries=0)
-    bench.planner.play(straight_plan, NO_PATH, straight_plan)
-    sequence = bench.navigator.follow_waypoints(NEAR, stop_on_failure=stop)
+def test_a_failed_waypoint_ends_the_waypoint_sequence_or_not(make_session, stop, visits):
+    session = make_session(recovery_enabled=False, planner_max_retries=0)
+    session.planner.play(straight_plan, NO_PATH, straight_plan)
+    sequence = session.navigator.follow_waypoints(NEAR, stop_on_failure=stop)
     assert len(sequence.results) == visits
     assert sequence.failed == (1,)
     assert (sequence.success, sequence.outcome) == (False, GetPathOutcome.NO_PATH_FOUND)
     assert "1 of 3 visit(s) failed, first visit 1: walled in" in sequence.message
 
 
-def test_a_waypoint_sequence_of_no_loops_is_refused_and_one_of_no_waypoints_is_over_at_once(make_bench):
-    bench = make_bench()
+def test_a_waypoint_sequence_of_no_loops_is_refused_and_one_of_no_waypoints_is_over_at_once(make_session):
+    session = make_session()
     with pytest.raises(ValueError, match="loops"):
-        bench.navigator.follow_waypoints([], loops=0)
-    assert bench.navigator.follow_waypoints([]).success
+        session.navigator.follow_waypoints([], loops=0)
+    assert session.navigator.follow_waypoints([]).success
 
 
 @pytest.mark.parametrize("fields", [{"planner": "none"}, {"controller": "none"}, {"dist_tolerance": -1.0}])
-def test_a_waypoint_sequence_whose_visits_would_be_rejected_is_rejected(make_bench, fields):
-    handle = make_bench().navigator.send(FollowWaypointsGoal(NEAR, **fields))
+def test_a_waypoint_sequence_whose_visits_would_be_rejected_is_rejected(make_session, fields):
+    handle = make_session().navigator.send(FollowWaypointsGoal(NEAR, **fields))
     assert (handle.status, handle.result.outcome) == (GoalStatus.REJECTED, MoveBaseOutcome.FAILURE)
 
 
-def test_feedback_reports_the_visit_and_how_it_gets_on(make_bench):
-    bench = make_bench()
+def test_feedback_reports_the_visit_and_how_it_gets_on(make_session):
+    session = make_session()
     seen = []
-    handle = bench.navigator.send(FollowWaypointsGoal(NEAR[:2], loops=2))
+    handle = session.navigator.send(FollowWaypointsGoal(NEAR[:2], loops=2))
     handle.add_feedback_callback(seen.append)
     handle.wait()
-    bench.clock.sleep(0.1)
+    session.clock.sleep(0.1)
     assert list(dict.fromkeys((reported.visit, reported.waypoint) for reported in seen)) == [
         (0, 0),
         (1, 1),
@@ -79,11 +79,11 @@ def test_feedback_reports_the_visit_and_how_it_gets_on(make_bench):
 # ----------------------------------------------------------------------------------------------------- cancel
 @pytest.mark.parametrize("stop", EVERY_WAY)
 @pytest.mark.parametrize("end", ["cancel", "cancel_all", "preempt", "close", "asyncio"])
-def test_whatever_cancels_the_waypoint_sequence_the_robot_stands_and_sets_off_no_more(make_bench, stop, end):
-    bench = make_bench()
-    handle = bench.navigator.send(FollowWaypointsGoal(FAR, stop_on_failure=stop))
-    bench.clock.sleep(2.0)
-    assert not bench.robot.command.is_stopped()
+def test_whatever_cancels_the_waypoint_sequence_the_robot_stands_and_sets_off_no_more(make_session, stop, end):
+    session = make_session()
+    handle = session.navigator.send(FollowWaypointsGoal(FAR, stop_on_failure=stop))
+    session.clock.sleep(2.0)
+    assert not session.robot.command.is_stopped()
 
     async def give_up():
         task = asyncio.ensure_future(handle)
@@ -93,47 +93,47 @@ def test_whatever_cancels_the_waypoint_sequence_the_robot_stands_and_sets_off_no
 
     {
         "cancel": handle.cancel,
-        "cancel_all": bench.navigator.cancel_all,
-        "preempt": lambda: bench.navigator.send(FollowWaypointsGoal(())),
-        "close": bench.server.close,
+        "cancel_all": session.navigator.cancel_all,
+        "preempt": lambda: session.navigator.send(FollowWaypointsGoal(())),
+        "close": session.server.close,
         "asyncio": lambda: asyncio.run(give_up()),
     }[end]()
     result = handle.wait(2.0)
-    ended = bench.clock.now()
+    ended = session.clock.now()
     assert (handle.status, result.outcome) == (GoalStatus.CANCELED, MoveBaseOutcome.CANCELED)
     assert len(result.results) == 1
-    bench.clock.sleep(5.0)
-    assert not bench.robot.moved_after(ended)
-    assert bench.robot.command.is_stopped()
-    assert_ended_once(bench, handle)
+    session.clock.sleep(5.0)
+    assert not session.robot.moved_after(ended)
+    assert session.robot.command.is_stopped()
+    assert_ended_once(session, handle)
 
 
 @pytest.mark.parametrize("stop", EVERY_WAY)
-def test_a_goal_that_takes_the_robot_away_ends_the_waypoint_sequence(make_bench, stop):
-    bench = make_bench()
-    handle = bench.navigator.send(FollowWaypointsGoal(FAR, stop_on_failure=stop))
-    bench.clock.sleep(2.0)
-    other = bench.navigator.send(MoveBaseGoal(Pose.planar(2.0, 0.0)))
+def test_a_goal_that_takes_the_robot_away_ends_the_waypoint_sequence(make_session, stop):
+    session = make_session()
+    handle = session.navigator.send(FollowWaypointsGoal(FAR, stop_on_failure=stop))
+    session.clock.sleep(2.0)
+    other = session.navigator.send(MoveBaseGoal(Pose.planar(2.0, 0.0)))
     assert other.wait().success
     assert handle.wait().message == "visit 0 was canceled: preempted by a new goal"
     assert handle.status is GoalStatus.CANCELED
-    bench.clock.sleep(5.0)
-    assert bench.robot.pose.x < 2.2
+    session.clock.sleep(5.0)
+    assert session.robot.pose.x < 2.2
 
 
-def test_a_visit_that_its_controller_gives_up_is_a_failure_not_a_cancel(make_bench):
-    bench = make_bench(recovery_enabled=False, controller_max_retries=0)
+def test_a_visit_that_its_controller_gives_up_is_a_failure_not_a_cancel(make_session):
+    session = make_session(recovery_enabled=False, controller_max_retries=0)
     blocked = ControlResult(ExePathOutcome.BLOCKED_PATH, "no")
-    bench.controller.play(blocked, bench.controller.follow)
-    sequence = bench.navigator.follow_waypoints(NEAR, stop_on_failure=False)
+    session.controller.play(blocked, session.controller.follow)
+    sequence = session.navigator.follow_waypoints(NEAR, stop_on_failure=False)
     assert sequence.failed == (0,)
     assert len(sequence.results) == 3
 
 
-def test_a_rejected_visit_ends_the_waypoint_sequence_whatever_it_says(make_bench):
-    bench = make_bench(max_quarantined=1)
-    sequence = bench.navigator.send(
-        FollowWaypointsGoal(NEAR, 10**6, False, lambda *_: bench.server.runtime.hanging.add("a call"))
+def test_a_rejected_visit_ends_the_waypoint_sequence_whatever_it_says(make_session):
+    session = make_session(max_quarantined=1)
+    sequence = session.navigator.send(
+        FollowWaypointsGoal(NEAR, 10**6, False, lambda *_: session.server.runtime.hanging.add("a call"))
     )
     result = sequence.wait(60.0)
     assert [visit.success for visit in result.results] == [True, False]
@@ -142,25 +142,25 @@ def test_a_rejected_visit_ends_the_waypoint_sequence_whatever_it_says(make_bench
 
 # ------------------------------------------------------------------------------------------------------ pause
 @pytest.mark.parametrize("clock", [SimClock, WallClock])
-def test_a_paused_waypoint_sequence_holds_and_goes_on_also_after_pausing_all(make_bench, clock):
-    bench = make_bench(clock=clock())
-    handle = bench.navigator.send(FollowWaypointsGoal(NEAR))
-    for pause in (handle.pause, bench.server.pause_all):
-        bench.clock.sleep(0.2)
+def test_a_paused_waypoint_sequence_holds_and_goes_on_also_after_pausing_all(make_session, clock):
+    session = make_session(clock=clock())
+    handle = session.navigator.send(FollowWaypointsGoal(NEAR))
+    for pause in (handle.pause, session.server.pause_all):
+        session.clock.sleep(0.2)
         pause()
-        bench.clock.sleep(0.3)
-        here = bench.robot.pose
-        bench.clock.sleep(0.3)
-        assert bench.robot.pose.position == here.position
+        session.clock.sleep(0.3)
+        here = session.robot.pose
+        session.clock.sleep(0.3)
+        assert session.robot.pose.position == here.position
         handle.resume()
     assert handle.wait(60.0).success
 
 
-def test_a_waypoint_sequence_paused_during_its_task_does_not_set_off(make_bench):
-    bench = make_bench()
-    handle = bench.navigator.send(FollowWaypointsGoal(NEAR, task=lambda index, pose: handle.pause()))
+def test_a_waypoint_sequence_paused_during_its_task_does_not_set_off(make_session):
+    session = make_session()
+    handle = session.navigator.send(FollowWaypointsGoal(NEAR, task=lambda index, pose: handle.pause()))
     for visit in range(2):
-        bench.clock.sleep(10.0)
+        session.clock.sleep(10.0)
         assert (handle.status, len(handle.feedback.results)) == (GoalStatus.PAUSED, visit + 1)
         handle.resume()
     assert handle.wait(10.0).success
@@ -168,49 +168,49 @@ def test_a_waypoint_sequence_paused_during_its_task_does_not_set_off(make_bench)
 
 # ------------------------------------------------------------------------------------------------------- task
 @pytest.mark.parametrize("error", [ValueError("no box here"), SystemExit("no box here")])
-def test_a_task_that_raises_ends_the_waypoint_sequence_and_the_next_one_works(make_bench, error):
+def test_a_task_that_raises_ends_the_waypoint_sequence_and_the_next_one_works(make_session, error):
     def task(index, pose):
         raise error
 
-    bench = make_bench()
-    sequence = bench.navigator.follow_waypoints(NEAR, task=task)
+    session = make_session()
+    sequence = session.navigator.follow_waypoints(NEAR, task=task)
     assert sequence.outcome == MoveBaseOutcome.INTERNAL_ERROR
     assert sequence.message == f"the task at waypoint 0 raised {type(error).__name__}: no box here"
-    assert bench.navigator.follow_waypoints(NEAR).success
+    assert session.navigator.follow_waypoints(NEAR).success
 
 
-def test_a_task_may_use_the_navigator(make_bench):
-    bench = make_bench()
+def test_a_task_may_use_the_navigator(make_session):
+    session = make_session()
 
     def task(index, pose):
-        assert bench.navigator.recover().success
-        assert bench.navigator.exe_path(bench.path_to(pose.x, 0.2)).success
+        assert session.navigator.recover().success
+        assert session.navigator.exe_path(session.path_to(pose.x, 0.2)).success
 
-    assert bench.navigator.follow_waypoints(NEAR, task=task).success
+    assert session.navigator.follow_waypoints(NEAR, task=task).success
 
 
-def test_a_task_that_cancels_all_ends_the_waypoint_sequence_after_itself(make_bench):
-    bench = make_bench()
-    sequence = bench.navigator.follow_waypoints(
-        NEAR, stop_on_failure=False, task=lambda index, pose: bench.navigator.cancel_all()
+def test_a_task_that_cancels_all_ends_the_waypoint_sequence_after_itself(make_session):
+    session = make_session()
+    sequence = session.navigator.follow_waypoints(
+        NEAR, stop_on_failure=False, task=lambda index, pose: session.navigator.cancel_all()
     )
     assert (sequence.outcome, len(sequence.results)) == (MoveBaseOutcome.CANCELED, 1)
 
 
-def test_a_cancel_waits_for_a_hanging_task_no_longer_than_the_grace(make_bench):
-    bench = make_bench(cancel_grace=0.5)
-    hang = Hang(bench.clock)
-    handle = bench.navigator.send(FollowWaypointsGoal(NEAR, task=lambda index, pose: hang(pose)))
-    bench.clock.sleep(20.0)
+def test_a_cancel_waits_for_a_hanging_task_no_longer_than_the_grace(make_session):
+    session = make_session(cancel_grace=0.5)
+    hang = Hang(session.clock)
+    handle = session.navigator.send(FollowWaypointsGoal(NEAR, task=lambda index, pose: hang(pose)))
+    session.clock.sleep(20.0)
     assert (hang.entered, handle.done) == (1, False)
     handle.cancel("enough")
     result = handle.wait(0.6)
     assert (handle.status, len(result.results)) == (GoalStatus.CANCELED, 1)
     assert result.message == "enough; the task at waypoint 0 has not ended yet"
-    assert bench.navigator.follow_waypoints(NEAR).success
-    assert len(bench.server.runtime.hanging) == 1
+    assert session.navigator.follow_waypoints(NEAR).success
+    assert len(session.server.runtime.hanging) == 1
     hang.release()
-    bench.clock.sleep(0.1)
-    assert not bench.server.runtime.hanging
-    assert_ended_once(bench, handle)
-    assert_next_goals_work(bench)
+    session.clock.sleep(0.1)
+    assert not session.server.runtime.hanging
+    assert_ended_once(session, handle)
+    assert_next_goals_work(session)

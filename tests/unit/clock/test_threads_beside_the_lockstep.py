@@ -10,8 +10,8 @@ import pytest
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal
 from mbf_abstract.outcomes import GetPathOutcome
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import ClockDeadlock, SimClock
 
@@ -52,14 +52,14 @@ def test_outside_is_the_way_out():
 
 
 def test_a_plugin_that_waits_for_a_pool_of_its_own_is_reported_too():
-    with Bench(hang_guard=2.0) as bench, ThreadPoolExecutor(1) as pool:
+    with ScriptedSession(hang_guard=2.0) as session, ThreadPoolExecutor(1) as pool:
 
         def plan(request):
-            pool.submit(bench.clock.sleep, 0.1).result(20.0)
+            pool.submit(session.clock.sleep, 0.1).result(20.0)
             return straight_plan(request)
 
-        bench.planner.play(plan)
-        result = bench.navigator.send(GetPathGoal(Pose.planar(2.0, 0.0))).wait()
+        session.planner.play(plan)
+        result = session.navigator.send(GetPathGoal(Pose.planar(2.0, 0.0))).wait()
         assert result.outcome == GetPathOutcome.INTERNAL_ERROR
         assert "with clock.outside()" in result.message
 
@@ -85,13 +85,13 @@ def test_a_closed_server_leaves_no_thread_and_no_clock_behind_although_nobody_wa
     before = set(threading.enumerate())
 
     def make_use_and_close():
-        bench = Bench()
-        bench.robot.close()
-        bench.clock.sleep(0.1)
+        session = ScriptedSession()
+        session.robot.close()
+        session.clock.sleep(0.1)
         if uses:
-            assert bench.navigator.get_path(Pose.planar(2.0, 0.0)).success
-        bench.server.close()
-        return weakref.ref(bench.clock)
+            assert session.navigator.get_path(Pose.planar(2.0, 0.0)).success
+        session.server.close()
+        return weakref.ref(session.clock)
 
     clocks = [make_use_and_close() for _ in range(3)]
     left = [thread for thread in threading.enumerate() if thread not in before]
@@ -103,8 +103,8 @@ def test_a_closed_server_leaves_no_thread_and_no_clock_behind_although_nobody_wa
 
 
 def test_closing_moves_no_time():
-    bench = Bench()
-    bench.clock.sleep(1.0)
-    bench.server.close()
-    assert bench.clock.now() == 1.0
-    bench.close()
+    session = ScriptedSession()
+    session.clock.sleep(1.0)
+    session.server.close()
+    assert session.clock.now() == 1.0
+    session.close()

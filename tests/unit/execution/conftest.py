@@ -4,15 +4,15 @@ import pytest
 
 
 @pytest.fixture
-def make_bench(make_bench):
+def make_session(make_session):
     """F286: after whatever end, the robot is told to stand."""
     made = []
 
     def make(*args, **parameters):
-        made.append(make_bench(*args, **parameters))
+        made.append(make_session(*args, **parameters))
         return made[-1]
 
     yield make
-    for bench in made:
-        bench.clock.sleep(1.0)
-        assert bench.robot.command.is_stopped()
+    for session in made:
+        session.clock.sleep(1.0)
+        assert session.robot.command.is_stopped()

@@ -16,43 +16,43 @@ from mbf_abstract.testing.scripted import ScriptedController
 FAILS = ControlResult(Outcome.BLOCKED_PATH, "a chair")
 
 
-def _coasting(bench, seconds):
+def _coasting(session, seconds):
     """Odometry that says the robot still moves for a while after it was told to stand."""
-    real = bench.robot.odometry
+    real = session.robot.odometry
     stopped_at = []
 
     def odometry():
-        if bench.robot.command.is_stopped() and bench.robot.commands:
-            stopped_at.append(bench.clock.now())
-            if bench.clock.now() - stopped_at[0] < seconds:
-                return Odometry(Twist.planar(0.3), bench.clock.now())
+        if session.robot.command.is_stopped() and session.robot.commands:
+            stopped_at.append(session.clock.now())
+            if session.clock.now() - stopped_at[0] < seconds:
+                return Odometry(Twist.planar(0.3), session.clock.now())
         return real()
 
     return odometry
 
 
-def test_with_force_stop_the_goal_succeeds_only_when_the_robot_stands(make_bench, states):
-    bench = make_bench(force_stop_at_goal=True)
-    bench.robot.odometry = _coasting(bench, 1.0)
-    bench.controller.play(drive(0.5))
-    assert bench.navigator.exe_path(bench.path_to(1.0), dist_tolerance=0.3).success
-    assert states(bench, "controller_execution")[-2:] == ["stopping", "arrived_goal"]
+def test_with_force_stop_the_goal_succeeds_only_when_the_robot_stands(make_session, states):
+    session = make_session(force_stop_at_goal=True)
+    session.robot.odometry = _coasting(session, 1.0)
+    session.controller.play(drive(0.5))
+    assert session.navigator.exe_path(session.path_to(1.0), dist_tolerance=0.3).success
+    assert states(session, "controller_execution")[-2:] == ["stopping", "arrived_goal"]
 
 
-def test_a_robot_that_does_not_come_to_rest_at_its_goal_is_no_success(make_bench):
-    bench = make_bench(force_stop_at_goal=True, controller_patience=2.0)
-    bench.robot.odometry = _coasting(bench, 1000.0)
-    bench.controller.play(drive(0.5))
-    result = bench.navigator.exe_path(bench.path_to(1.0), dist_tolerance=0.3)
+def test_a_robot_that_does_not_come_to_rest_at_its_goal_is_no_success(make_session):
+    session = make_session(force_stop_at_goal=True, controller_patience=2.0)
+    session.robot.odometry = _coasting(session, 1000.0)
+    session.controller.play(drive(0.5))
+    result = session.navigator.exe_path(session.path_to(1.0), dist_tolerance=0.3)
     assert result.outcome == Outcome.PAT_EXCEEDED
     assert "still moves at 0.30 m/s" in result.message
 
 
-def test_without_force_stop_the_goal_succeeds_at_once_and_the_watchdog_stops_the_robot(make_bench):
-    bench = make_bench(force_stop_at_goal=False)
-    bench.controller.play(drive(0.5))
-    assert bench.navigator.exe_path(bench.path_to(1.0), dist_tolerance=0.3).success
-    assert bench.robot.command == Twist.planar(0.5)
+def test_without_force_stop_the_goal_succeeds_at_once_and_the_watchdog_stops_the_robot(make_session):
+    session = make_session(force_stop_at_goal=False)
+    session.controller.play(drive(0.5))
+    assert session.navigator.exe_path(session.path_to(1.0), dist_tolerance=0.3).success
+    assert session.robot.command == Twist.planar(0.5)
 
 
 @pytest.mark.parametrize(
@@ -66,12 +66,12 @@ def test_without_force_stop_the_goal_succeeds_at_once_and_the_watchdog_stops_the
         ({"mbf_tolerance_exclusive": True}, False, 0.7),
     ],
 )
-def test_who_decides_that_the_robot_has_arrived(make_bench, parameters, plugin_says, arrives_at):
-    bench = make_bench(force_stop_at_goal=False, **parameters)
-    bench.controller.is_goal_reached = lambda pose, distance, angle: plugin_says
-    bench.controller.play(drive(0.5))
-    handle = bench.navigator.send(ExePathGoal(bench.path_to(1.0), dist_tolerance=0.3, angle_tolerance=0.1))
-    bench.clock.sleep(10.0)
+def test_who_decides_that_the_robot_has_arrived(make_session, parameters, plugin_says, arrives_at):
+    session = make_session(force_stop_at_goal=False, **parameters)
+    session.controller.is_goal_reached = lambda pose, distance, angle: plugin_says
+    session.controller.play(drive(0.5))
+    handle = session.navigator.send(ExePathGoal(session.path_to(1.0), dist_tolerance=0.3, angle_tolerance=0.1))
+    session.clock.sleep(10.0)
     if arrives_at is None:
         assert not handle.done
         handle.cancel()
@@ -87,22 +87,22 @@ def driven_to_its_end():
 
 
 @pytest.mark.parametrize("parameters", [{"mbf_tolerance_check": True}, {"mbf_tolerance_exclusive": True}, {}])
-def test_a_path_that_ends_where_it_begins_is_driven_before_the_robot_has_arrived(make_bench, parameters):
-    bench = make_bench(**parameters)
-    bench.controller.is_goal_reached = lambda pose, distance, angle: not parameters and bench.clock.now() > 9.0
+def test_a_path_that_ends_where_it_begins_is_driven_before_the_robot_has_arrived(make_session, parameters):
+    session = make_session(**parameters)
+    session.controller.is_goal_reached = lambda pose, distance, angle: not parameters and session.clock.now() > 9.0
     there_and_back = [0.5] * 60 + [-0.5] * 60
-    bench.controller.play(*(ControlResult(Outcome.SUCCESS, "", Twist.planar(speed)) for speed in there_and_back))
+    session.controller.play(*(ControlResult(Outcome.SUCCESS, "", Twist.planar(speed)) for speed in there_and_back))
     out_and_back = Path.from_points([(0, 0, 0), (1.5, 0, 0), (0, 0, 0)])
-    assert bench.navigator.exe_path(out_and_back, dist_tolerance=0.1, angle_tolerance=4.0).success
-    assert max(command.vx for _, command in bench.robot.commands) == 0.5
-    assert bench.clock.now() > 5.5
+    assert session.navigator.exe_path(out_and_back, dist_tolerance=0.1, angle_tolerance=4.0).success
+    assert max(command.vx for _, command in session.robot.commands) == 0.5
+    assert session.clock.now() > 5.5
 
 
-def test_a_robot_that_turns_and_drives_without_getting_farther_is_ended_by_default(make_bench):
-    bench = make_bench()
+def test_a_robot_that_turns_and_drives_without_getting_farther_is_ended_by_default(make_session):
+    session = make_session()
     to_and_fro = [Twist.planar(0.3, wz=1.0)] * 20 + [Twist.planar(-0.3, wz=1.0)] * 20
-    bench.controller.play(*(ControlResult(Outcome.SUCCESS, "", command) for command in to_and_fro * 50))
-    result = bench.navigator.exe_path(Path.from_points([(0, 0, 0), (5, 0, 0)]))
+    session.controller.play(*(ControlResult(Outcome.SUCCESS, "", command) for command in to_and_fro * 50))
+    result = session.navigator.exe_path(Path.from_points([(0, 0, 0), (5, 0, 0)]))
     assert result.outcome == Outcome.OSCILLATION
     assert "no progress in 60 s" in result.message
 
@@ -131,17 +131,17 @@ def test_f088_headings_are_compared_around_the_circle():
 
 @pytest.mark.parametrize("velocity", [Twist.planar(1.0), Twist.planar(0.0, 1.0), Twist.planar(wz=1.0)])
 @pytest.mark.parametrize("force_stop", [True, False])
-def test_f089_speed_at_the_goal_counts_only_with_force_stop(make_bench, velocity, force_stop):
-    bench = make_bench(force_stop_at_goal=force_stop, controller_patience=1.0)
-    bench.robot.odometry = lambda: Odometry(velocity, bench.clock.now())
-    assert bench.navigator.exe_path(Path.from_points([(0, 0, 0), (0.01, 0, 0)])).success is not force_stop
+def test_f089_speed_at_the_goal_counts_only_with_force_stop(make_session, velocity, force_stop):
+    session = make_session(force_stop_at_goal=force_stop, controller_patience=1.0)
+    session.robot.odometry = lambda: Odometry(velocity, session.clock.now())
+    assert session.navigator.exe_path(Path.from_points([(0, 0, 0), (0.01, 0, 0)])).success is not force_stop
 
 
-def test_the_lease_goes_to_one_goal_only(make_bench):
-    bench = make_bench({"controller": ScriptedController, "other": ScriptedController})
-    first = bench.navigator.send(ExePathGoal(bench.path_to(9.0), controller="controller"))
-    bench.clock.sleep(0.5)
-    second = bench.navigator.send(ExePathGoal(bench.path_to(9.0), controller="other", concurrency_slot=1))
+def test_the_lease_goes_to_one_goal_only(make_session):
+    session = make_session({"controller": ScriptedController, "other": ScriptedController})
+    first = session.navigator.send(ExePathGoal(session.path_to(9.0), controller="controller"))
+    session.clock.sleep(0.5)
+    second = session.navigator.send(ExePathGoal(session.path_to(9.0), controller="other", concurrency_slot=1))
     result = second.wait()
     assert result.outcome == Outcome.FAILURE
     assert "driven by exe_path controller" in result.message
@@ -150,28 +150,28 @@ def test_the_lease_goes_to_one_goal_only(make_bench):
     first.wait()
 
 
-def test_feedback_reports_where_the_robot_is_on_its_path(make_bench):
-    bench = make_bench()
+def test_feedback_reports_where_the_robot_is_on_its_path(make_session):
+    session = make_session()
     seen = []
-    handle = bench.navigator.send(ExePathGoal(bench.path_to(2.0)))
+    handle = session.navigator.send(ExePathGoal(session.path_to(2.0)))
     handle.add_feedback_callback(seen.append)
     handle.wait()
-    bench.clock.sleep(0.1)
+    session.clock.sleep(0.1)
     assert len(seen) > 50
     middle = seen[len(seen) // 2]
     assert middle.dist_to_goal == pytest.approx(2.0 - middle.current_pose.x, abs=0.02)
     assert middle.distance_along_path == pytest.approx(middle.dist_to_goal, abs=0.11)
     assert 0.0 < middle.time_to_goal < 10.0
     assert [f.distance_along_path for f in seen] == sorted((f.distance_along_path for f in seen), reverse=True)
-    assert len(bench.events(EventKind.LEASE_GRANTED)) == 1
+    assert len(session.recorded(EventKind.LEASE_GRANTED)) == 1
 
 
-def test_a_loop_ends_with_one_event_that_counts_its_cycles(make_bench):
-    bench = make_bench(controller_max_retries=-1)
-    bench.controller.play(FAILS, FAILS, drive())
-    bench.navigator.exe_path(bench.path_to(1.0))
+def test_a_loop_ends_with_one_event_that_counts_its_cycles(make_session):
+    session = make_session(controller_max_retries=-1)
+    session.controller.play(FAILS, FAILS, drive())
+    session.navigator.exe_path(session.path_to(1.0))
 
-    (reported,) = bench.memory.of_kind(EventKind.CONTROL_LOOP)
+    (reported,) = session.memory.of_kind(EventKind.CONTROL_LOOP)
     assert (reported.source, reported.data["failed"]) == ("controller", 2)
-    assert reported.data["cycles"] == len(bench.controller.requests)
+    assert reported.data["cycles"] == len(session.controller.requests)
     assert reported.data["began"] < reported.time

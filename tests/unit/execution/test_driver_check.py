@@ -7,8 +7,8 @@ import pytest
 from mbf_abstract.drive.driver_check import DriverError, check_driver
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Twist
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_abstract.time.sim_clock import SimClock
 
@@ -97,7 +97,7 @@ def test_what_is_no_driver_is_refused(robot, text, clock):
 def test_a_server_with_what_is_no_driver_is_not_made():
     clock = SimClock()
     with pytest.raises(DriverError, match="send_command is missing"):
-        Bench(clock=clock, robot=object())
+        ScriptedSession(clock=clock, robot=object())
     clock.sleep(0.1)
     assert set(clock.thread_names) == {"main", "loopback robot"}
 

@@ -1,11 +1,11 @@
-"""A bench for executives, and tree nodes that do what a test tells them."""
+"""A session for executives, and tree nodes that do what a test tells them."""
 
 import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 PLUGINS = {
     "planner": ScriptedPlanner,
@@ -18,17 +18,19 @@ STATUSES = {"S": Status.SUCCESS, "F": Status.FAILURE, "R": Status.RUNNING, "I": 
 
 
 @pytest.fixture
-def make_bench():
-    """Make benches with three recoveries; all are closed at the end of the test."""
-    benches = []
+def make_session():
+    """Make sessions with three recoveries; all are closed at the end of the test."""
+    sessions = []
 
     def make(**parameters):
-        benches.append(Bench(PLUGINS, **{"planner_max_retries": 0, "controller_max_retries": 0, **parameters}))
-        return benches[-1]
+        sessions.append(
+            ScriptedSession(PLUGINS, **{"planner_max_retries": 0, "controller_max_retries": 0, **parameters})
+        )
+        return sessions[-1]
 
     yield make
-    for bench in benches:
-        bench.close()
+    for session in sessions:
+        session.close()
 
 
 class Scripted(Behaviour):
@@ -75,4 +77,4 @@ def recoveries():
     """Return the names of the behaviours that ran, in order."""
     from mbf_abstract.events import EventKind
 
-    return lambda bench: [event.data["plugin"] for event in bench.events(EventKind.RECOVERY)]
+    return lambda session: [event.data["plugin"] for event in session.recorded(EventKind.RECOVERY)]

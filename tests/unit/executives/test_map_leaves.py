@@ -11,7 +11,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformError
 from mbf_abstract.maps.queries import CellState, PathAnswer, PlaceAnswer
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
-from mbf_abstract.testing.bench import MapFreeServer
+from mbf_abstract.testing.scripted_session import MapFreeServer
 
 GOAL = Pose.planar(1.0, 0.0)
 
@@ -53,9 +53,9 @@ def world(monkeypatch):
 
 
 @pytest.fixture
-def run(make_bench, world):
-    bench = make_bench()
-    return lambda tree, **given: TreeExecutive(tree, bench.navigator).run(**given)
+def run(make_session, world):
+    session = make_session()
+    return lambda tree, **given: TreeExecutive(tree, session.navigator).run(**given)
 
 
 @pytest.mark.parametrize(
@@ -75,9 +75,9 @@ def test_the_code_says_whether_robot_or_goal_is_blocked(run, world):
     assert run(CheckPose("goal"), target=GOAL).mission.failure_code == GetPathOutcome.BLOCKED_GOAL
 
 
-def test_a_path_is_checked_up_to_its_first_bad_pose(run, world, make_bench):
+def test_a_path_is_checked_up_to_its_first_bad_pose(run, world, make_session):
     world.states = [CellState.LETHAL]
-    path = make_bench().path_to(1.0)
+    path = make_session().path_to(1.0)
     assert run(CheckPath("path free?"), path=path).mission.failure_code == ExePathOutcome.BLOCKED_PATH
     assert world.asked[-1] == ("path", CellState.LETHAL)
 
@@ -85,9 +85,9 @@ def test_a_path_is_checked_up_to_its_first_bad_pose(run, world, make_bench):
 @pytest.mark.parametrize(
     ("state", "status"), [(CellState.LETHAL, Status.SUCCESS), (CellState.INSCRIBED, Status.FAILURE)]
 )
-def test_a_path_is_blocked_if_its_next_metres_are_and_that_is_no_failure(run, world, make_bench, state, status):
+def test_a_path_is_blocked_if_its_next_metres_are_and_that_is_no_failure(run, world, make_session, state, status):
     world.states = [state]
-    result = run(PathBlocked("blocked?", 0.5), path=make_bench().path_to(3.0))
+    result = run(PathBlocked("blocked?", 0.5), path=make_session().path_to(3.0))
     assert (result.status, result.mission.failure) == (status, None)
     assert 0.0 < world.path_length <= 0.5
 
@@ -97,12 +97,12 @@ def test_without_a_path_nothing_is_blocked(run, world):
     assert world.asked == []
 
 
-def test_a_second_planner_of_blocked_paths_is_not_asked_on_a_free_one(make_bench, world):
+def test_a_second_planner_of_blocked_paths_is_not_asked_on_a_free_one(make_session, world):
     for state, planned in ((CellState.FREE, 1), (CellState.LETHAL, 3)):
-        bench, world.states = make_bench(), [state]
+        session, world.states = make_session(), [state]
         options = TreeOptions(check_poses=False, second_planner_pause=0.5, second_planner_look_ahead=1.0)
-        assert TreeExecutive(navigation_tree(options), bench.navigator).run(Pose.planar(3.0, 0.0)).success
-        calls = [e for e in bench.events(EventKind.PLUGIN_CALL_STARTED) if e.data["method"] == "make_plan"]
+        assert TreeExecutive(navigation_tree(options), session.navigator).run(Pose.planar(3.0, 0.0)).success
+        calls = [e for e in session.recorded(EventKind.PLUGIN_CALL_STARTED) if e.data["method"] == "make_plan"]
         assert len(calls) == planned if planned == 1 else len(calls) >= planned
 
 
@@ -117,9 +117,9 @@ def test_the_map_is_cleared(run, world):
     assert world.cleared == 1
 
 
-def test_navigation_frees_a_blocked_robot_before_it_plans(make_bench, world, recoveries):
-    bench = make_bench()
+def test_navigation_frees_a_blocked_robot_before_it_plans(make_session, world, recoveries):
+    session = make_session()
     world.states = [CellState.LETHAL, CellState.LETHAL, CellState.FREE]
     tree = navigation_tree(TreeOptions(second_planner_pause=0.0))
-    assert TreeExecutive(tree, bench.navigator).run(GOAL).success
-    assert recoveries(bench) == ["clear", "back_up"]
+    assert TreeExecutive(tree, session.navigator).run(GOAL).success
+    assert recoveries(session) == ["clear", "back_up"]

@@ -22,31 +22,31 @@ from mbf_abstract.testing.faulty import drive
 
 
 @pytest.fixture
-def bench(make_bench):
-    return make_bench()
+def session(make_session):
+    return make_session()
 
 
 @pytest.fixture
-def bind(bench):
-    """Let a tree run on the bench."""
+def bind(session):
+    """Let a tree run on the session."""
 
     def run(tree, target=None):
         for node in tree.iterate():
-            node.setup(mission=MissionContext(bench.navigator, target))
+            node.setup(mission=MissionContext(session.navigator, target))
         return tree
 
     return run
 
 
 @pytest.fixture
-def tick_every(bench, tick):
+def tick_every(session, tick):
     """Tick, then wait ``seconds``, ``times`` times; returns the statuses."""
 
     def run(tree, seconds, times):
         seen = ""
         for _ in range(times):
             seen += tick(tree)
-            bench.clock.sleep(seconds)
+            session.clock.sleep(seconds)
         return seen
 
     return run
@@ -74,28 +74,28 @@ def test_f200_one_failure_fails_the_pipeline(scripted, tick):
 
 
 # ------------------------------------------------------------------------------------------------------ pacing
-def test_f201_distance_paces_the_child(bench, bind, scripted, tick):
+def test_f201_distance_paces_the_child(session, bind, scripted, tick):
     child = scripted("S")
     tree = bind(EveryDistance("every metre", child, 1.0))
     counts = []
     for step in range(7):
-        bench.robot._x = 0.51 * step
-        bench.clock.sleep(0.05)
+        session.robot._x = 0.51 * step
+        session.clock.sleep(0.05)
         tick(tree)
         counts.append(child.ticks)
     assert counts == [1, 1, 2, 2, 3, 3, 4]
 
 
-def test_f202_speed_paces_the_child(bench, bind, scripted, tick):
+def test_f202_speed_paces_the_child(session, bind, scripted, tick):
     tree = bind(BySpeed("by speed", scripted("S"), 0.1, 1.0, 0.5))
     tick(tree)
     assert tree.period == 1.0
-    bench.robot.send_command(drive(0.223).command)
-    bench.clock.sleep(1.0)
+    session.robot.send_command(drive(0.223).command)
+    session.clock.sleep(1.0)
     tick(tree)
     assert tree.period == pytest.approx(2.0, abs=0.01)
-    bench.robot.send_command(drive(0.0).command)
-    bench.clock.sleep(2.05)
+    session.robot.send_command(drive(0.0).command)
+    session.clock.sleep(2.05)
     tick(tree)
     assert tree.period == pytest.approx(10.0)
     assert tree.decorated.ticks == 3
@@ -113,12 +113,12 @@ def test_f203_time_passes_again_and_again(bind, tick_every):
     assert tick_every(tree, 0.5, 7) == "FFSFSFS"
 
 
-def test_f204_the_goal_is_reached_within_its_distance(bench, bind, tick):
+def test_f204_the_goal_is_reached_within_its_distance(session, bind, tick):
     tree = bind(GoalReached(distance=0.25), Pose.planar(1.0, 1.0))
     seen = ""
     for place in (0.0, 0.5, 0.9, 1.0):
-        bench.robot._x = bench.robot._y = place
-        bench.clock.sleep(0.05)
+        session.robot._x = session.robot._y = place
+        session.clock.sleep(0.05)
         seen += tick(tree)
     assert seen == "FFSS"
 

@@ -33,18 +33,18 @@ def fetch():
     )
 
 
-def test_states_follow_each_other(make_bench):
-    bench = make_bench()
-    assert TreeExecutive(fetch(), bench.navigator).run(Pose.planar(1.0, 0.0)).success
+def test_states_follow_each_other(make_session):
+    session = make_session()
+    assert TreeExecutive(fetch(), session.navigator).run(Pose.planar(1.0, 0.0)).success
 
 
-def test_a_code_is_looked_for_before_failure(make_bench, recoveries):
-    bench = make_bench()
+def test_a_code_is_looked_for_before_failure(make_session, recoveries):
+    session = make_session()
     blocked = ControlResult(ExePathOutcome.BLOCKED_PATH, "a chair")
-    bench.controller.play(ControlResult(ExePathOutcome.COLLISION, "a wall"), blocked, bench.controller.follow)
-    assert TreeExecutive(fetch(), bench.navigator).run(Pose.planar(1.0, 0.0)).success
-    assert recoveries(bench) == ["back_up"]
-    assert len(bench.planner.requests) == 2
+    session.controller.play(ControlResult(ExePathOutcome.COLLISION, "a wall"), blocked, session.controller.follow)
+    assert TreeExecutive(fetch(), session.navigator).run(Pose.planar(1.0, 0.0)).success
+    assert recoveries(session) == ["back_up"]
+    assert len(session.planner.requests) == 2
 
 
 def test_states_that_end_at_once_follow_within_one_tick(scripted, tick):
@@ -74,8 +74,8 @@ def test_all_mistakes_are_reported_at_once(scripted):
     assert "state 'b' does not say what follows SUCCESS" in text
 
 
-def test_a_machine_is_a_node_of_a_tree(make_bench):
-    bench = make_bench()
-    bench.planner.play(RuntimeError("boom"), bench.planner._answers[0])
+def test_a_machine_is_a_node_of_a_tree(make_session):
+    session = make_session()
+    session.planner.play(RuntimeError("boom"), session.planner._answers[0])
     tree = RecoveryNode("twice", [fetch(), Recovery("clear")])
-    assert TreeExecutive(tree, bench.navigator).run(Pose.planar(1.0, 0.0)).success
+    assert TreeExecutive(tree, session.navigator).run(Pose.planar(1.0, 0.0)).success

@@ -55,86 +55,87 @@ def back_off(request):
     return RecoveryResult(RecoveryOutcome.SUCCESS, "backed off")
 
 
-def eventful(bench):
+def eventful(session):
     """Plans that take time and fail, collisions, and recoveries that move: every kind of node gets its turn."""
-    bench.planner.modelled_compute_time = 0.2
-    bench.planner.play(NO_PATH, straight_plan)
+    session.planner.modelled_compute_time = 0.2
+    session.planner.play(NO_PATH, straight_plan)
     for name in ("clear", "back_up"):
-        bench.plugin(name, object).play(back_off)
-    bench.controller.play(*[drive(0.3)] * 10, COLLISION, *[drive(0.3)] * 5, COLLISION, bench.controller.follow)
+        session.plugin(name, object).play(back_off)
+    session.controller.play(*[drive(0.3)] * 10, COLLISION, *[drive(0.3)] * 5, COLLISION, session.controller.follow)
 
 
-def assert_at_rest(bench):
-    assert bench.robot.command.is_stopped()
+def assert_at_rest(session):
+    assert session.robot.command.is_stopped()
     ids = [
-        {e.data["goal_id"] for e in bench.events(kind)} for kind in (EventKind.GOAL_ACCEPTED, EventKind.GOAL_FINISHED)
+        {e.data["goal_id"] for e in session.recorded(kind)}
+        for kind in (EventKind.GOAL_ACCEPTED, EventKind.GOAL_FINISHED)
     ]
     assert ids[0] == ids[1]
-    now = bench.clock.now()
-    bench.clock.sleep(2.0)
-    assert bench.robot.moved_after(now) == []
+    now = session.clock.now()
+    session.clock.sleep(2.0)
+    assert session.robot.moved_after(now) == []
 
 
 @pytest.mark.parametrize("name", ["navigation", "move base", "machine"])
 @given(tick=st.integers(1, 130))
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_cancel_at_any_tick_stops_the_robot_and_leaves_no_goal(make_bench, name, tick):
-    bench = make_bench()
-    eventful(bench)
-    executive = TreeExecutive(make_tree(name), bench.navigator)
+def test_cancel_at_any_tick_stops_the_robot_and_leaves_no_goal(make_session, name, tick):
+    session = make_session()
+    eventful(session)
+    executive = TreeExecutive(make_tree(name), session.navigator)
     executive.on_tick.append(lambda count: executive.cancel("enough") if count == tick else None)
     result = executive.run(GOAL)
     assert result.status == Status.INVALID or result.success
-    assert_at_rest(bench)
+    assert_at_rest(session)
 
 
 @pytest.mark.parametrize("name", ["navigation", "move base", "machine"])
 @given(seconds=st.floats(0.0, 6.0))
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_cancel_from_another_thread_does_the_same(make_bench, name, seconds):
-    bench = make_bench()
-    eventful(bench)
-    executive = TreeExecutive(make_tree(name), bench.navigator)
+def test_cancel_from_another_thread_does_the_same(make_session, name, seconds):
+    session = make_session()
+    eventful(session)
+    executive = TreeExecutive(make_tree(name), session.navigator)
 
     def cancel_later():
-        bench.clock.sleep(seconds)
+        session.clock.sleep(seconds)
         executive.cancel("enough")
 
-    bench.clock.spawn(cancel_later, "client", Priority.CLIENT)
+    session.clock.spawn(cancel_later, "client", Priority.CLIENT)
     executive.run(GOAL)
-    assert_at_rest(bench)
+    assert_at_rest(session)
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_cancel_holds_for_any_interleaving_of_the_threads(make_bench, seed):
+def test_cancel_holds_for_any_interleaving_of_the_threads(make_session, seed):
     rng = np.random.default_rng(seed)
-    bench = make_bench(clock=SimClock(schedule=rng))
-    eventful(bench)
-    tree = TreeExecutive(make_tree(["navigation", "move base", "machine"][seed % 3]), bench.navigator)
-    executive = ClassicMoveBase(bench.navigator) if seed % 4 == 3 else tree
+    session = make_session(clock=SimClock(schedule=rng))
+    eventful(session)
+    tree = TreeExecutive(make_tree(["navigation", "move base", "machine"][seed % 3]), session.navigator)
+    executive = ClassicMoveBase(session.navigator) if seed % 4 == 3 else tree
     seconds = float(rng.uniform(0.0, 5.0))
 
     def cancel_later():
-        bench.clock.sleep(seconds)
+        session.clock.sleep(seconds)
         executive.cancel("enough")
 
-    bench.clock.spawn(cancel_later, "client", Priority.CLIENT)
+    session.clock.spawn(cancel_later, "client", Priority.CLIENT)
     executive.run(GOAL)
-    assert_at_rest(bench)
+    assert_at_rest(session)
 
 
-def test_a_canceled_run_says_why(make_bench):
-    bench = make_bench()
-    executive = TreeExecutive(Running("for ever"), bench.navigator)
+def test_a_canceled_run_says_why(make_session):
+    session = make_session()
+    executive = TreeExecutive(Running("for ever"), session.navigator)
     executive.on_tick.append(lambda count: executive.cancel("lunch"))
     result = executive.run()
     assert (result.status, result.message) == (Status.INVALID, "lunch")
 
 
-def test_a_node_that_raises_stops_the_robot_before_the_error_is_seen(make_bench):
-    bench = make_bench()
+def test_a_node_that_raises_stops_the_robot_before_the_error_is_seen(make_session):
+    session = make_session()
     tree = navigation_tree(TreeOptions(check_poses=False))
-    executive = TreeExecutive(tree, bench.navigator)
+    executive = TreeExecutive(tree, session.navigator)
 
     def fail(count):
         if count == 20:
@@ -143,40 +144,40 @@ def test_a_node_that_raises_stops_the_robot_before_the_error_is_seen(make_bench)
     executive.on_tick.append(fail)
     with pytest.raises(RuntimeError, match="boom"):
         executive.run(GOAL)
-    assert_at_rest(bench)
+    assert_at_rest(session)
 
 
-def test_the_same_executive_runs_again(make_bench):
-    bench = make_bench()
-    executive = TreeExecutive(navigation_tree(TreeOptions(check_poses=False)), bench.navigator)
+def test_the_same_executive_runs_again(make_session):
+    session = make_session()
+    executive = TreeExecutive(navigation_tree(TreeOptions(check_poses=False)), session.navigator)
     assert executive.run(GOAL).success
     assert executive.run(Pose.planar(0.0, 1.0)).success
 
 
-def test_two_runs_of_a_tree_write_one_log(make_bench):
+def test_two_runs_of_a_tree_write_one_log(make_session):
     logs = []
     for _ in range(2):
-        bench = make_bench()
-        eventful(bench)
-        TreeExecutive(make_tree("navigation"), bench.navigator).run(GOAL)
-        logs.append([event.to_json() for event in bench.events(*EventKind)])
+        session = make_session()
+        eventful(session)
+        TreeExecutive(make_tree("navigation"), session.navigator).run(GOAL)
+        logs.append([event.to_json() for event in session.recorded(*EventKind)])
     assert logs[0] == logs[1]
 
 
-def test_ticks_come_at_the_period_of_the_clock(make_bench):
-    bench = make_bench()
-    executive = TreeExecutive(Do("never", lambda mission: False), bench.navigator, period=0.2)
+def test_ticks_come_at_the_period_of_the_clock(make_session):
+    session = make_session()
+    executive = TreeExecutive(Do("never", lambda mission: False), session.navigator, period=0.2)
     executive.tree = Running("for ever")
     times = []
-    executive.on_tick.append(lambda count: times.append(bench.clock.now()))
+    executive.on_tick.append(lambda count: times.append(session.clock.now()))
     executive.on_tick.append(lambda count: executive.cancel() if count == 4 else None)
     executive.run()
     assert times == pytest.approx([0.0, 0.2, 0.4, 0.6])
 
 
-def test_a_period_must_be_positive(make_bench):
+def test_a_period_must_be_positive(make_session):
     with pytest.raises(ValueError, match="period must be positive"):
-        TreeExecutive(Running("r"), make_bench().navigator, period=0.0)
+        TreeExecutive(Running("r"), make_session().navigator, period=0.0)
 
 
 # ----------------------------------------------------------------------------------------------------- drawing

@@ -3,13 +3,13 @@
 import os
 import signal
 
-from mbf_abstract.testing.bench import Bench
+from mbf_abstract.testing.scripted_session import ScriptedSession
 from terrain.sweeps.worker_pool import run_in_workers
 
 
 def end_once(marker):
     """End this worker by SIGTERM in its first job, with a navigation server alive; return the process of the second."""
-    with Bench():
+    with ScriptedSession():
         if not os.path.exists(marker):
             with open(marker, "w") as file:
                 file.write(str(os.getpid()))

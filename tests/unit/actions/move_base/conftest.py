@@ -1,4 +1,4 @@
-"""The bench of every test of move_base: scripted plugins, three recovery behaviours, and how a goal is sent."""
+"""The session of every test of move_base: scripted plugins, three recovery behaviours, and how a goal is sent."""
 
 from contextlib import ExitStack
 
@@ -9,8 +9,8 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanResult
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery
+from mbf_abstract.testing.scripted_session import ScriptedSession
 
 PLUGINS = {
     "planner": ScriptedPlanner,
@@ -21,7 +21,7 @@ PLUGINS = {
 }
 
 
-class MoveBaseBench(Bench):
+class MoveBaseSession(ScriptedSession):
     no_path = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
 
     def send(self, x=2.0, y=0.0, **fields):
@@ -30,7 +30,7 @@ class MoveBaseBench(Bench):
     @property
     def recoveries(self):
         """Names of the recovery behaviours that have run, oldest first."""
-        return [event.data["plugin"] for event in self.events(EventKind.RECOVERY)]
+        return [event.data["plugin"] for event in self.recorded(EventKind.RECOVERY)]
 
     @property
     def plans(self):
@@ -39,13 +39,13 @@ class MoveBaseBench(Bench):
 
 
 @pytest.fixture
-def make_bench():
-    """Make any number of benches; ``retries`` holds for planner and controller, the server's defaults without it."""
+def make_session():
+    """Make any number of sessions; ``retries`` holds for planner and controller, the server's defaults without it."""
     with ExitStack() as stack:
 
         def make(retries=None, **parameters):
             if retries is not None:
                 parameters |= {"planner_max_retries": retries, "controller_max_retries": retries}
-            return stack.enter_context(MoveBaseBench(PLUGINS, **parameters))
+            return stack.enter_context(MoveBaseSession(PLUGINS, **parameters))
 
         yield make

@@ -27,96 +27,96 @@ def alternate(*answers):
     return answer
 
 
-def test_it_plans_follows_and_succeeds(make_bench, states):
-    bench = make_bench()
-    handle = bench.send()
+def test_it_plans_follows_and_succeeds(make_session, states):
+    session = make_session()
+    handle = session.send()
     result = handle.wait()
     assert (handle.status, result.outcome) == (GoalStatus.SUCCEEDED, Outcome.SUCCESS)
     assert result.dist_to_goal < 0.1
     assert result.final_pose.x == pytest.approx(2.0, abs=0.1)
-    assert states(bench, "move_base") == ["exe_path"]
+    assert states(session, "move_base") == ["exe_path"]
     assert handle.feedback.dist_to_goal < 0.2
-    assert bench.recoveries == []
+    assert session.recoveries == []
 
 
-def test_the_goals_tolerances_reach_planner_and_controller(make_bench):
-    bench = make_bench()
-    result = bench.send(dist_tolerance=0.7, angle_tolerance=0.3).wait()
-    request = bench.planner.requests[0]
+def test_the_goals_tolerances_reach_planner_and_controller(make_session):
+    session = make_session()
+    result = session.send(dist_tolerance=0.7, angle_tolerance=0.3).wait()
+    request = session.planner.requests[0]
     assert (request.dist_tolerance, request.angle_tolerance) == (0.7, 0.3)
     assert 0.3 < result.dist_to_goal < 0.75
 
 
-def test_without_tolerances_of_the_goal_those_of_the_server_reach_the_planner(make_bench):
-    bench = make_bench(dist_tolerance=0.4, angle_tolerance=0.5)
-    bench.send().wait()
-    request = bench.planner.requests[0]
+def test_without_tolerances_of_the_goal_those_of_the_server_reach_the_planner(make_session):
+    session = make_session(dist_tolerance=0.4, angle_tolerance=0.5)
+    session.send().wait()
+    request = session.planner.requests[0]
     assert (request.dist_tolerance, request.angle_tolerance) == (0.4, 0.5)
 
 
 @pytest.mark.parametrize(("off", "farthest"), [(0.1, 0.4), (0.3, 0.4), (0.39, 0.5)])
-def test_a_path_that_ends_off_the_target_leaves_less_of_the_tolerance_for_arrival(make_bench, off, farthest):
-    bench = make_bench(dist_tolerance=0.4)
+def test_a_path_that_ends_off_the_target_leaves_less_of_the_tolerance_for_arrival(make_session, off, farthest):
+    session = make_session(dist_tolerance=0.4)
     short = Pose.planar(2.0 - off, 0.0)
-    bench.planner.play(lambda request: straight_plan(replace(request, goal=short)))
-    result = bench.send().wait()
+    session.planner.play(lambda request: straight_plan(replace(request, goal=short)))
+    result = session.send().wait()
     assert result.success
     assert result.final_pose.distance_to(Pose.planar(2.0, 0.0)) <= farthest
 
 
-def test_failed_planning_runs_the_behaviours_in_order_and_ends_with_the_planners_code(make_bench):
-    bench = make_bench(retries=0)
-    bench.planner.play(bench.no_path)
-    result = bench.send().wait()
-    assert bench.recoveries == ["first", "second", "third"]
-    assert bench.plans == 4
+def test_failed_planning_runs_the_behaviours_in_order_and_ends_with_the_planners_code(make_session):
+    session = make_session(retries=0)
+    session.planner.play(session.no_path)
+    result = session.send().wait()
+    assert session.recoveries == ["first", "second", "third"]
+    assert session.plans == 4
     assert (result.outcome, result.message) == (GetPathOutcome.NO_PATH_FOUND, "walled in")
 
 
-def test_failed_control_runs_the_behaviours_in_order_and_ends_with_the_controllers_code(make_bench):
-    bench = make_bench(retries=0)
-    bench.controller.play(BLOCKED)
-    result = bench.send().wait()
-    assert bench.recoveries == ["first", "second", "third"]
+def test_failed_control_runs_the_behaviours_in_order_and_ends_with_the_controllers_code(make_session):
+    session = make_session(retries=0)
+    session.controller.play(BLOCKED)
+    result = session.send().wait()
+    assert session.recoveries == ["first", "second", "third"]
     assert (result.outcome, result.message) == (ExePathOutcome.BLOCKED_PATH, "a chair")
 
 
-def test_a_recovery_that_helps_lets_the_goal_succeed(make_bench):
-    bench = make_bench(retries=0)
-    bench.planner.play(bench.no_path, straight_plan)
-    assert bench.send().wait().success
-    assert bench.recoveries == ["first"]
+def test_a_recovery_that_helps_lets_the_goal_succeed(make_session):
+    session = make_session(retries=0)
+    session.planner.play(session.no_path, straight_plan)
+    assert session.send().wait().success
+    assert session.recoveries == ["first"]
 
 
 @pytest.mark.parametrize("answer", [RecoveryResult(RecoveryOutcome.FAILURE, "no"), RuntimeError("broken")])
-def test_a_behaviour_that_fails_is_followed_by_planning_and_then_the_next_one(make_bench, answer):
-    bench = make_bench(retries=0)
-    bench.plugin("first", ScriptedRecovery).play(answer)
-    bench.planner.play(bench.no_path, bench.no_path, straight_plan)
-    assert bench.send().wait().success
-    assert bench.recoveries == ["first", "second"]
+def test_a_behaviour_that_fails_is_followed_by_planning_and_then_the_next_one(make_session, answer):
+    session = make_session(retries=0)
+    session.plugin("first", ScriptedRecovery).play(answer)
+    session.planner.play(session.no_path, session.no_path, straight_plan)
+    assert session.send().wait().success
+    assert session.recoveries == ["first", "second"]
 
 
-def test_a_plan_after_failed_planning_resets_the_list(make_bench):
-    bench = make_bench(retries=0)
-    bench.planner.play(bench.no_path, straight_plan)
-    bench.controller.play(drive(0.3), BLOCKED, bench.controller.follow)
-    assert bench.send().wait().success
-    assert bench.recoveries == ["first", "first"]
+def test_a_plan_after_failed_planning_resets_the_list(make_session):
+    session = make_session(retries=0)
+    session.planner.play(session.no_path, straight_plan)
+    session.controller.play(drive(0.3), BLOCKED, session.controller.follow)
+    assert session.send().wait().success
+    assert session.recoveries == ["first", "first"]
 
 
-def test_motion_after_failed_control_resets_the_list(make_bench):
-    bench = make_bench(retries=0, oscillation_distance=0.5)
-    bench.controller.play(BLOCKED, *[drive(0.5)] * 30, BLOCKED, bench.controller.follow)
-    assert bench.send(4.0).wait().success
-    assert bench.recoveries == ["first", "first"]
+def test_motion_after_failed_control_resets_the_list(make_session):
+    session = make_session(retries=0, oscillation_distance=0.5)
+    session.controller.play(BLOCKED, *[drive(0.5)] * 30, BLOCKED, session.controller.follow)
+    assert session.send(4.0).wait().success
+    assert session.recoveries == ["first", "first"]
 
 
-def test_without_motion_after_failed_control_the_next_behaviour_runs(make_bench):
-    bench = make_bench(retries=0, oscillation_distance=0.5)
-    bench.controller.play(BLOCKED, drive(0.5), BLOCKED, bench.controller.follow)
-    assert bench.send(4.0).wait().success
-    assert bench.recoveries == ["first", "second"]
+def test_without_motion_after_failed_control_the_next_behaviour_runs(make_session):
+    session = make_session(retries=0, oscillation_distance=0.5)
+    session.controller.play(BLOCKED, drive(0.5), BLOCKED, session.controller.follow)
+    assert session.send(4.0).wait().success
+    assert session.recoveries == ["first", "second"]
 
 
 @pytest.mark.parametrize(
@@ -127,31 +127,31 @@ def test_without_motion_after_failed_control_the_next_behaviour_runs(make_bench)
         ({}, {"recovery_enabled": False}, []),
     ],
 )
-def test_the_goal_and_the_parameters_say_which_behaviours_run(make_bench, fields, parameters, expected):
-    bench = make_bench(retries=0, **parameters)
-    bench.planner.play(bench.no_path)
-    assert bench.send(**fields).wait().outcome == GetPathOutcome.NO_PATH_FOUND
-    assert bench.recoveries == expected
+def test_the_goal_and_the_parameters_say_which_behaviours_run(make_session, fields, parameters, expected):
+    session = make_session(retries=0, **parameters)
+    session.planner.play(session.no_path)
+    assert session.send(**fields).wait().outcome == GetPathOutcome.NO_PATH_FOUND
+    assert session.recoveries == expected
 
 
-def test_a_fatal_failure_of_control_ends_the_goal_without_recovery(make_bench):
-    bench = make_bench()
-    bench.controller.play(RuntimeError("broken"))
-    assert bench.send().wait().outcome == ExePathOutcome.INTERNAL_ERROR
-    assert bench.recoveries == []
+def test_a_fatal_failure_of_control_ends_the_goal_without_recovery(make_session):
+    session = make_session()
+    session.controller.play(RuntimeError("broken"))
+    assert session.send().wait().outcome == ExePathOutcome.INTERNAL_ERROR
+    assert session.recoveries == []
 
 
-def test_a_robot_that_gets_nowhere_is_stopped_and_recovered(make_bench):
-    bench = make_bench(oscillation_timeout=2.0)
+def test_a_robot_that_gets_nowhere_is_stopped_and_recovered(make_session):
+    session = make_session(oscillation_timeout=2.0)
     to_and_fro = [drive(0.3 if i // 5 % 2 else -0.3) for i in range(45)]
-    bench.controller.play(*to_and_fro, bench.controller.follow)
-    assert bench.send(3.0).wait().success
-    assert bench.recoveries == ["first"]
+    session.controller.play(*to_and_fro, session.controller.follow)
+    assert session.send(3.0).wait().success
+    assert session.recoveries == ["first"]
 
 
-def test_a_robot_that_never_gets_anywhere_ends_with_oscillation(make_bench):
-    bench = make_bench(oscillation_timeout=2.0)
-    bench.controller.play(alternate(*[drive(0.3)] * 5, *[drive(-0.3)] * 5))
-    result = bench.send(3.0).wait()
+def test_a_robot_that_never_gets_anywhere_ends_with_oscillation(make_session):
+    session = make_session(oscillation_timeout=2.0)
+    session.controller.play(alternate(*[drive(0.3)] * 5, *[drive(-0.3)] * 5))
+    result = session.send(3.0).wait()
     assert result.outcome == Outcome.OSCILLATION
-    assert bench.recoveries == ["first", "second", "third"]
+    assert session.recoveries == ["first", "second", "third"]

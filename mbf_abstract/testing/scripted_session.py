@@ -1,10 +1,10 @@
-"""A test bench: a server without a map, a loopback robot and scripted plugins on one clock, made in one line.
+"""A session for tests: a server without a map, a loopback robot and scripted plugins on one clock, made in one line.
 
 Example
 -------
->>> with Bench(controller_patience=1.0) as bench:
-...     bench.planner.play(RuntimeError("boom"))
-...     result = bench.navigator.get_path(Pose.planar(3.0, 0.0))
+>>> with ScriptedSession(controller_patience=1.0) as session:
+...     session.planner.play(RuntimeError("boom"))
+...     result = session.navigator.get_path(Pose.planar(3.0, 0.0))
 """
 
 from __future__ import annotations
@@ -17,18 +17,15 @@ import numpy as np
 
 from mbf_abstract.config.configuration import Config, NavigationParameters, PluginSpec
 from mbf_abstract.drive.robot import Robot
-from mbf_abstract.events import Event, EventBus, EventKind, MemorySink
+from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import MapQueries
 from mbf_abstract.maps.sensing import RangeScan
-from mbf_abstract.navigator import Navigator
 from mbf_abstract.plugins import PLUGIN_BASES, Plugin, PluginContext, PluginKind
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
-from mbf_abstract.testing.loopback import LoopbackRobot
+from mbf_abstract.testing.loopback import LoopbackSession
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, ScriptedRefiner
 from mbf_abstract.time.clock import Clock
-from mbf_abstract.time.sim_clock import SimClock
 
 P = TypeVar("P", bound=Plugin)
 
@@ -66,8 +63,8 @@ class MapFreeServer(AbstractNavigationServer):
         return self.map_trouble
 
 
-class Bench:
-    """Clock, robot, server, navigator and event record of one test; use it as a context manager.
+class ScriptedSession(LoopbackSession):
+    """A loopback robot and a server of scripted plugins.
 
     Parameters
     ----------
@@ -91,15 +88,10 @@ class Bench:
         robot: Robot | None = None,
         **parameters: Any,
     ) -> None:
-        self.clock: Clock = clock or SimClock()
-        self.memory = MemorySink(100_000)
-        self.bus = EventBus(self.clock.now, [self.memory])
-        self.transforms = TransformBuffer()
-        self.robot = LoopbackRobot(self.clock, self.transforms, start or Pose.planar(0.0, 0.0))
+        super().__init__(start or Pose.planar(0.0, 0.0), clock)
         specs = [_spec(name, plugin_class) for name, plugin_class in (plugins or SCRIPTED).items()]
-        config = Config("none", FilePath("bench.yaml"), NavigationParameters(**parameters), tuple(specs))
-        self.server = MapFreeServer(config, robot or self.robot, self.clock, self.transforms, self.bus)
-        self.navigator = Navigator(self.server)
+        config = Config("none", FilePath("scripted.yaml"), NavigationParameters(**parameters), tuple(specs))
+        self.server = self.serve(MapFreeServer, config, robot or self.robot, self.transforms)
 
     @property
     def planner(self) -> ScriptedPlanner:
@@ -129,7 +121,7 @@ class Bench:
                 return found.instance
         raise KeyError(f"no {plugin_class.__name__} named {name!r}")
 
-    def events(self, *kinds: EventKind) -> tuple[Event, ...]:
+    def recorded(self, *kinds: EventKind) -> tuple[Event, ...]:
         """Return what was recorded, of these kinds only."""
         return self.memory.of_kind(*kinds)
 
@@ -138,18 +130,6 @@ class Bench:
         start = self.robot.pose
         count = max(2, int(start.distance_to(Pose.planar(x, y)) / 0.1) + 1)
         return Path.from_points(np.linspace(start.position, (x, y, start.z), count))
-
-    def close(self) -> None:
-        """Shut everything down and let the threads end."""
-        self.server.close()
-        self.robot.close()
-        self.clock.sleep(1.0)
-
-    def __enter__(self) -> Bench:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
 
 
 def _spec(name: str, plugin_class: type[Plugin]) -> PluginSpec:

@@ -1,4 +1,4 @@
-"""The loopback robot, the scripted plugins and the bench."""
+"""The loopback robot, the scripted plugins and the session."""
 
 import math
 
@@ -7,10 +7,10 @@ import pytest
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.plugins import RefineResult
-from mbf_abstract.testing.bench import Bench
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.testing.promises import assert_stops
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner
+from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.sim_clock import SimClock
 
 
@@ -50,35 +50,37 @@ def test_a_stuck_robot_stays_and_says_so_by_its_odometry(robot):
     assert robot.odometry().velocity == Twist()
 
 
-def test_the_bench_drives_to_a_goal_with_its_scripted_plugins():
-    with Bench(start=Pose.planar(1.0, 1.0)) as bench:
-        assert bench.navigator.go_to(Pose.planar(2.0, 2.0, 1.0)).success
-        assert bench.robot.pose.distance_to(Pose.planar(2.0, 2.0)) < 0.1
+def test_the_session_drives_to_a_goal_with_its_scripted_plugins():
+    with ScriptedSession(start=Pose.planar(1.0, 1.0)) as session:
+        assert session.navigator.go_to(Pose.planar(2.0, 2.0, 1.0)).success
+        assert session.robot.pose.distance_to(Pose.planar(2.0, 2.0)) < 0.1
 
 
 def test_answers_are_played_in_order_and_the_last_is_repeated():
-    with Bench() as bench:
-        path = bench.path_to(1.0)
-        bench.refiner.play(RefineResult(0, "first", path), lambda given: RefineResult(0, f"{len(given)} poses", given))
-        messages = [bench.refiner.apply_refinement(path, None).message for _ in range(3)]
+    with ScriptedSession() as session:
+        path = session.path_to(1.0)
+        session.refiner.play(
+            RefineResult(0, "first", path), lambda given: RefineResult(0, f"{len(given)} poses", given)
+        )
+        messages = [session.refiner.apply_refinement(path, None).message for _ in range(3)]
         assert messages == ["first", "11 poses", "11 poses"]
-        assert len(bench.refiner.requests) == 3
+        assert len(session.refiner.requests) == 3
 
 
-def test_a_plugin_of_the_bench_is_found_by_name_and_class():
-    with Bench() as bench:
-        assert bench.plugin("planner", ScriptedPlanner) is bench.planner
+def test_a_plugin_of_the_session_is_found_by_name_and_class():
+    with ScriptedSession() as session:
+        assert session.plugin("planner", ScriptedPlanner) is session.planner
         with pytest.raises(KeyError, match="no ScriptedController named 'planner'"):
-            bench.plugin("planner", ScriptedController)
+            session.plugin("planner", ScriptedController)
 
 
 def test_the_stop_promise_is_checked_in_earnest():
-    with Bench() as bench:
-        bench.robot.send_command(Twist.planar(1.0))
+    with ScriptedSession() as session:
+        session.robot.send_command(Twist.planar(1.0))
         with pytest.raises(AssertionError, match="the robot still does"):
-            assert_stops(bench, 0.0)
-        bench.clock.sleep(3.0)
-        bench.robot.send_command(Twist.planar(1.0))
+            assert_stops(session, 0.0)
+        session.clock.sleep(3.0)
+        session.robot.send_command(Twist.planar(1.0))
         with pytest.raises(AssertionError, match="commands after the fault"):
-            assert_stops(bench, 0.0)
-        bench.robot.send_command(Twist())
+            assert_stops(session, 0.0)
+        session.robot.send_command(Twist())

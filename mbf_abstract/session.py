@@ -1,0 +1,96 @@
+"""A clock, a record of the events, a robot, its server and a navigator, wired together and closed in the right order.
+
+When to use: simulations, tests and commands that make their own robot. When not: on a real robot, for which
+``Navigator.from_file`` is enough.
+
+Example
+-------
+>>> with NavigationSession() as session:
+...     session.serve(*read_config("navigation.yaml"), robot)
+...     session.navigator.go_to(Pose.planar(8.0, 3.0))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from typing import TypeVar
+
+from mbf_abstract.config.configuration import Config
+from mbf_abstract.drive.robot import Robot
+from mbf_abstract.events import EventBus, EventSink, MemorySink
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.navigator import Navigator
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.time.clock import Clock
+from mbf_abstract.time.sim_clock import SimClock
+
+Session = TypeVar("Session", bound="NavigationSession")
+Server = TypeVar("Server", bound=AbstractNavigationServer)
+
+TIME_TO_END = 1.0  # s of simulated time for threads to end; it passes only while a thread waits
+
+
+class NavigationSession:
+    """What navigation of one robot needs, on one clock; a context manager, or call ``close``.
+
+    Parameters
+    ----------
+    clock : Clock, optional
+        A new ``SimClock`` if not given.
+    sinks : iterable of EventSink
+        Where events go, beside the session's memory.
+    max_events : int
+        How many events the memory keeps.
+
+    Attributes
+    ----------
+    clock : Clock
+    events : EventBus
+    memory : MemorySink
+        The events so far.
+    navigator : Navigator
+        Of the server, once there is one.
+    """
+
+    navigator: Navigator
+
+    def __init__(self, clock: Clock | None = None, sinks: Iterable[EventSink] = (), max_events: int = 100_000) -> None:
+        self.clock: Clock = clock or SimClock()
+        self.memory = MemorySink(max_events)
+        self.events = EventBus(self.clock.now, [self.memory, *sinks])
+        self._closing = ExitStack()
+        self.on_close(self.events.close)
+        self.on_close(self._let_threads_end)
+
+    def serve(
+        self,
+        server_class: type[Server],
+        config: Config,
+        robot: Robot,
+        transforms: TransformBuffer | None = None,
+        seed: int = 0,
+    ) -> Server:
+        """Make the server of a configuration; the parameters, and what is raised, are those of its class."""
+        server = server_class(config, robot, self.clock, transforms, self.events, seed)
+        self.on_close(server.close)
+        self.navigator = Navigator(server)
+        return server
+
+    def on_close(self, call: Callable[[], object]) -> None:
+        """Let the session end with this call; what was made last ends first."""
+        self._closing.callback(call)
+
+    def close(self) -> None:
+        """Stop the robot, close the server and let the threads end; once."""
+        self._closing.close()
+
+    def _let_threads_end(self) -> None:
+        if isinstance(self.clock, SimClock):
+            self.clock.sleep(TIME_TO_END)
+
+    def __enter__(self: Session) -> Session:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
