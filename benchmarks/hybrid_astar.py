@@ -136,7 +136,7 @@ def fault_of(costmap: Costmap, result: PlanResult, goal: np.ndarray) -> str:
     path = result.path
     points, yaws = path.positions[:, :2], np.unwrap([pose.yaw for pose in path])
     steps, turns = np.hypot(*np.diff(points, axis=0).T), np.abs(np.diff(yaws))
-    outline = CAR.offset(-0.3 * costmap.resolution)
+    outline = CAR.padded(-0.3 * costmap.resolution)
     if not np.allclose(points[-1], goal[:2], atol=1e-6) or abs(math.remainder(yaws[-1] - goal[2], 2 * math.pi)) > 1e-6:
         return "does not end at the goal"
     if steps.max(initial=0.0) > costmap.resolution + 1e-6:

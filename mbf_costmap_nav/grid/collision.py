@@ -41,19 +41,9 @@ class FootprintCosts(NamedTuple):
     highest: int
 
     @property
-    def outside(self) -> bool:
-        """Whether a corner lies outside the map."""
-        return self.covered < 0
-
-    @property
-    def in_collision(self) -> bool:
-        """Whether a lethal cell is covered, or the footprint extends beyond the map."""
-        return self.outside or self.lethal > 0
-
-    @property
     def state(self) -> CellState:
         """Worst state among the cells; unknown counts as worse than lethal (MBF)."""
-        if self.outside:
+        if self.covered < 0:
             return CellState.OUTSIDE
         if self.unknown:
             return CellState.UNKNOWN

@@ -95,7 +95,7 @@ class Footprint:
         return Footprint(self.vertices + padding * np.sign(self.vertices))
 
     def offset(self, distance: float) -> Footprint:
-        """Outline that keeps ``distance`` [m] from this one; negative shrinks.
+        """Outline that keeps ``distance`` [m], 0 or more, from this one.
 
         The sides move outwards by exactly ``distance`` and meet in corners; a corner sharper than ``MITRE_LIMIT`` is
         cut flat, still outside the rounded offset. A footprint that is not convex is replaced by its convex hull,
@@ -104,14 +104,12 @@ class Footprint:
         Raises
         ------
         ValueError
-            The distance is not finite, or shrinking by it leaves nothing.
+            The distance is negative or not finite.
         """
-        if not math.isfinite(distance):
-            raise ValueError(f"the distance of an offset must be finite, got {distance} m")
+        if not 0.0 <= distance < math.inf:
+            raise ValueError(f"the distance of an offset must be 0 m or more and finite, got {distance} m")
         if distance == 0.0:
             return self
-        if distance < 0.0:
-            return Footprint(_shrunk(self.vertices, -distance))
         if len(self.vertices) < 3:
             return Footprint.circle(distance / math.cos(math.pi / CIRCLE_POINTS))
         hull = _convex_hull(self.vertices)
@@ -183,29 +181,6 @@ def _convex_hull(points: FloatArray) -> FloatArray:
 def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
     """Twice the area of the triangle; positive if a, b, c turn left."""
     return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-
-
-def _shrunk(vertices: FloatArray, distance: float) -> FloatArray:
-    """What is left of the hull when each side moves inwards by ``distance`` [m]; sides may vanish."""
-    hull = rest = _convex_hull(vertices) if len(vertices) >= 3 else np.zeros((0, 2))
-    sides = np.roll(hull, -1, axis=0) - hull
-    for vertex, side in zip(hull, sides, strict=True):
-        inwards = np.array([-side[1], side[0]]) / norm(side)
-        rest = _clipped(rest, scalar_products(rest - vertex, inwards) - distance)
-    if len(rest) < 3:
-        raise ValueError(f"shrinking the footprint by {distance:g} m leaves nothing of it")
-    return rest
-
-
-def _clipped(polygon: FloatArray, depths: FloatArray) -> FloatArray:
-    """Part of a convex polygon whose corners' ``depths`` are above 0 (one step of Sutherland and Hodgman 1974)."""
-    corners: list[FloatArray] = []
-    for a, b, depth_a, depth_b in zip(polygon, np.roll(polygon, -1, axis=0), depths, np.roll(depths, -1), strict=True):
-        if depth_a > 0.0:
-            corners.append(a)
-        if (depth_a > 0.0) != (depth_b > 0.0):
-            corners.append(a + (b - a) * (depth_a / (depth_a - depth_b)))
-    return np.array(corners).reshape(-1, 2)
 
 
 def _mitred_offset(hull: FloatArray, distance: float) -> FloatArray:

@@ -48,20 +48,11 @@ class FootprintCheck:
         """Whether a lethal cell lies under the footprint."""
         return self.cost(costmap, x, y, yaw) == LETHAL
 
-    def lethal_count(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
-        """Number of footprint samples on lethal cells: a measure of how deep the robot is in a collision."""
-        points = rotated(plane_rotation(yaw), self.samples) + np.array([x, y])
-        cells, inside = costmap.world_to_cells(points)
-        return int(np.count_nonzero(costmap.cells[cells[inside, 1], cells[inside, 0]] == LETHAL))
-
-    def outside_count(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
-        """Number of footprint samples off the map."""
-        points = rotated(plane_rotation(yaw), self.samples) + np.array([x, y])
-        return int(np.count_nonzero(~costmap.world_to_cells(points)[1]))
-
     def touched(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
-        """Number of footprint samples on lethal cells or off the map."""
-        return self.lethal_count(costmap, x, y, yaw) + self.outside_count(costmap, x, y, yaw)
+        """Number of footprint samples on lethal cells or off the map: how deep the robot is in a collision."""
+        cells, inside = costmap.world_to_cells(rotated(plane_rotation(yaw), self.samples) + np.array([x, y]))
+        lethal = costmap.cells[cells[inside, 1], cells[inside, 0]] == LETHAL
+        return int(np.count_nonzero(lethal)) + int(np.count_nonzero(~inside))
 
     def first_collision(self, costmap: Costmap, poses: FloatArray) -> int:
         """Index of the first colliding pose of (n, 3) poses (x, y, yaw), or -1."""

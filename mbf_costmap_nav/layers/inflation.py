@@ -68,8 +68,8 @@ class InflationLayer(CostmapLayer):
         self._tabulate()
 
     @property
-    def lasting(self) -> bool:
-        """As lasting as the costs it inflates; not if it inflates unknown cells."""
+    def permanent(self) -> bool:
+        """Whether it inflates no unknown cells; its costs are as permanent as those it inflates."""
         return not self.parameters.inflate_around_unknown
 
     def configuration_warning(self) -> str:

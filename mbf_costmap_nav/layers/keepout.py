@@ -56,7 +56,7 @@ class KeepoutLayer(CostmapLayer):
         self._changed = EMPTY_BOX
 
     @property
-    def lasting(self) -> bool:
+    def permanent(self) -> bool:
         """Whether its areas are in the costmap's frame."""
         return self._placement.in_costmap_frame
 

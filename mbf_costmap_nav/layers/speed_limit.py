@@ -59,7 +59,7 @@ class SpeedLimitLayer(CostmapLayer):
         self._placement = Placement(files.map_frame, context)
 
     @property
-    def lasting(self) -> bool:
+    def permanent(self) -> bool:
         """Always true: it changes no cell."""
         return True
 

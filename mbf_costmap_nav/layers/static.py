@@ -66,7 +66,7 @@ class StaticLayer(GridLayer):
         self._placement = Placement(self._map.frame_id, context)
 
     @property
-    def lasting(self) -> bool:
+    def permanent(self) -> bool:
         """Whether its map is in the costmap's frame."""
         return self._placement.in_costmap_frame
 

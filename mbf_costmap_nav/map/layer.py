@@ -126,9 +126,15 @@ class CostmapLayer(MapLayer):
         """Forget the cells in ``box``, or all cells out of it (``inside`` false)."""
 
     @property
-    def lasting(self) -> bool:
-        """Whether no sensor has a part in its cells, and no frame moves them: what it forbids stays forbidden."""
+    def permanent(self) -> bool:
+        """Whether neither a sensor nor a transform changes its cells: what it forbids stays forbidden."""
         return False
+
+    @property
+    def only_raises(self) -> bool:
+        """Whether it never lowers the costs of the layers before it."""
+        overwrite = CombinationMethod.OVERWRITE
+        return getattr(self.parameters, "combination_method", overwrite) is not overwrite
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Allowed speed [m/s] at the point (x, y) [m], at most ``full_speed``."""

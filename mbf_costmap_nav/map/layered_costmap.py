@@ -13,27 +13,21 @@ The order of work, bounds and the combination rules are those of costmap_2d.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.maps.layered_map import LayeredMap
+from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.maps.layers.layer_stack import LayerStack
-from mbf_abstract.maps.navigation_map import PlaceCheck
-from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.grid.motion_check import nearest_lethal, obstacle_ahead
-from mbf_costmap_nav.map import pose_checks
 from mbf_costmap_nav.map.layer import CostmapLayer, shifted
-from mbf_costmap_nav.map.layers_in_sum import lasting_map, warnings_about
+from mbf_costmap_nav.map.snapshot_answers import SnapshotAnswers
 
 
-class LayeredCostmap(LayeredMap):
-    """Layers, the cells they produce, and the questions a server asks.
+class LayeredCostmap(SnapshotAnswers):
+    """Layers and the cells they produce.
 
     Parameters
     ----------
@@ -53,6 +47,13 @@ class LayeredCostmap(LayeredMap):
         Start cells as unknown instead of free.
     max_age : float
         Seconds after the last update at which the map stops being current; 0 = never.
+
+    Attributes
+    ----------
+    geometry : GridGeometry
+        The current grid; it moves with the robot if the window rolls.
+    last_update : float or None
+        Time [s] of the last update; None before the first one.
 
     Raises
     ------
@@ -80,12 +81,12 @@ class LayeredCostmap(LayeredMap):
         self.frame_id = frame_id
         self.rolling_window = rolling_window
         self.max_age = max_age
-        self._default_value = UNKNOWN if track_unknown_space else FREE
-        self._geometry = geometry
-        self._cells: CellArray = np.full((geometry.height, geometry.width), self._default_value, dtype=np.uint8)
+        self._default_cost = UNKNOWN if track_unknown_space else FREE
+        self.geometry = geometry
+        self._cells = self._default_cells()
         self._footprint_padding = footprint_padding
         self._version = 0
-        self._last_update: float | None = None
+        self.last_update: float | None = None
         self._pending = geometry.box
         self._snapshot: Costmap | None = None
         self._unmoved: set[str] = set()  # names of layers that have not followed the window
@@ -93,110 +94,68 @@ class LayeredCostmap(LayeredMap):
             layer.match_geometry(geometry)
         self.set_footprint(footprint)
 
-    # ------------------------------------------------------------------------------------------------- places
-    def point_check(self) -> PlaceCheck:
-        """State and cost of the cells of points."""
-        costmap = self.snapshot()
-        return lambda pose: pose_checks.check_point(costmap, pose.x, pose.y)
-
-    def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
-        """State and summed cost of the outline, see ``pose_checks.pose_check``."""
-        if center_only:
-            return pose_checks.pose_check(self.snapshot(), Footprint([]), replace(query, safety_dist=0.0))
-        return pose_checks.pose_check(self.snapshot(), self._outline(query), query)
-
-    def find_valid_pose(
-        self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
-    ) -> PoseAnswer:
-        """Nearest pose where the outline fits, see ``pose_checks.find_valid_pose``."""
-        tolerances = dist_tolerance, angle_tolerance
-        return pose_checks.find_valid_pose(self.snapshot(), self._outline(query), pose, *tolerances, query)
-
-    def _outline(self, query: PlaceQuery) -> Footprint:
-        return self.footprint if query.use_padded_footprint else self.unpadded_footprint
-
     # ------------------------------------------------------------------------------------------------ reading
-    @property
-    def geometry(self) -> GridGeometry:
-        """The current grid; it moves with the robot if the window rolls."""
-        return self._geometry
-
-    @property
-    def resolution(self) -> float:
-        """Side of a cell [m]."""
-        return self._geometry.resolution
-
-    @property
-    def last_update(self) -> float | None:
-        """Time [s] of the last update; None before the first one."""
-        return self._last_update
-
-    @property
-    def inscribed_radius(self) -> float:
-        """Distance [m] from the base to the nearest side of the padded footprint."""
-        return self.footprint.inscribed_radius
-
-    @property
-    def circumscribed_radius(self) -> float:
-        """Distance [m] from the base to the farthest corner of the padded footprint."""
-        return self.footprint.circumscribed_radius
-
     def snapshot(self) -> Costmap:
         """Read-only copy of the map as of the last update; the same object until the map changes."""
         with self._lock:
             if self._snapshot is None:
                 cells = self._cells.copy()
                 cells.flags.writeable = False
-                grid = self._geometry
-                self._snapshot = Costmap(
-                    cells,
-                    grid.resolution,
-                    grid.origin_x,
-                    grid.origin_y,
-                    self.frame_id,
-                    self._last_update or 0.0,
-                    self._version,
-                )
+                self._snapshot = self._costmap(cells)
             return self._snapshot
 
-    def lasting(self) -> Costmap | None:
-        """The map as it were if no sensor saw anything, see ``layers_in_sum``; None where that is moot."""
+    def permanent_costmap(self) -> Costmap | None:
+        """Costs that the permanent layers alone give, as if no sensor saw anything.
+
+        None on a rolling window, before the first update, without permanent layers, and where another layer may lower
+        their costs.
+        """
         with self._lock:
-            if self.rolling_window or self._last_update is None:
+            layers = list(self.layers.enabled)
+            safe = all(layer.permanent or layer.only_raises for layer in layers)
+            if self.rolling_window or self.last_update is None or not safe:
                 return None
-            self._pending = self._geometry.box  # layers may keep notes of the cells they are asked for
-            return lasting_map(list(self.layers.enabled), self._geometry, self._default_value, self.frame_id)
+            permanent = [layer for layer in layers if layer.permanent]
+            self._pending = self.geometry.box  # layers may keep notes of the cells they are asked for
+            cells = self._default_cells()
+            for layer in permanent:
+                layer.update_costs(cells, self.geometry.box)
+            return self._costmap(cells) if permanent else None
+
+    def _default_cells(self) -> CellArray:
+        return np.full((self.geometry.height, self.geometry.width), self._default_cost, dtype=np.uint8)
+
+    def _costmap(self, cells: CellArray) -> Costmap:
+        grid, stamp = self.geometry, self.last_update or 0.0
+        return Costmap(cells, grid.resolution, grid.origin_x, grid.origin_y, self.frame_id, stamp, self._version)
 
     def stale_reason(self, now: float) -> str:
         """Why the map is not current at ``now`` [s]: its age, a layer that raised, a silent sensor; empty if it is."""
         with self._lock:
             if self.layers.problem:
                 return self.layers.problem
-            if self._last_update is None:
+            if self.last_update is None:
                 return "the costmap has not been updated yet"
-            age = now - self._last_update
+            age = now - self.last_update
             if 0.0 < self.max_age < age:
                 return f"the last update of the costmap is {age:.2f} s old, allowed are {self.max_age:.2f} s"
             return self.layers.stale_reason(now)
 
     def configuration_warnings(self) -> list[str]:
-        """What is legal but hardly meant in the layers' parameters, e.g. an inflation narrower than the robot."""
+        """What is legal but hardly meant: of each layer, and that none inflates around a robot that is no point."""
         with self._lock:
-            return warnings_about(self.layers, self.inscribed_radius)
+            warnings = self.layers.configuration_warnings()
+            inflates = any(hasattr(layer.parameters, "inflation_radius") for layer in self.layers.enabled)
+            if self.layers and not inflates and self.inscribed_radius > 0.0:
+                radius = f"{self.inscribed_radius:.2f} m"
+                text = f"no inflation layer: grid planners take the robot, of inscribed radius {radius}, for a point"
+                warnings.append(text)
+            return warnings
 
     def speed_limit(self, x: float, y: float, full_speed: float) -> float:
         """Lowest speed [m/s] the layers allow at the point (x, y) [m]; ``full_speed`` where there is no limit."""
         with self._lock:
             return min((layer.speed_limit(x, y, full_speed) for layer in self.layers.enabled), default=full_speed)
-
-    # ------------------------------------------------------------------------------------------------- motion
-    def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
-        """Where the footprint would touch more than now if the robot kept ``command`` for ``duration`` [s]."""
-        return obstacle_ahead(self.snapshot(), self.footprint, pose, command, duration)
-
-    def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
-        """Offset [m] to the centre of the nearest lethal cell; None if none is ``within`` [m]."""
-        return nearest_lethal(self.snapshot(), pose, within)
 
     # ----------------------------------------------------------------------------------------------- updating
     def update(self, robot_pose: Pose | None, now: float) -> CellBox:
@@ -219,46 +178,49 @@ class LayeredCostmap(LayeredMap):
             self.end_overrides(now)
             for name in sorted(self._unmoved):  # a layer raised when the window moved: it begins anew
                 with self.layers.computing(self.layers[name]):
-                    self.layers[name].match_geometry(self._geometry)
+                    self.layers[name].match_geometry(self.geometry)
                 self._unmoved.discard(name)
             if self.rolling_window and robot_pose is not None:
                 self._follow(robot_pose)
             box = self._pending
-            self._pending = self._geometry.box  # stays so if a layer raises: the next update then repairs everything
+            self._pending = self.geometry.box  # stays so if a layer raises: the next update then repairs everything
             for layer in self.layers.enabled:
                 with self.layers.computing(layer):
                     box = layer.update_bounds(robot_pose, now, box)
-            box = box.clipped(self._geometry.box)
+            box = box.clipped(self.geometry.box)
             if not box.empty:
-                self._cells[box.slices] = self._default_value
-                for layer in self.layers.enabled:
-                    with self.layers.computing(layer):
-                        layer.update_costs(self._cells, box)
-                self._version += 1
-                self._snapshot = None
+                self._recompute(box)
             self._pending = EMPTY_BOX
             self.layers.problem = ""
-            self._last_update = now
+            self.last_update = now
             return EMPTY_BOX if box.empty else box
+
+    def _recompute(self, box: CellBox) -> None:
+        self._cells[box.slices] = self._default_cost
+        for layer in self.layers.enabled:
+            with self.layers.computing(layer):
+                layer.update_costs(self._cells, box)
+        self._version += 1
+        self._snapshot = None
 
     def _follow(self, robot_pose: Pose) -> None:
         """Move the window so that the robot is in its middle; origins stay multiples of the resolution."""
-        grid = self._geometry
+        grid = self.geometry
         ix = round(robot_pose.x / grid.resolution - grid.width / 2)
         iy = round(robot_pose.y / grid.resolution - grid.height / 2)
         dx = ix - round(grid.origin_x / grid.resolution)
         dy = iy - round(grid.origin_y / grid.resolution)
         if dx == 0 and dy == 0:
             return
-        self._geometry = GridGeometry(
+        self.geometry = GridGeometry(
             grid.width, grid.height, grid.resolution, ix * grid.resolution, iy * grid.resolution
         )
-        self._cells = shifted(self._cells, dx, dy, self._default_value)
-        self._pending = self._geometry.box
+        self._cells = shifted(self._cells, dx, dy, self._default_cost)
+        self._pending = self.geometry.box
         self._unmoved |= set(self.layers)
         for layer in self.layers.values():
             with self.layers.computing(layer):
-                layer.shift(self._geometry, dx, dy)
+                layer.shift(self.geometry, dx, dy)
             self._unmoved.discard(layer.name)
 
     # --------------------------------------------------------------------------------------- changes at run time
@@ -278,13 +240,13 @@ class LayeredCostmap(LayeredMap):
             self.footprint = footprint.padded(self._footprint_padding)
             for layer in self.layers.values():
                 layer.set_footprint(self.footprint)
-            self._pending = self._geometry.box
+            self._pending = self.geometry.box
 
     def _replace_parameters(self, name: str, parameters: LayerParameters) -> None:
         """Give a layer its parameters; the effect is visible after the next update, which recomputes everything."""
         layer = self.layers[name]
         old, layer.parameters = layer.parameters, parameters
-        self._pending = self._geometry.box
+        self._pending = self.geometry.box
         try:
             layer.parameters_changed()
         except BaseException:
@@ -296,49 +258,30 @@ class LayeredCostmap(LayeredMap):
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
         """Reset layers (all by default) to what they know without sensors; return their names.
 
-        The effect is visible after the next update. A static layer returns to its map.
-
-        Raises
-        ------
-        KeyError
-            A name is no layer of this map.
+        The effect is visible after the next update. Raises KeyError where a name is no layer.
         """
         with self._lock:
             chosen = self.layers.chosen(layer_names)
             for layer in chosen:
                 layer.reset()
-            self._pending = self._geometry.box
+            self._pending = self.geometry.box
         return [layer.name for layer in chosen]
 
     def clear_area(
         self, center: Pose, size: float, layer_names: Iterable[str] | None = None, *, inside: bool = True
     ) -> list[str]:
-        """Clear layers inside, or outside, a square window around a pose; return their names.
+        """Clear layers inside, or outside, a square window of side ``size`` [m] around a pose; return their names.
 
         By default these are the layers that sensors fill again (``CostmapLayer.clearable``), not the floor plan. A
-        static layer that is named loses the area until ``clear``.
-
-        Parameters
-        ----------
-        center : Pose
-            Middle of the window in the map's frame, usually the robot's pose.
-        size : float
-            Side of the window [m].
-        inside : bool
-            Clear the window itself; otherwise everything but the window, as move_base's clear_costmap_recovery.
-
-        Raises
-        ------
-        KeyError
-            A name is no layer of this map.
+        static layer that is named loses the area until ``clear``. Raises KeyError where a name is no layer.
         """
         with self._lock:
             clearable = [name for name, layer in self.layers.items() if layer.clearable]
             chosen = self.layers.chosen(clearable if layer_names is None else layer_names)
-            x0, y0 = self._geometry.world_to_cell_unbounded(center.x - size / 2, center.y - size / 2)
-            x1, y1 = self._geometry.world_to_cell_unbounded(center.x + size / 2, center.y + size / 2)
+            x0, y0 = self.geometry.world_to_cell_unbounded(center.x - size / 2, center.y - size / 2)
+            x1, y1 = self.geometry.world_to_cell_unbounded(center.x + size / 2, center.y + size / 2)
             window = CellBox(x0 + 1, y0 + 1, x1, y1)  # costmap_2d's window leaves out its border cells
             for layer in chosen:
                 layer.clear_area(window, inside)
-            self._pending = self._geometry.box
+            self._pending = self.geometry.box
         return [layer.name for layer in chosen]

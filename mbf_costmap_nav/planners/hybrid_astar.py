@@ -32,7 +32,7 @@ from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP, HEADINGS, Target, 
 from mbf_costmap_nav.kernels.car.motion_primitives import Car
 from mbf_costmap_nav.kernels.car.shorter_drive import shortened
 from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND, search
-from mbf_costmap_nav.planning.grid_planning import check_tolerance, heights_along, off_map, unless_lasting
+from mbf_costmap_nav.planning.grid_planning import check_tolerance, heights_along, marked_if_permanent, off_map
 from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid
 from mbf_costmap_nav.plugins import CostmapPlanner
 
@@ -137,7 +137,7 @@ class HybridAStarPlanner(CostmapPlanner):
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if leg is None or len(leg.poses) == 0:
                 failure = failure or self._no_path(world, start, goal, leg, tolerance)
-                return unless_lasting(failure, self.costmap, start, goal, tolerance)
+                return marked_if_permanent(failure, self.costmap, start, goal, tolerance)
             legs.append(leg)
         poses = np.concatenate([legs[0].poses, *(leg.poses[1:] for leg in legs[1:])])
         path = to_path(poses, heights_along(poses[:, :2], request), world.costmap.frame_id, self.clock.now())

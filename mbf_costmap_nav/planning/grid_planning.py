@@ -16,14 +16,15 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.execution.path_tracker import polyline_lengths
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_costmap_nav.control.path_geometry import arc_lengths, resample
+from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.grid.costmap import INSCRIBED, Costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
-from mbf_costmap_nav.planning.lasting_walls import stays_unreachable
+from mbf_costmap_nav.planning.permanent_walls import is_permanently_unreachable
 from mbf_costmap_nav.planning.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchWorkspace
 from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
 
@@ -87,7 +88,7 @@ class GridPlanner(CostmapPlanner):
                 return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
             if len(leg.points) == 0:
                 failure = failure or _no_path(grid, start, goal, tolerance, name)
-                return unless_lasting(failure, self.costmap, start, goal, tolerance, self.parameters.lethal_cost)
+                return marked_if_permanent(failure, self.costmap, start, goal, tolerance, self.parameters.lethal_cost)
             reached_goal = leg.reached_goal and grid.costmap.contains(goal.x, goal.y)
             piece = _with_exact_ends(grid, leg.points, start, goal if reached_goal else None)
             pieces.append(resample(piece, self.pose_spacing) if self.pose_spacing > 0.0 else piece)
@@ -108,7 +109,7 @@ class GridPlanner(CostmapPlanner):
         return None
 
 
-def unless_lasting(
+def marked_if_permanent(
     failure: PlanResult,
     costmap: LayeredCostmap,
     start: Pose,
@@ -119,7 +120,7 @@ def unless_lasting(
     """Return a failure to find a path; it is permanent where permanent walls separate start and goal."""
     if failure.outcome not in (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_GOAL):
         return failure
-    if not stays_unreachable(costmap, start, goal, tolerance, lethal_cost):
+    if not is_permanently_unreachable(costmap, start, goal, tolerance, lethal_cost):
         return failure
     text = f"{failure.message}; walls of the static map separate them"
     return replace(failure, message=text, permanent=True)
@@ -185,7 +186,7 @@ def _from_exactly(grid: SearchGrid, exact: NDArray[np.float64], points: NDArray[
 
 def heights_along(points: NDArray[np.float64], request: PlanRequest) -> NDArray[np.float64]:
     """Heights [m] of a path on a flat map: interpolated linearly from the start's to the goal's."""
-    along = arc_lengths(points)
+    along = polyline_lengths(points)
     share = along / along[-1] if along[-1] > 0.0 else along
     return np.asarray(request.start.z + share * (request.goal.z - request.start.z))
 

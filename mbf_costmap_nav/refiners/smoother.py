@@ -20,7 +20,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.execution.path_tracker import PathTracker, polyline_lengths
 from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.arithmetic import arctan2
 from mbf_abstract.geometry.transform_buffer import TransformError
@@ -28,7 +28,7 @@ from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RefineResult
 from mbf_abstract.time.cancel import CancelToken
-from mbf_costmap_nav.control.path_geometry import arc_lengths, resample
+from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.kernels.control.smoothing import relax_path
 from mbf_costmap_nav.plugins import CostmapRefiner
@@ -83,7 +83,8 @@ class SmootherRefiner(CostmapRefiner):
         smoothed = self._drivable(costmap, points, cancel_token)
         if isinstance(smoothed, RefineResult):
             return replace(smoothed, path=path)
-        heights = np.interp(arc_lengths(points), arc_lengths(there.positions[:, :2]), there.positions[:, 2])
+        lengths, old_lengths = polyline_lengths(points), polyline_lengths(there.positions[:, :2])
+        heights = np.interp(lengths, old_lengths, there.positions[:, 2])
         flat = Path.from_points(np.column_stack([smoothed, np.zeros(len(smoothed))]))
         positions = np.column_stack([smoothed, heights])
         refined = T_costmap_path.inverse().apply_to_path(

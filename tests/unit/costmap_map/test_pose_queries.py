@@ -97,7 +97,7 @@ def test_f299_growing_obstacles_push_the_solution_away(ten_by_ten):
             inscribed(cells), UNIT_SQUARE, Pose.planar(5.5, 5.5), 5.0, math.pi, angle_increment=math.pi / 4
         )
         assert (found.pose.x, found.pose.y) == (x, y)
-        assert not footprint_costs(inscribed(cells), UNIT_SQUARE, x, y, found.pose.yaw).in_collision
+        assert footprint_costs(inscribed(cells), UNIT_SQUARE, x, y, found.pose.yaw).lethal == 0
         cells[int(y), int(x)] = 254
 
 

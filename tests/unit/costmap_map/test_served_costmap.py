@@ -68,9 +68,12 @@ def follow(length):
     return ExePathGoal(Path.from_points([(0.0, 0.0, 0.0), (length / 2.0, 0.0, 0.0), (length, 0.0, 0.0)]))
 
 
+def age(served, clock):
+    return clock.now() - served.map.last_update
+
+
 def ages(navigator, clock):
-    server = navigator.server
-    return [clock.now() - costmap.last_update for costmap in (server.global_costmap, server.local_costmap)]
+    return [age(served, clock) for served in navigator.server.served.values()]
 
 
 def test_all_plugins_share_the_two_maps_and_work_on_the_one_they_are_bound_to(start):
@@ -124,6 +127,32 @@ def test_maps_begin_and_cease_to_run_when_the_parameter_changes(start):
     navigator.server.set_parameters(shutdown_costmaps=True)
     clock.sleep(3.0)
     assert min(ages(navigator, clock)) > 1.5
+
+
+def test_a_map_runs_to_the_end_of_its_last_user_and_through_the_delay(start):
+    navigator, clock = start(shutdown="true")
+    served = navigator.server.served["local_costmap"]
+    with served.in_use():
+        with served.in_use():
+            clock.sleep(5.0)
+        clock.sleep(5.0)
+        assert age(served, clock) <= 0.1 + 1e-9, "one user is left"
+    clock.sleep(0.8)
+    with served.in_use():
+        pass
+    clock.sleep(0.8)
+    assert age(served, clock) <= 0.1 + 1e-9, "each use begins the delay anew"
+    clock.sleep(1.2)
+    assert age(served, clock) > 0.8
+
+
+def test_work_that_fails_does_not_stay_a_user_of_the_map(start):
+    navigator, clock = start(shutdown="true")
+    served = navigator.server.served["local_costmap"]
+    with pytest.raises(RuntimeError, match="boom"), served.in_use():
+        raise RuntimeError("boom")
+    clock.sleep(5.0)
+    assert age(served, clock) > 3.0
 
 
 def test_a_silent_sensor_stops_the_robot_and_ends_the_goal(start):

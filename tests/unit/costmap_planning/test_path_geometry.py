@@ -5,14 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from mbf_abstract.geometry import Pose
-from mbf_costmap_nav.control.path_geometry import (
-    arc_lengths,
-    circle_crossing,
-    distance_to_path,
-    look_ahead_point,
-    resample,
-)
+from mbf_abstract.execution.path_tracker import PathTracker, polyline_lengths
+from mbf_abstract.geometry import Path, Pose
+from mbf_costmap_nav.control.path_geometry import circle_crossing, look_ahead_point, resample
 from mbf_costmap_nav.control.path_handling import to_base_frame
 
 X_AXIS = np.column_stack([np.arange(10.0), np.zeros(10)])
@@ -45,31 +40,13 @@ def test_circle_crossing(a, b, radius, expected):
 )
 def test_f119_point_at_a_distance_along_a_segment(a, b, distance, expected):
     points = np.array([a, b], dtype=float)
-    s = distance / arc_lengths(points)[-1]
+    s = distance / polyline_lengths(points)[-1]
     assert points[0] + s * (points[1] - points[0]) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("distance", [1.0, 3.8])
 def test_f120_look_ahead_between_poses(distance):
     assert look_ahead_point(X_AXIS, distance) == pytest.approx((distance, 0.0))
-
-
-@pytest.mark.parametrize(
-    ("points", "expected"),
-    [
-        pytest.param([(0, 0), (1, 0), (2, 0), (3, 0)], (10, 0), id="F121"),
-        pytest.param([(2, 0), (3, 0)], (12, 0), id="F122"),
-    ],
-)
-def test_look_ahead_beyond_the_path_is_counted_from_its_first_pose(points, expected):
-    assert look_ahead_point(np.array(points, dtype=float), 10.0, extrapolate=True) == pytest.approx(expected)
-
-
-@pytest.mark.parametrize("angle", [45, 90, 135, 180, -135, -90, -45])
-def test_f123_extrapolated_look_ahead_in_all_directions(angle):
-    u = np.array([math.cos(math.radians(angle)), math.sin(math.radians(angle))])
-    points = np.array([2 * u, 3 * u])
-    assert look_ahead_point(points, 10.0, extrapolate=True) == pytest.approx(12 * u)
 
 
 def test_look_ahead_inside_the_circle_ends_at_the_last_pose():
@@ -96,45 +73,43 @@ def test_f067_resampling_nothing_gives_nothing():
 
 
 def test_f126_length_of_ten_poses_two_metres_apart():
-    assert arc_lengths(2 * X_AXIS)[-1] == 18.0
-    assert len(arc_lengths(X_AXIS[10:])) == 0
+    assert polyline_lengths(2 * X_AXIS)[-1] == 18.0
+    assert len(polyline_lengths(X_AXIS[10:])) == 0
 
 
 def test_f127_length_of_a_circle():
     angles = np.radians(np.arange(361))
     circle = 2.0 * np.column_stack([np.cos(angles), np.sin(angles)])
-    assert arc_lengths(circle)[-1] == pytest.approx(12.566, abs=0.1)
+    assert polyline_lengths(circle)[-1] == pytest.approx(12.566, abs=0.1)
 
 
-def test_f129_an_empty_path_is_infinitely_far():
-    assert distance_to_path(np.zeros((0, 2)), (1, 1)) == math.inf
+def deviation(points, position):
+    """Distance [m] of a robot that has just got a path from it."""
+    tracker = PathTracker(Path.from_points(np.column_stack([points, np.zeros(len(points))])), dimensions=2)
+    tracker.update(position)
+    return tracker.deviation
 
 
 def test_f130_robot_beside_a_path_there_and_back():
     there_and_back = np.vstack([np.column_stack([np.arange(11.0), np.zeros(11)]), [[x, 0] for x in range(9, -1, -1)]])
     for x in np.linspace(0, 10, 21):
-        assert distance_to_path(there_and_back, (x, 0.5)) == pytest.approx(0.5)
+        assert deviation(there_and_back, (x, 0.5)) == pytest.approx(0.5)
 
 
 def test_f131_circle_driven_twice():
     angles = np.linspace(0, 4 * np.pi, 50)
     circle = 5.0 * np.column_stack([np.cos(angles), np.sin(angles)])
     on_outer = 5.2 * np.array([np.cos(angles[7]), np.sin(angles[7])])
-    assert distance_to_path(circle, on_outer) == pytest.approx(0.2, abs=0.01)
+    assert deviation(circle, on_outer) == pytest.approx(0.2, abs=0.01)
 
 
 def test_f132_l_shaped_path():
     corner = np.array([[0, 0], [10, 0], [10, 10]], dtype=float)
-    assert distance_to_path(corner, (9, 1)) == pytest.approx(1.0, abs=0.1)
+    assert deviation(corner, (9, 1)) == pytest.approx(1.0, abs=0.1)
 
 
 def test_f133_path_of_a_single_pose():
-    assert distance_to_path(np.array([[2.0, 3.0]]), (5, 7)) == 5.0
-
-
-def test_f134_start_index_beyond_the_path_is_an_error():
-    with pytest.raises(IndexError, match="start index 3 is outside a path of 2 poses"):
-        distance_to_path(np.zeros((2, 2)), (0, 0), first=3)
+    assert deviation(np.array([[2.0, 3.0]]), (5, 7)) == 5.0
 
 
 def test_f135_pose_in_the_robots_frame():

@@ -132,7 +132,7 @@ def test_cancel_while_moving_stops_the_robot(run, recovery):
 def test_no_recovery_drives_into_what_stands_in_its_way(run, closed_loop, recovery, boxes):
     world = around(*boxes)
     _, robot, plugin = run(recovery, world)
-    touched = FootprintCheck(plugin.navigation_map.footprint, world.resolution).lethal_count
+    touched = FootprintCheck(plugin.navigation_map.footprint, world.resolution).touched
     deepest = max(touched(world, *state) for state in robot.trace)
     assert deepest <= touched(world, 0.0, 0.0, 0.0)
 

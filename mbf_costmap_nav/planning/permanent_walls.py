@@ -16,15 +16,15 @@ from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
 EIGHT_NEIGHBOURS = np.ones((3, 3), dtype=bool)
 
 
-def stays_unreachable(
+def is_permanently_unreachable(
     costmap: LayeredCostmap, start: Pose, goal: Pose, tolerance: float, lethal_cost: int = INSCRIBED
 ) -> bool:
-    """Whether lasting walls separate a start from all cells within ``tolerance`` [m] of a goal.
+    """Whether permanent walls separate a start from all cells within ``tolerance`` [m] of a goal.
 
     The test is conservative: unknown cells, cut corners and costs below the inscribed one count as free, and the answer
     is false for a start in a wall and for poses off the map. ``lethal_cost`` is the planner's.
     """
-    walls = costmap.lasting()
+    walls = costmap.permanent_costmap()
     if walls is None or not (walls.contains(start.x, start.y) and walls.contains(goal.x, goal.y)):
         return False
     free = (walls.cells < max(lethal_cost, INSCRIBED)) | (walls.cells == UNKNOWN)

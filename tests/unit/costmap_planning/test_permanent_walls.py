@@ -74,20 +74,20 @@ def test_a_goal_behind_sensed_obstacles_may_become_free(make_plugin, rooms, plan
         (("static", "obstacle", "denoise", "inflation"), {}),
     ],
 )
-def test_nothing_is_said_for_good_where_no_wall_lasts_or_a_layer_may_free_one(make_plugin, rooms, layers, obstacle):
+def test_no_wall_is_permanent_where_a_layer_may_free_it(make_plugin, rooms, layers, obstacle):
     costmap = rooms(0, True, layers, **obstacle)
-    assert costmap.lasting() is None
+    assert costmap.permanent_costmap() is None
 
 
-def test_a_tolerance_that_reaches_this_side_of_the_wall_is_no_failure_for_good(make_plugin, rooms):
+def test_a_tolerance_that_reaches_this_side_of_the_wall_is_no_permanent_failure(make_plugin, rooms):
     walled = rooms(gap=0, sensed=False)
     assert plan(make_plugin, AStarPlanner, walled, dist_tolerance=3.0).permanent
     assert plan(make_plugin, AStarPlanner, walled, dist_tolerance=5.0).success
 
 
-def test_asking_for_lasting_walls_changes_nothing_of_the_map(rooms):
+def test_asking_for_permanent_walls_changes_nothing_of_the_map(rooms):
     asked, left = rooms(gap=10, sensed=True), rooms(gap=10, sensed=True)
-    assert not np.array_equal(asked.lasting().cells, asked.snapshot().cells)
+    assert not np.array_equal(asked.permanent_costmap().cells, asked.snapshot().cells)
     for costmap in (asked, left):
         costmap.insert_points("scan", [(3.05, 3.05, 0.2)], (1.0, 2.5, 0.2), 1.0)
         costmap.update(Pose.planar(1.0, 2.5), 1.0)

@@ -1,0 +1,69 @@
+"""What a layered costmap answers from its snapshot: the places and the motions of the core's map contract.
+
+No lock is held while a question is answered.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import replace
+
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.maps.layered_map import LayeredMap
+from mbf_abstract.maps.navigation_map import PlaceCheck
+from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.grid.motion_check import nearest_lethal, obstacle_ahead
+from mbf_costmap_nav.map import pose_checks
+
+
+class SnapshotAnswers(LayeredMap):
+    """The part of a ``LayeredCostmap`` that needs no more than its snapshot and its footprints.
+
+    Attributes
+    ----------
+    footprint, unpadded_footprint : Footprint
+        The robot's outline with and without padding.
+    """
+
+    footprint: Footprint
+    unpadded_footprint: Footprint
+
+    @abstractmethod
+    def snapshot(self) -> Costmap:
+        """Read-only copy of the map as of the last update; the same object until the map changes."""
+
+    @property
+    def inscribed_radius(self) -> float:
+        """Distance [m] from the base to the nearest side of the padded footprint."""
+        return self.footprint.inscribed_radius
+
+    def point_check(self) -> PlaceCheck:
+        """State and cost of the cells of points."""
+        costmap = self.snapshot()
+        return lambda pose: pose_checks.check_point(costmap, pose.x, pose.y)
+
+    def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
+        """State and summed cost of the outline, see ``pose_checks.pose_check``."""
+        if center_only:
+            return pose_checks.pose_check(self.snapshot(), Footprint([]), replace(query, safety_dist=0.0))
+        return pose_checks.pose_check(self.snapshot(), self._outline(query), query)
+
+    def find_valid_pose(
+        self, pose: Pose, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery
+    ) -> PoseAnswer:
+        """Nearest pose where the outline fits, see ``pose_checks.find_valid_pose``."""
+        tolerances = dist_tolerance, angle_tolerance
+        return pose_checks.find_valid_pose(self.snapshot(), self._outline(query), pose, *tolerances, query)
+
+    def _outline(self, query: PlaceQuery) -> Footprint:
+        return self.footprint if query.use_padded_footprint else self.unpadded_footprint
+
+    def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
+        """Where the footprint would touch more than now if the robot kept ``command`` for ``duration`` [s]."""
+        return obstacle_ahead(self.snapshot(), self.footprint, pose, command, duration)
+
+    def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
+        """Offset [m] to the centre of the nearest lethal cell; None if none is ``within`` [m]."""
+        return nearest_lethal(self.snapshot(), pose, within)
