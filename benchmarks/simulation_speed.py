@@ -21,9 +21,10 @@ import numpy as np
 from mbf_abstract.geometry import Twist
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.protocols import SimulatedRobot, SimulatedWorld
 from terrain.physics.robot_models import HUSKY
 from terrain.physics.robots import WheeledRobot
-from terrain.physics.simulation import SimulatedRobot, Simulation, SteppedWorld
+from terrain.physics.simulation import Simulation
 from terrain.physics.world import STATIC, BulletWorld
 from terrain.sensors.lidar import Lidar, LidarModel, ring_directions
 from terrain.sensors.rays import StaticRays
@@ -45,7 +46,7 @@ def ring_lidar(robot: SimulatedRobot, rays: StaticRays) -> Lidar:
     return Lidar(robot, "lidar", [rays], model, np.random.default_rng(0))
 
 
-def realtime_factor(world: SteppedWorld, robot: SimulatedRobot, sensors: dict[str, Lidar], seconds: float) -> float:
+def realtime_factor(world: SimulatedWorld, robot: SimulatedRobot, sensors: dict[str, Lidar], seconds: float) -> float:
     """Simulated seconds per CPU second of a straight drive."""
     simulation = Simulation(world, robot, sensors)
     robot.send_command(Twist.planar(0.8))

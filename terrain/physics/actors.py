@@ -20,6 +20,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm
 from terrain.physics.incidents import Thing
 from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.protocols import SimulatedRobot
 from terrain.physics.robot_models import RobotSpec
 from terrain.physics.world import BulletWorld
 from terrain.recording.recording import RobotShape
@@ -33,6 +34,7 @@ AnyWorld = BulletWorld | KinematicWorld
 PERSON_RADIUS: float = 0.25  # m
 PERSON_HEIGHT: float = 1.7  # m
 MAX_ROUTE_DRAWS = 10_000
+LONGEST_LEG = 12.0  # m; short legs of a drawn route are found sooner
 COURTESY = 0.3  # m; an actor that gives way stops this far from the robot
 
 
@@ -51,17 +53,6 @@ class Actor(Protocol):
 
     def pose(self) -> Pose:
         """Pose of the actor's frame now."""
-
-
-class VisibleRobot(Protocol):
-    """What a walker sees of a robot."""
-
-    @property
-    def spec(self) -> RobotSpec:
-        """Its model."""
-
-    def pose(self) -> Pose:
-        """Where it is."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +115,7 @@ class RouteWalker:
         self._reach = size[0] if len(size) == 2 else 0.5 * math.hypot(size[0], size[1])
         self._waited = 0.0
         self._gives_way = gives_way
-        self._robot: VisibleRobot | None = None
+        self._robot: SimulatedRobot | None = None
         self.thing = body.thing
         if len(size) == 2:
             radius, height = size
@@ -145,7 +136,7 @@ class RouteWalker:
         ahead = self._corners[leg] - self._corners[leg - 1]
         return Pose.planar(x, y, math.atan2(ahead[1], ahead[0]), z + self._lift)
 
-    def meet(self, robot: VisibleRobot) -> None:
+    def meet(self, robot: SimulatedRobot) -> None:
         """Give way to this robot from now on."""
         self._robot = robot if self._gives_way else None
 
@@ -154,7 +145,7 @@ class RouteWalker:
             self._waited += self._world.time_step
         self._world.place_body(self.body, self.pose())
 
-    def _is_ahead(self, robot: VisibleRobot) -> bool:
+    def _is_ahead(self, robot: SimulatedRobot) -> bool:
         """Whether the robot is near, and on the side this one walks to."""
         here, there = self.pose(), robot.pose()
         dx, dy = there.x - here.x, there.y - here.y
@@ -227,17 +218,13 @@ def _robot_looks(spec: RobotSpec, size: tuple[float, float, float]) -> Surface:
     return joined([raised, *(Surface(drum + wheel, drum_faces) for wheel in wheels)])
 
 
-def random_route(
-    grid: OccupancyGrid, rng: np.random.Generator, corners: int = 4, clearance: float = 0.4, longest_leg: float = 12.0
-) -> FloatArray:
+def random_route(grid: OccupancyGrid, rng: np.random.Generator, corners: int = 4, clearance: float = 0.4) -> FloatArray:
     """Draw a closed route (corners, 2) [m] through free cells, each leg straight and clear of walls.
 
     Parameters
     ----------
     clearance : float
         Distance kept to walls [m].
-    longest_leg : float
-        [m]; short legs are found sooner.
 
     Raises
     ------
@@ -252,7 +239,7 @@ def random_route(
         ends = [*route[-1:], cell]
         if len(route) == corners - 1:
             ends.append(route[0])
-        if all(_leg_is_open(open_cells, a, b, longest_leg / grid.resolution) for a, b in pairwise(ends)):
+        if all(_leg_is_open(open_cells, a, b, LONGEST_LEG / grid.resolution) for a, b in pairwise(ends)):
             route.append(cell)
         if len(route) == corners:
             centres = (np.array(route, dtype=float)[:, ::-1] + 0.5) * grid.resolution

@@ -1,4 +1,4 @@
-"""Import of PyBullet: quiet, and with a clear error where it is missing.
+"""A PyBullet world of its own: started quietly, and with a clear error where PyBullet is missing.
 
 PyBullet's C++ side prints straight to the process's output (a build line on import, warnings without a line end on
 loading). That would mix with our own output, so such calls happen inside ``quiet_native_output``.
@@ -57,19 +57,21 @@ def _flush_native_buffers() -> None:
         ctypes.CDLL(None).fflush(None)
 
 
-def load_pybullet() -> Any:
-    """Return the ``pybullet`` module.
+def connect() -> Any:
+    """Make an empty PyBullet world without a window and return its client, a ``BulletClient``.
+
+    The client has all functions of ``pybullet`` with the number of this world filled in.
 
     Raises
     ------
     SimulatorMissingError
-        It cannot be imported.
+        PyBullet cannot be imported.
     """
-    if sys.modules.get("pybullet") is not None:
-        return sys.modules["pybullet"]
     try:
         with quiet_native_output():
             import pybullet
+            from pybullet_utils.bullet_client import BulletClient
+
+            return BulletClient(pybullet.DIRECT)
     except ImportError as error:
         raise SimulatorMissingError("this world needs PyBullet: pip install 'mbf-flex[sim]'") from error
-    return pybullet

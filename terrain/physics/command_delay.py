@@ -4,22 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
 
 from mbf_abstract.geometry import Command
+from terrain.physics.protocols import SimulatedWorld
 
 TIME_TOLERANCE = 1e-9  # s; a step this close before the due time counts as reaching it
-
-
-class DelayedWorld(Protocol):
-    """What the delay needs of a world: its time, and a call before each step."""
-
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-
-    def before_step(self, callback: Callable[[], None]) -> None:
-        """Call ``callback`` before each step."""
 
 
 class CommandDelay:
@@ -27,14 +16,14 @@ class CommandDelay:
 
     Parameters
     ----------
-    world : DelayedWorld
+    world : SimulatedWorld
     send : callable
         Takes the commands that are due.
     delay : float
         [s of the world]; at 0 commands pass at once.
     """
 
-    def __init__(self, world: DelayedWorld, send: Callable[[Command], None], delay: float) -> None:
+    def __init__(self, world: SimulatedWorld, send: Callable[[Command], None], delay: float) -> None:
         self._world = world
         self._send = send
         self._delay = delay

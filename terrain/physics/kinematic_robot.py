@@ -50,10 +50,6 @@ class KinematicRobot:
         """Hold a command until the next one or the time-out."""
         self._command, self._command_stamp = command, self.world.time
 
-    def stop(self) -> None:
-        """Brake."""
-        self.send_command(Twist())
-
     def advance(self, seconds: float) -> None:
         """Move on by one small time step; ground that ends and what the outline would touch stop the robot."""
         if self.world.time - self._command_stamp > self.command_timeout:

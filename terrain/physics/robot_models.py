@@ -103,10 +103,10 @@ def rectangle(x_min: float, x_max: float, half_width: float) -> tuple[tuple[floa
     return ((x_min, -half_width), (x_max, -half_width), (x_max, half_width), (x_min, half_width))
 
 
-def _circle(radius: float, corners: int = 16) -> tuple[tuple[float, float], ...]:
-    """Polygon around a circle, so that no part of the robot sticks out."""
-    outer = radius / math.cos(math.pi / corners)
-    angles = [2.0 * math.pi * (k + 0.5) / corners for k in range(corners)]
+def _circle(radius: float) -> tuple[tuple[float, float], ...]:
+    """Polygon of 16 corners around a circle, so that no part of the robot sticks out."""
+    outer = radius / math.cos(math.pi / 16)
+    angles = [2.0 * math.pi * (k + 0.5) / 16 for k in range(16)]
     return tuple((outer * math.cos(angle), outer * math.sin(angle)) for angle in angles)
 
 

@@ -72,16 +72,11 @@ class WheeledRobot:
         drop = max(0.05, 1.5 * spec.wheel_radius) * pose.rotation[:, 2]
         with quiet_native_output():
             self.body: int = self._bullet.loadURDF(
-                str(spec.urdf),
-                basePosition=(np.array(pose.position) + drop).tolist(),
-                baseOrientation=pose.orientation,
-                physicsClientId=world.client,
+                str(spec.urdf), basePosition=(np.array(pose.position) + drop).tolist(), baseOrientation=pose.orientation
             )
         self._joints = self._read_joints()
         self._driven = [self._joints[name] for name in (*spec.left_wheels, *spec.right_wheels)]
-        self._p_base_com = np.array(
-            self._bullet.getDynamicsInfo(self.body, BODY_LINK, physicsClientId=world.client)[3], dtype=float
-        )
+        self._p_base_com = np.array(self._bullet.getDynamicsInfo(self.body, BODY_LINK)[3], dtype=float)
         self._set_up_contacts(friction)
         self._weigh(mass_factor)
         world.set_group(self.body, ROBOT)
@@ -89,40 +84,30 @@ class WheeledRobot:
 
     def _read_joints(self) -> dict[str, int]:
         """Joint indices by name."""
-        count = self._bullet.getNumJoints(self.body, physicsClientId=self.world.client)
-        infos = [self._bullet.getJointInfo(self.body, i, physicsClientId=self.world.client) for i in range(count)]
+        count = self._bullet.getNumJoints(self.body)
+        infos = [self._bullet.getJointInfo(self.body, i) for i in range(count)]
         return {info[1].decode(): info[0] for info in infos}
 
     def _set_up_contacts(self, friction: float) -> None:
         """Give wheels grip, casters none, and let joints that are neither driven nor steered roll freely."""
-        client = self.world.client
         for name, joint in self._joints.items():
             if name.endswith("caster_mount"):
-                self._bullet.changeDynamics(self.body, joint, lateralFriction=0.01, physicsClientId=client)
+                self._bullet.changeDynamics(self.body, joint, lateralFriction=0.01)
                 continue
             self._bullet.changeDynamics(
-                self.body,
-                joint,
-                lateralFriction=friction,
-                anisotropicFriction=list(self.spec.wheel_friction),
-                physicsClientId=client,
+                self.body, joint, lateralFriction=friction, anisotropicFriction=list(self.spec.wheel_friction)
             )
             if joint not in self._driven:  # Bullet puts a braking motor on every joint
-                self._bullet.setJointMotorControl2(
-                    self.body, joint, self._bullet.VELOCITY_CONTROL, force=0, physicsClientId=client
-                )
+                self._bullet.setJointMotorControl2(self.body, joint, self._bullet.VELOCITY_CONTROL, force=0)
 
     def _weigh(self, factor: float) -> None:
         """Make every part ``factor`` times as heavy, and as hard to turn."""
         if factor == 1.0:
             return
-        client = self.world.client
         for link in (BODY_LINK, *self._joints.values()):
-            mass, _, inertia = self._bullet.getDynamicsInfo(self.body, link, physicsClientId=client)[:3]
+            mass, _, inertia = self._bullet.getDynamicsInfo(self.body, link)[:3]
             scaled = [factor * moment for moment in inertia]
-            self._bullet.changeDynamics(
-                self.body, link, mass=factor * mass, localInertiaDiagonal=scaled, physicsClientId=client
-            )
+            self._bullet.changeDynamics(self.body, link, mass=factor * mass, localInertiaDiagonal=scaled)
 
     def send_command(self, command: Command) -> None:
         """Hold a command until the next one or the time-out.
@@ -135,10 +120,6 @@ class WheeledRobot:
         if isinstance(command, AckermannCommand) and self.spec.drive is not Drive.ACKERMANN:
             raise TypeError(f"the {self.spec.name} has no steering, it takes a Twist")
         self._command, self._command_stamp = command, self.world.time
-
-    def stop(self) -> None:
-        """Brake: hold all driven wheels at speed zero."""
-        self.send_command(STANDSTILL)
 
     def settle(self, seconds: float = SETTLING_TIME) -> None:
         """Let the robot fall onto its wheels, then let this instant be time 0."""
@@ -162,7 +143,6 @@ class WheeledRobot:
             self._bullet.VELOCITY_CONTROL,
             targetVelocities=[targets.left] * lefts + [targets.right] * rights,
             forces=[self.spec.motor_torque] * (lefts + rights),
-            physicsClientId=self.world.client,
         )
         for name, angle in zip(self.spec.steering, (targets.steering_left, targets.steering_right), strict=False):
             self._bullet.setJointMotorControl2(
@@ -172,7 +152,6 @@ class WheeledRobot:
                 targetPosition=angle,
                 force=STEERING_TORQUE,
                 maxVelocity=STEERING_SPEED,
-                physicsClientId=self.world.client,
             )
 
     def _state(self) -> tuple[Pose, Twist]:
@@ -180,9 +159,8 @@ class WheeledRobot:
         step = self.world.step_count
         if self._last_state is not None and self._last_state[0] == step:
             return self._last_state[1], self._last_state[2]
-        client = self.world.client
-        p_map_com, orientation = self._bullet.getBasePositionAndOrientation(self.body, physicsClientId=client)
-        v_map_com, omega_map = self._bullet.getBaseVelocity(self.body, physicsClientId=client)
+        p_map_com, orientation = self._bullet.getBasePositionAndOrientation(self.body)
+        v_map_com, omega_map = self._bullet.getBaseVelocity(self.body)
         R_map_base = rotation_matrix(orientation)
         offset_map = rotated(R_map_base, self._p_base_com)
         v_map_base = np.array(v_map_com) - np.cross(omega_map, offset_map)
@@ -205,17 +183,14 @@ class WheeledRobot:
 
     def place(self, pose: Pose) -> None:
         """Put base_link at ``pose`` at once, at rest."""
-        client = self.world.client
         p_map_com = np.array(pose.position) + rotated(pose.rotation, self._p_base_com)
-        self._bullet.resetBasePositionAndOrientation(
-            self.body, p_map_com.tolist(), pose.orientation, physicsClientId=client
-        )
-        self._bullet.resetBaseVelocity(self.body, [0, 0, 0], [0, 0, 0], physicsClientId=client)
+        self._bullet.resetBasePositionAndOrientation(self.body, p_map_com.tolist(), pose.orientation)
+        self._bullet.resetBaseVelocity(self.body, [0, 0, 0], [0, 0, 0])
         self._last_state = None
 
     def wheel_state(self) -> tuple[float, float, float, float]:
         """Mean speeds [rad/s] of left and right wheels, bicycle steering angle [rad], power of the motors [W]."""
-        states = self._bullet.getJointStates(self.body, self._driven, physicsClientId=self.world.client)
+        states = self._bullet.getJointStates(self.body, self._driven)
         speeds = [state[1] for state in states]
         lefts = len(self.spec.left_wheels)
         power = sum(abs(state[1] * state[3]) for state in states)
@@ -225,7 +200,7 @@ class WheeledRobot:
         if not self.spec.steering:
             return 0.0
         joints = [self._joints[name] for name in self.spec.steering]
-        states = self._bullet.getJointStates(self.body, joints, physicsClientId=self.world.client)
+        states = self._bullet.getJointStates(self.body, joints)
         return math.atan(0.5 * sum(math.tan(state[0]) for state in states))
 
     def rolling_velocity(self) -> Twist:
@@ -245,7 +220,7 @@ class WheeledRobot:
     def _contacts(self) -> tuple[bool, frozenset[Thing]]:
         """Whether the body lies on the ground, and what any part touches that is not ground."""
         on_ground, touched = False, set[Thing]()
-        for contact in self._bullet.getContactPoints(bodyA=self.body, physicsClientId=self.world.client):
+        for contact in self._bullet.getContactPoints(bodyA=self.body):
             other, link, distance = contact[2], contact[3], contact[8]
             if distance > TOUCHING_DISTANCE or other == self.body:
                 continue

@@ -14,13 +14,12 @@ Example
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any
 
-from mbf_abstract.drive.robot import Odometry
-from mbf_abstract.geometry import Command, Pose
-from terrain.physics.incidents import Incident, IncidentMonitor, MotionSample
-from terrain.physics.robot_models import RobotSpec
-from terrain.sensors.lidar import SensedRobot, Sensor
+from mbf_abstract.geometry import Pose
+from terrain.physics.incidents import Incident, IncidentMonitor
+from terrain.physics.protocols import SimulatedRobot, SimulatedWorld
+from terrain.sensors.sensor import Sensor
 
 MONITOR_RATE = 20.0  # Hz
 TIME_TOLERANCE = 1e-9  # s; a target this close behind a step is reached by it
@@ -28,55 +27,23 @@ TIME_TOLERANCE = 1e-9  # s; a target this close behind a step is reached by it
 Listener = Callable[[str, Any], None]
 
 
-class SteppedWorld(Protocol):
-    """A world that moves in fixed steps: ``BulletWorld`` or ``KinematicWorld``."""
-
-    @property
-    def time_step(self) -> float:
-        """Length of a step [s]."""
-
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-
-    def step(self) -> None:
-        """Advance by one time step."""
-
-
-class SimulatedRobot(SensedRobot, Protocol):
-    """A robot in such a world: ``WheeledRobot`` or ``KinematicRobot``."""
-
-    @property
-    def spec(self) -> RobotSpec:
-        """Its model."""
-
-    def send_command(self, command: Command) -> None:
-        """Hold a command until the next one or the time-out."""
-
-    def odometry(self) -> Odometry:
-        """Ground truth of the velocity, stamped with the world's time."""
-
-    def motion_sample(self) -> MotionSample:
-        """Collect what ``IncidentMonitor`` looks at."""
-
-
 class Simulation:
     """World, robot and sensors on one time line.
 
     Parameters
     ----------
-    world : SteppedWorld
+    world : SimulatedWorld
         With its clock at the instant the run shall start, that is after ``robot.settle()``.
     robot : SimulatedRobot
     sensors : mapping of str to Sensor
         By topic; each measures at its own rate, the first time at once.
-    monitor : IncidentMonitor, optional
-        Counts what goes wrong.
 
     Attributes
     ----------
     latest : dict of str to measurement
         Newest measurement of each sensor that has given one.
+    monitor : IncidentMonitor
+        Counts what goes wrong.
     incidents : list of Incident
         All so far.
     track : list of Pose
@@ -85,15 +52,14 @@ class Simulation:
 
     def __init__(
         self,
-        world: SteppedWorld,
+        world: SimulatedWorld,
         robot: SimulatedRobot,
         sensors: Mapping[str, Sensor[Any]] | None = None,
-        monitor: IncidentMonitor | None = None,
     ) -> None:
         self.world = world
         self.robot = robot
         self.sensors = dict(sensors or {})
-        self.monitor = monitor or IncidentMonitor()
+        self.monitor = IncidentMonitor()
         self.latest: dict[str, Any] = {}
         self.incidents: list[Incident] = []
         self.track: list[Pose] = []

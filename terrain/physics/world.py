@@ -15,20 +15,19 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import Pose
-from terrain.physics.bullet import load_pybullet, quiet_native_output
+from terrain.physics.bullet import connect, quiet_native_output
 from terrain.physics.incidents import Thing
 from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.surface import Surface, box, cylinder, joined
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 TIME_STEP = 1.0 / 240.0
 GRAVITY = 9.81
@@ -41,14 +40,7 @@ RAY_MARGIN = 1.0  # metres above and below the world where vertical rays start a
 RAY, STATIC, ROBOT, MOVING = 1, 2, 4, 8
 EVERY_GROUP = RAY | STATIC | ROBOT | MOVING
 
-
-@dataclass(frozen=True)
-class RayHits:
-    """What rays hit: ``hit`` (n,) bool, ``points`` (n, 3) float64 [m] (end of the ray if nothing), ``bodies`` (n,)."""
-
-    hit: NDArray[np.bool_]
-    points: FloatArray
-    bodies: IntArray
+ORIGIN = Pose((0.0, 0.0, 0.0))
 
 
 class BulletWorld:
@@ -61,8 +53,8 @@ class BulletWorld:
 
     Attributes
     ----------
-    client : int
-        PyBullet's number of this world, the ``physicsClientId`` of every call.
+    bullet : pybullet_utils.bullet_client.BulletClient
+        The functions of PyBullet, for this world.
     step_count : int
         Steps since the clock was started (see ``restart_clock``); ``time`` is derived from it and thus exact.
     ground_bodies : set of int
@@ -73,9 +65,7 @@ class BulletWorld:
 
     def __init__(self, time_step: float = TIME_STEP) -> None:
         self.time_step = time_step
-        self.bullet = load_pybullet()
-        with quiet_native_output():
-            self.client: int = self.bullet.connect(self.bullet.DIRECT)
+        self.bullet = connect()
         self.step_count = 0
         self.ground_bodies: set[int] = set()
         self.things: dict[int, Thing] = {}
@@ -84,14 +74,13 @@ class BulletWorld:
         self._folder = tempfile.TemporaryDirectory(prefix="mbf_world_")
         self._before_step: list[Callable[[], None]] = []
         self._closed = False
-        self.bullet.setGravity(0, 0, -GRAVITY, physicsClientId=self.client)
+        self.bullet.setGravity(0, 0, -GRAVITY)
         self.bullet.setPhysicsEngineParameter(
             fixedTimeStep=time_step,
             numSolverIterations=50,
             deterministicOverlappingPairs=1,
             enableConeFriction=0,  # with the cone on, a skid-steered robot turns at a fifth of the commanded rate
             enableFileCaching=0,  # meshes are cached by file name otherwise, even if the file has changed
-            physicsClientId=self.client,
         )
 
     def __enter__(self) -> BulletWorld:
@@ -104,7 +93,7 @@ class BulletWorld:
         """Free the world; idempotent."""
         if not self._closed:
             self._closed = True
-            self.bullet.disconnect(physicsClientId=self.client)
+            self.bullet.disconnect()
             self._folder.cleanup()
 
     @property
@@ -124,10 +113,10 @@ class BulletWorld:
         """Advance by one time step."""
         for callback in self._before_step:
             callback()
-        self.bullet.stepSimulation(physicsClientId=self.client)
+        self.bullet.stepSimulation()
         self.step_count += 1
 
-    def add_heightfield(self, terrain: Heightfield, friction: float = 1.0) -> int:
+    def add_heightfield(self, terrain: Heightfield) -> int:
         """Put a terrain in as Bullet's own heightfield.
 
         Returns
@@ -152,14 +141,12 @@ class BulletWorld:
             heightfieldData=raw.ravel(),
             numHeightfieldRows=terrain.nx,  # Bullet's "rows" is the number of samples along x
             numHeightfieldColumns=terrain.ny,
-            physicsClientId=self.client,
         )
         middle = 0.5 * (float(raw.min()) + float(raw.max()))  # Bullet centres z on the middle of the range
-        centre = [terrain.x0 + terrain.size[0] / 2, terrain.y0 + terrain.size[1] / 2, middle + shift]
-        self._static.append(terrain.surface())
-        return self._add_static_body(shape, centre, friction, ground=True)
+        centre = (terrain.x0 + terrain.size[0] / 2, terrain.y0 + terrain.size[1] / 2, middle + shift)
+        return self._add_ground(shape, terrain.surface(), Pose(centre))
 
-    def add_mesh(self, vertices: ArrayLike, faces: ArrayLike, friction: float = 1.0, ground: bool = True) -> int:
+    def add_mesh(self, vertices: ArrayLike, faces: ArrayLike, ground: bool = True) -> int:
         """Put a fixed, maybe concave triangle mesh in and return its body.
 
         Parameters
@@ -171,106 +158,102 @@ class BulletWorld:
         ground : bool
             False for walls: touching them is a collision.
         """
-        vertices = np.array(vertices, dtype=np.float64).reshape(-1, 3)
-        faces = np.array(faces, dtype=np.int32).reshape(-1, 3)
+        surface = Surface(np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int32))
         file = Path(self._folder.name) / f"mesh_{len(self._static)}.obj"
-        np.savetxt(file, vertices, fmt="v %.9g %.9g %.9g")
+        np.savetxt(file, surface.vertices, fmt="v %.9g %.9g %.9g")
         with file.open("a", encoding="ascii") as out:
-            np.savetxt(out, faces + 1, fmt="f %d %d %d")
+            np.savetxt(out, surface.faces + 1, fmt="f %d %d %d")
         with quiet_native_output():
             shape = self.bullet.createCollisionShape(
-                self.bullet.GEOM_MESH,
-                fileName=str(file),
-                flags=self.bullet.GEOM_FORCE_CONCAVE_TRIMESH,
-                physicsClientId=self.client,
+                self.bullet.GEOM_MESH, fileName=str(file), flags=self.bullet.GEOM_FORCE_CONCAVE_TRIMESH
             )
-        self._static.append(Surface(vertices, faces))
-        return self._add_static_body(shape, [0.0, 0.0, 0.0], friction, ground)
+        return self._add_ground(shape, surface) if ground else self._add_body(shape, ORIGIN, STATIC, surface)
 
-    def add_ground_plane(self, x_min: float, x_max: float, y_min: float, y_max: float, friction: float = 1.0) -> int:
+    def add_building(self, grid: OccupancyGrid) -> None:
+        """Put the floor of a building in and every occupied cell as a wall; unknown cells become floor."""
+        self.add_ground_plane(*grid.bounds)
+        if grid.occupied.any():
+            self.add_mesh(*wall_surface(grid), ground=False)
+
+    def add_ground_plane(self, x_min: float, x_max: float, y_min: float, y_max: float) -> int:
         """Put a level floor in at z = 0; it is endless for wheels and as large as given [m] for lidar rays."""
         corners = np.array([[x_min, y_min, 0], [x_max, y_min, 0], [x_max, y_max, 0], [x_min, y_max, 0]], dtype=float)
-        self._static.append(Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)))
-        shape = self.bullet.createCollisionShape(
-            self.bullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=self.client
-        )
-        return self._add_static_body(shape, [0.0, 0.0, 0.0], friction, ground=True)
+        shape = self.bullet.createCollisionShape(self.bullet.GEOM_PLANE, planeNormal=[0, 0, 1])
+        return self._add_ground(shape, Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)))
 
-    def add_box(self, pose: Pose, size: Sequence[float], mass: float = 0.0, moving: bool = False) -> int:
+    def add_box(self, pose: Pose, size: Sequence[float], moving: bool = False) -> int:
         """Put a box of ``size`` (3,) [m] in, centred at ``pose``.
 
         Parameters
         ----------
-        mass : float
-            0 fixes the box; above [kg], wheels can push it.
         moving : bool
-            True for a fixed-mass box that an actor sets to new poses: ``MovingRays`` see it, ``StaticRays`` do not.
+            True for a box that an actor sets to new poses: ``MovingRays`` see it, ``StaticRays`` do not.
         """
         half = [0.5 * length for length in size]
-        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
-        return self._add_solid(shape, pose, mass, moving, box(size))
+        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half)
+        return self._add_body(shape, pose, MOVING if moving else STATIC, box(size))
 
-    def add_cylinder(self, pose: Pose, radius: float, height: float, mass: float = 0.0, moving: bool = False) -> int:
+    def add_cylinder(self, pose: Pose, radius: float, height: float, moving: bool = False) -> int:
         """Put an upright cylinder in, centred at ``pose``; parameters as for ``add_box``."""
-        shape = self.bullet.createCollisionShape(
-            self.bullet.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self.client
-        )
-        return self._add_solid(shape, pose, mass, moving, cylinder(radius, height))
+        shape = self.bullet.createCollisionShape(self.bullet.GEOM_CYLINDER, radius=radius, height=height)
+        return self._add_body(shape, pose, MOVING if moving else STATIC, cylinder(radius, height))
 
-    def _add_solid(self, shape: int, pose: Pose, mass: float, moving: bool, surface: Surface) -> int:
-        group = MOVING if moving or mass > 0.0 else STATIC
-        self.has_moving_bodies |= group == MOVING
-        if group == STATIC:
-            self._static.append(surface.at(pose))
-        body: int = self.bullet.createMultiBody(
-            mass, shape, basePosition=pose.position, baseOrientation=pose.orientation, physicsClientId=self.client
-        )
-        self.set_group(body, group)
-        self.bullet.changeDynamics(body, -1, lateralFriction=1.0, physicsClientId=self.client)
+    def _add_ground(self, shape: int, surface: Surface, at: Pose = ORIGIN) -> int:
+        """Add something to drive on; ``surface`` is in the map, ``at`` is where Bullet puts the shape's origin."""
+        self._static.append(surface)
+        body = self._add_body(shape, at, STATIC)
+        self.ground_bodies.add(body)
         return body
 
-    def _add_static_body(self, shape: int, position: Sequence[float], friction: float, ground: bool) -> int:
-        body: int = self.bullet.createMultiBody(0, shape, basePosition=position, physicsClientId=self.client)
+    def _add_body(self, shape: int, pose: Pose, group: int, surface: Surface | None = None) -> int:
+        """Add a body without mass; the ``surface`` of a fixed one is seen by rays."""
+        self.has_moving_bodies |= group == MOVING
+        if group == STATIC and surface is not None:
+            self._static.append(surface.at(pose))
+        body: int = self.bullet.createMultiBody(0, shape, basePosition=pose.position, baseOrientation=pose.orientation)
+        self.set_group(body, group)
         # Bullet multiplies the frictions of the two bodies, and its own default is 0.5
-        self.bullet.changeDynamics(body, -1, lateralFriction=friction, physicsClientId=self.client)
-        self.set_group(body, STATIC)
-        if ground:
-            self.ground_bodies.add(body)
+        self.bullet.changeDynamics(body, -1, lateralFriction=1.0)
         return body
 
     def place_body(self, body: int, pose: Pose) -> None:
         """Put a body at ``pose`` at once."""
-        self.bullet.resetBasePositionAndOrientation(body, pose.position, pose.orientation, physicsClientId=self.client)
+        self.bullet.resetBasePositionAndOrientation(body, pose.position, pose.orientation)
 
     def set_group(self, body: int, group: int) -> None:
         """Put all links of a body into a collision group; it collides with every group, fixed with fixed excepted."""
         collides_with = EVERY_GROUP & ~STATIC if group == STATIC else EVERY_GROUP
-        for link in range(-1, self.bullet.getNumJoints(body, physicsClientId=self.client)):
-            self.bullet.setCollisionFilterGroupMask(body, link, group, collides_with, physicsClientId=self.client)
+        for link in range(-1, self.bullet.getNumJoints(body)):
+            self.bullet.setCollisionFilterGroupMask(body, link, group, collides_with)
 
     def static_surface(self) -> Surface:
         """All that is fixed as one mesh."""
         return joined(self._static)
 
-    def cast_rays(self, starts: ArrayLike, ends: ArrayLike, groups: int = STATIC | MOVING) -> RayHits:
-        """Cast rays from ``starts`` to ``ends``, each (n, 3) [m], at the bodies of ``groups``."""
-        starts, ends = np.asarray(starts, dtype=float).reshape(-1, 3), np.asarray(ends, dtype=float).reshape(-1, 3)
+    def cast_rays(
+        self, starts: ArrayLike, ends: ArrayLike, groups: int = STATIC | MOVING
+    ) -> tuple[NDArray[np.bool_], FloatArray]:
+        """Cast rays from ``starts`` to ``ends``, each (n, 3) [m], at the bodies of ``groups``.
+
+        Returns
+        -------
+        hit : (n,) bool
+        points : (n, 3) float64
+            Where each ray hits, or its end [m].
+        """
+        starts, ends = np.asarray(starts, dtype=float), np.asarray(ends, dtype=float)
         results: list[tuple[int, int, float, tuple[float, float, float], tuple[float, float, float]]] = []
         for first in range(0, len(starts), MAX_RAYS_PER_CALL):
             part = slice(first, first + MAX_RAYS_PER_CALL)
-            results += self.bullet.rayTestBatch(
-                starts[part], ends[part], numThreads=1, collisionFilterMask=groups, physicsClientId=self.client
-            )
-        bodies = np.array([result[0] for result in results], dtype=np.int32)
+            results += self.bullet.rayTestBatch(starts[part], ends[part], numThreads=1, collisionFilterMask=groups)
         fractions = np.array([result[2] for result in results], dtype=np.float64).reshape(-1, 1)
-        return RayHits(bodies >= 0, starts + fractions * (ends - starts), bodies)
+        return np.array([result[0] >= 0 for result in results], dtype=bool), starts + fractions * (ends - starts)
 
     def vertical_rays(self, xy: ArrayLike) -> FloatArray:
         """Height [m] of the highest fixed thing at each position ``xy`` (n, 2); nan where there is none."""
-        xy = np.asarray(xy, dtype=float).reshape(-1, 2)
-        vertices = self.static_surface().vertices
-        top = float(vertices[:, 2].max(initial=0.0)) + RAY_MARGIN
-        bottom = float(vertices[:, 2].min(initial=0.0)) - RAY_MARGIN
-        starts = np.column_stack([xy, np.full(len(xy), top)])
-        hits = self.cast_rays(starts, np.column_stack([xy, np.full(len(xy), bottom)]), STATIC)
-        return np.where(hits.hit, hits.points[:, 2], np.nan)
+        xy = np.asarray(xy, dtype=float)
+        heights = self.static_surface().vertices[:, 2]
+        top, bottom = float(heights.max(initial=0.0)) + RAY_MARGIN, float(heights.min(initial=0.0)) - RAY_MARGIN
+        starts, ends = (np.column_stack([xy, np.full(len(xy), z)]) for z in (top, bottom))
+        hit, points = self.cast_rays(starts, ends, STATIC)
+        return np.where(hit, points[:, 2], np.nan)

@@ -16,8 +16,8 @@ from mbf_abstract.geometry.arithmetic import rotated, rotated_back
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.physics.actors import AnyWorld
-from terrain.sensors.lidar import Sensor
 from terrain.sensors.proprioception import Localization
+from terrain.sensors.sensor import Sensor
 
 LOCALIZATION, ODOMETRY, IMU = "localization", "odometry", "imu"
 """Names among the sensors of a fault, of those that look at the robot itself."""

@@ -15,9 +15,10 @@ from terrain.scenarios import scenario as model
 from terrain.scenarios.faults import IMU, LOCALIZATION, ODOMETRY
 from terrain.scenarios.noise import LocalizationNoise
 from terrain.scenarios.world import ScenarioWorld
-from terrain.sensors.lidar import Lidar, LidarModel, Sensor, camera_directions, planar_directions, ring_directions
+from terrain.sensors.lidar import Lidar, LidarModel, camera_directions, planar_directions, ring_directions
 from terrain.sensors.proprioception import Imu, Localization, PoseNoise, WheelOdometry
 from terrain.sensors.rays import MovingRays, RayCaster, StaticRays
+from terrain.sensors.sensor import Sensor
 from terrain.worlds.upright_solids import SolidRays
 
 AnyRobot = WheeledRobot | KinematicRobot

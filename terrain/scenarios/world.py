@@ -15,9 +15,9 @@ import numpy as np
 
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray, Pose
-from terrain.physics.actors import Actor, AnyWorld, RouteWalker, VisibleRobot
-from terrain.physics.indoor import add_building
+from terrain.physics.actors import Actor, AnyWorld, RouteWalker
 from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.protocols import SimulatedRobot
 from terrain.physics.world import TIME_STEP, BulletWorld
 from terrain.scenarios.places import Place
 from terrain.scenarios.world_types import BuildingWorld, LevelsWorld, TerrainWorld
@@ -61,7 +61,7 @@ class ScenarioWorld:
     places: Mapping[str, Pose] = field(default_factory=dict)
     actors: list[Actor] = field(default_factory=list)
 
-    def introduce(self, robot: VisibleRobot) -> None:
+    def introduce(self, robot: SimulatedRobot) -> None:
         """Make the robot known to the walkers, which may give way to it."""
         for actor in self.actors:
             if isinstance(actor, RouteWalker):
@@ -138,7 +138,7 @@ def _build_terrain(terrain: Heightfield, lethal_slope: float, files: MapFiles, p
 
 def _build_building(world: BuildingWorld, grid: OccupancyGrid, files: MapFiles, physics: AnyWorld) -> ScenarioWorld:
     if isinstance(physics, BulletWorld):
-        add_building(physics, grid)
+        physics.add_building(grid)
     walls = wall_surface(grid) if grid.occupied.any() else None
     return ScenarioWorld(
         physics, files.of_building(grid), lambda x, y: 0.0, _floor_surface(grid), walls, grid, world.places()

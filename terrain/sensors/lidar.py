@@ -1,91 +1,25 @@
-"""Base class of the simulated sensors, and the lidars.
-
-``Simulation`` calls ``measure`` at the sensor's rate. All noise comes from the
-sensor's own generator, so that one sensor's faults do not shift another's noise. Three switches make it fail, for
-scenarios: ``silent`` (no measurement), ``stale`` (the last measurement again, with its old stamp) and ``wrong``
-(new measurements with wrong values).
-"""
+"""Lidars and depth cameras: scanners with a fixed fan of rays."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Pose, Twist, Vector3
+from mbf_abstract.geometry import Vector3
 from mbf_abstract.geometry.arithmetic import norm, rotated
 from mbf_abstract.maps.sensing import RangeScan
+from terrain.physics.protocols import SimulatedRobot
 from terrain.sensors.rays import RayCaster
+from terrain.sensors.sensor import Sensor
 
 FloatArray = NDArray[np.float64]
 
-Measurement = TypeVar("Measurement")
-
+RINGS, MAX_ELEVATION = 16, np.radians(15.0)
 WRONG_RANGE_FACTOR = 0.5  # a lidar gone wrong sees everything at half its distance
-
-
-class SensedRobot(Protocol):
-    """What sensors ask of a robot: ground truth, and what its wheels do."""
-
-    def pose(self) -> Pose:
-        """Ground truth of base_link in map."""
-
-    def velocity(self) -> Twist:
-        """Ground truth of the velocity, in base_link."""
-
-    def rolling_velocity(self) -> Twist:
-        """Motion of the base if the wheels did not slip."""
-
-
-class Sensor(ABC, Generic[Measurement]):
-    """Base of all sensors.
-
-    Parameters
-    ----------
-    robot : SensedRobot
-        Carries the sensor.
-    rate : float
-        Measurements per second of simulated time.
-    rng : numpy Generator
-        Draws the noise; belongs to this sensor alone.
-
-    Attributes
-    ----------
-    silent, stale, wrong : bool
-        Fault switches, see the module's text.
-    """
-
-    def __init__(self, robot: SensedRobot, rate: float, rng: np.random.Generator) -> None:
-        self.robot = robot
-        self.rate = rate
-        self.rng = rng
-        self.silent = False
-        self.stale = False
-        self.wrong = False
-        self._last: Measurement | None = None
-
-    def measure(self, stamp: float) -> Measurement | None:
-        """Measure at ``stamp`` [s]; None where the sensor gives nothing."""
-        if self.silent:
-            return None
-        if self.stale:
-            return self._last
-        measurement = self._sense(stamp)
-        self._last = self._falsify(measurement) if self.wrong else measurement
-        return self._last
-
-    @abstractmethod
-    def _sense(self, stamp: float) -> Measurement:
-        """Take a correct measurement, with noise."""
-
-    @abstractmethod
-    def _falsify(self, measurement: Measurement) -> Measurement:
-        """Return the wrong measurement of a defective sensor."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +68,7 @@ class Lidar(Sensor[RangeScan]):
 
     def __init__(
         self,
-        robot: SensedRobot,
+        robot: SimulatedRobot,
         source: str,
         casters: Sequence[RayCaster],
         model: LidarModel,
@@ -175,16 +109,18 @@ def ray_fan(azimuths: FloatArray, elevations: FloatArray) -> FloatArray:
     return np.stack(rays, axis=-1).reshape(-1, 3)
 
 
-def planar_directions(rays: int = 360, field_of_view: float = 2.0 * np.pi) -> FloatArray:
-    """Rays (rays, 3) of a planar lidar, evenly over ``field_of_view`` [rad] about straight ahead."""
-    azimuths = (np.arange(rays) + 0.5) / rays * field_of_view - 0.5 * field_of_view
-    return ray_fan(azimuths, np.zeros(1))
+def planar_directions(rays: int = 360) -> FloatArray:
+    """Rays (rays, 3) of a planar lidar, all around."""
+    return ray_fan(_azimuths(rays), np.zeros(1))
 
 
-def ring_directions(rings: int = 16, rays: int = 360, elevation: float = np.radians(15.0)) -> FloatArray:
-    """Rays (rings * rays, 3) of a turning multi-beam lidar, rings from -``elevation`` to +``elevation`` [rad]."""
-    azimuths = (np.arange(rays) + 0.5) / rays * 2.0 * np.pi - np.pi
-    return ray_fan(azimuths, np.linspace(-elevation, elevation, rings))
+def ring_directions(rays: int = 360) -> FloatArray:
+    """Rays (16 * rays, 3) of a turning multi-beam lidar, its rings from -15 to +15 degrees."""
+    return ray_fan(_azimuths(rays), np.linspace(-MAX_ELEVATION, MAX_ELEVATION, RINGS))
+
+
+def _azimuths(rays: int) -> FloatArray:
+    return (np.arange(rays) + 0.5) / rays * 2.0 * np.pi - np.pi
 
 
 def camera_directions(width: int = 160, height: int = 120, field_of_view: float = np.radians(70.0)) -> FloatArray:

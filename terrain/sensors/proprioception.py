@@ -10,8 +10,11 @@ import numpy as np
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Pose, Quaternion, Twist, Vector3, quaternion_from_yaw, quaternion_multiply
 from terrain.physics.incidents import roll_pitch
-from terrain.sensors.lidar import SensedRobot, Sensor
+from terrain.physics.protocols import SimulatedRobot
+from terrain.sensors.sensor import Sensor
 
+RATE = 50.0  # Hz
+TILT_NOISE, TURNING_NOISE = 0.005, 0.01  # rad and rad/s; standard deviations of an IMU
 WRONG_TILT = 0.35  # rad; what a defective IMU adds to roll
 WRONG_SPEED_FACTOR = -1.0  # a defective encoder counts backwards
 WRONG_PLACE = (2.0, -1.5, 0.8)  # m, m, rad; how far a localisation gone wrong is off
@@ -30,24 +33,15 @@ class Tilt:
 class Imu(Sensor[Tilt]):
     """Roll, pitch and turning rates with white noise; no heading."""
 
-    def __init__(
-        self,
-        robot: SensedRobot,
-        rng: np.random.Generator,
-        rate: float = 50.0,
-        tilt_noise: float = 0.005,
-        rate_noise: float = 0.01,
-    ) -> None:
+    def __init__(self, robot: SimulatedRobot, rng: np.random.Generator, rate: float = RATE) -> None:
         super().__init__(robot, rate, rng)
-        self.tilt_noise = tilt_noise
-        self.rate_noise = rate_noise
 
     def _sense(self, stamp: float) -> Tilt:
         roll, pitch = roll_pitch(self.robot.pose())
         noise = self.rng.normal(size=5).tolist()
         x, y, z = self.robot.velocity().angular
-        turning = (x + self.rate_noise * noise[2], y + self.rate_noise * noise[3], z + self.rate_noise * noise[4])
-        return Tilt(roll + self.tilt_noise * noise[0], pitch + self.tilt_noise * noise[1], turning, stamp)
+        turning = (x + TURNING_NOISE * noise[2], y + TURNING_NOISE * noise[3], z + TURNING_NOISE * noise[4])
+        return Tilt(roll + TILT_NOISE * noise[0], pitch + TILT_NOISE * noise[1], turning, stamp)
 
     def _falsify(self, measurement: Tilt) -> Tilt:
         return replace(measurement, roll=measurement.roll + WRONG_TILT)
@@ -74,14 +68,13 @@ class WheelOdometry(Sensor[WheelOdometryReading]):
 
     def __init__(
         self,
-        robot: SensedRobot,
+        robot: SimulatedRobot,
         rng: np.random.Generator,
-        rate: float = 50.0,
         scale_error: float = 0.01,
         yaw_scale_error: float = 0.02,
         noise: float = 0.02,
     ) -> None:
-        super().__init__(robot, rate, rng)
+        super().__init__(robot, RATE, rng)
         self.noise = noise
         self._scale = 1.0 + scale_error * float(rng.normal())
         self._yaw_scale = 1.0 + yaw_scale_error * float(rng.normal())
@@ -137,10 +130,8 @@ class Localization(Sensor[Pose]):
         dx, dy [m] and yaw [rad] added to the truth; a scenario sets it to let map -> odom jump (REP-105).
     """
 
-    def __init__(
-        self, robot: SensedRobot, rng: np.random.Generator, noise: PoseNoise = NO_NOISE, rate: float = 50.0
-    ) -> None:
-        super().__init__(robot, rate, rng)
+    def __init__(self, robot: SimulatedRobot, rng: np.random.Generator, noise: PoseNoise = NO_NOISE) -> None:
+        super().__init__(robot, RATE, rng)
         self.noise = noise
         self.offset: Vector3 = (0.0, 0.0, 0.0)
 

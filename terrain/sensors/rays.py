@@ -74,5 +74,5 @@ class MovingRays:
         """Cast the rays; see ``RayCaster``."""
         if not self._world.has_moving_bodies:
             return np.full(len(origins), np.inf)
-        hits = self._world.cast_rays(origins, origins + max_range * directions, MOVING)
-        return np.where(hits.hit, norm(hits.points - origins), np.inf)
+        hit, points = self._world.cast_rays(origins, origins + max_range * directions, MOVING)
+        return np.where(hit, norm(points - origins), np.inf)

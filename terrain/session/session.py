@@ -36,7 +36,7 @@ from terrain.scenarios.scenario import Scenario, load_scenario
 from terrain.scenarios.sensors import AnyRobot, make_localization, make_proprioceptive_sensors, make_sensors
 from terrain.scenarios.settings import apply_settings, apply_world_settings
 from terrain.scenarios.world import ScenarioWorld
-from terrain.sensors.lidar import Sensor
+from terrain.sensors.sensor import Sensor
 from terrain.session.simulation_session import SessionOptions, SimulationSession
 
 __all__ = ["Session", "SessionOptions"]

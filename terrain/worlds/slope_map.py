@@ -26,17 +26,17 @@ BORDER = 0.5  # m at the edge of the terrain that count as occupied
 OCCUPIED = 100
 
 
-def cell_slopes(terrain: Heightfield, resolution: float, robot_length: float = ROBOT_LENGTH) -> FloatArray:
+def cell_slopes(terrain: Heightfield, resolution: float) -> FloatArray:
     """Slope [degrees] of square cells of ``resolution`` [m], as (ny, nx) float64.
 
     Cell [0, 0] has its lower left corner at the terrain's; heights are smoothed first by a Gaussian whose width (four
-    sigma) is ``robot_length`` [m].
+    sigma) is the length of a small robot, 0.5 m.
     """
     nx, ny = (int(length / resolution) for length in terrain.size)
     x = terrain.x0 + (np.arange(nx) + 0.5) * resolution
     y = terrain.y0 + (np.arange(ny) + 0.5) * resolution
     heights = terrain.height_at(*np.meshgrid(x, y))
-    sigma = 0.25 * robot_length / resolution
+    sigma = 0.25 * ROBOT_LENGTH / resolution
     smooth = smoothed(heights, (sigma, sigma))
     rise_y, rise_x = np.gradient(smooth, resolution)
     return np.asarray(np.degrees(arctan(np.hypot(rise_x, rise_y))))

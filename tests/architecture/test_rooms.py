@@ -26,7 +26,16 @@ SPAWNERS = (
 )
 SEEDED = {"np.random.default_rng", "np.random.Generator", "np.random.SeedSequence"}
 VIEWS = {"matplotlib", "viser", "rich", "typer", "PIL"}
-SIMULATOR = {"pybullet", "pybullet_data", "matplotlib", "viser", "embreex", "mcap", "foxglove_schemas_protobuf"}
+SIMULATOR = {
+    "pybullet",
+    "pybullet_data",
+    "pybullet_utils",
+    "matplotlib",
+    "viser",
+    "embreex",
+    "mcap",
+    "foxglove_schemas_protobuf",
+}
 PLUGIN_ROOMS = {"planners", "controllers", "recoveries", "refiners"}
 ALGORITHM_ROOMS = PLUGIN_ROOMS | {"kernels", "layers", "execution", "actions"}
 UNSAFE_CALLS = {"yaml.load", "yaml.unsafe_load", "eval", "exec", "os.system"}

@@ -62,10 +62,10 @@ def test_the_sign_trap_is_avoided_slanted_rays_hit_ground_high_above_the_sea() -
     ends = np.column_stack([np.linspace(-30.0, -22.0, 200), np.linspace(15.0, 22.0, 200), np.full(200, 480.0)])
     with BulletWorld() as world:
         world.add_heightfield(terrain)
-        on_heightfield = world.cast_rays(starts, ends)
+        hit_heightfield, on_heightfield = world.cast_rays(starts, ends)
     with BulletWorld() as world:
         world.add_mesh(*terrain.surface())
-        on_mesh = world.cast_rays(starts, ends)
-    assert on_mesh.hit.sum() > 100
-    assert np.array_equal(on_heightfield.hit, on_mesh.hit)
-    assert np.abs(on_heightfield.points - on_mesh.points).max() < LIMIT
+        hit_mesh, on_mesh = world.cast_rays(starts, ends)
+    assert hit_mesh.sum() > 100
+    assert np.array_equal(hit_heightfield, hit_mesh)
+    assert np.abs(on_heightfield - on_mesh).max() < LIMIT

@@ -76,8 +76,8 @@ def test_mass_and_friction_reach_every_part_of_the_robot_in_bullet():
         ]
         found = []
         for robot in robots:
-            links = range(-1, world.bullet.getNumJoints(robot.body, physicsClientId=world.client))
-            infos = [world.bullet.getDynamicsInfo(robot.body, k, physicsClientId=world.client) for k in links]
+            links = range(-1, world.bullet.getNumJoints(robot.body))
+            infos = [world.bullet.getDynamicsInfo(robot.body, k) for k in links]
             found.append([(info[0], np.array(info[2]), info[1]) for info in infos])
         for (mass, inertia, friction), (heavier, harder, less) in zip(*found, strict=True):
             assert heavier == pytest.approx(1.1 * mass)
@@ -94,7 +94,7 @@ def test_a_slippery_robot_slides_down_where_a_normal_one_stands():
         with BulletWorld() as world:
             world.add_heightfield(slope)
             robot = WheeledRobot(world, HUSKY, slope.pose_at(5.0, 5.0, math.pi), friction=friction)
-            robot.stop()
+            robot.send_command(Twist())
             robot.settle(2.0)
             slid.append(5.0 - robot.pose().x)
     assert slid[0] < 0.5 < 1.0 < slid[1]

@@ -110,12 +110,12 @@ def test_actors_move_in_the_world_and_the_seed_draws_the_crowd(tmp_path):
     for seed in (1, 1, 2):
         rng = np.random.default_rng(0)
         world = build_world(OfficeWorld(type="office"), MapFiles(tmp_path, MapNoise(), rng), rng, np.zeros((0, 2)))
-        before = world.physics.bullet.getNumBodies(physicsClientId=world.physics.client)
+        before = world.physics.bullet.getNumBodies()
         add_actors(world, actors, np.random.default_rng(seed))
         for _ in range(240):
             world.physics.step()
         bodies = range(before, before + 5)
-        places.append([world.physics.bullet.getBasePositionAndOrientation(b, world.physics.client)[0] for b in bodies])
+        places.append([world.physics.bullet.getBasePositionAndOrientation(b)[0] for b in bodies])
         world.physics.close()
     assert places[0][0] == pytest.approx((5.0, 9.7, 0.85), abs=0.02)
     assert places[0][1] == pytest.approx((8.25, 11.0, 1.0), abs=0.02)

@@ -11,7 +11,6 @@ from terrain.physics import actors
 from terrain.worlds import elevation_files as dem_io
 from terrain.worlds import floor_plan
 from terrain.worlds import generate
-from terrain.physics import indoor
 from terrain.physics import kinematic_robot
 from terrain.worlds import multi_level
 from terrain.sensors import rays

@@ -12,7 +12,6 @@ from PIL import Image
 from scipy import ndimage
 
 from mbf_abstract.config.findings import ConfigError
-from terrain.physics.indoor import add_building
 from terrain.physics.robot_models import TURTLEBOT
 from terrain.physics.world import BulletWorld
 from terrain.worlds.floor_plan import (
@@ -86,7 +85,7 @@ def test_a_real_building_becomes_walls_that_rays_meet(shared_data: Path) -> None
     iy, ix = (int(value[0]) for value in np.nonzero(grid.occupied))
     x, y = grid.origin_x + (ix + 0.5) * grid.resolution, grid.origin_y + (iy + 0.5) * grid.resolution
     with BulletWorld() as world:
-        add_building(world, grid)
+        world.add_building(grid)
         assert world.vertical_rays([[x, y]])[0] == pytest.approx(2.0, abs=1e-3)
 
 
@@ -147,5 +146,5 @@ def test_a_far_map_keeps_all_digits_in_the_file_that_is_written(tmp_path: Path) 
 def test_a_floor_without_walls_is_a_plane() -> None:
     free = np.ones((4, 4), dtype=bool)
     with BulletWorld() as world:
-        add_building(world, OccupancyGrid(~free, free, 1.0))
+        world.add_building(OccupancyGrid(~free, free, 1.0))
         assert world.vertical_rays([[2.0, 2.0]])[0] == pytest.approx(0.0, abs=1e-6)

@@ -76,11 +76,11 @@ def test_the_ray_tree_and_bullet_agree_on_rough_ground() -> None:
     origins = np.tile([10.0, 10.0, float(hills.height_at(10.0, 10.0)) + 1.0], (len(directions), 1))
     with BulletWorld() as world:
         world.add_mesh(*hills.surface())
-        bullet = world.cast_rays(origins, origins + 15.0 * directions)
+        hit, points = world.cast_rays(origins, origins + 15.0 * directions)
         tree = StaticRays(*world.static_surface()).distances(origins, directions, 15.0)
-    both = bullet.hit & np.isfinite(tree)
-    assert both.sum() > 1000 and (bullet.hit != np.isfinite(tree)).mean() < 0.002
-    assert np.abs(np.linalg.norm(bullet.points - origins, axis=1) - tree)[both].max() < 2e-3
+    both = hit & np.isfinite(tree)
+    assert both.sum() > 1000 and (hit != np.isfinite(tree)).mean() < 0.002
+    assert np.abs(np.linalg.norm(points - origins, axis=1) - tree)[both].max() < 2e-3
 
 
 def test_noise_has_its_spread_and_drop_out_its_share_by_seed() -> None:

@@ -9,7 +9,6 @@ from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.maps.sensing import RangeScan
 from terrain.physics.actors import RouteWalker, SlidingDoor, other_robot, random_route
 from terrain.physics.incidents import IncidentKind, Thing
-from terrain.physics.indoor import add_building
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
@@ -28,7 +27,7 @@ from terrain.worlds.occupancy import OccupancyGrid, read_occupancy
 def office_run(seed: int) -> tuple[list[Pose], list[RangeScan]]:
     grid = read_occupancy(OFFICE_MAP)
     with BulletWorld() as world:
-        add_building(world, grid)
+        world.add_building(grid)
         RouteWalker(world, random_route(grid, np.random.default_rng(seed)), 1.0)
         robot = WheeledRobot(world, TURTLEBOT, Pose.planar(2.0, 9.7))
         robot.settle()
