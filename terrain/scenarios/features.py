@@ -1,7 +1,11 @@
-"""Features that a scenario puts on generated ground, in the order they are listed."""
+"""Features that a scenario puts on generated ground, in the order they are listed.
+
+The keys of a feature are the parameters of the function in ``terrain.worlds.generate`` that makes it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Literal
 
 import numpy as np
@@ -23,10 +27,6 @@ class Ridge(ParameterModel):
     height: float = parameter(..., "Of the crest above the ground; below 0 it is a trench.", unit="m")
     width: float = parameter(..., "From foot to foot.", unit="m", gt=0.0)
 
-    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
-        """Return the terrain with the ridge."""
-        return add_ridge(terrain, np.array(self.points), self.height, self.width)
-
 
 class Crater(ParameterModel):
     """A bowl with a raised rim."""
@@ -38,10 +38,6 @@ class Crater(ParameterModel):
     depth: float = parameter(..., "Of the bowl below the ground.", unit="m", gt=0.0)
     rim: float | None = parameter(None, "Of the crest above the ground; absent = a fifth of the depth.", unit="m")
 
-    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
-        """Return the terrain with the crater."""
-        return add_crater(terrain, self.x, self.y, self.radius, self.depth, self.rim)
-
 
 class Ruts(ParameterModel):
     """Two wheel ruts along a line."""
@@ -52,10 +48,6 @@ class Ruts(ParameterModel):
     width: float = parameter(0.4, "Of one rut.", unit="m", gt=0.0)
     depth: float = parameter(0.15, "Of the ruts.", unit="m", gt=0.0)
 
-    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
-        """Return the terrain with the ruts."""
-        return add_ruts(terrain, np.array(self.points), self.track, self.width, self.depth)
-
 
 class Road(ParameterModel):
     """A road that is level across; hairpins make a switchback."""
@@ -65,10 +57,6 @@ class Road(ParameterModel):
     width: float = parameter(3.0, "Of the level part.", unit="m", gt=0.0)
     shoulder: float = parameter(1.0, "Over which it fades into the ground on each side.", unit="m", gt=0.0)
 
-    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
-        """Return the terrain with the road."""
-        return add_road(terrain, np.array(self.points), self.width, self.shoulder)
-
 
 class Boulders(ParameterModel):
     """Half-buried round boulders at places drawn from the seed; start and goals stay clear."""
@@ -77,10 +65,6 @@ class Boulders(ParameterModel):
     density: float = parameter(5.0, "Boulders on 100 square metres.", ge=0.0, le=200.0)
     radius_min: float = parameter(0.1, "Smallest radius.", unit="m", gt=0.0)
     radius_max: float = parameter(0.8, "Largest radius.", unit="m", gt=0.0)
-
-    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
-        """Return the terrain with boulders."""
-        return add_boulders(terrain, rng, self.density, self.radius_min, self.radius_max, keep_clear)
 
 
 class Steps(ParameterModel):
@@ -92,9 +76,26 @@ class Steps(ParameterModel):
     length: float = parameter(1.0, "Of a step.", unit="m", gt=0.0)
     count: int = parameter(1, "Number of steps.", ge=1, le=1000)
 
-    def put_on(self, terrain: Heightfield, rng: np.random.Generator, keep_clear: FloatArray) -> Heightfield:
-        """Return the terrain with the steps."""
-        return add_steps(terrain, self.height, self.length, self.x, self.count)
 
+ADD: dict[str, Callable[..., Heightfield]] = {
+    "ridge": add_ridge,
+    "crater": add_crater,
+    "ruts": add_ruts,
+    "road": add_road,
+    "steps": add_steps,
+}
 
 Feature = Annotated[Ridge | Crater | Ruts | Road | Boulders | Steps, Field(discriminator="type")]
+
+
+def put_on(
+    terrain: Heightfield,
+    feature: Feature,
+    rng: np.random.Generator,
+    keep_clear: FloatArray,
+) -> Heightfield:
+    """Return the terrain with a feature; boulders are drawn from ``rng`` and leave the places (n, 2) [m] clear."""
+    sizes = feature.model_dump(exclude={"type"})
+    if isinstance(feature, Boulders):
+        return add_boulders(terrain, rng, keep_clear=keep_clear, **sizes)
+    return ADD[feature.type](terrain, **sizes)

@@ -17,7 +17,7 @@ from pydantic import Field
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.parameters import ParameterModel, parameter
-from terrain.scenarios.features import Feature
+from terrain.scenarios.features import Feature, put_on
 from terrain.worlds.elevation_files import jacksboro, read_dem
 from terrain.worlds.floor_plan import OFFICE_MAP, read_floor_plan
 from terrain.worlds.generate import flat_terrain, fractal_terrain
@@ -74,7 +74,7 @@ class GeneratedWorld(TerrainWorld):
         else:
             terrain = flat_terrain(*self.size, self.spacing)
         for feature in self.features:
-            terrain = feature.put_on(terrain, rng, keep_clear)
+            terrain = put_on(terrain, feature, rng, keep_clear)
         return terrain
 
 

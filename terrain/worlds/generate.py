@@ -12,12 +12,14 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry.arithmetic import exp, power, tan
 from terrain.worlds.heightfield import Heightfield
 
 FloatArray = NDArray[np.float64]
+
+CLEAR_RADIUS = 2.0  # m around start and goals without boulders
 
 
 def flat_terrain(size_x: float, size_y: float, spacing: float, x0: float = 0.0, y0: float = 0.0) -> Heightfield:
@@ -67,20 +69,27 @@ def _grid(terrain: Heightfield) -> tuple[FloatArray, FloatArray]:
     return np.meshgrid(terrain.x0 + terrain.dx * np.arange(terrain.nx), terrain.y0 + terrain.dy * np.arange(terrain.ny))
 
 
-def _distance_to_polyline(terrain: Heightfield, points: FloatArray) -> FloatArray:
-    """Distance [m] of every sample (ny, nx) to a polyline (n, 2)."""
+def _nearest_on_polyline(terrain: Heightfield, points: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Horizontal distance [m] of every sample (ny, nx) to a polyline (n, 3), and the polyline's z at the nearest point.
+
+    A polyline (n, 2) has z = 0.
+    """
+    corners = np.asarray(points, dtype=float)
+    corners = np.column_stack([corners, np.zeros(len(corners))])[:, :3]
     x, y = _grid(terrain)
-    nearest = np.full(x.shape, np.inf)
-    for (ax, ay), (bx, by) in pairwise(points.tolist()):
-        length_squared = max((bx - ax) ** 2 + (by - ay) ** 2, 1e-12)
-        t = np.clip(((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length_squared, 0.0, 1.0)
-        nearest = np.minimum(nearest, np.hypot(x - ax - t * (bx - ax), y - ay - t * (by - ay)))
-    return nearest
+    nearest, z = np.full(x.shape, np.inf), np.zeros(x.shape)
+    for a, b in pairwise(corners):
+        along, length_squared = b - a, max(float(np.sum((b - a)[:2] ** 2)), 1e-12)
+        t = np.clip(((x - a[0]) * along[0] + (y - a[1]) * along[1]) / length_squared, 0.0, 1.0)
+        distance = np.hypot(x - a[0] - t * along[0], y - a[1] - t * along[1])
+        z = np.where(distance < nearest, a[2] + t * along[2], z)
+        nearest = np.minimum(nearest, distance)
+    return nearest, z
 
 
-def add_ridge(terrain: Heightfield, points: FloatArray, height: float, width: float) -> Heightfield:
+def add_ridge(terrain: Heightfield, points: ArrayLike, height: float, width: float) -> Heightfield:
     """Raise a ridge of Gaussian section along a polyline (n, 2) [m]; ``width`` [m] is from foot to foot (4 sigma)."""
-    distance = _distance_to_polyline(terrain, np.asarray(points, dtype=float))
+    distance, _ = _nearest_on_polyline(terrain, points)
     return terrain.with_heights(terrain.heights + height * exp(-0.5 * (4.0 * distance / width) ** 2))
 
 
@@ -105,14 +114,14 @@ def add_crater(
     return terrain.with_heights(terrain.heights + np.where(r < 1.0, inside, outside))
 
 
-def add_ruts(terrain: Heightfield, points: FloatArray, track: float, width: float, depth: float) -> Heightfield:
+def add_ruts(terrain: Heightfield, points: ArrayLike, track: float, width: float, depth: float) -> Heightfield:
     """Press two wheel ruts, ``track`` [m] apart, along a polyline (n, 2) [m]."""
-    distance = _distance_to_polyline(terrain, np.asarray(points, dtype=float))
+    distance, _ = _nearest_on_polyline(terrain, points)
     across = (distance - 0.5 * track) / (0.5 * width)
     return terrain.with_heights(terrain.heights - depth * np.clip(1.0 - across**2, 0.0, 1.0))
 
 
-def add_road(terrain: Heightfield, points: FloatArray, width: float, shoulder: float) -> Heightfield:
+def add_road(terrain: Heightfield, points: ArrayLike, width: float, shoulder: float) -> Heightfield:
     """Cut and fill a road that is level across; hairpins make a switchback.
 
     Parameters
@@ -124,14 +133,7 @@ def add_road(terrain: Heightfield, points: FloatArray, width: float, shoulder: f
     shoulder : float
         Over which the road's height fades into the old ground's on both sides [m].
     """
-    x, y = _grid(terrain)
-    nearest, road_height = np.full(x.shape, np.inf), np.zeros(x.shape)
-    for a, b in pairwise(np.asarray(points, dtype=float)):
-        along, length_squared = b - a, max(float(np.sum((b - a)[:2] ** 2)), 1e-12)
-        t = np.clip(((x - a[0]) * along[0] + (y - a[1]) * along[1]) / length_squared, 0.0, 1.0)
-        distance = np.hypot(x - a[0] - t * along[0], y - a[1] - t * along[1])
-        road_height = np.where(distance < nearest, a[2] + t * along[2], road_height)
-        nearest = np.minimum(nearest, distance)
+    nearest, road_height = _nearest_on_polyline(terrain, points)
     share = np.clip(1.0 - (nearest - 0.5 * width) / shoulder, 0.0, 1.0)
     return terrain.with_heights(terrain.heights + share * (road_height - terrain.heights))
 
@@ -139,20 +141,23 @@ def add_road(terrain: Heightfield, points: FloatArray, width: float, shoulder: f
 def add_boulders(
     terrain: Heightfield,
     rng: np.random.Generator,
-    per_100_square_metres: float,
+    density: float,
     radius_min: float = 0.1,
     radius_max: float = 0.8,
     keep_clear: FloatArray | None = None,
-    clear_radius: float = 2.0,
 ) -> Heightfield:
     """Lay half-buried round boulders, many small and few large (radius density falls as its third power).
 
     Parameters
     ----------
+    density : float
+        Boulders on 100 square metres, on average.
+    radius_min, radius_max : float
+        [m]
     keep_clear : (n, 2) float, optional
-        Places [m], such as start and goal, that no boulder touches within ``clear_radius`` [m].
+        Places [m], such as start and goal, that no boulder comes nearer to than 2 m.
     """
-    count = rng.poisson(per_100_square_metres * terrain.size[0] * terrain.size[1] / 100.0)
+    count = rng.poisson(density * terrain.size[0] * terrain.size[1] / 100.0)
     centres = np.column_stack(
         [rng.uniform(terrain.x0, terrain.x_max, count), rng.uniform(terrain.y0, terrain.y_max, count)]
     )
@@ -161,7 +166,7 @@ def add_boulders(
     clear = np.zeros((0, 2)) if keep_clear is None else np.asarray(keep_clear, dtype=float).reshape(-1, 2)
     heights = terrain.heights.astype(np.float64)
     for (x, y), radius in zip(centres.tolist(), radii.tolist(), strict=True):
-        if len(clear) and np.hypot(*(clear - (x, y)).T).min() < clear_radius + radius:
+        if len(clear) and np.hypot(*(clear - (x, y)).T).min() < CLEAR_RADIUS + radius:
             continue
         _raise_dome(terrain, heights, x, y, radius)
     return terrain.with_heights(heights)
@@ -187,8 +192,8 @@ def _raise_dome(terrain: Heightfield, heights: FloatArray, x: float, y: float, r
     heights[rows, columns] = np.where(squared < radius**2, np.maximum(patch, dome), patch)
 
 
-def add_steps(terrain: Heightfield, height: float, length: float, x_start: float, count: int) -> Heightfield:
-    """Cut ``count`` stairs of ``height`` x ``length`` [m], rising along +x from ``x_start`` [m], one sample steep."""
-    x, _ = _grid(terrain)
-    step = np.clip(np.floor((x - x_start) / length) + 1.0, 0, count)
+def add_steps(terrain: Heightfield, x: float, height: float, length: float, count: int) -> Heightfield:
+    """Cut ``count`` stairs of ``height`` x ``length`` [m], rising along +x from ``x`` [m], one sample steep."""
+    gx, _ = _grid(terrain)
+    step = np.clip(np.floor((gx - x) / length) + 1.0, 0, count)
     return terrain.with_heights(terrain.heights + height * step)

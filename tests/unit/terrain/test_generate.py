@@ -56,7 +56,7 @@ def test_ruts_run_on_both_sides_of_the_line() -> None:
 def test_boulders_leave_start_and_goal_clear() -> None:
     flat = flat_terrain(20.0, 20.0, 0.1)
     ends = np.array([[3.0, 3.0], [17.0, 17.0]])
-    rubble = generate.add_boulders(flat, rng(), 60.0, keep_clear=ends, clear_radius=2.0)
+    rubble = generate.add_boulders(flat, rng(), 60.0, keep_clear=ends)
     angle = np.linspace(0.0, 2.0 * np.pi, 50)
     for x, y in ends:
         assert np.all(rubble.height_at(x + 1.8 * np.cos(angle), y + 1.8 * np.sin(angle)) == 0.0)
@@ -64,7 +64,7 @@ def test_boulders_leave_start_and_goal_clear() -> None:
 
 
 def test_steps_rise_along_x() -> None:
-    stairs = generate.add_steps(flat_terrain(10.0, 2.0, 0.1), 0.15, 1.0, 3.05, 4)
+    stairs = generate.add_steps(flat_terrain(10.0, 2.0, 0.1), 3.05, 0.15, 1.0, 4)
     assert stairs.height_at([2.5, 3.5, 4.5, 9.0], 1.0).tolist() == pytest.approx([0.0, 0.15, 0.3, 0.6], abs=1e-6)
 
 
