@@ -37,7 +37,8 @@ class Pose:
         orientation = finite("orientation", self.orientation)
         if len(position) != 3 or len(orientation) != 4:
             raise ValueError("a pose has a position of 3 and an orientation of 4 components")
-        norm_squared = sum(component * component for component in orientation)
+        x, y, z, w = orientation
+        norm_squared = x * x + y * y + z * z + w * w
         if abs(norm_squared - 1.0) > QUATERNION_NORM_TOLERANCE:
             raise ValueError(f"orientation must have unit length, its squared norm is {norm_squared:.6g}")
         object.__setattr__(self, "position", position)
@@ -84,8 +85,8 @@ class Pose:
 
     def angle_to(self, other: Pose) -> float:
         """Smallest rotation [rad] in [0, pi] that takes one orientation to the other."""
-        dot = abs(sum(a * b for a, b in zip(self.orientation, other.orientation, strict=True)))
-        return 2.0 * math.acos(min(1.0, dot))
+        (ax, ay, az, aw), (bx, by, bz, bw) = self.orientation, other.orientation
+        return 2.0 * math.acos(min(1.0, abs(ax * bx + ay * by + az * bz + aw * bw)))
 
     def stamped(self, stamp: float) -> Pose:
         """Return the same pose with another time stamp [s]."""

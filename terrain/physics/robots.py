@@ -21,7 +21,7 @@ from mbf_abstract.geometry import (
     Vector3,
     rotation_matrix,
 )
-from mbf_abstract.geometry.arithmetic import rotated, rotated_back
+from mbf_abstract.geometry.arithmetic import cross_product, rotated, rotated_back
 from terrain.physics.bullet import quiet_native_output
 from terrain.physics.drive import STEERING_SPEED, commanded_twist, twist_from_wheels, wheel_targets
 from terrain.physics.incidents import MotionSample, Thing
@@ -163,7 +163,7 @@ class WheeledRobot:
         v_map_com, omega_map = self._bullet.getBaseVelocity(self.body)
         R_map_base = rotation_matrix(orientation)
         offset_map = rotated(R_map_base, self._p_base_com)
-        v_map_base = np.array(v_map_com) - np.cross(omega_map, offset_map)
+        v_map_base = np.array(v_map_com) - cross_product(omega_map, offset_map)
         pose = Pose(_vector(np.array(p_map_com) - offset_map), orientation, "map", self.world.time)
         twist = Twist(_vector(rotated_back(R_map_base, v_map_base)), _vector(rotated_back(R_map_base, omega_map)))
         self._last_state = (step, pose, twist)

@@ -17,7 +17,17 @@ VECTORS = arrays(np.float64, (7, 3), elements=st.floats(-1e3, 1e3))
 def test_scalar_products_and_norms_are_sums_from_the_first_component_on(a, b):
     expected = [u[0] * v[0] + u[1] * v[1] + u[2] * v[2] for u, v in zip(a.tolist(), b.tolist(), strict=True)]
     assert arithmetic.scalar_products(a, b).tolist() == expected
+    assert [float(arithmetic.scalar_products(u, v)) for u, v in zip(a, b, strict=True)] == expected
     assert arithmetic.norm(a).tolist() == [math.sqrt(x * x + y * y + z * z) for x, y, z in a.tolist()]
+
+
+@given(VECTORS, VECTORS)
+def test_turning_and_crossing_add_in_written_order_for_one_vector_and_for_many(rows, vectors):
+    turn = rows[:3]
+    expected = [[r[0] * v[0] + r[1] * v[1] + r[2] * v[2] for r in turn.tolist()] for v in vectors.tolist()]
+    assert arithmetic.rotated(turn, vectors).tolist() == expected
+    assert [arithmetic.rotated(turn, vector).tolist() for vector in vectors] == expected
+    assert np.array_equal(arithmetic.cross_product(rows[0], vectors[0]), np.cross(rows[0], vectors[0]))
 
 
 @given(VECTORS, st.floats(-7.0, 7.0))
