@@ -1,11 +1,7 @@
-"""Features that a scenario puts on generated ground, in the order they are listed.
-
-The keys of a feature are the parameters of the function in ``terrain.worlds.generate`` that makes it.
-"""
+"""Features that a scenario puts on generated ground, in the order they are listed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated, Literal
 
 import numpy as np
@@ -77,14 +73,6 @@ class Steps(ParameterModel):
     count: int = parameter(1, "Number of steps.", ge=1, le=1000)
 
 
-ADD: dict[str, Callable[..., Heightfield]] = {
-    "ridge": add_ridge,
-    "crater": add_crater,
-    "ruts": add_ruts,
-    "road": add_road,
-    "steps": add_steps,
-}
-
 Feature = Annotated[Ridge | Crater | Ruts | Road | Boulders | Steps, Field(discriminator="type")]
 
 
@@ -95,7 +83,15 @@ def put_on(
     keep_clear: FloatArray,
 ) -> Heightfield:
     """Return the terrain with a feature; boulders are drawn from ``rng`` and leave the places (n, 2) [m] clear."""
-    sizes = feature.model_dump(exclude={"type"})
-    if isinstance(feature, Boulders):
-        return add_boulders(terrain, rng, keep_clear=keep_clear, **sizes)
-    return ADD[feature.type](terrain, **sizes)
+    f = feature  # short, for the calls below
+    if isinstance(f, Ridge):
+        return add_ridge(terrain, f.points, f.height, f.width)
+    if isinstance(f, Crater):
+        return add_crater(terrain, f.x, f.y, f.radius, f.depth, f.rim)
+    if isinstance(f, Ruts):
+        return add_ruts(terrain, f.points, f.track, f.width, f.depth)
+    if isinstance(f, Road):
+        return add_road(terrain, f.points, f.width, f.shoulder)
+    if isinstance(f, Boulders):
+        return add_boulders(terrain, rng, f.density, f.radius_min, f.radius_max, keep_clear)
+    return add_steps(terrain, f.x, f.height, f.length, f.count)
