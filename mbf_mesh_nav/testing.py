@@ -11,11 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.testing.contract.report import ContractBroken, Report
-from mbf_mesh_nav.map.layer import CostArray, IntArray, LayerContext, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.arrays import FloatArray, IntArray
+from mbf_mesh_nav.map.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
 __all__ = ["ContractBroken", "check_layer"]
@@ -98,7 +99,7 @@ class _LayerCheck:
         self.layer.recompute()
         self._expect_same(computed, "the same parameters, set at run time, gave other values")
 
-    def sensing(self, points: NDArray[np.float64], origin: NDArray[np.float64]) -> None:
+    def sensing(self, points: FloatArray, origin: FloatArray) -> None:
         """Hand over a cloud, let it expire, clear it; the state without sensors must come back."""
         unseen = _values(self.layer)
         scan = RangeScan("sensor", "map", origin, points, np.ones(len(points), dtype=np.bool_), 1.0)

@@ -18,7 +18,6 @@ import math
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.execution.path_tracker import reverse_segments
 from mbf_abstract.geometry import AckermannCommand, Command, Path, Pose, Twist
@@ -26,6 +25,7 @@ from mbf_abstract.geometry.arithmetic import exp, norm, tan
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent
 from mbf_mesh_nav.kernels.mesh.vectors import Vector
 from mbf_mesh_nav.kernels.motion.mppi import score_rollouts
@@ -101,7 +101,7 @@ class MPPIController(MeshController):
         super().__init__(context)
         self._shortest_edge = float(self.mesh_map.neighbour_lengths.min())
         self._ranks_of: tuple[int, float] = (-1, 0.0)  # version of the map and cost limit
-        self._ranks: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
+        self._ranks: Float32Array = np.zeros(0, dtype=np.float32)
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path of at least one pose in the map's frame; not one in reverse for a car that may not."""
@@ -119,7 +119,7 @@ class MPPIController(MeshController):
             path = bent
         self._begun, self._idle_cycles = False, 0
         self._follow(path)
-        self._nominal: NDArray[np.float64] = np.zeros((p.time_steps, 2))
+        self._nominal: FloatArray = np.zeros((p.time_steps, 2))
         return True
 
     @property
@@ -196,7 +196,7 @@ class MPPIController(MeshController):
             return False
         return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
 
-    def _best_motion(self, spot: SurfacePoint, pose: Pose) -> NDArray[np.float64] | None:
+    def _best_motion(self, spot: SurfacePoint, pose: Pose) -> FloatArray | None:
         """Blend the sampled motions by their scores; (time_steps, 2), or None if no motion makes progress."""
         max_speed = min(
             self.parameters.max_vel_x,
@@ -226,7 +226,7 @@ class MPPIController(MeshController):
         assert self._approach is not None
         return ground_distance(pose, self._approach.goal)
 
-    def _sample(self, max_speed: float, remaining: float) -> NDArray[np.float64]:
+    def _sample(self, max_speed: float, remaining: float) -> FloatArray:
         """Motions (batch_size, time_steps, 2) around the last one; the first is that one, the second stands still.
 
         No robot that can turn where it stands goes on past the goal, ``remaining`` [m] away: motions that run beyond it
@@ -251,9 +251,7 @@ class MPPIController(MeshController):
         np.clip(controls[..., 1], -turn_limit, turn_limit, out=controls[..., 1])
         return np.asarray(controls)
 
-    def _score(
-        self, controls: NDArray[np.float64], spot: SurfacePoint, pose: Pose
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def _score(self, controls: FloatArray, spot: SurfacePoint, pose: Pose) -> tuple[FloatArray, BoolArray]:
         """Scores (n,) and collisions (n,) of motions on the map of now."""
         p, mesh_map = self.parameters, self.mesh_map
         snapshot = mesh_map.snapshot()
@@ -299,7 +297,7 @@ class MPPIController(MeshController):
             -1.0 if backward else 1.0,
         )
 
-    def _run_out(self, end: float) -> NDArray[np.float64]:
+    def _run_out(self, end: float) -> FloatArray:
         """Points (3, 3) straight on beyond ``end`` [m] of the path: beyond a cusp, or beyond the goal as it looks."""
         tracker = self._tracker
         if end == tracker.length:
@@ -320,18 +318,18 @@ class MPPIController(MeshController):
         stride = max(p.max_vel_x, -p.min_vel_x) * p.model_dt
         return math.ceil(stride / max(0.5 * self._shortest_edge, _LEAST_STRIDE))
 
-    def _blocked(self) -> NDArray[np.bool_]:
+    def _blocked(self) -> BoolArray:
         """Vertices (V,) that no curve may pass near."""
         return np.asarray(self._ranks_at(self.mesh_map.snapshot()) > 0.0)
 
-    def _ranks_at(self, snapshot: MeshSnapshot) -> NDArray[np.float32]:
+    def _ranks_at(self, snapshot: MeshSnapshot) -> Float32Array:
         """How forbidden the vertices (V,) are to the robot."""
         wanted = snapshot.version, self.parameters.cost_limit
         if wanted != self._ranks_of:
             self._ranks, self._ranks_of = snapshot.traversability_rank(self.parameters.cost_limit), wanted
         return self._ranks
 
-    def _as_motions(self, controls: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _as_motions(self, controls: FloatArray) -> FloatArray:
         """Turn controls (..., 2) into speed and yaw rate (..., 2), where a car has a steering angle."""
         if self.parameters.motion_model != "ackermann":
             return controls
@@ -344,5 +342,5 @@ class MPPIController(MeshController):
         return AckermannCommand(speed, clamp(turn, self._steering_limit))
 
 
-def _vector(array: NDArray[np.float64]) -> Vector:
+def _vector(array: FloatArray) -> Vector:
     return float(array[0]), float(array[1]), float(array[2])

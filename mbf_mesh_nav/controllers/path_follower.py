@@ -13,13 +13,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_to, in_robot_frame
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter
 from mbf_mesh_nav.mesh.borders import beyond_border
 from mbf_mesh_nav.motion.goal_approach import (
@@ -115,7 +115,7 @@ class PathFollower(MeshController):
             return False
         return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
 
-    def _distance_to_obstacle(self, here: NDArray[np.float64]) -> float | None:
+    def _distance_to_obstacle(self, here: FloatArray) -> float | None:
         """Distance [m] along the path to where the current map forbids to go on; None if that is not in sight.
 
         A robot that stands on forbidden surface may leave it, see ``kernels.search.forbidden_surface``. Where the path

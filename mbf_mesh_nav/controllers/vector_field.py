@@ -13,13 +13,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm, rotated_back
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
+from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.motion.goal_approach import GoalApproach, clamp, ground_distance, heading_error, tracker_on_surface
 from mbf_mesh_nav.motion.vector_field import VectorField
 from mbf_mesh_nav.plugins import MeshController
@@ -111,7 +111,7 @@ class VectorFieldController(MeshController):
             return path
         return path[int(np.argmin(norm(path.positions - self._fields[-2].goal))) :]
 
-    def _pass_via(self, point: NDArray[np.float64]) -> None:
+    def _pass_via(self, point: FloatArray) -> None:
         """Go on to the next leg where its via point is passed; on the last leg keep the progress."""
         if self._on_last_leg:
             self._tracker.update(point)

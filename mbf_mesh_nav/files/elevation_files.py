@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
@@ -31,7 +32,7 @@ def elevation_readers() -> dict[str, EntryPoint]:
     return {f".{point.name}": point for point in entry_points(group=READERS_GROUP)}
 
 
-def read_elevation(path: Path, max_faces: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def read_elevation(path: Path, max_faces: int) -> tuple[FloatArray, NDArray[np.int64]]:
     """Read an elevation model whose ending is in ``elevation_readers()``.
 
     Returns

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 GLTF_FORMATS = frozenset({".gltf", ".glb"})
@@ -66,7 +66,7 @@ def file_frame(path: Path, up_axis: str = "", unit: float = 0.0) -> FileFrame:
     return FileFrame(up_axis or said.up_axis, unit or said.unit)
 
 
-def on_the_map(points: NDArray[np.float64], frame: FileFrame) -> NDArray[np.float64]:
+def on_the_map(points: FloatArray, frame: FileFrame) -> FloatArray:
     """Positions (n, 3) of a file in metres with z up.
 
     Nothing is mirrored. The axis that points to the viewer when the up axis points to the top of the page (COLLADA's

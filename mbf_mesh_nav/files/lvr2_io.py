@@ -21,10 +21,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import Float32Array, FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
-FloatArray = NDArray[np.float64]
 LAYOUTS: dict[str, tuple[str, str]] = {
     "mesh_io": ("geometry", "vertex_attributes"),
     "channels": ("channels", "channels"),
@@ -55,7 +55,7 @@ def read_lvr2_mesh(path: Path, part: str, max_faces: int) -> tuple[FloatArray, N
 
 def read_lvr2_vertex_attributes(
     path: Path, part: str = "", max_bytes: int = MAX_ATTRIBUTE_BYTES
-) -> dict[str, NDArray[np.float32]]:
+) -> dict[str, Float32Array]:
     """Read all per-vertex numbers of a part, e.g. costs that mesh_navigation saved, in the file's numbering.
 
     Parameters
@@ -225,6 +225,6 @@ def _is_numbers(item: Any, kinds: str) -> bool:
     return isinstance(item, h5py.Dataset) and item.shape is not None and item.dtype.kind in kinds
 
 
-def _without_last_axis(values: NDArray[np.float32]) -> NDArray[np.float32]:
+def _without_last_axis(values: Float32Array) -> Float32Array:
     """(V, 1) as (V,), anything else as it is."""
     return values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values

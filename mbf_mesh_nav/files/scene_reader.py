@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from mbf_abstract.config.bounded_files import special_file
 from mbf_abstract.geometry.arithmetic import rotated, scalar_products
+from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.files.collada_check import check_collada
 from mbf_mesh_nav.files.file_frames import GLTF_FORMATS
 from mbf_mesh_nav.files.gltf_check import check_gltf
 from mbf_mesh_nav.files.truncated_files import refuse_cut_file
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
-MeshArrays = tuple[NDArray[np.float64], NDArray[np.int64]]
+MeshArrays = tuple[FloatArray, NDArray[np.int64]]
 
 OBJ_PARTS = {"split_objects": True, "group_material": False}
 BARE = {"skip_materials": True}
@@ -84,7 +85,7 @@ def _read(path: Path, part: str, max_faces: int) -> MeshArrays:
     return np.vstack(vertices), np.vstack(faces)
 
 
-def _placed(scene: Any, node: str, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool]:
+def _placed(scene: Any, node: str, points: FloatArray) -> tuple[FloatArray, bool]:
     """Points (n, 3) of a node in the scene's frame, and whether they are mirrored.
 
     They go from node to node: trimesh would multiply the transforms, in an order of sums that depends on the CPU.

@@ -9,9 +9,9 @@ a cosine ramp over ``height_inflation`` above it, then 0.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.parameters import parameter
+from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.layer import CostArray, LayerParameters, LethalArray, MeshLayer
 
 RAY_OFFSET = 0.001
@@ -32,7 +32,7 @@ class ClearanceLayer(MeshLayer):
     parameters: ClearanceParameters
     cacheable = True
 
-    def free_heights(self) -> NDArray[np.float64]:
+    def free_heights(self) -> FloatArray:
         """Free height [m] above every vertex (V,), inf where it is more than the robot and the ramp need."""
         normals = self.topology.vertex_normals
         enough = self.parameters.robot_height + self.parameters.height_inflation

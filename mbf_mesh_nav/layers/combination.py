@@ -7,7 +7,8 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.map.layer import CostArray, IntArray, LethalArray, MeshLayer
+from mbf_mesh_nav.arrays import IntArray
+from mbf_mesh_nav.map.layer import CostArray, LethalArray, MeshLayer
 
 
 class CombinationLayer(MeshLayer):

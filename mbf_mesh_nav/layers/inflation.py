@@ -18,15 +18,9 @@ from pydantic import model_validator
 
 from mbf_abstract.maps.layers.inflation import InflationRadii
 from mbf_abstract.parameters import parameter
+from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.kernels.layers.inflation import repair_distances, set_fading_costs
-from mbf_mesh_nav.map.layer import (
-    CostArray,
-    IntArray,
-    LayerContext,
-    LayerParameters,
-    LethalArray,
-    MeshLayer,
-)
+from mbf_mesh_nav.map.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
 
 
 class InflationParameters(LayerParameters, InflationRadii):

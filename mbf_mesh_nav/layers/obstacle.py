@@ -25,16 +25,8 @@ from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
-from mbf_mesh_nav.map.layer import (
-    NOTHING_CHANGED,
-    CostArray,
-    FloatArray,
-    IntArray,
-    LayerContext,
-    LayerParameters,
-    LethalArray,
-    MeshLayer,
-)
+from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
 from mbf_mesh_nav.map.range_image import NO_RANGE, RangeImage
 
 MAX_WAITING = 256
@@ -190,7 +182,7 @@ class ObstacleLayer(MeshLayer):
         faces, _ = self.locator.cast_rays(near, down, settings.robot_height)
         return faces[faces >= 0], near[faces >= 0]
 
-    def _still_valid(self, hits: Hits, scan: RangeScan, sensor: int) -> NDArray[np.bool_]:
+    def _still_valid(self, hits: Hits, scan: RangeScan, sensor: int) -> BoolArray:
         """Mask of the kept hits that this scan neither outdates nor sees through.
 
         A scan that comes late, from a slow sensor, knows nothing of what another saw after its stamp.

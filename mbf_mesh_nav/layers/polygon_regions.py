@@ -8,7 +8,8 @@ from pydantic import field_validator, model_validator
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
 from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_abstract.parameters import ParameterModel, parameter
-from mbf_mesh_nav.map.layer import FloatArray, IntArray, LethalArray
+from mbf_mesh_nav.arrays import FloatArray, IntArray
+from mbf_mesh_nav.map.layer import LethalArray
 
 ON_OUTLINE = 1e-6
 """A vertex this near [m] to a side of a polygon lies on it."""

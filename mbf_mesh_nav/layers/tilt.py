@@ -17,10 +17,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
 from mbf_abstract.parameters import parameter
+from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.layers.footprint_settling import settle_footprints, wheel_directions
 from mbf_mesh_nav.map.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
 
@@ -75,9 +75,9 @@ class TiltLayer(MeshLayer):
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
         shape = (context.topology.vertex_count, HEADINGS)
-        self.roll: NDArray[np.float32] = np.zeros(shape, dtype=np.float32)
-        self.pitch: NDArray[np.float32] = np.zeros(shape, dtype=np.float32)
-        self.allowed: NDArray[np.bool_] = np.ones(shape, dtype=np.bool_)
+        self.roll: Float32Array = np.zeros(shape, dtype=np.float32)
+        self.pitch: Float32Array = np.zeros(shape, dtype=np.float32)
+        self.allowed: BoolArray = np.ones(shape, dtype=np.bool_)
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = share of the limits that the best headings use, as many as needed; 1 and lethal where too few can."""
@@ -96,7 +96,7 @@ class TiltLayer(MeshLayer):
         lethal = np.isinf(ranked)
         return np.where(lethal, 1.0, ranked).astype(np.float32), lethal
 
-    def _usage(self) -> NDArray[np.float32]:
+    def _usage(self) -> Float32Array:
         """Greatest ratio (V, 16) of an angle to its limit."""
         roll_limit, up_limit, down_limit = self.limits()
         sideways = np.abs(self.roll) / roll_limit

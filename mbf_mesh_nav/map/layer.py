@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 
 from mbf_abstract.maps.layers import layer as map_layer
 from mbf_abstract.parameters import parameter
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.mesh.locate import SurfaceLocator
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
-CostArray = NDArray[np.float32]
-LethalArray = NDArray[np.bool_]
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
+CostArray = Float32Array
+LethalArray = BoolArray
 
 NOTHING_CHANGED: IntArray = np.zeros(0, dtype=np.int32)
 

@@ -16,7 +16,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mbf_abstract.maps.layers.layer_stack import LayerStack
-from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerParameters, MeshLayer
+from mbf_mesh_nav.arrays import IntArray
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerParameters, MeshLayer
 
 
 class LayerGraph(LayerStack[MeshLayer]):

@@ -17,7 +17,8 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
-from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerParameters, MeshLayer
+from mbf_mesh_nav.arrays import IntArray
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph, union_of
 from mbf_mesh_nav.map.places import MeshPlaces
 from mbf_mesh_nav.map.snapshot import MeshSnapshot, SnapshotSeries

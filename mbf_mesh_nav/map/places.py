@@ -15,13 +15,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import norm, scalar_products
 from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_mesh_nav.arrays import BoolArray, IntArray
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
-from mbf_mesh_nav.map.layer import IntArray
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.borders import on_surface
 from mbf_mesh_nav.mesh.locate import SurfaceLocator, SurfacePoint
@@ -98,6 +97,6 @@ class MeshPlaces:
         graph = (mesh.vertices, mesh.neighbour_offsets, mesh.neighbours)
         return vertices_in_disc(*graph, self._nearest_vertex(place), place.point, float(radius))
 
-    def _blocked(self, vertices: IntArray) -> NDArray[np.bool_]:
+    def _blocked(self, vertices: IntArray) -> BoolArray:
         snapshot = self.snapshot
         return np.asarray(snapshot.lethal[vertices] | ~np.isfinite(snapshot.costs[vertices]))

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry.arithmetic import arcsin, arctan2, norm
-
-FloatArray = NDArray[np.float64]
+from mbf_mesh_nav.arrays import BoolArray, FloatArray
 
 BIN_ANGLE = np.radians(1.0)
 COLUMNS = round(2.0 * np.pi / BIN_ANGLE)
@@ -33,7 +32,7 @@ class RangeImage:
         rows, columns, distances = self._bins(points[away])
         np.minimum.at(self._ranges, (rows, columns), distances)
 
-    def sees_through(self, points: FloatArray, margin: float = 0.1) -> NDArray[np.bool_]:
+    def sees_through(self, points: FloatArray, margin: float = 0.1) -> BoolArray:
         """Mask (m,) of points (m, 3) that rays passed by on their way to something farther.
 
         A point counts as seen through if there is a ray in its own bin and all rays in that bin and the eight around

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.kernels.layers.edge_weights import show_changes
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK
-from mbf_mesh_nav.map.layer import CostArray, IntArray, LethalArray
+from mbf_mesh_nav.map.layer import CostArray, LethalArray
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_mesh_nav.arrays import BoolArray, FloatArray
 from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
@@ -15,8 +15,8 @@ ON_EDGE = 1e-9
 
 
 def beyond_border(
-    topology: MeshTopology, places: NDArray[np.float64], location: Location, slack: float = BORDER_SLACK
-) -> NDArray[np.bool_]:
+    topology: MeshTopology, places: FloatArray, location: Location, slack: float = BORDER_SLACK
+) -> BoolArray:
     """Whether positions (n, 3) lie past a border of the surface, by more than ``slack`` [m] sideways.
 
     The surface point nearest to such a position lies on a border edge, and not below or above it. ``location`` is that
@@ -38,7 +38,7 @@ def beyond_border(
 def on_surface(
     topology: MeshTopology,
     locator: SurfaceLocator,
-    position: NDArray[np.float64] | tuple[float, ...],
+    position: FloatArray | tuple[float, ...],
     reach: float,
 ) -> SurfacePoint | None:
     """Return the surface point of a position at most ``reach`` [m] above or below it, None also past a border."""

@@ -8,10 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
+from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +32,11 @@ class CheckedMesh:
     face_source: IntArray
     input_to_vertex: IntArray
 
-    def without_faces(self, dropped: NDArray[np.bool_]) -> CheckedMesh:
+    def without_faces(self, dropped: BoolArray) -> CheckedMesh:
         """Copy without the faces of a mask (F,)."""
         return replace(self, faces=self.faces[~dropped], face_source=self.face_source[~dropped])
 
-    def without_vertices(self, dropped: NDArray[np.bool_]) -> CheckedMesh:
+    def without_vertices(self, dropped: BoolArray) -> CheckedMesh:
         """Copy without the vertices of a mask (V,), none of which a face may use."""
         renumbered = np.where(dropped, -1, np.cumsum(~dropped) - 1).astype(np.int32)
         given = self.input_to_vertex
@@ -68,7 +66,7 @@ class CheckedMesh:
         )
 
     @property
-    def used(self) -> NDArray[np.bool_]:
+    def used(self) -> BoolArray:
         """Mask (V,) of the vertices that belong to a face."""
         mask = np.zeros(len(self.vertices), dtype=np.bool_)
         mask[self.faces] = True

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh, IntArray
+from mbf_mesh_nav.arrays import FloatArray, IntArray
+from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 
@@ -52,7 +53,7 @@ def densify(
     return CheckedMesh(vertices, faces, vertex_source, face_source, mesh.input_to_vertex)
 
 
-def _lengths(vertices: NDArray[np.float64], faces: IntArray) -> NDArray[np.float64]:
+def _lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Lengths (F, 3) [m] of the edges from corner k to corner k+1."""
     x, y, z = (column[faces] - column[np.roll(faces, -1, axis=1)] for column in np.ascontiguousarray(vertices.T))
     return np.asarray(np.sqrt(x * x + y * y + z * z))

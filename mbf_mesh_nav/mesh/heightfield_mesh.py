@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 
 
 def heightfield_mesh(
     heights: ArrayLike, dx: float, dy: float, x0: float = 0.0, y0: float = 0.0, keep_grid: bool = False
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+) -> tuple[FloatArray, IntArray]:
     """Triangulate a heightfield along the anti-diagonals (x+1, y)-(x, y+1), the split of Bullet's heightfield shape.
 
     Parameters

@@ -13,13 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.bounding_boxes import build_boxes, closest_face, closest_faces
 from mbf_mesh_nav.kernels.mesh.rays import first_hits
 from mbf_mesh_nav.kernels.mesh.topology import morton_codes
 from mbf_mesh_nav.mesh.topology import MeshTopology
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 SORT_FROM = 100
 """Number of points from which sorting them costs less than the cache misses it saves."""

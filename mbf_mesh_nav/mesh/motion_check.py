@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.mesh.surface_disc import vertices_in_disc
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent, turned, walk
 from mbf_mesh_nav.kernels.search.forbidden_surface import LETHAL_RANK, may_enter, rank_at
@@ -36,7 +36,7 @@ def slope_at(mesh: MeshTopology, place: SurfacePoint) -> float:
 
 def forbidden_ahead(
     mesh: MeshTopology,
-    ranks: NDArray[np.float32],
+    ranks: Float32Array,
     place: SurfacePoint,
     pose: Pose,
     command: Twist,
@@ -86,7 +86,7 @@ def forbidden_ahead(
 
 
 def nearest_of(
-    mesh: MeshTopology, place: SurfacePoint, pose: Pose, within: float, forbidden: NDArray[np.bool_]
+    mesh: MeshTopology, place: SurfacePoint, pose: Pose, within: float, forbidden: BoolArray
 ) -> tuple[float, float, float] | None:
     """Offset [m] from a pose to the nearest ``forbidden`` (V,) vertex of its storey; None if none is ``within`` [m]."""
     graph = (mesh.vertices, mesh.neighbour_offsets, mesh.neighbours)

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.defects import (
     face_shapes,
     faces_without_area,
@@ -28,7 +29,7 @@ from mbf_mesh_nav.kernels.mesh.defects import (
 )
 from mbf_mesh_nav.kernels.mesh.fans import fans_at_vertices
 from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges
-from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh, FloatArray, IntArray
+from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
 from mbf_mesh_nav.mesh.mesh_report import Finding, MeshError, MeshReport
 from mbf_mesh_nav.mesh.slivers import without_slivers
 from mbf_mesh_nav.mesh.topology import faces_of_vertices

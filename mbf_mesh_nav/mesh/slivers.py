@@ -8,15 +8,15 @@ instead, and where two corners are one point, they are made one vertex.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.defects import faces_without_area
 from mbf_mesh_nav.kernels.mesh.slivers import flip_slivers
 from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges
-from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh, FloatArray, IntArray
+from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
 from mbf_mesh_nav.mesh.topology import faces_of_vertices
 
 SAME_POINT_SHARE = 1e-9
@@ -64,7 +64,7 @@ def _same_points(vertices: FloatArray, slivers: IntArray) -> IntArray:
     lengths = _edge_lengths(vertices, slivers)
     sliver, corner = np.nonzero(lengths <= SAME_POINT_SHARE * lengths.max(axis=1, keepdims=True))
     target = np.arange(len(vertices), dtype=np.int32)
-    pairs: NDArray[np.int32] = np.stack([slivers[sliver, corner], slivers[sliver, (corner + 1) % 3]])
+    pairs: IntArray = np.stack([slivers[sliver, corner], slivers[sliver, (corner + 1) % 3]])
     if pairs.size:
         graph = coo_array((np.ones(pairs.shape[1], dtype=np.int8), pairs), shape=(len(vertices), len(vertices)))
         labels = connected_components(graph, directed=False)[1]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
@@ -20,7 +20,7 @@ def nearest_corner(mesh_map: MeshMap, point: SurfacePoint) -> int:
     return int(mesh_map.faces[point.face, np.argmax(point.barycentric)])
 
 
-def passes_blocked_corner(start: SurfacePoint, end: SurfacePoint, blocked: NDArray[np.bool_]) -> bool:
+def passes_blocked_corner(start: SurfacePoint, end: SurfacePoint, blocked: BoolArray) -> bool:
     """Whether the line between two points of one face comes nearer to a blocked corner (3,) than to the free ones.
 
     Neither point does itself. How much nearer is the lesser of two linear functions, so greatest where they are equal.
@@ -44,8 +44,8 @@ def surface_point_at_vertex(mesh_map: MeshMap, vertex: int) -> SurfacePoint:
 
 
 def corner_distances(
-    mesh_map: MeshMap, blocked: NDArray[np.bool_], point: SurfacePoint, snapshot: MeshSnapshot | None = None
-) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    mesh_map: MeshMap, blocked: BoolArray, point: SurfacePoint, snapshot: MeshSnapshot | None = None
+) -> tuple[IntArray, Float32Array]:
     """Free corners of the point's face (k,) int32 and how far the point is from them (k,) float32 [m].
 
     With a ``snapshot`` the straight lines are weighted like its edges, by the mean of the costs at both ends; corners
@@ -83,6 +83,6 @@ def describe_blockage(mesh_map: MeshMap, snapshot: MeshSnapshot, vertex: int, co
     return f"cost {snapshot.costs[vertex]:.3g}, limit {cost_limit:g}{layers}"
 
 
-def position_text(position: NDArray[np.float64] | tuple[float, float, float]) -> str:
+def position_text(position: FloatArray | tuple[float, float, float]) -> str:
     """Write a position for a message, in metres."""
     return f"({position[0]:.2f}, {position[1]:.2f}, {position[2]:.2f})"

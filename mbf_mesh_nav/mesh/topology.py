@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh import topology as kernels
 from mbf_mesh_nav.kernels.mesh.surface import Surface
-
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +57,7 @@ class MeshTopology:
     edges: IntArray
     neighbour_offsets: IntArray
     neighbours: IntArray
-    neighbour_lengths: NDArray[np.float32]
+    neighbour_lengths: Float32Array
     vertex_face_offsets: IntArray
     vertex_faces: IntArray
     face_neighbours: IntArray
@@ -83,7 +81,7 @@ class MeshTopology:
         return float(np.mean(self.neighbour_lengths)) if len(self.neighbour_lengths) else 1.0
 
     @cached_property
-    def border_vertices(self) -> NDArray[np.bool_]:
+    def border_vertices(self) -> BoolArray:
         """Vertices (V,) at the boundary of the mesh and of its holes."""
         face, corner = np.nonzero(self.face_neighbours < 0)
         border = np.zeros(len(self.vertices), dtype=np.bool_)

@@ -10,6 +10,7 @@ import networkx
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import Float32Array
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
 
@@ -22,9 +23,7 @@ def vertex_names(topology: MeshTopology) -> NDArray[np.int64]:
     return np.where(topology.internal_to_input >= 0, topology.internal_to_input, -1 - internal)
 
 
-def build_vertex_graph(
-    topology: MeshTopology, costs: NDArray[np.float32], edge_weights: NDArray[np.float32]
-) -> networkx.Graph[int]:
+def build_vertex_graph(topology: MeshTopology, costs: Float32Array, edge_weights: Float32Array) -> networkx.Graph[int]:
     """Graph whose nodes are the caller's vertex numbers, see ``vertex_names``.
 
     Parameters

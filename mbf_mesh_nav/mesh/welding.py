@@ -8,15 +8,12 @@ inside of a surface is, it stays as it is.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from mbf_abstract.geometry.arithmetic import norm
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 
 ROUNDING_SHARE = 1e-6
 """Default distance for joining, in diagonals of the mesh: some twenty times what four-byte numbers lose."""

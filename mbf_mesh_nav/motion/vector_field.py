@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mbf_abstract.geometry.arithmetic import norm, rotated_back
+from mbf_mesh_nav.arrays import Float32Array, FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.topology import MeshTopology
@@ -36,10 +34,10 @@ class VectorField:
         The mesh it belongs to; on another one its vectors are invalid.
     """
 
-    directions: NDArray[np.float32]
-    distances: NDArray[np.float32]
+    directions: Float32Array
+    distances: Float32Array
     goal_face: int
-    goal: NDArray[np.float64]
+    goal: FloatArray
     map_version: int
     topology: MeshTopology
 
@@ -47,7 +45,7 @@ class VectorField:
         for array in (self.directions, self.distances, self.goal):
             array.flags.writeable = False
 
-    def direction_at(self, mesh_map: MeshMap, point: SurfacePoint) -> NDArray[np.float64] | None:
+    def direction_at(self, mesh_map: MeshMap, point: SurfacePoint) -> FloatArray | None:
         """Return the unit vector (3,) at a surface point, None where the field does not lead anywhere.
 
         Corners the wave did not reach do not count; in the goal's face the direction is the straight line to the goal.

@@ -13,11 +13,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry.arithmetic import arctan2
 from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import PlanResult
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for
 from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors
 from mbf_mesh_nav.kernels.search.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
@@ -90,7 +90,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         normals = np.concatenate([ends[0], mesh_map.vertex_normals[chain], ends[1]])
         return Leg(positions, normals, cost)
 
-    def reach(self, query: LegQuery) -> NDArray[np.float32] | None:
+    def reach(self, query: LegQuery) -> Float32Array | None:
         """As for every planner; here to where the robot may also turn to a heading asked for at the goal."""
         limits = self._current_limits()
         from_start = EndStretches(self.mesh_map, limits, query, self.parameters.turning_cost).from_start()
@@ -110,9 +110,9 @@ class HeadingAStarPlanner(SurfacePlanner):
         self,
         query: LegQuery,
         limits: HeadingLimits,
-        from_start: tuple[NDArray[np.int32], NDArray[np.float32]],
-        to_goal: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.int32]],
-    ) -> tuple[int, float, NDArray[np.float32], NDArray[np.int32]]:
+        from_start: tuple[IntArray, Float32Array],
+        to_goal: tuple[IntArray, Float32Array, IntArray],
+    ) -> tuple[int, float, Float32Array, IntArray]:
         """Run the kernel: best target state, its cost, distances and predecessors (16 V,) of all states it came to."""
         mesh_map = self.mesh_map
         distances = np.full(HEADINGS * len(mesh_map.vertices), np.inf, dtype=np.float32)
@@ -140,7 +140,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         )
         return best, cost, distances, predecessors
 
-    def _no_path(self, start: SurfacePoint, goal: SurfacePoint, blocked: NDArray[np.bool_]) -> PlanResult:
+    def _no_path(self, start: SurfacePoint, goal: SurfacePoint, blocked: BoolArray) -> PlanResult:
         """Name the tilt where it, and not a blocked vertex, makes the goal unreachable."""
         result = super()._no_path(start, goal, blocked)
         return replace(result, message=result.message + self._tilt_at_ends)
@@ -169,7 +169,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         return self._limits
 
 
-def may_turn_to(allowed: NDArray[np.bool_], heading: int) -> NDArray[np.bool_]:
+def may_turn_to(allowed: BoolArray, heading: int) -> BoolArray:
     """Headings (V, 16) from which the robot may turn on the spot to ``heading``: all between must be ``allowed``."""
     may_turn = np.ones_like(allowed)
     for away in range(1, HEADINGS // 2 + 1):

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mbf_mesh_nav.arrays import Float32Array, IntArray
 from mbf_mesh_nav.kernels.search.dijkstra import propagate_distances
 from mbf_mesh_nav.kernels.search.repair_wave import invalidate_subtrees
 from mbf_mesh_nav.mesh.surface_point import corner_distances
@@ -35,10 +33,10 @@ class RememberedWave:
     goal: list[float]
     cost_limit: float
     version: int
-    roots: NDArray[np.int32]
-    root_distances: NDArray[np.float32]
-    distances: NDArray[np.float32]
-    predecessors: NDArray[np.int32]
+    roots: IntArray
+    root_distances: Float32Array
+    distances: Float32Array
+    predecessors: IntArray
 
 
 class RepairingPlanner(SurfacePlanner):
@@ -74,7 +72,7 @@ class RepairingPlanner(SurfacePlanner):
         self._wave = wave
         return vertex_path_leg(self.mesh_map, query, wave.distances, wave.predecessors, rooted_at_goal=True)
 
-    def _changes_since(self, wave: RememberedWave, query: LegQuery) -> NDArray[np.int32] | None:
+    def _changes_since(self, wave: RememberedWave, query: LegQuery) -> IntArray | None:
         """Vertices that changed since the wave; None if it leads elsewhere, or nobody remembers what changed."""
         roots, offsets = corner_distances(self.mesh_map, query.blocked, query.goal, query.snapshot)
         same_source = (
@@ -94,7 +92,7 @@ class RepairingPlanner(SurfacePlanner):
             goal, self.parameters.cost_limit, version, seeds, distances[seeds], distances, predecessors
         )
 
-    def _invalidate(self, changed: NDArray[np.int32], wave: RememberedWave, query: LegQuery) -> NDArray[np.int32]:
+    def _invalidate(self, changed: IntArray, wave: RememberedWave, query: LegQuery) -> IntArray:
         """Invalidate the subtrees of changed vertices; return the seeds of the repair."""
         return invalidate_subtrees(
             self.mesh_map.neighbour_offsets,

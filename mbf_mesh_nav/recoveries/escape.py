@@ -13,7 +13,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist
@@ -22,6 +21,7 @@ from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRec
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors, propagate_distances
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
@@ -54,10 +54,10 @@ class EscapePath:
         Of the robot along the polyline from where it stood over these vertices.
     """
 
-    vertices: NDArray[np.int32]
+    vertices: IntArray
     tracker: PathTracker
 
-    def is_open(self, lethal: NDArray[np.bool_], blocked: NDArray[np.bool_]) -> bool:
+    def is_open(self, lethal: BoolArray, blocked: BoolArray) -> bool:
         """Whether no vertex ahead of the robot is ``lethal`` (V,), nor the end ``blocked`` (V,)."""
         ahead = self.vertices[self.tracker.lengths[1:] > self.tracker.progress]
         return not (lethal[ahead].any() or blocked[self.vertices[-1]])
@@ -111,16 +111,14 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
             return Twist.planar(wz=math.copysign(p.yaw_rate, bearing))
         return Twist.planar(vx=p.speed, wz=clamp(p.speed * curvature, p.yaw_rate))
 
-    def _patch_below(self, spot: SurfacePoint, snapshot: MeshSnapshot, flag: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    def _patch_below(self, spot: SurfacePoint, snapshot: MeshSnapshot, flag: FlagArray) -> BoolArray:
         """Lethal vertices (V,) connected to the one the robot stands on; none if it stands beside them."""
         lethal = _lethal(snapshot)
         if not lethal[nearest_corner(self.mesh_map, spot)]:
             return np.zeros_like(lethal)
         return np.isfinite(self._propagate(spot, ~lethal, flag)[0])
 
-    def _escape_path(
-        self, spot: SurfacePoint, own_patch: NDArray[np.bool_], request: RecoveryRequest
-    ) -> EscapePath | None:
+    def _escape_path(self, spot: SurfacePoint, own_patch: BoolArray, request: RecoveryRequest) -> EscapePath | None:
         """Path over the mesh to the nearest vertex around which no face is forbidden, on the current map.
 
         It leads over costly surface, and of lethal vertices (V,) only over those of ``own_patch``.
@@ -139,9 +137,7 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
         points = np.concatenate([[spot.point], mesh_map.vertices[chain]])
         return EscapePath(chain, PathTracker(Path.from_points(points, frame_id=mesh_map.frame_id)))
 
-    def _propagate(
-        self, spot: SurfacePoint, closed: NDArray[np.bool_], flag: NDArray[np.uint8]
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    def _propagate(self, spot: SurfacePoint, closed: BoolArray, flag: FlagArray) -> tuple[Float32Array, IntArray]:
         """Lengths of the paths from the robot to all vertices but the ``closed`` ones, and their predecessors."""
         mesh_map = self.mesh_map
         distances, predecessors, seeds = seeded_arrays(mesh_map, closed, spot)
@@ -151,6 +147,6 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
         return distances, predecessors
 
 
-def _lethal(snapshot: MeshSnapshot) -> NDArray[np.bool_]:
+def _lethal(snapshot: MeshSnapshot) -> BoolArray:
     """Vertices (V,) that no robot may touch, whatever the cost limit."""
     return np.asarray(snapshot.lethal | np.isposinf(snapshot.costs))

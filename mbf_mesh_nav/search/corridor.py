@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 from mbf_mesh_nav.kernels.wave.corridor_detours import pass_vertices
 from mbf_mesh_nav.kernels.wave.corridors import link_faces, straighten
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -13,7 +13,7 @@ from mbf_mesh_nav.search.path_cost import cost_along
 
 _MIN_PIECE = 10  # points; shorter pieces are not split further
 
-Piece = tuple[NDArray[np.float64], NDArray[np.int32]]
+Piece = tuple[FloatArray, IntArray]
 """Points (n, 3) [m], and the face (n,) in which the segment to each lies."""
 
 
@@ -26,12 +26,12 @@ class Corridor:
         Faces with a blocked corner never become part of a corridor.
     """
 
-    def __init__(self, mesh_map: MeshMap, snapshot: MeshSnapshot, blocked: NDArray[np.bool_]) -> None:
+    def __init__(self, mesh_map: MeshMap, snapshot: MeshSnapshot, blocked: BoolArray) -> None:
         self._mesh_map = mesh_map
         self._snapshot = snapshot
         self._blocked = blocked
 
-    def shorten(self, positions: NDArray[np.float64], point_faces: NDArray[np.int32]) -> Piece:
+    def shorten(self, positions: FloatArray, point_faces: IntArray) -> Piece:
         """Shorten a traced path by string pulling; a piece keeps its old course where the shorter one costs more.
 
         Where nothing along the path has a cost the corridors are changed, too, and the path becomes a geodesic.
@@ -58,9 +58,7 @@ class Corridor:
             faces.append(new[1][1:])
         return np.concatenate(points), np.concatenate(faces)
 
-    def _shorten_piece(
-        self, positions: NDArray[np.float64], point_faces: NDArray[np.int32], corridor: NDArray[np.int32], turn: bool
-    ) -> Piece:
+    def _shorten_piece(self, positions: FloatArray, point_faces: IntArray, corridor: IntArray, turn: bool) -> Piece:
         """Take the geodesic near the corridor if it is not more expensive, else try its halves."""
         mesh_map = self._mesh_map
         ends = tuple(positions[0].tolist()), tuple(positions[-1].tolist())
@@ -78,7 +76,7 @@ class Corridor:
         tail = self._shorten_piece(positions[middle:], point_faces[middle:], corridor[cut[0] :], turn)
         return np.concatenate([head[0], tail[0][1:]]), np.concatenate([head[1], tail[1][1:]])
 
-    def pass_vertices(self, positions: NDArray[np.float64], point_faces: NDArray[np.int32]) -> Piece:
+    def pass_vertices(self, positions: FloatArray, point_faces: IntArray) -> Piece:
         """The shortest geodesic found by passing single vertices on their other side; all costs apart.
 
         A path that leads along edges between blocked faces stays as it is.
@@ -92,11 +90,11 @@ class Corridor:
         points, faces = pass_vertices(*mesh, corridor, *ends)
         return points, np.concatenate([point_faces[:1], faces])
 
-    def has_costs(self, faces: NDArray[np.int32]) -> bool:
+    def has_costs(self, faces: IntArray) -> bool:
         """Whether costs on faces (n,) make some paths over them longer than others; infinite ones do not count."""
         costs = self._snapshot.costs[self._mesh_map.faces[faces]]
         return self._snapshot.edge_cost_factor > 0.0 and bool((np.isfinite(costs) & (costs > 0.0)).any())
 
-    def cost(self, positions: NDArray[np.float64], point_faces: NDArray[np.int32]) -> float:
+    def cost(self, positions: FloatArray, point_faces: IntArray) -> float:
         """Length plus collected cost [m] of a path, see ``path_cost``."""
         return cost_along(self._mesh_map, self._snapshot, positions, point_faces)

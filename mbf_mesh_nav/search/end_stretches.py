@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
+from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.search.heading_astar import HEADING_STEP, HEADINGS
 from mbf_mesh_nav.layers.tilt import heading_index
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -26,8 +26,7 @@ ANY_HEADING = -1
 ROUNDED = 2e-3
 """A tolerance may be so little [rad] less than meant: 3.14 is half a turn."""
 
-IntArray = NDArray[np.int32]
-Offsets = NDArray[np.float32]
+Offsets = Float32Array
 
 
 class EndStretches:
@@ -128,7 +127,7 @@ class EndStretches:
         return 0.0 if pose is None else self._limits.standing(place, pose.yaw)
 
 
-def heading_towards(start: NDArray[np.float64], end: NDArray[np.float64]) -> int:
+def heading_towards(start: FloatArray, end: FloatArray) -> int:
     """Index of the heading nearest to that from one point to another."""
     return heading_index(math.atan2(end[1] - start[1], end[0] - start[0]))
 

@@ -11,11 +11,11 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw, quaternion_multiply
 from mbf_abstract.geometry.arithmetic import norm, rotated, rotated_back, scalar_products
+from mbf_mesh_nav.arrays import BoolArray, FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.borders import beyond_border
 from mbf_mesh_nav.mesh.locate import Location
@@ -29,9 +29,7 @@ _LONGEST_STEP = 3.0 * _SPACING  # [m] between neighbouring points put onto one s
 _SIDES = {"L": 1.0, "S": 0.0, "R": -1.0}
 
 
-def with_first_turn(
-    path: Path, mesh_map: MeshMap, blocked: NDArray[np.bool_], turning_radius: float, pose: Pose
-) -> Path:
+def with_first_turn(path: Path, mesh_map: MeshMap, blocked: BoolArray, turning_radius: float, pose: Pose) -> Path:
     """Bend the begin of a path so that a car at ``pose`` drives onto it; the path itself where it leads ahead anyway.
 
     That is the approach of the reversed path: from the goal to the pose of the robot, turned about.
@@ -48,7 +46,7 @@ def with_first_turn(
 def with_final_approach(
     path: Path,
     mesh_map: MeshMap,
-    blocked: NDArray[np.bool_],
+    blocked: BoolArray,
     turning_radius: float,
     small_corner: float = _SMALL_CORNER,
 ) -> Path:
@@ -82,7 +80,7 @@ def with_final_approach(
     return best
 
 
-def _fits(mesh_map: MeshMap, blocked: NDArray[np.bool_], curve: NDArray[np.float64], spots: Location) -> bool:
+def _fits(mesh_map: MeshMap, blocked: BoolArray, curve: FloatArray, spots: Location) -> bool:
     """Whether a curve (n, 3) lies on free surface throughout: past no border, and no part on another storey."""
     if (spots.faces < 0).any() or blocked[mesh_map.faces[spots.faces]].any():
         return False
@@ -97,7 +95,7 @@ def _corner_at_goal(path: Path) -> float:
     return math.acos(min(max(cosine, -1.0), 1.0))
 
 
-def _curve_to_goal(path: Path, tracker: PathTracker, leaves_at: float, radius: float) -> NDArray[np.float64]:
+def _curve_to_goal(path: Path, tracker: PathTracker, leaves_at: float, radius: float) -> FloatArray:
     """Points (n, 3) in the goal's tangent plane from ``leaves_at`` [m] of the path to the straight piece at the end."""
     goal = path[-1]
     start, ahead = rotated_back(goal.rotation, tracker.points_at(np.array([leaves_at, leaves_at + 0.5 * _SPACING])))
@@ -109,7 +107,7 @@ def _curve_to_goal(path: Path, tracker: PathTracker, leaves_at: float, radius: f
     return np.asarray(rotated(goal.rotation, np.column_stack([flat, np.zeros(len(flat))])) + end)
 
 
-def dubins_curve(start: tuple[float, float, float], radius: float, spacing: float) -> NDArray[np.float64]:
+def dubins_curve(start: tuple[float, float, float], radius: float, spacing: float) -> FloatArray:
     """Shortest arc, line, arc from a pose (x, y, yaw) to the origin looking along x.
 
     Returns

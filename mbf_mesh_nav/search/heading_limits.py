@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray
 from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, greatest_use, scratch_for
 from mbf_mesh_nav.kernels.mesh.slopes import slopes_of_edges, tilt_of_normals
 from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN, HEADING_STEP, HEADINGS
@@ -19,7 +20,6 @@ from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 
-FloatArray = NDArray[np.float64]
 NO_CHASSIS = Chassis(1.0, 1.0, False, 1.0, 1.0, 1.0, math.inf)
 
 
@@ -36,8 +36,8 @@ class HeadingLimits(Protocol):
         For edges of which nothing is known.
     """
 
-    allowed: NDArray[np.bool_]
-    roll: NDArray[np.float32]
+    allowed: BoolArray
+    roll: Float32Array
     edges: NDArray[np.uint8]
     chassis: Chassis
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
+from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors, propagate_distances
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
@@ -35,8 +35,8 @@ class LegQuery:
     start: SurfacePoint
     goal: SurfacePoint
     snapshot: MeshSnapshot
-    blocked: NDArray[np.bool_]
-    cancel_flag: NDArray[np.uint8]
+    blocked: BoolArray
+    cancel_flag: FlagArray
     start_pose: Pose | None = None
     goal_pose: Pose | None = None
     angle_tolerance: float = 0.0
@@ -49,8 +49,8 @@ class Leg:
     The note is for the user.
     """
 
-    positions: NDArray[np.float64]
-    normals: NDArray[np.float64]
+    positions: FloatArray
+    normals: FloatArray
     cost: float
     guidance: Any = None
     note: str = ""
@@ -59,11 +59,11 @@ class Leg:
 def propagate_from(
     mesh_map: MeshMap,
     snapshot: MeshSnapshot,
-    blocked: NDArray[np.bool_],
+    blocked: BoolArray,
     source: SurfacePoint,
-    cancel_flag: NDArray[np.uint8],
+    cancel_flag: FlagArray,
     target: SurfacePoint | None = None,
-) -> tuple[NDArray[np.float32], NDArray[np.int32], bool]:
+) -> tuple[Float32Array, IntArray, bool]:
     """Shortest distances over the vertex graph from a surface point.
 
     Parameters
@@ -102,10 +102,10 @@ def propagate_from(
 
 def seeded_arrays(
     mesh_map: MeshMap,
-    blocked: NDArray[np.bool_],
+    blocked: BoolArray,
     source: SurfacePoint,
     snapshot: MeshSnapshot | None = None,
-) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
+) -> tuple[Float32Array, IntArray, IntArray]:
     """Start state of a search from a surface point: distances (V,), predecessors (V,), seed vertices.
 
     A ``snapshot`` weighs the lines to the seeds, see ``corner_distances``.
@@ -126,8 +126,8 @@ def threshold_step(mesh_map: MeshMap) -> float:
 def vertex_path_leg(
     mesh_map: MeshMap,
     query: LegQuery,
-    distances: NDArray[np.float32],
-    predecessors: NDArray[np.int32],
+    distances: Float32Array,
+    predecessors: IntArray,
     rooted_at_goal: bool = False,
 ) -> Leg | None:
     """Leg along the predecessors of a search from ``query.start``, or from the goal; None without a path.

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import Float32Array
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.search.corridor import Corridor, Piece
@@ -28,7 +28,7 @@ _WORTH_A_TRY = 1.15
 _SHORTER = 0.999
 """A course is another one only if it is shorter than so many times the length of the best before."""
 
-Distances = NDArray[np.float32]
+Distances = Float32Array
 Trace = Callable[[SurfacePoint], Piece]
 """The descent of a field from a surface point."""
 

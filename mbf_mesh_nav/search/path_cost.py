@@ -6,17 +6,13 @@ between, so both agree where a path follows an edge.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.motion.path_costs import way_cost
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 
 
-def cost_along(
-    mesh_map: MeshMap, snapshot: MeshSnapshot, positions: NDArray[np.float64], point_faces: NDArray[np.int32]
-) -> float:
+def cost_along(mesh_map: MeshMap, snapshot: MeshSnapshot, positions: FloatArray, point_faces: IntArray) -> float:
     """Length plus collected cost [m] of a path.
 
     Parameters

@@ -14,24 +14,19 @@ from abc import abstractmethod
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
+from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.motion.path_poses import poses_along
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.borders import on_surface
 from mbf_mesh_nav.mesh.ground import ground_heights
 from mbf_mesh_nav.mesh.locate import SurfacePoint
-from mbf_mesh_nav.mesh.surface_point import (
-    describe_blockage,
-    nearest_corner,
-    position_text,
-    surface_point_at_vertex,
-)
+from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, position_text, surface_point_at_vertex
 from mbf_mesh_nav.plugins import MeshContext, MeshPlanner
 from mbf_mesh_nav.search.blocked_vertices import BlockedVertices
 from mbf_mesh_nav.search.leg_search import Leg, LegQuery, propagate_from
@@ -66,7 +61,7 @@ class SurfacePlanner(MeshPlanner):
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Return the best leg, None if there is none (or the search was cancelled)."""
 
-    def reach(self, query: LegQuery) -> NDArray[np.float32] | None:
+    def reach(self, query: LegQuery) -> Float32Array | None:
         """Distances (V,) [m] from the query's start to every vertex with a path, inf elsewhere; None: cancelled.
 
         Here: along the edges of free vertices.
@@ -115,7 +110,7 @@ class SurfacePlanner(MeshPlanner):
         return PlanResult(GetPathOutcome.SUCCESS, "; ".join(notes), path, sum(leg.cost for leg in legs))
 
     def _locate_stops(
-        self, request: PlanRequest, snapshot: MeshSnapshot, blocked: NDArray[np.bool_]
+        self, request: PlanRequest, snapshot: MeshSnapshot, blocked: BoolArray
     ) -> tuple[list[SurfacePoint], PlanResult | None]:
         """Start, via points and goal on the surface, in order, up to the first that has a problem; the problem."""
         stops: list[SurfacePoint] = []
@@ -129,9 +124,7 @@ class SurfacePlanner(MeshPlanner):
             stops.append(point)
         return stops, None
 
-    def _locate(
-        self, name: str, pose: Pose, snapshot: MeshSnapshot, blocked: NDArray[np.bool_]
-    ) -> SurfacePoint | PlanResult:
+    def _locate(self, name: str, pose: Pose, snapshot: MeshSnapshot, blocked: BoolArray) -> SurfacePoint | PlanResult:
         """Put a pose on the surface, or return why that fails."""
         reach = self.parameters.max_surface_distance
         point = on_surface(self.mesh_map.topology, self.mesh_map.locator, pose.position, reach)
@@ -169,7 +162,7 @@ class SurfacePlanner(MeshPlanner):
         )
         return PlanResult(GetPathOutcome.NO_PATH_FOUND, message, permanent=True)
 
-    def _no_path(self, start: SurfacePoint, goal: SurfacePoint, blocked: NDArray[np.bool_]) -> PlanResult:
+    def _no_path(self, start: SurfacePoint, goal: SurfacePoint, blocked: BoolArray) -> PlanResult:
         component = self.mesh_map.components == self.mesh_map.components[nearest_corner(self.mesh_map, start)]
         share = float(np.mean(blocked[component]))
         message = (
@@ -179,7 +172,7 @@ class SurfacePlanner(MeshPlanner):
         return PlanResult(GetPathOutcome.NO_PATH_FOUND, message)
 
     def _leg_near_goal(
-        self, start: SurfacePoint, request: PlanRequest, snapshot: MeshSnapshot, blocked: NDArray[np.bool_]
+        self, start: SurfacePoint, request: PlanRequest, snapshot: MeshSnapshot, blocked: BoolArray
     ) -> Leg | None:
         """Leg to the reachable vertex nearest to the goal, if one lies within ``dist_tolerance``."""
         mesh_map = self.mesh_map

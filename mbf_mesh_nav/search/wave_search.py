@@ -8,9 +8,9 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.geometry.arithmetic import norm
+from mbf_mesh_nav.arrays import FlagArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.corners import build_corner_ends, write_corner_weights
 from mbf_mesh_nav.kernels.wave.cvp import ALONG_EDGE, propagate_wave
 from mbf_mesh_nav.kernels.wave.descent import Field, trace_descent
@@ -49,10 +49,10 @@ class Wave:
         Whether no path over free faces leads to the start, so that the wave also walked along edges.
     """
 
-    distances: NDArray[np.float32]
-    predecessors: NDArray[np.int32]
-    cut_records: NDArray[np.int32]
-    bends: NDArray[np.int32]
+    distances: Float32Array
+    predecessors: IntArray
+    cut_records: IntArray
+    bends: IntArray
     along_edges: bool
 
 
@@ -60,7 +60,7 @@ class _Weights(NamedTuple):
     """Weights of corner records at one version of the map, and the typical weight [m] of an edge."""
 
     version: int
-    of_corners: NDArray[np.float32]
+    of_corners: Float32Array
     step: float
 
 
@@ -91,9 +91,7 @@ class WaveSearch:
                 return wave
         return None
 
-    def edges_text(
-        self, query: LegQuery, wave: Wave, positions: NDArray[np.float64], point_faces: NDArray[np.int32]
-    ) -> str:
+    def edges_text(self, query: LegQuery, wave: Wave, positions: FloatArray, point_faces: IntArray) -> str:
         """Note that a path follows edges where no whole face is free, with the length; empty if it does not."""
         if not wave.along_edges:
             return ""
@@ -102,7 +100,7 @@ class WaveSearch:
         length = math.fsum(math.dist(positions[index], positions[index + 1]) for index in np.flatnonzero(blocked))
         return f"no path over whole free faces: {length:.2f} m lead along edges between blocked faces"
 
-    def path(self, query: LegQuery, wave: Wave, pull_over_costs: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    def path(self, query: LegQuery, wave: Wave, pull_over_costs: bool) -> tuple[FloatArray, IntArray]:
         """Positions (n, 3) from start to goal, and the face (n,) the segment to each of them lies in.
 
         The descent of the field, shortened to a geodesic. Where that is longer than the field's distance, it has lost
@@ -148,7 +146,7 @@ class WaveSearch:
             return np.array([place.point, query.goal.point]), np.array([place.face] * 2, dtype=np.int32)
         return self._trace(replace(query, start=place), wave, along_edges=False)
 
-    def _trace(self, query: LegQuery, wave: Wave, along_edges: bool) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    def _trace(self, query: LegQuery, wave: Wave, along_edges: bool) -> tuple[FloatArray, IntArray]:
         """Descent of the field, see ``kernels.wave.descent``."""
         start, goal = query.start, query.goal
         return trace_descent(
@@ -186,9 +184,7 @@ class WaveSearch:
             directions, wave.distances, goal.face, goal.point.copy(), query.snapshot.version, mesh_map.topology
         )
 
-    def _propagated(
-        self, query: LegQuery, targets: NDArray[np.int32], overshoot: float, along_edges: bool
-    ) -> Wave | None:
+    def _propagated(self, query: LegQuery, targets: IntArray, overshoot: float, along_edges: bool) -> Wave | None:
         """Run the kernel from the goal of a query; None if cancelled."""
         mesh_map = self._mesh_map
         weights = self._take_weights(query)
@@ -231,7 +227,7 @@ class WaveSearch:
             return self._gathered(query.snapshot, query.cancel_flag)
         return self._written(query.snapshot, changed, weights.of_corners, query.cancel_flag)
 
-    def _gathered(self, snapshot: MeshSnapshot, cancel_flag: NDArray[np.uint8]) -> _Weights | None:
+    def _gathered(self, snapshot: MeshSnapshot, cancel_flag: FlagArray) -> _Weights | None:
         of_corners = np.empty((len(self._corner_ends), 3), dtype=np.float32)
         everything = np.arange(len(snapshot.costs), dtype=np.int32)
         return self._written(snapshot, everything, of_corners, cancel_flag)
@@ -239,9 +235,9 @@ class WaveSearch:
     def _written(
         self,
         snapshot: MeshSnapshot,
-        changed: NDArray[np.int32],
-        of_corners: NDArray[np.float32],
-        cancel_flag: NDArray[np.uint8],
+        changed: IntArray,
+        of_corners: Float32Array,
+        cancel_flag: FlagArray,
     ) -> _Weights | None:
         """Bring weights (3F, 3) up to date at the changed vertices."""
         mesh_map = self._mesh_map

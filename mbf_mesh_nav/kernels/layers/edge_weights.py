@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
-
-IntArray = NDArray[np.int32]
-CostArray = NDArray[np.float32]
 
 _UNCHANGED, _WAITING, _WRITTEN = 0, 1, 2
 
@@ -17,14 +14,14 @@ _UNCHANGED, _WAITING, _WRITTEN = 0, 1, 2
 def show_changes(
     offsets: IntArray,
     neighbours: IntArray,
-    lengths: CostArray,
-    new_costs: CostArray,
-    new_lethal: NDArray[np.bool_],
+    lengths: Float32Array,
+    new_costs: Float32Array,
+    new_lethal: BoolArray,
     edge_cost_factor: float,
     changed: IntArray,
-    costs: CostArray,
-    lethal: NDArray[np.bool_],
-    weights: CostArray,
+    costs: Float32Array,
+    lethal: BoolArray,
+    weights: Float32Array,
 ) -> None:
     """Take over costs and flags of the ``changed`` vertices, write the weights of all edges at them, both directions.
 

@@ -11,12 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.surface import Surface
-
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
-AngleArray = NDArray[np.float32]
 
 MAX_STEPS = 1000
 LEAST_UPWARD = 0.05
@@ -141,7 +138,7 @@ def settle_footprints(
     wheelbase: float,
     track: float,
     rigid: bool,
-) -> tuple[AngleArray, AngleArray, AngleArray]:
+) -> tuple[Float32Array, Float32Array, Float32Array]:
     """Settle a robot at every vertex and heading.
 
     Parameters

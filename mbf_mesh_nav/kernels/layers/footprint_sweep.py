@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.layers.footprint_settling import LEAST_UPWARD, MAX_STEPS, face_below
 from mbf_mesh_nav.kernels.mesh.surface import Surface
-from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, row
-from mbf_mesh_nav.kernels.search.dijkstra import Int32Array
+from mbf_mesh_nav.kernels.mesh.vectors import Vector, row
 
 
 class Chassis(NamedTuple):
@@ -37,11 +37,11 @@ class Chassis(NamedTuple):
 class Scratch(NamedTuple):
     """Memory of one search: who saw a vertex last (V,), members (V,), the last mark (1,), wheels and their faces."""
 
-    seen: Int32Array
-    members: Int32Array
-    mark: Int32Array
-    wheels: Float64Array
-    wheel_faces: Int32Array
+    seen: IntArray
+    members: IntArray
+    mark: IntArray
+    wheels: FloatArray
+    wheel_faces: IntArray
 
 
 def scratch_for(vertex_count: int) -> Scratch:
@@ -219,7 +219,7 @@ def _gather_below(surface: Surface, chassis: Chassis, scratch: Scratch, face: in
 
 
 @inner_kernel
-def _share_beside(vertices: Float64Array, vertex: int, start: Vector, x: float, y: float, squared: float) -> float:
+def _share_beside(vertices: FloatArray, vertex: int, start: Vector, x: float, y: float, squared: float) -> float:
     """Where on the line, as a share of it, a vertex is nearest, seen from above."""
     if squared == 0.0:
         return 0.0

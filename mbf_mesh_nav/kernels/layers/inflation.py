@@ -14,15 +14,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.search.near_far import after
-
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-CostArray = NDArray[np.float32]
 
 RIGHT_ANGLE_TOLERANCE = 1e-9
 _WAITING: Any = np.uint8(1)
@@ -91,7 +86,7 @@ def repair_distances(
     lethal: BoolArray,
     known_lethal: BoolArray,
     changed: IntArray,
-    distances: CostArray,
+    distances: Float32Array,
     sources: IntArray,
 ) -> tuple[IntArray, int]:
     """Bring the distances up to date after some vertices became lethal or ceased to be; from scratch is a case of it.
@@ -194,14 +189,14 @@ def repair_distances(
 
 @kernel
 def set_fading_costs(
-    distances: CostArray,
+    distances: Float32Array,
     touched: IntArray,
     flips: int,
     inscribed_radius: float,
     lethal_value: float,
     inscribed_value: float,
     cost_scaling_factor: float,
-    costs: CostArray,
+    costs: Float32Array,
 ) -> IntArray:
     """Write the costs of the ``touched`` vertices (t,) and return those that differ, and all of the first ``flips``.
 

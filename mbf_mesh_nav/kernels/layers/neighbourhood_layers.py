@@ -9,14 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, difference, dot, norm, row
-
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
-CostArray = NDArray[np.float32]
 
 _SPHERE = (0.0, 0.0, 0.0)
 """Instead of a normal: distances count in all directions."""
@@ -68,7 +64,7 @@ def height_differences(
     neighbours: IntArray,
     radius: float,
     along_limit: float,
-) -> CostArray:
+) -> Float32Array:
     """Greatest minus least height along the own normal over v and N_r(v), metric across the normal, (V,) [m]."""
     count = vertices.shape[0]
     differences = np.empty(count, dtype=np.float32)
@@ -103,7 +99,7 @@ def mean_edge_angles(normals: FloatArray, offsets: IntArray, neighbours: IntArra
 @kernel
 def neighbourhood_means(
     values: FloatArray, vertices: FloatArray, offsets: IntArray, neighbours: IntArray, radius: float
-) -> CostArray:
+) -> Float32Array:
     """Mean of ``values`` over v and N_r(v), metric of the sphere, (V,)."""
     count = vertices.shape[0]
     means = np.empty(count, dtype=np.float32)
@@ -126,7 +122,7 @@ def normal_tip_distances(
     neighbours: IntArray,
     radius: float,
     without_neighbours: float,
-) -> CostArray:
+) -> Float32Array:
     """Mean distance [m] of the tips of unit normals planted on v and on the members of N_r(v), (V,)."""
     count = vertices.shape[0]
     distances = np.empty(count, dtype=np.float32)

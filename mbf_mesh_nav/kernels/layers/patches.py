@@ -10,14 +10,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, difference, dot, norm, row
 
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
-CostArray = NDArray[np.float32]
 Borders = tuple[IntArray, IntArray, IntArray]
 """Offsets (P + 1,) of the entries of each patch, the vertices next to it (b,), where the next patch's begin (b,)."""
 
@@ -131,7 +128,7 @@ def height_differences_by_patches(
     begins: IntArray,
     bounds: FloatArray,
     borders: Borders,
-) -> CostArray:
+) -> Float32Array:
     """Greatest minus least height along the own normal, as ``height_differences`` gives it, (V,) [m]."""
     count = vertices.shape[0]
     differences = np.empty(count, dtype=np.float32)

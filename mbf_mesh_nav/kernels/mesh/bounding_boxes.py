@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.vectors import difference, dot, triangle
-
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
 
 BRANCHES = 4
 _BRANCHES: Any = Index(BRANCHES)

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from mbf_mesh_nav.arrays import FlagArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
-from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL, FlagArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 
 
 @kernel
-def build_corner_ends(faces: Int32Array, vertex_face_offsets: Int32Array, vertex_faces: Int32Array) -> Int32Array:
+def build_corner_ends(faces: IntArray, vertex_face_offsets: IntArray, vertex_faces: IntArray) -> IntArray:
     """Other corners (3F, 2) int32 of the records, aligned with ``vertex_faces``: (v, first, second) is ccw."""
     ends = np.empty((len(vertex_faces), 2), dtype=np.int32)
     for vertex in range(len(vertex_face_offsets) - 1):
@@ -29,12 +30,12 @@ def build_corner_ends(faces: Int32Array, vertex_face_offsets: Int32Array, vertex
 
 @kernel
 def write_corner_weights(
-    vertex_face_offsets: Int32Array,
-    corner_ends: Int32Array,
-    neighbour_offsets: Int32Array,
-    neighbours: Int32Array,
+    vertex_face_offsets: IntArray,
+    corner_ends: IntArray,
+    neighbour_offsets: IntArray,
+    neighbours: IntArray,
     edge_weights: Float32Array,
-    changed: Int32Array,
+    changed: IntArray,
     corner_weights: Float32Array,
     cancel_flag: FlagArray,
 ) -> bool:
@@ -63,7 +64,7 @@ def write_corner_weights(
 
 
 @inner_kernel
-def slot_of(neighbour_offsets: Int32Array, neighbours: Int32Array, vertex: int, other: int) -> int:
+def slot_of(neighbour_offsets: IntArray, neighbours: IntArray, vertex: int, other: int) -> int:
     """Where ``other`` stands in the ascending list of a vertex: after all that are less. Without a branch to guess."""
     slot = Index(neighbour_offsets[vertex])
     for entry in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):

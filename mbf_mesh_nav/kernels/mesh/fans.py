@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.kernels.compiled import kernel
-
-IntArray = NDArray[np.int32]
 
 
 def fans_at_vertices(

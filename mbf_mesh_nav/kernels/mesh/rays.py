@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.bounding_boxes import BRANCHES, STACK_SIZE
 from mbf_mesh_nav.kernels.mesh.vectors import Vector, cross, difference, dot, row, triangle
-
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
 
 
 @inner_kernel

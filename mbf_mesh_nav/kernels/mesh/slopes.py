@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, kernel
-from mbf_mesh_nav.kernels.mesh.vectors import Float64Array
-from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Float32Array, Int32Array
 
 
 @kernel
-def inclinations(normals: Float64Array) -> Float32Array:
+def inclinations(normals: FloatArray) -> Float32Array:
     """Angle (V,) float32 [rad] between unit normals (V, 3) and the vertical, from 0 to pi."""
     angles = np.empty(normals.shape[0], dtype=np.float32)
     for vertex in range(normals.shape[0]):
@@ -22,7 +21,7 @@ def inclinations(normals: Float64Array) -> Float32Array:
 
 @kernel
 def tilt_of_normals(
-    normals: Float64Array, headings: Float64Array, max_roll: float, max_pitch: float
+    normals: FloatArray, headings: FloatArray, max_roll: float, max_pitch: float
 ) -> tuple[BoolArray, Float32Array]:
     """Which headings a robot that stands on a vertex' tangent plane may have, and its roll there.
 
@@ -56,10 +55,10 @@ def tilt_of_normals(
 
 @kernel
 def slopes_of_edges(
-    vertices: Float64Array,
-    neighbour_offsets: Int32Array,
-    neighbours: Int32Array,
-    normals: Float64Array,
+    vertices: FloatArray,
+    neighbour_offsets: IntArray,
+    neighbours: IntArray,
+    normals: FloatArray,
     max_roll: float,
     max_pitch: float,
 ) -> BoolArray:

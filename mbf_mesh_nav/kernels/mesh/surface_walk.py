@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, kernel
-from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, cross, difference, dot, row
-from mbf_mesh_nav.kernels.search.dijkstra import Int32Array
+from mbf_mesh_nav.kernels.mesh.vectors import Vector, cross, difference, dot, row
 
 _MAX_CROSSINGS = 200
 
@@ -43,10 +43,10 @@ def turned(direction: Vector, normal: Vector, angle: float) -> Vector:
 
 @kernel
 def walk(
-    vertices: Float64Array,
-    faces: Int32Array,
-    face_neighbours: Int32Array,
-    face_normals: Float64Array,
+    vertices: FloatArray,
+    faces: IntArray,
+    face_neighbours: IntArray,
+    face_normals: FloatArray,
     face: int,
     point: Vector,
     direction: Vector,

@@ -5,17 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, Index, kernel
 from mbf_mesh_nav.kernels.mesh.vectors import cross, difference, norm, row, set_row, triangle
 
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
-
 
 @kernel
-def edges_of_neighbours(
-    vertices: FloatArray, offsets: IntArray, neighbours: IntArray
-) -> tuple[IntArray, NDArray[np.float32]]:
+def edges_of_neighbours(vertices: FloatArray, offsets: IntArray, neighbours: IntArray) -> tuple[IntArray, Float32Array]:
     """Enumerate the undirected edges: edges (E, 2) with i < j, and the length per CSR entry.
 
     Vertices are visited in ascending order and every list is ascending, so the entries of ``u`` that point to larger

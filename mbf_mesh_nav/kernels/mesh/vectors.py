@@ -4,30 +4,27 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel
 
-Float64Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 
 @inner_kernel
-def row(array: Float64Array, index: int) -> Vector:
+def row(array: FloatArray, index: int) -> Vector:
     """One row of an (n, 3) array."""
     return array[index, 0], array[index, 1], array[index, 2]
 
 
 @inner_kernel
-def triangle(vertices: Float64Array, faces: NDArray[np.int32], face: int) -> tuple[Vector, Vector, Vector]:
+def triangle(vertices: FloatArray, faces: IntArray, face: int) -> tuple[Vector, Vector, Vector]:
     """Corners of a face."""
     a, b, c = Count(faces[face, 0]), Count(faces[face, 1]), Count(faces[face, 2])
     return row(vertices, a), row(vertices, b), row(vertices, c)
 
 
 @inner_kernel
-def set_row(array: Float64Array, index: int, vector: Vector) -> None:
+def set_row(array: FloatArray, index: int, vector: Vector) -> None:
     """Write one row of an (n, 3) array."""
     array[index, 0], array[index, 1], array[index, 2] = vector
 

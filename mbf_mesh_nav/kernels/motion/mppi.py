@@ -11,12 +11,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.surface_walk import turned, walk
-from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, cross, difference, dot, norm, row
-from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.mesh.vectors import Vector, cross, difference, dot, norm, row
 from mbf_mesh_nav.kernels.search.forbidden_surface import may_enter, rank_at
 
 PATH, COST, TILT, TURN, GOAL, HEADING = range(6)
@@ -25,23 +24,23 @@ PATH, COST, TILT, TURN, GOAL, HEADING = range(6)
 
 @kernel
 def score_rollouts(
-    vertices: Float64Array,
-    faces: Int32Array,
-    face_neighbours: Int32Array,
-    face_normals: Float64Array,
+    vertices: FloatArray,
+    faces: IntArray,
+    face_neighbours: IntArray,
+    face_normals: FloatArray,
     costs: Float32Array,
     ranks: Float32Array,
     start_face: int,
     start: Vector,
     heading: Vector,
-    controls: NDArray[np.float64],
+    controls: FloatArray,
     period: float,
-    path_points: Float64Array,
-    remaining: Float64Array,
-    weights: Float64Array,
+    path_points: FloatArray,
+    remaining: FloatArray,
+    weights: FloatArray,
     tilt_limits: tuple[float, float],
     facing: float,
-) -> tuple[Float64Array, BoolArray]:
+) -> tuple[FloatArray, BoolArray]:
     """Score every sequence of ``controls``.
 
     Parameters
@@ -120,6 +119,6 @@ def score_rollouts(
 
 
 @inner_kernel
-def _squared_distance(points: Float64Array, index: int, point: Vector) -> float:
+def _squared_distance(points: FloatArray, index: int, point: Vector) -> float:
     offset = difference(row(points, index), point)
     return dot(offset, offset)

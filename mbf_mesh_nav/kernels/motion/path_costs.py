@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, kernel
-from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, between, cross, difference, dot, norm, row, triangle
+from mbf_mesh_nav.kernels.mesh.vectors import between, cross, difference, dot, norm, row, triangle
 
 _LEAST_WEIGHT = 1e-9  # of the corners with a finite cost, lest a cost is divided by zero
 
 
 @kernel
 def way_cost(
-    vertices: Float64Array,
-    faces: NDArray[np.int32],
-    costs: NDArray[np.float32],
+    vertices: FloatArray,
+    faces: IntArray,
+    costs: Float32Array,
     factor: float,
-    positions: Float64Array,
-    point_faces: NDArray[np.int32],
+    positions: FloatArray,
+    point_faces: IntArray,
 ) -> float:
     """Length plus ``factor`` times the cost in the middle of each step [m]; steps in order, see ``cost_along``."""
     total = 0.0

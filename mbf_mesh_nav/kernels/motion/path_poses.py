@@ -6,13 +6,14 @@ import math
 
 import numpy as np
 
+from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.surface_walk import tangent
-from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, cross, difference, dot, row, set_row
+from mbf_mesh_nav.kernels.mesh.vectors import Vector, cross, difference, dot, row, set_row
 
 
 @kernel
-def poses_along(positions: Float64Array, normals: Float64Array, tolerance: float) -> tuple[Float64Array, Float64Array]:
+def poses_along(positions: FloatArray, normals: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray]:
     """Positions (m, 3) and quaternions (m, 4), x y z w: each pose stands on its normal and looks to the next one.
 
     Both ends are kept, and of the points between what is farther than ``tolerance`` from the last one kept before;

@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
-from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 from mbf_mesh_nav.kernels.search.near_far import IN_FAR, IN_NEAR, UNQUEUED, after, raise_threshold
 
 _ROUNDING_MARGIN = 1.0 - 1e-6  # keeps the float32 bound below the float32 path cost
@@ -22,17 +22,17 @@ _ROUNDING_MARGIN = 1.0 - 1e-6  # keeps the float32 bound below the float32 path 
 
 @kernel
 def search_towards(
-    vertices: NDArray[np.float64],
-    neighbour_offsets: Int32Array,
-    neighbours: Int32Array,
+    vertices: FloatArray,
+    neighbour_offsets: IntArray,
+    neighbours: IntArray,
     edge_weights: Float32Array,
     blocked: BoolArray,
     distances: Float32Array,
-    predecessors: Int32Array,
-    seeds: Int32Array,
-    targets: Int32Array,
+    predecessors: IntArray,
+    seeds: IntArray,
+    targets: IntArray,
     target_offsets: Float32Array,
-    goal: NDArray[np.float64],
+    goal: FloatArray,
     threshold_step: float,
     cancel_flag: FlagArray,
 ) -> int:
@@ -106,7 +106,7 @@ def search_towards(
 
 
 @inner_kernel
-def straight_line_bound(vertices: NDArray[np.float64], vertex: int, goal: NDArray[np.float64]) -> np.float32:
+def straight_line_bound(vertices: FloatArray, vertex: int, goal: FloatArray) -> np.float32:
     """Straight-line distance [m] from a vertex to the goal, rounded down."""
     dx = vertices[vertex, 0] - goal[0]
     dy = vertices[vertex, 1] - goal[1]

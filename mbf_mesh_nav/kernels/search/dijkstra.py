@@ -6,30 +6,25 @@ Use it for whole fields. For one goal far from the borders ``astar.py`` visits f
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
 from mbf_mesh_nav.kernels.search.near_far import IN_FAR, IN_NEAR, UNQUEUED, after, raise_threshold
-
-BoolArray = NDArray[np.bool_]
-FlagArray = NDArray[np.uint8]
-Float32Array = NDArray[np.float32]
-Int32Array = NDArray[np.int32]
 
 CANCEL_POLL_INTERVAL = 4096
 
 
 @kernel
 def propagate_distances(
-    neighbour_offsets: Int32Array,
-    neighbours: Int32Array,
+    neighbour_offsets: IntArray,
+    neighbours: IntArray,
     edge_weights: Float32Array,
     blocked: BoolArray,
     distances: Float32Array,
-    predecessors: Int32Array,
-    seeds: Int32Array,
+    predecessors: IntArray,
+    seeds: IntArray,
     threshold_step: float,
-    targets: Int32Array,
+    targets: IntArray,
     target_offsets: Float32Array,
     cancel_flag: FlagArray,
 ) -> bool:
@@ -104,7 +99,7 @@ def propagate_distances(
 
 
 @kernel
-def follow_predecessors(predecessors: Int32Array, vertex: int) -> Int32Array:
+def follow_predecessors(predecessors: IntArray, vertex: int) -> IntArray:
     """Vertices (n,) int32 from ``vertex`` back to the seed it was reached from."""
     count = 1
     walker = vertex

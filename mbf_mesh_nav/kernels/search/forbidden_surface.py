@@ -11,9 +11,9 @@ Used by every controller and recovery that looks ahead. Planners do not use it: 
 
 from __future__ import annotations
 
+from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Index, kernel
-from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, difference, dot, triangle
-from mbf_mesh_nav.kernels.search.dijkstra import Float32Array, Int32Array
+from mbf_mesh_nav.kernels.mesh.vectors import Vector, difference, dot, triangle
 
 LETHAL_RANK = 4.0
 """Rank of a lethal vertex; twice that of any that is forbidden by its cost."""
@@ -29,7 +29,7 @@ def may_enter(before: float, now: float) -> bool:
 
 
 @kernel
-def rank_at(vertices: Float64Array, faces: Int32Array, ranks: Float32Array, face: int, point: Vector) -> float:
+def rank_at(vertices: FloatArray, faces: IntArray, ranks: Float32Array, face: int, point: Vector) -> float:
     """Rank of a point [m] in a face, between those (V,) of its corners; 0 where the nearest of them is free."""
     a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
     if ranks[a] == 0.0 and ranks[b] == 0.0 and ranks[c] == 0.0:

@@ -13,11 +13,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, Scratch, edge_use
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.search.astar import straight_line_bound
-from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 from mbf_mesh_nav.kernels.search.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
 HEADINGS = 16
@@ -37,12 +38,12 @@ def search_with_heading(
     roll_cost: float,
     turning_cost: float,
     distances: Float32Array,
-    predecessors: Int32Array,
-    seeds: Int32Array,
-    targets: Int32Array,
+    predecessors: IntArray,
+    seeds: IntArray,
+    targets: IntArray,
     target_offsets: Float32Array,
-    target_headings: Int32Array,
-    goal: NDArray[np.float64],
+    target_headings: IntArray,
+    goal: FloatArray,
     edges: NDArray[np.uint8],
     chassis: Chassis,
     scratch: Scratch,

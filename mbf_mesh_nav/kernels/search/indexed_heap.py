@@ -17,18 +17,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
 from mbf_mesh_nav.kernels.wave.bucket_queue import entry_of, item_of, key_of
 
 HeapArray = NDArray[np.uint64]
-Int32Array = NDArray[np.int32]
 
 _TWO: Any = Index(2)
 _THREE: Any = Index(3)
 
 
 @kernel
-def push_or_decrease(heap: HeapArray, positions: Int32Array, size: int, item: int, key: np.float32) -> int:
+def push_or_decrease(heap: HeapArray, positions: IntArray, size: int, item: int, key: np.float32) -> int:
     """Queue ``item`` with ``key`` >= 0, or lower its key if it is queued already; return the new size."""
     entry = entry_of(np.float32(key), item)
     position = positions[item]
@@ -62,7 +62,7 @@ def top_key(heap: HeapArray) -> np.float32:
 
 
 @kernel
-def remove_top(heap: HeapArray, positions: Int32Array, size: int) -> int:
+def remove_top(heap: HeapArray, positions: IntArray, size: int) -> int:
     """Take the item with the lowest key off the heap; return the new size."""
     positions[item_of(heap[0])] = -1
     size -= 1

@@ -13,13 +13,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Index, inner_kernel, kernel
 
 UNQUEUED, IN_NEAR, IN_FAR = 0, 1, 2
 
 
 @kernel
-def after(place: int, ring: NDArray[np.int32]) -> int:
+def after(place: int, ring: IntArray) -> int:
     """Return the place that follows one in the ring buffer."""
     following = place + ONE
     return following if following < Index(len(ring)) else Index(0)  # type: ignore[no-any-return]
@@ -27,10 +28,10 @@ def after(place: int, ring: NDArray[np.int32]) -> int:
 
 @inner_kernel
 def raise_threshold(
-    near: NDArray[np.int32],
-    far: NDArray[np.int32],
+    near: IntArray,
+    far: IntArray,
     state: NDArray[np.uint8],
-    keys: NDArray[np.float32],
+    keys: Float32Array,
     tail: int,
     far_count: int,
     threshold: np.float32,

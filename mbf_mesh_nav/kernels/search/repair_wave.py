@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
-from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Float32Array, Int32Array
 
 _RESET: Any = np.uint8(1)
 _SEED: Any = np.uint8(2)
@@ -20,15 +20,15 @@ _SEED: Any = np.uint8(2)
 
 @kernel
 def invalidate_subtrees(
-    neighbour_offsets: Int32Array,
-    neighbours: Int32Array,
+    neighbour_offsets: IntArray,
+    neighbours: IntArray,
     blocked: BoolArray,
     distances: Float32Array,
-    predecessors: Int32Array,
-    roots: Int32Array,
+    predecessors: IntArray,
+    roots: IntArray,
     root_distances: Float32Array,
-    changed: Int32Array,
-) -> Int32Array:
+    changed: IntArray,
+) -> IntArray:
     """Reset, in place, all vertices whose way leads over a changed vertex; return the seeds of the repair.
 
     Parameters

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel
-from mbf_mesh_nav.kernels.search.dijkstra import Int32Array
 
 Entries = NDArray[np.uint64]
 
@@ -55,8 +55,8 @@ def key_of(entry: int) -> np.float32:
 
 @inner_kernel
 def put(
-    heads: Int32Array,
-    links: Int32Array,
+    heads: IntArray,
+    links: IntArray,
     entries: Entries,
     near: Entries,
     used: int,
@@ -76,7 +76,7 @@ def put(
 
 @inner_kernel
 def next_bucket(
-    heads: Int32Array, links: Int32Array, entries: Entries, near: Entries, bucket: int, inverse_width: np.float32
+    heads: IntArray, links: IntArray, entries: Entries, near: Entries, bucket: int, inverse_width: np.float32
 ) -> tuple[int, int]:
     """Fill the heap, which is empty, from the next bucket that has something; returns that bucket and the heap's size.
 
@@ -103,7 +103,7 @@ def next_bucket(
 
 @inner_kernel
 def _go_to_least(
-    heads: Int32Array, links: Int32Array, entries: Entries, near: Entries, inverse_width: np.float32
+    heads: IntArray, links: IntArray, entries: Entries, near: Entries, inverse_width: np.float32
 ) -> tuple[int, int]:
     """Fill the empty heap from the bucket of the least entry, however far ahead, and sort the others in behind it."""
     # 1. All that waits in one list, and where the least of it belongs.
@@ -129,7 +129,7 @@ def _go_to_least(
 
 
 @inner_kernel
-def _link(heads: Int32Array, links: Int32Array, number: int, place: int) -> None:
+def _link(heads: IntArray, links: IntArray, number: int, place: int) -> None:
     """Put an entry at the head of a bucket's list."""
     slot = Index(place) & _MASK
     links[number] = heads[slot]

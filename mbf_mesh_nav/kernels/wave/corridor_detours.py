@@ -7,9 +7,9 @@ straight, one vertex at a time, and the geodesic on the other side is taken wher
 
 from __future__ import annotations
 
+from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, kernel
-from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector
-from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Int32Array
+from mbf_mesh_nav.kernels.mesh.vectors import Vector
 from mbf_mesh_nav.kernels.wave.corridors import (
     corner_of,
     fan_length,
@@ -26,14 +26,14 @@ _MAX_TRIES_A_FACE = 50
 
 @kernel
 def pass_vertices(
-    vertices: Float64Array,
-    faces: Int32Array,
-    face_neighbours: Int32Array,
+    vertices: FloatArray,
+    faces: IntArray,
+    face_neighbours: IntArray,
     blocked: BoolArray,
-    corridor: Int32Array,
+    corridor: IntArray,
     start: Vector,
     goal: Vector,
-) -> tuple[Float64Array, Int32Array]:
+) -> tuple[FloatArray, IntArray]:
     """Shortest geodesic that vertices passed on their other side lead to; arguments and result of ``straighten``."""
     points, corridor = straighten(vertices, faces, face_neighbours, blocked, corridor, start, goal, True)
     length, index, tries = path_length(points), Count(0), _MAX_TRIES_A_FACE * len(corridor)

@@ -12,9 +12,9 @@ import math
 
 import numpy as np
 
+from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
-from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, difference, dot, norm, row
-from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Int32Array
+from mbf_mesh_nav.kernels.mesh.vectors import Vector, difference, dot, norm, row
 from mbf_mesh_nav.kernels.wave.funnel import pull_string
 
 _AT_VERTEX = 1e-7  # m; a crossing this near to the end of a portal is that vertex
@@ -24,8 +24,8 @@ _MAX_TURNS_A_FACE = 50  # tries; a bound, a traced corridor needs a turn for few
 
 @kernel
 def link_faces(
-    faces: Int32Array, face_neighbours: Int32Array, blocked: BoolArray, point_faces: Int32Array
-) -> tuple[Int32Array, Int32Array]:
+    faces: IntArray, face_neighbours: IntArray, blocked: BoolArray, point_faces: IntArray
+) -> tuple[IntArray, IntArray]:
     """Join the faces of a path to corridors in which each shares an edge with the next.
 
     Parameters
@@ -70,12 +70,12 @@ def link_faces(
 
 
 @inner_kernel
-def _end_piece(pieces: Int32Array, index: int, first: int, last: int, begin: int, end: int) -> None:
+def _end_piece(pieces: IntArray, index: int, first: int, last: int, begin: int, end: int) -> None:
     pieces[index, 0], pieces[index, 1], pieces[index, 2], pieces[index, 3] = first, last, begin, end
 
 
 @inner_kernel
-def _grown(corridor: Int32Array) -> Int32Array:
+def _grown(corridor: IntArray) -> IntArray:
     longer = np.empty(2 * len(corridor), dtype=np.int32)
     for index in range(len(corridor)):
         longer[index] = corridor[index]
@@ -83,12 +83,12 @@ def _grown(corridor: Int32Array) -> Int32Array:
 
 
 @inner_kernel
-def _is_blocked(corners: Int32Array, blocked: BoolArray) -> bool:
+def _is_blocked(corners: IntArray, blocked: BoolArray) -> bool:
     return bool(blocked[corners[0]] or blocked[corners[1]] or blocked[corners[2]])
 
 
 @inner_kernel
-def corner_of(corners: Int32Array, vertex: int) -> int:
+def corner_of(corners: IntArray, vertex: int) -> int:
     """Number of a vertex among the corners of a face, -1 if it is none of them."""
     for corner in range(3):
         if corners[corner] == vertex:
@@ -98,14 +98,14 @@ def corner_of(corners: Int32Array, vertex: int) -> int:
 
 @inner_kernel
 def _linked(
-    faces: Int32Array,
-    face_neighbours: Int32Array,
+    faces: IntArray,
+    face_neighbours: IntArray,
     blocked: BoolArray,
-    corridor: Int32Array,
+    corridor: IntArray,
     begin: int,
     count: int,
     following: int,
-) -> tuple[Int32Array, int]:
+) -> tuple[IntArray, int]:
     """Lead the corridor on to a face: at once, or by the shorter free fan round a common vertex; its length, or -1."""
     last = Count(corridor[count - 1])
     if last == following:
@@ -131,7 +131,7 @@ def _linked(
 
 
 @inner_kernel
-def _appended(corridor: Int32Array, begin: int, count: int, face: int) -> tuple[Int32Array, int]:
+def _appended(corridor: IntArray, begin: int, count: int, face: int) -> tuple[IntArray, int]:
     """Append a face; into a face and straight back out of it is no step at all."""
     if count - begin > 1 and corridor[count - 2] == face:
         return corridor, count - 1
@@ -142,15 +142,15 @@ def _appended(corridor: Int32Array, begin: int, count: int, face: int) -> tuple[
 
 
 @inner_kernel
-def next_round(faces: Int32Array, face_neighbours: Int32Array, vertex: int, face: int, side: int) -> int:
+def next_round(faces: IntArray, face_neighbours: IntArray, vertex: int, face: int, side: int) -> int:
     """Next face round a vertex over its outgoing (0) or incoming (2) edge; -1 at a border."""
     return Count(face_neighbours[face, (corner_of(faces[face], vertex) + side) % 3])  # type: ignore[no-any-return]
 
 
 @inner_kernel
 def fan_length(
-    faces: Int32Array,
-    face_neighbours: Int32Array,
+    faces: IntArray,
+    face_neighbours: IntArray,
     blocked: BoolArray,
     vertex: int,
     face: int,
@@ -172,15 +172,15 @@ def fan_length(
 
 @kernel
 def straighten(
-    vertices: Float64Array,
-    faces: Int32Array,
-    face_neighbours: Int32Array,
+    vertices: FloatArray,
+    faces: IntArray,
+    face_neighbours: IntArray,
     blocked: BoolArray,
-    corridor: Int32Array,
+    corridor: IntArray,
     start: Vector,
     goal: Vector,
     turn: bool,
-) -> tuple[Float64Array, Int32Array]:
+) -> tuple[FloatArray, IntArray]:
     """Pull a path taut through a corridor and turn the corridor round the vertices where that makes the path shorter.
 
     Parameters
@@ -233,7 +233,7 @@ def straighten(
 
 
 @inner_kernel
-def path_length(points: Float64Array) -> float:
+def path_length(points: FloatArray) -> float:
     """Length [m] of a polyline (n, 3)."""
     total = 0.0
     for index in range(len(points) - 1):
@@ -242,7 +242,7 @@ def path_length(points: Float64Array) -> float:
 
 
 @inner_kernel
-def _bend_at(vertices: Float64Array, faces: Int32Array, corridor: Int32Array, points: Float64Array, portal: int) -> int:
+def _bend_at(vertices: FloatArray, faces: IntArray, corridor: IntArray, points: FloatArray, portal: int) -> int:
     """Vertex at an end of a portal through which the path goes, else -1."""
     following, crossing = faces[corridor[portal + 1]], row(points, Count(portal + 1))
     for corner in range(3):
@@ -260,12 +260,12 @@ def _angle(at: Vector, first: Vector, second: Vector) -> float:
 
 @inner_kernel
 def _free_side(
-    vertices: Float64Array,
-    faces: Int32Array,
-    face_neighbours: Int32Array,
+    vertices: FloatArray,
+    faces: IntArray,
+    face_neighbours: IntArray,
     blocked: BoolArray,
-    corridor: Int32Array,
-    points: Float64Array,
+    corridor: IntArray,
+    points: FloatArray,
     vertex: int,
     first: int,
     last: int,
@@ -302,8 +302,8 @@ def _free_side(
 
 @inner_kernel
 def turned_corridor(
-    faces: Int32Array, face_neighbours: Int32Array, corridor: Int32Array, vertex: int, first: int, last: int, side: int
-) -> Int32Array:
+    faces: IntArray, face_neighbours: IntArray, corridor: IntArray, vertex: int, first: int, last: int, side: int
+) -> IntArray:
     """The corridor led round the other side of a vertex between two of its faces."""
     between, face, end = (
         Count(0),

@@ -28,8 +28,9 @@ from typing import Any
 
 import numpy as np
 
+from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, kernel
-from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL, BoolArray, FlagArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
 from mbf_mesh_nav.kernels.wave.bucket_queue import (
     BUCKETS_PER_STEP,
     EMPTY,
@@ -53,16 +54,16 @@ _INFINITE: Any = np.float32(np.inf)
 
 @kernel
 def propagate_wave(
-    vertex_face_offsets: Int32Array,
-    corner_ends: Int32Array,
+    vertex_face_offsets: IntArray,
+    corner_ends: IntArray,
     corner_weights: Float32Array,
     blocked: BoolArray,
     distances: Float32Array,
-    predecessors: Int32Array,
-    cut_records: Int32Array,
-    bends: Int32Array,
-    seeds: Int32Array,
-    targets: Int32Array,
+    predecessors: IntArray,
+    cut_records: IntArray,
+    bends: IntArray,
+    seeds: IntArray,
+    targets: IntArray,
     overshoot: float,
     step: float,
     cancel_flag: FlagArray,

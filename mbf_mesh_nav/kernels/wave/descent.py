@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.corners import slot_of
 from mbf_mesh_nav.kernels.mesh.surface import Surface
-from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, between, cross, difference, dot, norm, row, set_row
-from mbf_mesh_nav.kernels.search.dijkstra import BoolArray, Float32Array, Int32Array
+from mbf_mesh_nav.kernels.mesh.vectors import Vector, between, cross, difference, dot, norm, row, set_row
 from mbf_mesh_nav.kernels.wave.fronts import NO_BEND, SLACK
 
 _ON_VERTEX = 1e-6  # a crossing this near (as a share of the edge) to a vertex is the vertex
@@ -31,8 +31,8 @@ class Field(NamedTuple):
 
     edge_weights: Float32Array
     distances: Float32Array
-    predecessors: Int32Array
-    bends: Int32Array
+    predecessors: IntArray
+    bends: IntArray
 
 
 @kernel
@@ -44,7 +44,7 @@ def trace_descent(
     goal_face: int,
     goal: Vector,
     along_edges: bool,
-) -> tuple[Float64Array, Int32Array]:
+) -> tuple[FloatArray, IntArray]:
     """Trace the way down from ``start`` to the source of the field at ``goal``.
 
     Parameters
@@ -108,7 +108,7 @@ def trace_descent(
 
 
 @inner_kernel
-def _grown(points: Float64Array, point_faces: Int32Array, capacity: int) -> tuple[Float64Array, Int32Array]:
+def _grown(points: FloatArray, point_faces: IntArray, capacity: int) -> tuple[FloatArray, IntArray]:
     more_points, more_faces = np.empty((capacity, 3), dtype=np.float64), np.empty(capacity, dtype=np.int32)
     for i in range(len(points)):
         set_row(more_points, i, row(points, i))
@@ -117,12 +117,12 @@ def _grown(points: Float64Array, point_faces: Int32Array, capacity: int) -> tupl
 
 
 @inner_kernel
-def _has_corner(corners: Int32Array, vertex: int) -> bool:
+def _has_corner(corners: IntArray, vertex: int) -> bool:
     return bool(corners[0] == vertex or corners[1] == vertex or corners[2] == vertex)
 
 
 @inner_kernel
-def _side_of(corners: Int32Array, vertex: int) -> int:
+def _side_of(corners: IntArray, vertex: int) -> int:
     """Number of the side that begins at a corner."""
     side = 0 if corners[0] == vertex else (1 if corners[1] == vertex else 2)
     return Count(side)  # type: ignore[no-any-return]
@@ -138,7 +138,7 @@ def _on_side(side: int, share: float) -> Vector:
 
 
 @inner_kernel
-def _barycentric(vertices: Float64Array, corners: Int32Array, point: Vector) -> Vector:
+def _barycentric(vertices: FloatArray, corners: IntArray, point: Vector) -> Vector:
     """Barycentric coordinates of a point in the plane of a face."""
     a, b, c = row(vertices, Count(corners[0])), row(vertices, Count(corners[1])), row(vertices, Count(corners[2]))
     normal = cross(difference(b, a), difference(c, a))
@@ -149,7 +149,7 @@ def _barycentric(vertices: Float64Array, corners: Int32Array, point: Vector) -> 
 
 
 @inner_kernel
-def _side_weights(surface: Surface, edge_weights: Float32Array, corners: Int32Array) -> Vector:
+def _side_weights(surface: Surface, edge_weights: Float32Array, corners: IntArray) -> Vector:
     """Weights [m] of the sides of a face, that from corner k to the next at k; the length at a blocked corner."""
     return (
         _weight(surface, edge_weights, Count(corners[0]), Count(corners[1])),
@@ -213,12 +213,12 @@ def _way_through(
 
 
 @inner_kernel
-def _is_reached(corners: Int32Array, distances: Float32Array) -> bool:
+def _is_reached(corners: IntArray, distances: Float32Array) -> bool:
     return bool(distances[corners[0]] < np.inf and distances[corners[1]] < np.inf and distances[corners[2]] < np.inf)
 
 
 @inner_kernel
-def _leads_on(faces: Int32Array, following: int, distances: Float32Array, goal_face: int, passed: BoolArray) -> bool:
+def _leads_on(faces: IntArray, following: int, distances: Float32Array, goal_face: int, passed: BoolArray) -> bool:
     """Whether the trace may enter a face: the goal's, or one that is reached and has not been passed (F,)."""
     if following < 0 or passed[following]:
         return False

@@ -10,25 +10,24 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbf_mesh_nav.arrays import Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
 from mbf_mesh_nav.kernels.mesh.vectors import between, difference, norm, row
-from mbf_mesh_nav.kernels.search.dijkstra import Float32Array, Int32Array
 from mbf_mesh_nav.kernels.wave.fronts import NO_BEND
 
 
 @kernel
 def wave_directions(
-    vertices: NDArray[np.float64],
-    faces: Int32Array,
-    vertex_faces: Int32Array,
-    corner_ends: Int32Array,
+    vertices: FloatArray,
+    faces: IntArray,
+    vertex_faces: IntArray,
+    corner_ends: IntArray,
     corner_weights: Float32Array,
     distances: Float32Array,
-    predecessors: Int32Array,
-    cut_records: Int32Array,
-    bends: Int32Array,
+    predecessors: IntArray,
+    cut_records: IntArray,
+    bends: IntArray,
 ) -> Float32Array:
     """Return unit vectors (V, 3) float32 towards the source; zero at seeds and where the wave did not come.
 

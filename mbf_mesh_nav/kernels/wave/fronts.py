@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from mbf_mesh_nav.arrays import Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
-from mbf_mesh_nav.kernels.search.dijkstra import Float32Array, Int32Array
 
 NO_BEND = -1
 """The way comes straight from the source."""
@@ -83,7 +83,7 @@ def unfolded_distance(u1: float, u2: float, c: float, b: float, a: float) -> tup
 
 @inner_kernel
 def corner_behind(
-    offsets: Int32Array, corner_ends: Int32Array, corner_weights: Float32Array, vertex: int, known: int, free: int
+    offsets: IntArray, corner_ends: IntArray, corner_weights: Float32Array, vertex: int, known: int, free: int
 ) -> tuple[int, float, float, float]:
     """Return the corner behind the side from ``vertex`` to ``known``, that side, and the sides from there to both."""
     for record in range(Index(offsets[vertex]), Index(offsets[vertex + ONE])):
@@ -154,11 +154,11 @@ def distance_by_own_front(
 
 @inner_kernel
 def distance_where_fronts_meet(
-    offsets: Int32Array,
-    corner_ends: Int32Array,
+    offsets: IntArray,
+    corner_ends: IntArray,
     corner_weights: Float32Array,
     distances: Float32Array,
-    bends: Int32Array,
+    bends: IntArray,
     vertex: int,
     known: int,
     free: int,

@@ -10,18 +10,16 @@ import math
 
 import numpy as np
 
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, inner_kernel, kernel
-from mbf_mesh_nav.kernels.mesh.vectors import Float64Array, Vector, between, difference, dot, row, set_row
-from mbf_mesh_nav.kernels.search.dijkstra import Int32Array
+from mbf_mesh_nav.kernels.mesh.vectors import Vector, between, difference, dot, row, set_row
 
 FlatPoint = tuple[float, float]
 """A point of the unfolded corridor."""
 
 
 @kernel
-def pull_string(
-    vertices: Float64Array, faces: Int32Array, corridor: Int32Array, start: Vector, goal: Vector
-) -> Float64Array:
+def pull_string(vertices: FloatArray, faces: IntArray, corridor: IntArray, start: Vector, goal: Vector) -> FloatArray:
     """Shortest path through a corridor of faces.
 
     Parameters
@@ -87,13 +85,13 @@ def pull_string(
 
 @inner_kernel
 def _unfold(
-    vertices: Float64Array,
-    faces: Int32Array,
-    corridor: Int32Array,
+    vertices: FloatArray,
+    faces: IntArray,
+    corridor: IntArray,
     start: Vector,
     goal: Vector,
-    portals: Int32Array,
-    flat_portals: Float64Array,
+    portals: IntArray,
+    flat_portals: FloatArray,
 ) -> tuple[FlatPoint, FlatPoint]:
     """Lay the corridor into the plane; fills the portals' vertices and ends, returns start and goal in the plane."""
     a, b, c = Count(faces[corridor[0], 0]), Count(faces[corridor[0], 1]), Count(faces[corridor[0], 2])
@@ -120,7 +118,7 @@ def _unfold(
 
 @inner_kernel
 def _placed(
-    vertices: Float64Array, a: int, b: int, flat_a: FlatPoint, flat_b: FlatPoint, point: Vector, side: float
+    vertices: FloatArray, a: int, b: int, flat_a: FlatPoint, flat_b: FlatPoint, point: Vector, side: float
 ) -> FlatPoint:
     """Place a point in the plane, left (+1) or right (-1) of the edge a->b, keeping its distances to both ends."""
     edge = difference(row(vertices, b), row(vertices, a))
@@ -133,17 +131,17 @@ def _placed(
 
 
 @kernel
-def _left(flat_portals: Float64Array, index: int) -> FlatPoint:
+def _left(flat_portals: FloatArray, index: int) -> FlatPoint:
     return flat_portals[index, 0], flat_portals[index, 1]
 
 
 @inner_kernel
-def _right(flat_portals: Float64Array, index: int) -> FlatPoint:
+def _right(flat_portals: FloatArray, index: int) -> FlatPoint:
     return flat_portals[index, 2], flat_portals[index, 3]
 
 
 @inner_kernel
-def _set_portal(flat_portals: Float64Array, index: int, left: FlatPoint, right: FlatPoint) -> None:
+def _set_portal(flat_portals: FloatArray, index: int, left: FlatPoint, right: FlatPoint) -> None:
     flat_portals[index, 0], flat_portals[index, 1] = left
     flat_portals[index, 2], flat_portals[index, 3] = right
 
@@ -163,13 +161,13 @@ def _same(first: FlatPoint, second: FlatPoint) -> bool:
 
 @inner_kernel
 def _cross_portals(
-    vertices: Float64Array,
-    portals: Int32Array,
-    flat_portals: Float64Array,
-    bends: Float64Array,
-    bend_portals: Int32Array,
+    vertices: FloatArray,
+    portals: IntArray,
+    flat_portals: FloatArray,
+    bends: FloatArray,
+    bend_portals: IntArray,
     last_bend: int,
-    points: Float64Array,
+    points: FloatArray,
 ) -> None:
     """Write the surface points where the string, taut between its bends, crosses the portals; portal i to row i + 1."""
     segment = 0

@@ -9,7 +9,8 @@ from mbf_mesh_nav.layers.border import BorderLayer
 from mbf_mesh_nav.layers.max_combination import MaxCombinationLayer
 from mbf_mesh_nav.layers.mean import MeanLayer
 from mbf_mesh_nav.layers.weighted_sum import WeightedSumLayer
-from mbf_mesh_nav.map.layer import NOTHING_CHANGED, IntArray, LayerContext, LayerParameters, MeshLayer
+from mbf_mesh_nav.arrays import IntArray
+from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
 
