@@ -43,7 +43,8 @@ from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.map_findings import frame_findings, map_findings
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.densify import densify
-from mbf_mesh_nav.mesh.repair import REPAIRS, Finding, checked_mesh
+from mbf_mesh_nav.mesh.mesh_report import Finding
+from mbf_mesh_nav.mesh.repair import REPAIRS, checked_mesh
 from mbf_mesh_nav.mesh.topology import build_topology
 
 JOIN, KEEP_APART = "duplicate_vertices", "-duplicate_vertices"
@@ -195,8 +196,7 @@ def build_mesh_map(
     mesh, report = checked_mesh(vertices, faces, repair, file or "arrays", parameters.join_distance)
     if parameters.densify > 0.0:
         mesh = densify(mesh, parameters.densify, file=file or "arrays")
-    topology = build_topology(mesh.vertices, mesh.faces, mesh.vertex_source, mesh.face_source, mesh.input_to_vertex)
-    mesh_map = MeshMap(topology, frame_id, report, parameters.inscribed_radius)
+    mesh_map = MeshMap(build_topology(mesh), frame_id, report, parameters.inscribed_radius)
     mesh_map.max_turning_slope = parameters.max_turning_slope
     if plan:
         graph = _compute_layers(mesh_map, plan, parameters.cache_dir)

@@ -24,8 +24,9 @@ from mbf_mesh_nav.map.places import MeshPlaces
 from mbf_mesh_nav.map.snapshot import MeshSnapshot, SnapshotSeries
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.locate import Location, SurfaceLocator, SurfacePoint
+from mbf_mesh_nav.mesh.mesh_report import MeshReport
 from mbf_mesh_nav.mesh.motion_check import SURFACE_DISTANCE, UNKNOWN_RADIUS, forbidden_ahead, nearest_of, slope_at
-from mbf_mesh_nav.mesh.repair import MeshReport, checked_mesh
+from mbf_mesh_nav.mesh.repair import checked_mesh
 from mbf_mesh_nav.mesh.topology import MeshTopology, build_topology
 
 if TYPE_CHECKING:
@@ -114,8 +115,7 @@ class MeshMap(LayeredMap):
             The mesh has defects no listed repair removes; lists all of them.
         """
         mesh, report = checked_mesh(vertices, faces, repair)
-        topology = build_topology(mesh.vertices, mesh.faces, mesh.vertex_source, mesh.face_source, mesh.input_to_vertex)
-        return cls(topology, frame_id, report)
+        return cls(build_topology(mesh), frame_id, report)
 
     @classmethod
     def from_heights(

@@ -33,7 +33,9 @@ class CheckedMesh:
     input_to_vertex: IntArray
 
     def without_faces(self, dropped: BoolArray) -> CheckedMesh:
-        """Copy without the faces of a mask (F,)."""
+        """Copy without the faces of a mask (F,), the mesh itself if there are none."""
+        if not dropped.any():
+            return self
         return replace(self, faces=self.faces[~dropped], face_source=self.face_source[~dropped])
 
     def without_vertices(self, dropped: BoolArray) -> CheckedMesh:
@@ -71,3 +73,9 @@ class CheckedMesh:
         mask = np.zeros(len(self.vertices), dtype=np.bool_)
         mask[self.faces] = True
         return mask
+
+
+def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Lengths (F, 3) [m] of the edges from corner k to corner k+1."""
+    x, y, z = (column[faces] - column[np.roll(faces, -1, axis=1)] for column in np.ascontiguousarray(vertices.T))
+    return np.asarray(np.sqrt(x * x + y * y + z * z))

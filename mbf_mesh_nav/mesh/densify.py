@@ -8,11 +8,13 @@ refinement: a limit on it stops a mistyped length.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.arrays import FloatArray, IntArray
-from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
+from mbf_mesh_nav.arrays import IntArray
+from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh, edge_lengths
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
 
@@ -31,10 +33,9 @@ def densify(
     """
     if max_edge_length <= 0.0:
         raise MeshError(file, [f"densify: the maximal edge length must be positive, got {max_edge_length}"])
-    vertices, faces = mesh.vertices, mesh.faces
-    face_source = mesh.face_source
+    vertices, faces, face_source = mesh.vertices, mesh.faces, mesh.face_source
     while True:
-        is_long = _lengths(vertices, faces) > max_edge_length
+        is_long = edge_lengths(vertices, faces) > max_edge_length
         if not is_long.any():
             break
         if len(faces) + int(is_long.sum()) > max_faces:
@@ -50,13 +51,7 @@ def densify(
         face_source = face_source[parents]
     added = np.full(len(vertices) - len(mesh.vertices), -1, dtype=np.int32)
     vertex_source = np.concatenate([mesh.vertex_source, added])
-    return CheckedMesh(vertices, faces, vertex_source, face_source, mesh.input_to_vertex)
-
-
-def _lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Lengths (F, 3) [m] of the edges from corner k to corner k+1."""
-    x, y, z = (column[faces] - column[np.roll(faces, -1, axis=1)] for column in np.ascontiguousarray(vertices.T))
-    return np.asarray(np.sqrt(x * x + y * y + z * z))
+    return replace(mesh, vertices=vertices, faces=faces, vertex_source=vertex_source, face_source=face_source)
 
 
 def _edge_keys(faces: IntArray, count: int) -> NDArray[np.int64]:

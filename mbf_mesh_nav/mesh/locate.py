@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.bounding_boxes import build_boxes, closest_face, closest_faces
 from mbf_mesh_nav.kernels.mesh.rays import first_hits
-from mbf_mesh_nav.kernels.mesh.topology import morton_codes
-from mbf_mesh_nav.mesh.topology import MeshTopology
+from mbf_mesh_nav.mesh.topology import MeshTopology, morton_order
 
 SORT_FROM = 100
 """Number of points from which sorting them costs less than the cache misses it saves."""
@@ -77,7 +76,8 @@ class SurfaceLocator:
             The points do not have three coordinates each.
         """
         queries = _rows(points)
-        order = np.arange(len(queries)) if len(queries) < SORT_FROM else _locality_order(queries)
+        known = np.where(np.isfinite(queries), queries, 0.0)  # the others come anywhere
+        order = np.arange(len(queries)) if len(queries) < SORT_FROM else morton_order(known, known)
         return Location(*closest_faces(*self._tree, queries, order, float(max_distance)))
 
     def locate_one(self, point: ArrayLike, max_distance: float = np.inf, hint_face: int = -1) -> SurfacePoint | None:
@@ -125,11 +125,3 @@ def _rows(points: ArrayLike) -> FloatArray:
     if rows.size and rows.shape[-1] != 3:
         raise ValueError(f"points must be an array (n, 3) of coordinates, got one of shape {rows.shape}")
     return rows.reshape(-1, 3)
-
-
-def _locality_order(points: FloatArray) -> NDArray[np.int64]:
-    """Order of points (n, 3) along a Morton curve; points that are not finite come anywhere."""
-    known = np.where(np.isfinite(points), points, 0.0)
-    lower = known.min(axis=0)
-    cell = max(float((known.max(axis=0) - lower).max()), 1e-12) / (2**21 - 1)
-    return np.argsort(morton_codes(known, lower, cell), kind="stable")

@@ -16,26 +16,21 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.defects import (
     face_shapes,
     faces_without_area,
-    repeated_faces,
-    surplus_faces,
+    fans_at_vertices,
+    superfluous_faces,
     winding_flips,
 )
-from mbf_mesh_nav.kernels.mesh.fans import fans_at_vertices
 from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges
 from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
 from mbf_mesh_nav.mesh.mesh_report import Finding, MeshError, MeshReport
 from mbf_mesh_nav.mesh.slivers import without_slivers
-from mbf_mesh_nav.mesh.topology import faces_of_vertices
+from mbf_mesh_nav.mesh.topology import faces_of_vertices, group_of_each
 from mbf_mesh_nav.mesh.welding import join_boundaries, rounding_distance, same_position
-
-__all__ = ["REPAIRS", "CheckedMesh", "Finding", "MeshError", "MeshReport", "checked_mesh", "component_labels"]
 
 REPAIRS: dict[str, str] = {
     "non_finite": "drop vertices with NaN or inf and their faces",
@@ -139,12 +134,13 @@ class _Check:
         self.report = MeshReport()
         self._faces: IntArray | None = None
 
-    def incidence(self, mesh: CheckedMesh) -> tuple[IntArray, IntArray]:
-        """Faces of every vertex as CSR, computed once per face list."""
+    def neighbours(self, mesh: CheckedMesh) -> tuple[IntArray, IntArray, IntArray]:
+        """Faces of every vertex as CSR, and the faces across edges (F, 3); computed once per face list."""
         if mesh.faces is not self._faces:
+            offsets, incident = faces_of_vertices(mesh.faces, len(mesh.vertices))
+            self._neighbours = offsets, incident, faces_across_edges(mesh.faces, offsets, incident)
             self._faces = mesh.faces
-            self._incidence = faces_of_vertices(mesh.faces, len(mesh.vertices))
-        return self._incidence
+        return self._neighbours
 
     def found(
         self, name: str, text: str, indices: NDArray[np.integer], harmless: bool = False, always_repaired: bool = False
@@ -180,9 +176,7 @@ class _Check:
         moved = mesh.vertex_source[exact != np.arange(len(exact))]
         mesh = mesh.merged(exact)
         distance = self.join_distance or rounding_distance(mesh.vertices[mesh.used])
-        target = join_boundaries(
-            mesh.vertices, faces_across_edges(mesh.faces, *self.incidence(mesh)), mesh.faces, distance
-        )
+        target = join_boundaries(mesh.vertices, self.neighbours(mesh)[2], mesh.faces, distance)
         near = mesh.vertex_source[target != np.arange(len(target))]
         text = "{count} vertices repeat a position"
         if len(near):
@@ -197,23 +191,18 @@ class _Check:
         if flat.any() and "zero_area" in self.repair:
             mesh, cracks = without_slivers(mesh, ZERO_AREA_TOLERANCE)
             text += f"; at {cracks} of them the neighbours cannot be joined, a crack is left" if cracks else ""
-        elif flat.any():
-            mesh = mesh.without_faces(flat)
         self.found("zero_area", text, sources)
-        return mesh
+        return mesh if "zero_area" in self.repair else mesh.without_faces(flat)
 
     def edges(self, mesh: CheckedMesh) -> CheckedMesh:
-        repeated = repeated_faces(mesh.faces)
+        repeated, surplus = superfluous_faces(mesh.faces, *self.neighbours(mesh)[:2])
         self.found("duplicate_faces", "{count} faces have the corners of an earlier face", mesh.face_source[repeated])
-        mesh = mesh.without_faces(repeated) if repeated.any() else mesh
-        surplus = surplus_faces(mesh.faces, *self.incidence(mesh))
         self.found("non_manifold", "{count} faces are the third or later at an edge", mesh.face_source[surplus])
-        return mesh.without_faces(surplus) if surplus.any() else mesh
+        return mesh.without_faces(repeated | surplus)
 
     def winding(self, mesh: CheckedMesh) -> CheckedMesh:
-        across = faces_across_edges(mesh.faces, *self.incidence(mesh))
         shapes = face_shapes(mesh.vertices, mesh.faces)
-        flips, patches, contradictions = winding_flips(mesh.faces, across, shapes[:, 3])
+        flips, patches, contradictions = winding_flips(mesh.faces, self.neighbours(mesh)[2], shapes[:, 3])
         text = "{count} faces are wound against their neighbours"
         if contradictions:
             text += f", and {contradictions} edges of a one-sided surface cannot agree"
@@ -235,8 +224,7 @@ class _Check:
         return replace(mesh, faces=np.where(concerned[:, None], mesh.faces[:, ::-1], mesh.faces))
 
     def non_manifold_vertices(self, mesh: CheckedMesh) -> CheckedMesh:
-        offsets, incident = self.incidence(mesh)
-        across = faces_across_edges(mesh.faces, offsets, incident)
+        offsets, incident, across = self.neighbours(mesh)
         fans, counts = fans_at_vertices(mesh.faces, across, offsets, incident)
         several = counts > 1
         text = "{count} vertices join groups of faces that touch in this point only"
@@ -253,7 +241,8 @@ class _Check:
 
     def components(self, mesh: CheckedMesh) -> CheckedMesh:
         used = mesh.used
-        labels = component_labels(mesh.faces, len(mesh.vertices))
+        edges = np.stack([mesh.faces[:, :2].ravel(), mesh.faces[:, 1:].ravel()])
+        labels = group_of_each(edges, len(mesh.vertices))
         names, first, sizes = np.unique(labels[used], return_index=True, return_counts=True)
         if len(names) < 2:
             return mesh
@@ -279,11 +268,3 @@ def _numbers(mesh: CheckedMesh) -> IntArray:
     """The caller's number of every vertex (V,), that of the original where a repair made a copy."""
     numbers = mesh.vertex_source
     return numbers if (numbers >= 0).all() else numbers[same_position(mesh.vertices)]
-
-
-def component_labels(faces: IntArray, vertex_count: int) -> IntArray:
-    """Number of the component of every vertex (V,); vertices without a face are components of their own."""
-    first, second = faces[:, :2].ravel(), faces[:, 1:].ravel()
-    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(vertex_count, vertex_count))
-    labels: IntArray = connected_components(graph, directed=False)[1]
-    return labels

@@ -7,17 +7,17 @@ instead, and where two corners are one point, they are made one vertex.
 
 from __future__ import annotations
 
-import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from dataclasses import replace
 
-from mbf_abstract.geometry.arithmetic import norm
+import numpy as np
+
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh.defects import faces_without_area
 from mbf_mesh_nav.kernels.mesh.slivers import flip_slivers
 from mbf_mesh_nav.kernels.mesh.topology import faces_across_edges
-from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
+from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh, edge_lengths
 from mbf_mesh_nav.mesh.topology import faces_of_vertices
+from mbf_mesh_nav.mesh.welding import first_of_group
 
 SAME_POINT_SHARE = 1e-9
 """Corners of a face without area closer than this, in lengths of its longest edge, are one point."""
@@ -45,29 +45,15 @@ def without_slivers(mesh: CheckedMesh, tolerance: float) -> tuple[CheckedMesh, i
             break
     flat = faces_without_area(mesh.vertices, faces, tolerance)
     across = faces_across_edges(faces, *faces_of_vertices(faces, len(mesh.vertices)))[flat]
-    long = np.argmax(_edge_lengths(mesh.vertices, faces[flat]), axis=1)
+    long = np.argmax(edge_lengths(mesh.vertices, faces[flat]), axis=1)
     joining = np.take_along_axis(across, long[:, None], axis=1)[:, 0] >= 0
     torn = joining & ((across >= 0).sum(axis=1) > 1)
-    kept = CheckedMesh(mesh.vertices, faces[~flat], mesh.vertex_source, source[~flat], mesh.input_to_vertex)
-    return kept, int(torn.sum())
-
-
-def _edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Lengths (n, 3) [m] of the edges from corner k to corner k+1."""
-    corners = vertices[faces]
-    lengths: FloatArray = norm(corners - np.roll(corners, -1, axis=1))
-    return lengths
+    return replace(mesh, faces=faces[~flat], face_source=source[~flat]), int(torn.sum())
 
 
 def _same_points(vertices: FloatArray, slivers: IntArray) -> IntArray:
     """Vertex that stands for each vertex (V,) once the corners of slivers (n, 3) in one place are joined."""
-    lengths = _edge_lengths(vertices, slivers)
+    lengths = edge_lengths(vertices, slivers)
     sliver, corner = np.nonzero(lengths <= SAME_POINT_SHARE * lengths.max(axis=1, keepdims=True))
-    target = np.arange(len(vertices), dtype=np.int32)
-    pairs: IntArray = np.stack([slivers[sliver, corner], slivers[sliver, (corner + 1) % 3]])
-    if pairs.size:
-        graph = coo_array((np.ones(pairs.shape[1], dtype=np.int8), pairs), shape=(len(vertices), len(vertices)))
-        labels = connected_components(graph, directed=False)[1]
-        _, first = np.unique(labels, return_index=True)
-        target = first[labels].astype(np.int32)
-    return target
+    pairs = np.stack([slivers[sliver, corner], slivers[sliver, (corner + 1) % 3]])
+    return first_of_group(pairs, len(vertices))

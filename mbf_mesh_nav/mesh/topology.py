@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.mesh import topology as kernels
 from mbf_mesh_nav.kernels.mesh.surface import Surface
+from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,26 +101,11 @@ class MeshTopology:
         return digest.hexdigest()
 
 
-def build_topology(
-    vertices: FloatArray,
-    faces: IntArray,
-    vertex_source: IntArray | None = None,
-    face_source: IntArray | None = None,
-    input_to_given: IntArray | None = None,
-) -> MeshTopology:
-    """Sort a valid mesh along a Morton curve and build all neighbour arrays.
-
-    Parameters
-    ----------
-    vertices : (V, 3) float64
-    faces : (F, 3) int32
-        Checked by ``repair.check_mesh``: in range, no degenerate face, at most two faces an edge.
-    vertex_source, face_source : (V,), (F,) int32, optional
-        The caller's number of every given vertex and face, if repairs or densifying came between.
-    input_to_given : (V_input,) int32, optional
-        The other direction for vertices, -1 = dropped.
-    """
-    vertex_order, face_order = _locality_order(vertices, faces)
+def build_topology(mesh: CheckedMesh) -> MeshTopology:
+    """Sort a mesh along a Morton curve and build all neighbour arrays."""
+    vertices, faces = mesh.vertices, mesh.faces
+    centroids = (vertices[faces[:, 0]] + vertices[faces[:, 1]] + vertices[faces[:, 2]]) / 3.0
+    vertex_order, face_order = morton_order(vertices, vertices), morton_order(centroids, vertices)
     position = np.zeros(len(vertices), dtype=np.int32)
     position[vertex_order] = np.arange(len(vertices), dtype=np.int32)
     sorted_vertices = np.ascontiguousarray(vertices[vertex_order], dtype=np.float64)
@@ -130,7 +116,6 @@ def build_topology(
     offsets, neighbours = graph.indptr, graph.indices
     edges, lengths = kernels.edges_of_neighbours(sorted_vertices, offsets, neighbours)
     face_normals = kernels.unit_face_normals(sorted_vertices, sorted_faces)
-    identity = np.arange(len(vertices), dtype=np.int32) if input_to_given is None else input_to_given
     return MeshTopology(
         vertices=sorted_vertices,
         faces=sorted_faces,
@@ -143,10 +128,10 @@ def build_topology(
         vertex_face_offsets=face_offsets,
         vertex_faces=incident,
         face_neighbours=kernels.faces_across_edges(sorted_faces, face_offsets, incident),
-        components=connected_components(graph, directed=False)[1],
-        input_to_internal=np.where(identity >= 0, position[identity], -1).astype(np.int32),
-        internal_to_input=_renumbered(vertex_source, vertex_order),
-        internal_to_input_faces=_renumbered(face_source, face_order),
+        components=group_of_each(edges.T, len(vertices)),
+        input_to_internal=np.where(mesh.input_to_vertex >= 0, position[mesh.input_to_vertex], -1).astype(np.int32),
+        internal_to_input=mesh.vertex_source[vertex_order],
+        internal_to_input_faces=mesh.face_source[face_order],
     )
 
 
@@ -161,19 +146,20 @@ def faces_of_vertices(faces: IntArray, vertex_count: int) -> tuple[IntArray, Int
 def _neighbour_graph(faces: IntArray, vertex_count: int) -> csr_array:
     """Square matrix whose row of a vertex names its neighbours over mesh edges, ascending and without repetition."""
     starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    pairs = np.concatenate([starts, ends]), np.concatenate([ends, starts])
-    return coo_array((np.ones(2 * faces.size, dtype=np.int8), pairs), shape=(vertex_count, vertex_count)).tocsr()
+    upward = np.minimum(starts, ends), np.maximum(starts, ends)
+    once = coo_array((np.ones(faces.size, dtype=np.int8), upward), shape=(vertex_count, vertex_count)).tocsr()
+    return once + once.T
 
 
-def _renumbered(source: IntArray | None, order: NDArray[np.int64]) -> IntArray:
-    return (order if source is None else source[order]).astype(np.int32)
+def morton_order(points: FloatArray, around: FloatArray) -> NDArray[np.int64]:
+    """Order of points (n, 3) along the Morton curve of the bounding cube of the points ``around`` (m, 3)."""
+    lower = around.min(axis=0)
+    cell = max(float((around.max(axis=0) - lower).max()), 1e-12) / (2**21 - 1)
+    return np.argsort(kernels.morton_codes(points, lower, cell), kind="stable")
 
 
-def _locality_order(vertices: FloatArray, faces: IntArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Orders of vertices and of faces (by centroid) along the Morton curve of the bounding cube."""
-    lower = vertices.min(axis=0)
-    cell = max(float((vertices.max(axis=0) - lower).max()), 1e-12) / (2**21 - 1)
-    centroids = (vertices[faces[:, 0]] + vertices[faces[:, 1]] + vertices[faces[:, 2]]) / 3.0
-    vertex_order = np.argsort(kernels.morton_codes(vertices, lower, cell), kind="stable")
-    face_order = np.argsort(kernels.morton_codes(centroids, lower, cell), kind="stable")
-    return vertex_order, face_order
+def group_of_each(pairs: NDArray[np.integer], count: int) -> IntArray:
+    """Number (count,) of the group of each of ``count`` things, where the two of each of the pairs (2, n) share one."""
+    links = coo_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(count, count))
+    groups: IntArray = connected_components(links, directed=False)[1]
+    return groups

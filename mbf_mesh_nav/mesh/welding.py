@@ -8,12 +8,12 @@ inside of a surface is, it stays as it is.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_mesh_nav.arrays import FloatArray, IntArray
+from mbf_mesh_nav.mesh.topology import group_of_each
 
 ROUNDING_SHARE = 1e-6
 """Default distance for joining, in diagonals of the mesh: some twenty times what four-byte numbers lose."""
@@ -45,18 +45,20 @@ def join_boundaries(vertices: FloatArray, face_neighbours: IntArray, faces: IntA
     target = np.arange(len(vertices), dtype=np.int32)
     face, corner = np.nonzero(face_neighbours < 0)
     boundary = np.unique(np.concatenate([faces[face, corner], faces[face, (corner + 1) % 3]]))
-    pairs = (
-        cKDTree(vertices[boundary]).query_pairs(distance, output_type="ndarray") if len(boundary) else np.zeros((0, 2))
-    )
+    pairs = cKDTree(vertices[boundary]).query_pairs(distance, output_type="ndarray")
     if not len(pairs):
         return target
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(len(boundary), len(boundary)))
-    _, first, group = np.unique(connected_components(graph, directed=False)[1], return_index=True, return_inverse=True)
-    target[boundary] = boundary[first[group]]
+    target[boundary] = boundary[first_of_group(pairs.T, len(boundary))]
     # Corners of one face that are this close are a fine detail and no seam: leave all of them where they are.
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     detail = target[start[(target[start] == target[end]) & (start != end)]]
     return np.where(np.isin(target, detail), np.arange(len(target), dtype=np.int32), target)
+
+
+def first_of_group(pairs: NDArray[np.integer], count: int) -> IntArray:
+    """First member (count,) of the group of each of ``count`` things, groups as in ``group_of_each``."""
+    groups = group_of_each(pairs, count)
+    return np.unique(groups, return_index=True)[1][groups].astype(np.int32)
 
 
 def rounding_distance(vertices: FloatArray) -> float:

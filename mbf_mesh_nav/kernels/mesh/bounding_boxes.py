@@ -23,18 +23,36 @@ STACK_SIZE = 128
 def build_boxes(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """Boxes (N, 6) as min x y z, max x y z, leaves first, and the start of every level (levels + 1,)."""
     # Boxes are slightly larger than their faces, so that rounding loses no ray that runs along the side of one.
-    margin = 1e-12 * np.abs(vertices).max(initial=0.0)
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    low = np.minimum(np.minimum(a, b), c) - margin
-    high = np.maximum(np.maximum(a, b), c) + margin
-    boxes: list[FloatArray] = []
-    starts = [0]
-    while len(boxes) == 0 or len(low) > 1:
-        first = np.arange(0, len(low), BRANCHES)
-        low, high = np.minimum.reduceat(low, first), np.maximum.reduceat(high, first)
-        boxes.append(np.hstack([low, high]))
-        starts.append(starts[-1] + len(low))
-    return np.concatenate(boxes), np.array(starts, dtype=np.int32)
+    margin = 1e-12 * float(np.abs(vertices).max(initial=0.0))
+    levels = [_joined(_face_boxes(vertices, faces, margin))]
+    while len(levels[-1]) > 1:
+        levels.append(_joined(levels[-1]))
+    return np.concatenate(levels), np.cumsum([0, *map(len, levels)], dtype=np.int32)
+
+
+@kernel
+def _face_boxes(vertices: FloatArray, faces: IntArray, margin: float) -> FloatArray:
+    """Box (F, 6) of every face, larger by ``margin`` [m] on all sides."""
+    boxes = np.empty((len(faces), 6), dtype=np.float64)
+    for face in range(len(faces)):
+        a, b, c = triangle(vertices, faces, Index(face))
+        for axis in range(3):
+            boxes[face, axis] = min(a[axis], b[axis], c[axis]) - margin
+            boxes[face, axis + 3] = max(a[axis], b[axis], c[axis]) + margin
+    return boxes
+
+
+@kernel
+def _joined(boxes: FloatArray) -> FloatArray:
+    """Boxes (ceil(n / BRANCHES), 6), each around the next ``BRANCHES`` of the given (n, 6)."""
+    joined = np.empty(((len(boxes) + BRANCHES - 1) // BRANCHES, 6), dtype=np.float64)
+    for child in range(len(boxes)):
+        node = child // BRANCHES
+        for axis in range(6):
+            inner = boxes[child, axis]
+            if child % BRANCHES == 0 or (inner < joined[node, axis] if axis < 3 else inner > joined[node, axis]):
+                joined[node, axis] = inner
+    return joined
 
 
 @inner_kernel

@@ -1,4 +1,4 @@
-"""Finding what is wrong at the edges of a face list; used once, when a mesh is loaded."""
+"""Finding what is wrong at the edges and vertices of a face list; used once, when a mesh is loaded."""
 
 from __future__ import annotations
 
@@ -33,34 +33,36 @@ def faces_without_area(vertices: FloatArray, faces: IntArray, tolerance: float) 
     return np.asarray(2.0 * shapes[:, 3] <= tolerance * shapes[:, 4])
 
 
-def repeated_faces(faces: IntArray) -> BoolArray:
-    """Mask (F,) of faces with the same three corners, in any order, as a face of smaller number."""
-    corners = np.sort(faces, axis=1)
-    order = np.lexsort(corners.T)
-    repeated = np.zeros(len(faces), dtype=np.bool_)
-    repeated[order[1:]] = (corners[order[1:]] == corners[order[:-1]]).all(axis=1)
-    return repeated
-
-
 @kernel
-def surplus_faces(faces: IntArray, face_offsets: IntArray, incident: IntArray) -> BoolArray:
-    """Mask (F,) of faces that would be the third at one of their edges when faces are added in order."""
-    surplus = np.zeros(faces.shape[0], dtype=np.bool_)
+def superfluous_faces(faces: IntArray, face_offsets: IntArray, incident: IntArray) -> tuple[BoolArray, BoolArray]:
+    """Faces to drop when faces are added in order.
+
+    Returns
+    -------
+    repeated, surplus : (F,) bool
+        Faces with the corners of an earlier one, in any order; other faces that would be the third at an edge.
+    """
+    repeated, surplus = np.zeros(faces.shape[0], dtype=np.bool_), np.zeros(faces.shape[0], dtype=np.bool_)
     for face in range(faces.shape[0]):
         for corner in range(3):
-            start = faces[face, corner]
-            end = faces[face, (corner + 1) % 3]
+            start, end, third = faces[face, corner], faces[face, (corner + 1) % 3], faces[face, (corner + 2) % 3]
             present = 0
             for position in range(face_offsets[start], face_offsets[start + 1]):
                 other = incident[position]
                 if other >= face:
                     break
-                if not surplus[other] and (faces[other, 0] == end or faces[other, 1] == end or faces[other, 2] == end):
-                    present += 1
-            if present >= 2:
-                surplus[face] = True
-                break
-    return surplus
+                if has_corner(faces, other, end):
+                    repeated[face] |= has_corner(faces, other, third)
+                    present += not (repeated[other] or surplus[other])
+            surplus[face] |= present >= 2
+        surplus[face] &= not repeated[face]
+    return repeated, surplus
+
+
+@inner_kernel
+def has_corner(faces: IntArray, face: int, vertex: int) -> bool:
+    """Whether a vertex is a corner of a face."""
+    return bool(faces[face, 0] == vertex or faces[face, 1] == vertex or faces[face, 2] == vertex)
 
 
 @inner_kernel
@@ -118,3 +120,33 @@ def winding_flips(faces: IntArray, face_neighbours: IntArray, areas: FloatArray)
                 flip[patch[index]] = not flip[patch[index]]
         patch_count += 1
     return flip, patches, contradictions
+
+
+@kernel
+def fans_at_vertices(
+    faces: IntArray, face_neighbours: IntArray, face_offsets: IntArray, incident: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Fan of every entry of ``incident`` (3F,), counted from 0 at each vertex, and the number of fans (V,).
+
+    A fan is a group of faces around a vertex that are connected over edges; a sound vertex has one.
+    """
+    fans, counts = np.full(len(incident), -1, dtype=np.int32), np.zeros(len(face_offsets) - 1, dtype=np.int32)
+    waiting = np.empty(len(incident), dtype=np.int32)
+    for vertex in range(counts.shape[0]):
+        begin, end = face_offsets[vertex], face_offsets[vertex + 1]
+        for entry in range(begin, end):
+            if fans[entry] >= 0:
+                continue
+            fans[entry], waiting[0], size = counts[vertex], incident[entry], 1
+            while size > 0:
+                size -= 1
+                face = waiting[size]
+                for corner in range(3):
+                    if faces[face, corner] != vertex and faces[face, (corner + 1) % 3] != vertex:
+                        continue
+                    for place in range(begin, end):
+                        if incident[place] == face_neighbours[face, corner] and fans[place] < 0:
+                            fans[place], waiting[size] = counts[vertex], incident[place]
+                            size += 1
+            counts[vertex] += 1
+    return fans, counts

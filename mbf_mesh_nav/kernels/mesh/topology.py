@@ -74,10 +74,9 @@ def unit_face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 @kernel
 def unit_vertex_normals(face_normals: FloatArray, face_offsets: IntArray, incident: IntArray) -> FloatArray:
-    """Unweighted mean of the incident unit face normals, renormalised; (0, 0, 1) where it vanishes."""
-    vertex_count = face_offsets.shape[0] - 1
-    normals = np.empty((vertex_count, 3), dtype=np.float64)
-    for vertex in range(vertex_count):
+    """Unweighted means (V, 3) of the unit normals of the faces around, renormalised; (0, 0, 1) where they vanish."""
+    normals = np.empty((face_offsets.shape[0] - 1, 3), dtype=np.float64)
+    for vertex in range(face_offsets.shape[0] - 1):
         x = y = z = 0.0
         for position in range(face_offsets[vertex], face_offsets[vertex + 1]):
             normal = row(face_normals, Count(incident[position]))

@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mbf_mesh_nav.kernels.mesh.defects import superfluous_faces
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.topology import faces_of_vertices
 
 
 def random_map(seed: int, nx: int = 7, ny: int = 6, shuffled: bool = True) -> tuple[MeshMap, np.ndarray, np.ndarray]:
@@ -159,3 +161,20 @@ def test_heightfield_map_is_the_surface_bullet_drives_on():
     errors = np.abs(np.array([hit[3][2] for hit in hits]) - (3.0 - depths))
     assert np.median(errors) < 1e-6
     assert errors.max() < 1e-3
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_faces_to_drop_equal_those_found_by_adding_faces_one_by_one(seed):
+    rng = np.random.default_rng(seed)
+    faces = np.array([rng.choice(7, 3, replace=False) for _ in range(60)], dtype=np.int32)
+    repeated, surplus, kept = [], [], []
+    for face in faces.tolist():
+        repeated.append(any(set(face) == set(other) for other in faces[: len(repeated)].tolist()))
+        sides = [{face[0], face[1]}, {face[1], face[2]}, {face[2], face[0]}]
+        surplus.append(not repeated[-1] and any(sum(side < set(other) for other in kept) >= 2 for side in sides))
+        if not repeated[-1] and not surplus[-1]:
+            kept.append(face)
+    found = superfluous_faces(faces, *faces_of_vertices(faces, 7))
+    assert found[0].tolist() == repeated
+    assert found[1].tolist() == surplus
+    assert any(repeated) and any(surplus)
