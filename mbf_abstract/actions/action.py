@@ -1,14 +1,16 @@
 """What all actions share: slots, acceptance, preemption, and exactly one final state for every goal.
 
 The flow of a goal: ``send`` checks it and either rejects it with the reason or queues it for its slot; the slot's
-worker runs ``execute``, whose result becomes the goal's final state. A new goal in a used slot asks the running one to
-end and waits its turn; only the newest waits, the one it displaces ends CANCELED. Nothing here ever joins a thread.
+worker runs ``execute``, whose result becomes the goal's final state. A new goal in a used slot takes over the running
+one where that is open to it (``exe_path``, ``move_base``): the robot drives on. Else it asks the running one to end and
+waits its turn. Only the newest waits, the one it displaces ends CANCELED. Nothing here ever joins a thread.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, ClassVar, Generic, TypeVar
 
 from mbf_abstract.event_values import error_text
@@ -31,18 +33,23 @@ SHUT_DOWN = "the server is shut down"
 
 
 class GoalJob(Generic[G, R, F]):
-    """A goal as its slot's worker runs it; ``handle`` may become a newer goal's while it runs (plan update)."""
+    """A goal as its slot's worker runs it; while it runs, a newer goal of the slot may take it over."""
 
     def __init__(self, action: Action[G, R, F], handle: GoalHandle[G, R, F], slot: int) -> None:
         self.action = action
         self.handle = handle
         self.slot = slot
+        self._condition = action._condition
+        self._accepts: Callable[[G], bool] | None = None
+        self._on_offer: Callable[[], None] = lambda: None
+        self._offered: GoalJob[G, R, F] | None = None
 
+    # ------------------------------------------------------------------------------ for the slot's worker
     def run(self) -> None:
         """Execute the goal unless it was canceled while it waited; always leaves it in a final state."""
         action = self.action
         if self.handle.cancel_requested:
-            action.finish(self.handle, action.canceled_outcome, self._before_start())
+            self._end_unstarted(self.handle.cancel_reason)
             return
         self.handle.activate()
         try:
@@ -66,13 +73,88 @@ class GoalJob(Generic[G, R, F]):
         """Make way for a newer goal."""
         self.handle.cancel(PREEMPTED)
 
+    def _end_unstarted(self, reason: str) -> None:
+        self.action.finish(self.handle, self.action.canceled_outcome, f"{reason} before it started")
+
+    # ------------------------------------------------------------------------------- for the action
+    def report_started(self, **data: object) -> None:
+        """Record that the goal is being worked on."""
+        self.action.runtime.events.emit(
+            EventKind.GOAL_STARTED, self.action.name, goal_id=self.handle.id, slot=self.slot, **data
+        )
+
     def abandon(self, outcome: int, message: str) -> None:
         """End the goal while its plugin hangs, and free the slot."""
         self.action.finish(self.handle, outcome, message)
         self.action.worker(self.slot).abandon(self)
 
-    def _before_start(self) -> str:
-        return f"{self.handle.cancel_reason} before it started"
+    # ---------------------------------------------------------------------- take-over by a newer goal
+    @contextmanager
+    def open_to_take_over(
+        self, accepts: Callable[[G], bool], on_offer: Callable[[], None] = lambda: None
+    ) -> Iterator[None]:
+        """Let newer goals of the slot take this job over while the body runs, without an end in between.
+
+        Parameters
+        ----------
+        accepts : callable
+            Whether the running work can go on with that goal; others are queued.
+        on_offer : callable
+            Called, on the sender's thread, when there is something for ``take_over``; must be short.
+        """
+        with self._condition:
+            self._accepts, self._on_offer = accepts, on_offer
+        try:
+            yield
+        finally:
+            self.end_take_over()
+
+    def offer(self, newer: GoalJob[G, R, F]) -> bool:
+        """Offer a newer goal; False if it must be queued. An older offer ends CANCELED."""
+        with self._condition:
+            if self._accepts is None or self.handle.cancel_requested or not self._accepts(newer.handle.goal):
+                return False
+            displaced, self._offered = self._offered, newer
+        self._on_offer()
+        if displaced is not None:
+            displaced._end_unstarted(PREEMPTED)
+        return True
+
+    @property
+    def offered(self) -> bool:
+        """Whether a newer goal waits for ``take_over``."""
+        return self._offered is not None
+
+    def take_over(self, adopt: Callable[[GoalHandle[G, R, F]], None], reason: str, **data: object) -> bool:
+        """Go on with the newest goal on offer; the old one ends CANCELED. False if there is none.
+
+        Parameters
+        ----------
+        adopt : callable
+            Makes the running work serve the new handle, before the old goal ends.
+        reason : str
+            Message of the old goal's result.
+        **data
+            For the event that the new goal has started.
+        """
+        with self._condition:
+            newer, self._offered = self._offered, None
+        if newer is None:
+            return False
+        old, self.handle = self.handle, newer.handle
+        newer.handle.activate()
+        adopt(newer.handle)
+        self.action.finish(old, self.action.canceled_outcome, reason)
+        self.report_started(**data)
+        return True
+
+    def end_take_over(self) -> None:
+        """Refuse further offers, and queue one that came too late: it must not be lost. Idempotent."""
+        with self._condition:
+            self._accepts = None
+            late, self._offered = self._offered, None
+        if late is not None:
+            self.action.queue(late)
 
 
 class Action(ABC, Generic[G, R, F]):
@@ -127,7 +209,7 @@ class Action(ABC, Generic[G, R, F]):
         for worker in workers:
             waiting = worker.close()
             if isinstance(waiting, GoalJob):
-                self.finish(waiting.handle, self.canceled_outcome, f"{SHUT_DOWN} before it started")
+                waiting._end_unstarted(SHUT_DOWN)
 
     @property
     def unfinished(self) -> list[GoalHandle[G, R, F]]:
@@ -161,11 +243,16 @@ class Action(ABC, Generic[G, R, F]):
         return int(getattr(goal, "concurrency_slot", 0))
 
     def _dispatch(self, job: GoalJob[G, R, F]) -> None:
-        """Queue the job for its slot; overridden where a running goal can take the new one over."""
+        """Hand the job to the running one of its slot, if that can take its goal over, else queue it."""
+        running = self.worker(job.slot).current
+        if not (isinstance(running, GoalJob) and running.offer(job)):
+            self.queue(job)
+
+    def queue(self, job: GoalJob[G, R, F]) -> None:
+        """Let a job wait for the end of the running one of its slot, which is asked to end."""
         displaced = self.worker(job.slot).submit(job)
         if isinstance(displaced, GoalJob):
-            reason = SHUT_DOWN if displaced is job else PREEMPTED
-            self.finish(displaced.handle, self.canceled_outcome, f"{reason} before it started")
+            displaced._end_unstarted(SHUT_DOWN if displaced is job else PREEMPTED)
 
     def worker(self, slot: int) -> Worker:
         """Worker of a slot, made at its first use."""

@@ -51,7 +51,7 @@ class FollowWaypointsAction(Action[FollowWaypointsGoal, FollowWaypointsResult, F
 
     def execute(self, job: Job) -> FollowWaypointsResult:
         """Visit one waypoint after the other, on the slot's thread."""
-        self.runtime.events.emit(EventKind.GOAL_STARTED, self.name, goal_id=job.handle.id, slot=job.slot)
+        job.report_started()
         return _Run(self, job).run()
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> FollowWaypointsResult:

@@ -8,42 +8,43 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbf_abstract.actions.action import Action, GoalJob
+from mbf_abstract.actions.action import GoalJob
+from mbf_abstract.actions.plugin_action import PluginAction
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.plan_check import area_problem, check_path, in_global_frame
 from mbf_abstract.execution.planner import PlannerExecution, PlannerState
-from mbf_abstract.execution.plugin_run import PluginRun
-from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformError
 from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult, NoFeedback
 from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, PluginKind
-from mbf_abstract.server.plugin_table import PluginTable
 
 Handle = GoalHandle[GetPathGoal, GetPathResult, NoFeedback]
 Job = GoalJob[GetPathGoal, GetPathResult, NoFeedback]
 
 
-class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
+class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, AbstractPlanner]):
     """Plans paths."""
 
     name = "get_path"
+    kind = PluginKind.PLANNER
     canceled_outcome = GetPathOutcome.CANCELED
+    patience_outcome = GetPathOutcome.PAT_EXCEEDED
     invalid_plugin_outcome = GetPathOutcome.INVALID_PLUGIN
     internal_error_outcome = GetPathOutcome.INTERNAL_ERROR
 
-    def __init__(self, runtime: Runtime, plugins: PluginTable) -> None:
-        super().__init__(runtime)
-        self._plugins = plugins
+    @property
+    def patience(self) -> float:
+        """Time [s] for all calls of the planner together."""
+        return self.runtime.parameters.planner_patience
 
-    def _check(self, goal: GetPathGoal) -> tuple[int, str] | None:
-        """1. Accept only what can be answered: a loaded planner, known frames, sane tolerances."""
-        problem = self._plugins.problem(PluginKind.PLANNER, goal.planner)
-        if problem:
-            return GetPathOutcome.INVALID_PLUGIN, problem
+    def _plugin_name(self, goal: GetPathGoal) -> str:
+        return goal.planner
+
+    def _problem(self, goal: GetPathGoal) -> tuple[int, str] | None:
+        """1. Accept only what can be answered: sane tolerances, an area in the global frame."""
         distance, angle = self._tolerances(goal)
         if not (distance >= 0.0 and angle >= 0.0):  # not a number is no tolerance either
             return GetPathOutcome.INVALID_GOAL, f"tolerances must not be negative, got {distance} m and {angle} rad"
@@ -52,30 +53,21 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
 
     def execute(self, job: Job) -> GetPathResult:
         """2. to 5.: from the accepted goal to its result, on the slot's thread."""
-        goal, handle = job.handle.goal, job.handle
-        plugin = self._plugins.get(PluginKind.PLANNER, goal.planner)
+        handle, plugin = job.handle, self._plugin(job)
         # 2. Everything the planner sees is in the global frame.
         try:
-            request = self._request(goal, handle)
+            request = self._request(handle.goal, handle)
         except (TransformError, RobotStateError) as error:
             return GetPathResult(GetPathOutcome.TF_ERROR, str(error), planner=plugin.name)
-        self.runtime.events.emit(
-            EventKind.GOAL_STARTED, self.name, goal_id=handle.id, slot=job.slot, plugin=plugin.name
-        )
+        job.report_started(plugin=plugin.name)
         # 3. Plan, with the map kept alive, under patience and retries.
-        run: PluginRun[AbstractPlanner] = PluginRun(
-            self.runtime,
-            plugin,
-            handle,
-            patience=lambda: self.runtime.parameters.planner_patience,
-            on_abandon=lambda: job.abandon(*self._hung(run.suspect, handle)),
-        )
+        run = self._supervise(job, plugin)
         with run, run.map_in_use():
-            execution = PlannerExecution(run, request, goal.goal_area)
+            execution = PlannerExecution(run, request, handle.goal.goal_area)
             state = execution.execute()
         # 4. Judge how it ended.
-        if run.waited_for and not run.canceled:
-            return GetPathResult(GetPathOutcome.PAT_EXCEEDED, run.waiting_text(), planner=plugin.name)
+        if run.waited and not run.canceled:
+            return GetPathResult(GetPathOutcome.PAT_EXCEEDED, run.waited, planner=plugin.name)
         return self._result(state, execution.last_result, handle, request, plugin.name)
 
     def _request(self, goal: GetPathGoal, handle: Handle) -> PlanRequest:
@@ -103,42 +95,37 @@ class GetPathAction(Action[GetPathGoal, GetPathResult, NoFeedback]):
     def _result(
         self, state: PlannerState, last: PlanResult | None, handle: Handle, request: PlanRequest, planner: str
     ) -> GetPathResult:
-        said = PlanResult(GetPathOutcome.FAILURE, "") if last is None else last
-        words: dict[str, Any] = {"planner": planner}
-        if last is not None:
-            words.update(plugin_outcome=int(said.outcome), plugin_message=said.message)
+        fields: dict[str, Any] = {"planner": planner}
+        if last is None:
+            last = PlanResult(GetPathOutcome.FAILURE)
+        else:
+            fields.update(plugin_outcome=int(last.outcome), plugin_message=last.message)
         if state is PlannerState.FOUND_PLAN:
-            return self._found(said, handle, request, words)
+            return self._found(last, handle, request, fields)
         if state is PlannerState.CANCELED:
-            return GetPathResult(GetPathOutcome.CANCELED, handle.cancel_reason, **words)
+            return GetPathResult(GetPathOutcome.CANCELED, handle.cancel_reason, **fields)
         if state is PlannerState.PAT_EXCEEDED:
-            patience = self.runtime.parameters.planner_patience
-            tail = f"; the planner said last: {said.message}" if said.message else ""
-            return GetPathResult(GetPathOutcome.PAT_EXCEEDED, f"no plan within {patience:g} s{tail}", **words)
-        return GetPathResult(int(said.outcome), said.message, cost=said.cost, permanent=said.permanent, **words)
+            tail = f"; the planner said last: {last.message}" if last.message else ""
+            return GetPathResult(GetPathOutcome.PAT_EXCEEDED, f"no plan within {self.patience:g} s{tail}", **fields)
+        return GetPathResult(int(last.outcome), last.message, cost=last.cost, permanent=last.permanent, **fields)
 
-    def _found(self, said: PlanResult, handle: Handle, request: PlanRequest, words: dict[str, Any]) -> GetPathResult:
-        """5. Believe a plugin's success only after a look at its path."""
-        checked = check_path(said, request, self.runtime, handle.goal.goal_area)
-        if checked.path is None:
-            return GetPathResult(checked.outcome, checked.message, **words)
-        path, cost = checked.path, said.cost if said.cost != 0.0 else checked.path.length
+    def _found(self, answer: PlanResult, handle: Handle, request: PlanRequest, fields: dict[str, Any]) -> GetPathResult:
+        """5. Check the path of a plugin that reports success."""
+        checked = check_path(answer, request, self.runtime, handle.goal.goal_area)
+        path = checked.path
+        if path is None:
+            return GetPathResult(checked.outcome, checked.message, **fields)
+        cost = answer.cost if answer.cost != 0.0 else path.length
         self.runtime.events.emit(
             EventKind.PLAN,
             self.name,
             goal_id=handle.id,
-            plugin=words["planner"],
+            plugin=fields["planner"],
             cost=cost,
             length=path.length,
             poses=len(path),
         )
-        return GetPathResult(int(said.outcome), said.message or "plan found", path=path, cost=cost, **words)
-
-    def _hung(self, suspect: str, handle: Handle) -> tuple[int, str]:
-        if handle.cancel_requested:
-            return GetPathOutcome.CANCELED, f"{handle.cancel_reason}; {suspect} has not ended yet"
-        patience = self.runtime.parameters.planner_patience
-        return GetPathOutcome.PAT_EXCEEDED, f"{suspect} gave no answer within {patience:g} s and its grace"
+        return GetPathResult(int(answer.outcome), answer.message or "plan found", path=path, cost=cost, **fields)
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> GetPathResult:
         """Result without a path."""

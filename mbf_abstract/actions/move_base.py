@@ -26,14 +26,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbf_abstract.actions.action import PREEMPTED, Action, GoalJob
+from mbf_abstract.actions.action import Action, GoalJob
 from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.get_path import GetPathAction
-from mbf_abstract.actions.move_base_machine import MoveBaseMachine
+from mbf_abstract.actions.move_base_machine import MoveBaseMachine, SubActions
 from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.drive.robot import RobotStateError
-from mbf_abstract.events import EventKind
-from mbf_abstract.execution.plan_check import area_problem, in_global_frame
+from mbf_abstract.execution.plan_check import arrival_problem, in_global_frame
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformError
@@ -64,70 +63,41 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
         recovery: RecoveryAction,
     ) -> None:
         super().__init__(runtime)
-        self.plugins = plugins
-        self.get_path = get_path
-        self.exe_path = exe_path
-        self.recovery = recovery
-        self._machine: MoveBaseMachine | None = None
+        self._plugins = plugins
+        self._sub_actions = SubActions(get_path, exe_path, recovery)
 
     def _check(self, goal: MoveBaseGoal) -> tuple[int, str] | None:
         """Accept only names that are loaded and tolerances that make sense."""
         wanted = [(PluginKind.PLANNER, goal.planner), (PluginKind.CONTROLLER, goal.controller)]
         wanted += [(PluginKind.RECOVERY, name) for name in goal.recovery_behaviors or ()]
         for kind, name in wanted:
-            problem = self.plugins.problem(kind, name)
+            problem = self._plugins.problem(kind, name)
             if problem:
                 return MoveBaseOutcome.FAILURE, problem
-        for name in ("dist_tolerance", "angle_tolerance"):
-            value = getattr(goal, name)
-            if value is not None and not value > 0.0:
-                return MoveBaseOutcome.FAILURE, f"{name} must be positive, got {value}"
-        problem = area_problem(goal.goal_area, self.runtime)
+        problem = arrival_problem(goal, self.runtime)
         return (MoveBaseOutcome.FAILURE, problem) if problem else None
-
-    def _dispatch(self, job: Job) -> None:
-        """Hand the goal to the running machine, which takes it over while driving, else queue it."""
-        with self._condition:
-            machine = self._machine
-            taken, displaced = machine.offer(job) if machine is not None else (False, None)
-        if not taken:
-            super()._dispatch(job)
-        elif displaced is not None:
-            self.finish(displaced.handle, self.canceled_outcome, f"{PREEMPTED} before it started")
 
     def execute(self, job: Job) -> MoveBaseResult:
         """Run the state machine; the goal it ends with may be a later one than it began with."""
-        self.report_started(job.handle)
+        job.report_started()
         try:
             self.runtime.robot.pose()
-            target = self.target(job.handle)
+            target = self._target(job.handle)
         except (RobotStateError, TransformError) as error:
             return self.make_result(job.handle, MoveBaseOutcome.TF_ERROR, str(error))
-        machine = MoveBaseMachine(self, job, target)
-        with self._condition:
-            self._machine = machine
-        try:
+        machine = MoveBaseMachine(self._sub_actions, self._plugins, job, target)
+        with job.open_to_take_over(lambda goal: True, machine.wake):
             outcome, message = machine.run()
-        finally:
-            with self._condition:
-                self._machine = None
-                late = machine.close()
-            if late is not None:
-                super()._dispatch(late)
         return self.make_result(job.handle, outcome, message)
 
-    def target(self, handle: Handle) -> Pose:
+    def _target(self, handle: Handle) -> Pose:
         """Target pose in the global frame; raises TransformError."""
         return in_global_frame(handle.goal.target_pose, self.runtime)
-
-    def report_started(self, handle: Handle) -> None:
-        """Record that a goal is being worked on."""
-        self.runtime.events.emit(EventKind.GOAL_STARTED, self.name, goal_id=handle.id, slot=0)
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> MoveBaseResult:
         """Result with the robot's present pose and its distance to the target."""
         try:
-            pose, target = self.runtime.robot.pose(), self.target(handle)
+            pose, target = self.runtime.robot.pose(), self._target(handle)
         except (RobotStateError, TransformError):
             return MoveBaseResult(int(outcome), message)
         return MoveBaseResult(

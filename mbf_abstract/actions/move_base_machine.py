@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Any
+from typing import Any, NamedTuple
 
-from mbf_abstract.actions.action import PREEMPTED
-from mbf_abstract.actions.move_base_states import End, Job, MachineOwner, MoveBaseState, SubGoalAction, Trigger
+from mbf_abstract.actions.action import PREEMPTED, Action, GoalJob
+from mbf_abstract.actions.exe_path import ExePathAction
+from mbf_abstract.actions.get_path import GetPathAction
+from mbf_abstract.actions.move_base_states import MoveBaseState, Trigger
+from mbf_abstract.actions.recovery import RecoveryAction
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
-from mbf_abstract.execution.oscillation import OscillationDetector
+from mbf_abstract.execution.motion_watch import OscillationDetector
+from mbf_abstract.execution.plan_check import in_global_frame
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformError
 from mbf_abstract.goals.goal_types import (
@@ -17,11 +21,14 @@ from mbf_abstract.goals.goal_types import (
     ExePathGoal,
     GetPathGoal,
     GetPathResult,
+    MoveBaseGoal,
+    MoveBaseResult,
     RecoveryGoal,
 )
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from mbf_abstract.plugins import PluginKind
+from mbf_abstract.server.plugin_table import PluginTable
 from mbf_abstract.time.clock import Stopwatch
 
 SUB_GOAL_SLOT = 255  # so that a client's goal in slot 0 does not preempt a part of move_base
@@ -29,13 +36,25 @@ NO_REPLAN_WITHIN = 0.1  # m from the goal
 LEAST_SHARE_LEFT = 0.25  # of the tolerance, for stopping at the end of a path that does not reach the target
 FATAL = range(ExePathOutcome.INVALID_PATH, ExePathOutcome.INTERNAL_ERROR + 1)
 
+Job = GoalJob[MoveBaseGoal, MoveBaseResult, ExePathFeedback]
+End = tuple[int, str]
+
+
+class SubActions(NamedTuple):
+    """The actions that the machine sends goals to."""
+
+    get_path: GetPathAction
+    exe_path: ExePathAction
+    recovery: RecoveryAction
+
 
 class MoveBaseMachine:
     """One run of move_base, for one goal or several that take over from each other."""
 
-    def __init__(self, action: MachineOwner, job: Job, target: Pose) -> None:
-        self._action = action
-        self._runtime = action.runtime
+    def __init__(self, sub_actions: SubActions, plugins: PluginTable, job: Job, target: Pose) -> None:
+        self._sub_actions = sub_actions
+        self._plugins = plugins
+        self._runtime = job.action.runtime
         self._job = job
         self._target = target
         self._state = MoveBaseState.GET_PATH
@@ -51,39 +70,21 @@ class MoveBaseMachine:
         self._replan_watch = Stopwatch(self._runtime.clock)
         self._condition = self._runtime.clock.condition()
         self._mailbox: deque[AnyGoalHandle] = deque()
-        self._offered: Job | None = None
-        self._closed = False
-
-    # ------------------------------------------------------------------------------ from other threads
-    def offer(self, job: Job) -> tuple[bool, Job | None]:
-        """Offer a newer goal; returns whether it is taken, and the offer it displaces."""
-        with self._condition:
-            if self._closed or self._job.handle.cancel_requested:
-                return False, None
-            displaced, self._offered = self._offered, job
-            self._condition.notify_all()
-            return True, displaced
-
-    def close(self) -> Job | None:
-        """Take no more offers; return one that came too late."""
-        with self._condition:
-            self._closed = True
-            late, self._offered = self._offered, None
-            return late
 
     def _post(self, handle: AnyGoalHandle) -> None:
         with self._condition:
             self._mailbox.append(handle)
             self._condition.notify_all()
 
-    def _wake(self) -> None:
+    def wake(self) -> None:
+        """Look again at the goal: it was canceled, paused or resumed, or a newer one is on offer."""
         with self._condition:
             self._condition.notify_all()
 
     # ------------------------------------------------------------------------------------ the loop
     def run(self) -> End:
         """Work until the goal has its end."""
-        self._job.handle.on_wake(self._wake)
+        self._job.handle.on_wake(self.wake)
         self._ask_for_plan()
         try:
             end = None
@@ -133,7 +134,7 @@ class MoveBaseMachine:
             return True
         if self._state is MoveBaseState.CANCELING:
             return not self._sub_goals()
-        return self._offered is not None or handle.cancel_requested
+        return self._job.offered or handle.cancel_requested
 
     # -------------------------------------------------------------------------------------- planning
     def _ask_for_plan(self) -> None:
@@ -142,7 +143,7 @@ class MoveBaseMachine:
         if self._follow is None:
             self._enter(MoveBaseState.GET_PATH)
         self._plan = self._send(
-            self._action.get_path,
+            self._sub_actions.get_path,
             GetPathGoal(
                 self._target,
                 planner=goal.planner,
@@ -200,7 +201,7 @@ class MoveBaseMachine:
             self._replan_watch.restart()
         self._enter(MoveBaseState.EXE_PATH)
         self._follow = self._send(
-            self._action.exe_path,
+            self._sub_actions.exe_path,
             ExePathGoal(
                 path,
                 controller=goal.controller,
@@ -259,7 +260,7 @@ class MoveBaseMachine:
         behavior = behaviors[self._next_behavior]
         self._next_behavior += 1
         self._enter(MoveBaseState.RECOVERY, behavior=behavior, trigger=trigger.value, failure=failure[1])
-        self._recover = self._send(self._action.recovery, RecoveryGoal(behavior, concurrency_slot=SUB_GOAL_SLOT))
+        self._recover = self._send(self._sub_actions.recovery, RecoveryGoal(behavior, concurrency_slot=SUB_GOAL_SLOT))
         return None
 
     def _on_recovered(self) -> End | None:
@@ -273,7 +274,7 @@ class MoveBaseMachine:
 
     def _behaviors(self) -> list[str]:
         wanted = self._job.handle.goal.recovery_behaviors
-        return self._action.plugins.names(PluginKind.RECOVERY) if wanted is None else list(wanted)
+        return self._plugins.names(PluginKind.RECOVERY) if wanted is None else list(wanted)
 
     def _reset_recovery_after_motion(self, pose: Pose) -> None:
         if self._trigger in (Trigger.CONTROL, Trigger.OSCILLATION) and self._recovered_at is not None:
@@ -288,20 +289,13 @@ class MoveBaseMachine:
     # -------------------------------------------------------------------------- new goal, cancel, pause
     def _take_offer(self) -> None:
         """Let a newer goal take over: a new plan is asked for, the robot drives on until it is there."""
-        with self._condition:
-            offer, self._offered = self._offered, None
-        if offer is None:
+        if not self._job.take_over(lambda handle: handle.on_wake(self.wake), PREEMPTED):
             return
-        old, self._job.handle = self._job.handle, offer.handle
-        offer.handle.activate()
-        offer.handle.on_wake(self._wake)
-        self._action.finish(old, MoveBaseOutcome.CANCELED, PREEMPTED)
-        self._action.report_started(offer.handle)
         self._reset_recovery()
         self._failure = None
         self._oscillation.reset()
         try:
-            self._target = self._action.target(offer.handle)
+            self._target = in_global_frame(self._job.handle.goal.target_pose, self._runtime)
         except TransformError as error:
             self._end_after_stop((MoveBaseOutcome.TF_ERROR, str(error)))
             return
@@ -349,11 +343,11 @@ class MoveBaseMachine:
         for handle in self._sub_goals():
             handle.pause() if paused else handle.resume()
 
-    def _send(self, action: SubGoalAction, goal: object) -> AnyGoalHandle:
-        handle = action.send(goal)
+    def _send(self, action: Action[Any, Any, Any], goal: object) -> AnyGoalHandle:
+        handle: AnyGoalHandle = action.send(goal)
         if self._job.handle.paused:
             handle.pause()
-        handle.on_wake(self._wake)
+        handle.on_wake(self.wake)
         handle.subscribe(self._post)
         return handle
 

@@ -8,51 +8,43 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbf_abstract.actions.action import Action, GoalJob
+from mbf_abstract.actions.action import GoalJob
+from mbf_abstract.actions.plugin_action import PluginAction
 from mbf_abstract.events import EventKind
-from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.execution.recovery import RecoveryExecution
-from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.goals.goal_types import NoFeedback, RecoveryGoal, RecoveryResultMessage
 from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import RecoveryOutcome, is_success
 from mbf_abstract.plugins import AbstractRecovery, PluginKind
-from mbf_abstract.server.plugin_table import PluginTable
 
 Handle = GoalHandle[RecoveryGoal, RecoveryResultMessage, NoFeedback]
 Job = GoalJob[RecoveryGoal, RecoveryResultMessage, NoFeedback]
 
 
-class RecoveryAction(Action[RecoveryGoal, RecoveryResultMessage, NoFeedback]):
+class RecoveryAction(PluginAction[RecoveryGoal, RecoveryResultMessage, NoFeedback, AbstractRecovery]):
     """Runs recovery behaviours."""
 
     name = "recovery"
+    kind = PluginKind.RECOVERY
     canceled_outcome = RecoveryOutcome.CANCELED
+    patience_outcome = RecoveryOutcome.PAT_EXCEEDED
     invalid_plugin_outcome = RecoveryOutcome.INVALID_PLUGIN
     internal_error_outcome = RecoveryOutcome.INTERNAL_ERROR
 
-    def __init__(self, runtime: Runtime, plugins: PluginTable) -> None:
-        super().__init__(runtime)
-        self._plugins = plugins
+    @property
+    def patience(self) -> float:
+        """Time [s] for the behaviour."""
+        return self.runtime.parameters.recovery_patience
 
-    def _check(self, goal: RecoveryGoal) -> tuple[int, str] | None:
-        """1. Accept only a behaviour that is loaded and available."""
-        problem = self._plugins.problem(PluginKind.RECOVERY, goal.behavior)
-        return (RecoveryOutcome.INVALID_PLUGIN, problem) if problem else None
+    def _plugin_name(self, goal: RecoveryGoal) -> str:
+        return goal.behavior
 
     def execute(self, job: Job) -> RecoveryResultMessage:
         """2. and 3.: run the behaviour, on the slot's thread."""
-        handle = job.handle
-        plugin = self._plugins.get(PluginKind.RECOVERY, handle.goal.behavior)
+        handle, plugin = job.handle, self._plugin(job)
         self.runtime.events.emit(EventKind.RECOVERY, self.name, goal_id=handle.id, slot=job.slot, plugin=plugin.name)
         # 2. Run the behaviour, with the maps kept alive, under patience.
-        run: PluginRun[AbstractRecovery] = PluginRun(
-            self.runtime,
-            plugin,
-            handle,
-            patience=lambda: self.runtime.parameters.recovery_patience,
-            on_abandon=lambda: self._abandon(job, run, execution),
-        )
+        run = self._supervise(job, plugin, lambda reason: execution.motion.revoke(reason))
         execution = RecoveryExecution(run)
         with run, run.map_in_use():
             result = execution.execute()
@@ -60,17 +52,6 @@ class RecoveryAction(Action[RecoveryGoal, RecoveryResultMessage, NoFeedback]):
         verdict = "done" if is_success(result.outcome) else "failed"
         message = result.message or f"recovery {plugin.name!r} {verdict}"
         return RecoveryResultMessage(int(result.outcome), message, used_plugin=plugin.name)
-
-    def _abandon(self, job: Job, run: PluginRun[AbstractRecovery], execution: RecoveryExecution) -> None:
-        """Stop the robot under a behaviour that hangs, then end its goal."""
-        execution.motion.revoke("the behaviour hangs")
-        if job.handle.cancel_requested:
-            text = f"{job.handle.cancel_reason}; {run.suspect} has not ended yet"
-            job.abandon(RecoveryOutcome.CANCELED, text)
-        else:
-            patience = self.runtime.parameters.recovery_patience
-            text = f"{run.suspect} did not come back within {patience:g} s and its grace"
-            job.abandon(RecoveryOutcome.PAT_EXCEEDED, text)
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> RecoveryResultMessage:
         """Result of a goal that ended before or without its behaviour."""

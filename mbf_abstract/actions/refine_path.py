@@ -4,56 +4,47 @@ from __future__ import annotations
 
 from typing import Any
 
-from mbf_abstract.actions.action import Action, GoalJob
-from mbf_abstract.events import EventKind
-from mbf_abstract.execution.plugin_run import PluginRun
+from mbf_abstract.actions.action import GoalJob
+from mbf_abstract.actions.plugin_action import PluginAction
 from mbf_abstract.execution.refiner import RefinerExecution
-from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.goal_types import NoFeedback, RefinePathGoal, RefinePathResult
 from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import AbstractRefiner, PluginKind, RefineResult
-from mbf_abstract.server.plugin_table import PluginTable
 
 Handle = GoalHandle[RefinePathGoal, RefinePathResult, NoFeedback]
 Job = GoalJob[RefinePathGoal, RefinePathResult, NoFeedback]
 
 
-class RefinePathAction(Action[RefinePathGoal, RefinePathResult, NoFeedback]):
+class RefinePathAction(PluginAction[RefinePathGoal, RefinePathResult, NoFeedback, AbstractRefiner]):
     """Refines paths."""
 
     name = "refine_path"
+    kind = PluginKind.REFINER
     canceled_outcome = RefinePathOutcome.CANCELED
+    patience_outcome = RefinePathOutcome.STOPPED
     invalid_plugin_outcome = RefinePathOutcome.FAILURE
     internal_error_outcome = RefinePathOutcome.INTERNAL_ERROR
 
-    def __init__(self, runtime: Runtime, plugins: PluginTable) -> None:
-        super().__init__(runtime)
-        self._plugins = plugins
+    @property
+    def patience(self) -> float:
+        """Time [s] for all calls of the refiner together, as for a planner: one that hangs must not hold its slot."""
+        return self.runtime.parameters.planner_patience
 
-    def _check(self, goal: RefinePathGoal) -> tuple[int, str] | None:
-        """1. Accept only a loaded refiner and a path with poses."""
-        problem = self._plugins.problem(PluginKind.REFINER, goal.refiner)
-        if not problem and len(goal.path) == 0:
-            problem = "the path has no poses"
-        return (RefinePathOutcome.FAILURE, problem) if problem else None
+    def _plugin_name(self, goal: RefinePathGoal) -> str:
+        return goal.refiner
+
+    def _problem(self, goal: RefinePathGoal) -> tuple[int, str] | None:
+        """1. Accept only a path with poses."""
+        return (RefinePathOutcome.FAILURE, "the path has no poses") if len(goal.path) == 0 else None
 
     def execute(self, job: Job) -> RefinePathResult:
         """2. and 3.: refine, on the slot's thread."""
-        handle = job.handle
-        plugin = self._plugins.get(PluginKind.REFINER, handle.goal.refiner)
-        self.runtime.events.emit(
-            EventKind.GOAL_STARTED, self.name, goal_id=handle.id, slot=job.slot, plugin=plugin.name
-        )
-        # 2. Refine under the planner's patience: a refiner that hangs must not hold its slot.
-        run: PluginRun[AbstractRefiner] = PluginRun(
-            self.runtime,
-            plugin,
-            handle,
-            patience=lambda: self.runtime.parameters.planner_patience,
-            on_abandon=lambda: job.abandon(*self._hung(plugin.name, handle)),
-        )
+        handle, plugin = job.handle, self._plugin(job)
+        job.report_started(plugin=plugin.name)
+        # 2. Refine under patience and retries.
+        run = self._supervise(job, plugin)
         with run, run.map_in_use():
             result = RefinerExecution(run, handle.goal.path).execute()
         # 3. Measure what changed.
@@ -75,12 +66,6 @@ class RefinePathAction(Action[RefinePathGoal, RefinePathResult, NoFeedback]):
             path_length_ratio=refined.length / original.length if original.length > 0.0 else 1.0,
             refiner=refiner,
         )
-
-    def _hung(self, refiner: str, handle: Handle) -> tuple[int, str]:
-        if handle.cancel_requested:
-            return RefinePathOutcome.CANCELED, f"{handle.cancel_reason}; refiner {refiner!r} has not ended yet"
-        patience = self.runtime.parameters.planner_patience
-        return RefinePathOutcome.STOPPED, f"refiner {refiner!r} gave no answer within {patience:g} s and its grace"
 
     def make_result(self, handle: Handle, outcome: int, message: str) -> RefinePathResult:
         """Result with the path as it was."""

@@ -8,7 +8,7 @@ from typing import Literal
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_area import GoalArea
-from mbf_abstract.maps.relaxation import Slack
+from mbf_abstract.maps.relaxation import NO_SLACK, Slack
 
 ToleranceCheck = Literal["plugin", "either", "exclusive"]
 
@@ -48,7 +48,7 @@ class ArrivalCheck:
 
     def relaxed(self, slack: Slack) -> ArrivalCheck:
         """Return the same rule with tolerances at least as wide as the slack; an area is tolerance enough."""
-        if self.area is not None:
+        if self.area is not None or slack is NO_SLACK:
             return self
         return replace(
             self,

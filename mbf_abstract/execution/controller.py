@@ -8,17 +8,18 @@ Whatever ends the loop, the lease is given back and the robot stands. Difference
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TypeVar
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.drive.velocity_gate import Lease
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
-from mbf_abstract.execution.controller_state import ControllerEnd, ControllerState, Cycle, Plan
-from mbf_abstract.execution.loaded_plugin import PluginFault, PluginNonFinite, checked_answer
+from mbf_abstract.execution.controller_state import ControllerEnd, ControllerState, Plan
 from mbf_abstract.execution.motion_watch import MotionWatch
+from mbf_abstract.execution.plugin_answer import PluginFault, PluginNonFinite
 from mbf_abstract.execution.plugin_run import Abandoned, PluginRun
-from mbf_abstract.geometry import Command, Pose, Twist
+from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformError
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
@@ -38,14 +39,20 @@ class ControllerExecution:
         Answers a plan that came for this running execution, at most once each, else None; raises TransformError for
         a path that can not be brought into the global frame.
     on_cycle : callable
-        Told after every cycle that called the plugin, e.g. to publish feedback.
+        Called with the robot's pose and the result of every cycle that asked the plugin, e.g. to publish feedback.
+
+    Attributes
+    ----------
+    state : ControllerState
+    last_result : ControlResult, optional
+        The plugin's last answer; None if it was never asked for a command.
     """
 
     def __init__(
         self,
         run: PluginRun[AbstractController],
         take_new_plan: Callable[[], Plan | None],
-        on_cycle: Callable[[Cycle], None],
+        on_cycle: Callable[[Pose, ControlResult], None],
     ) -> None:
         self._run = run
         self._runtime = run.runtime
@@ -55,27 +62,25 @@ class ControllerExecution:
         self._failures = 0
         self._cycles = 0
         self._failed_cycles = 0
-        self._last_result: ControlResult | None = None
+        self.last_result: ControlResult | None = None
         self._hold_reason: tuple[int, str] | None = None
         self._motion = MotionWatch(run.runtime)
         self._graceful_stop: Stopwatch | None = None
         self._lease: Lease | None = None
         self.state = ControllerState.INITIALIZED
 
-    @property
-    def last_result(self) -> ControlResult | None:
-        """The plugin's last words; None if it was never asked for a command."""
-        return self._last_result
-
     def execute(self) -> ControllerEnd:
         """Drive until the loop ends; the robot stands when this returns."""
         self._enter(ControllerState.STARTED)
         if not self._run.acquire_plugin():
-            return self._canceled() if self._run.canceled else self._waited_too_long()
+            if self._run.canceled:
+                return self._canceled()
+            return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, self._run.waited)
         self._lease = lease = self._runtime.gate.acquire(f"exe_path {self._run.plugin.name}")
         if lease is None:
-            holder = self._runtime.gate.holder or "nobody (the gate is closed)"
-            return self._end(ControllerState.INTERNAL_ERROR, ExePathOutcome.FAILURE, f"the robot is driven by {holder}")
+            holder = self._runtime.gate.holder
+            text = f"the robot is driven by {holder}" if holder else "the velocity gate is closed"
+            return self._end(ControllerState.INTERNAL_ERROR, ExePathOutcome.FAILURE, text)
         end = ControllerEnd(ControllerState.STOPPED, ExePathOutcome.STOPPED, "stopped")
         began = self._runtime.clock.now()
         try:
@@ -131,7 +136,7 @@ class ControllerExecution:
             return end
         result = self._compute(pose, velocity)
         end = self._judge(result, lease)
-        self._on_cycle(Cycle(pose, velocity, result))
+        self._on_cycle(pose, result)
         return end
 
     def _adopt_new_plan(self) -> ControllerEnd | None:
@@ -194,7 +199,7 @@ class ControllerExecution:
         return state
 
     def _map_problem(self) -> str:
-        """Why the map must not be driven on; a map that cannot even say so must not."""
+        """Why the map must not be driven on: also where its hook raises."""
         try:
             problem: object = self._run.call_beside("the map's map_problem()", self._runtime.map_hooks.map_problem)
         except Abandoned:
@@ -249,13 +254,14 @@ class ControllerExecution:
         controller = self._run.plugin.instance
         request = ControlRequest(pose, velocity, self._run.handle.cancel_token)
         try:
-            answer = self._run.call("compute_velocity_commands", lambda: controller.compute_velocity_commands(request))
-            result = checked_answer(answer, ControlResult, self._run.plugin.name, "compute_velocity_commands")
+            result = self._run.ask(
+                "compute_velocity_commands", lambda: controller.compute_velocity_commands(request), ControlResult
+            )
         except PluginNonFinite as error:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, str(error))
         if result.success and result.command is None:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, "success, but no command")
-        self._last_result = result
+        self.last_result = result
         self._cycles += 1
         self._failed_cycles += not result.success
         return result
@@ -271,26 +277,21 @@ class ControllerExecution:
             return self._handle_cancel()
         if result.success and result.command is not None:
             self._motion.note_command()
-            if self._sent(result.command, lease):
+            if self._write_to_robot(partial(lease.send, result.command)):
                 self._failures = 0
                 self._run.patience_watch.restart()
                 self._enter(ControllerState.GOT_LOCAL_CMD)
                 return None
             result = ControlResult(ExePathOutcome.FAILURE, f"the command did not reach the robot: {lease.problem}")
-            self._last_result = result
+            self.last_result = result
         return self._count_failure(result, lease)
-
-    def _sent(self, command: Command, lease: Lease) -> bool:
-        return self._write_to_robot(lambda: lease.send(command))
 
     def _count_failure(self, result: ControlResult, lease: Lease) -> ControllerEnd | None:
         """Stop after a failed cycle; the end, once there were too many or the patience is over."""
         parameters = self._runtime.parameters
         self._failures += 1
-        if parameters.force_stop_on_retry or result.command is None:
-            self._write_to_robot(lease.stop)
-        else:
-            self._sent(result.command, lease)
+        command = None if parameters.force_stop_on_retry else result.command
+        self._write_to_robot(lease.stop if command is None else partial(lease.send, command))
         if self._failures > parameters.controller_max_retries >= 0:
             text = result.message or f"{self._failures} failed cycle(s) in a row"
             return self._end(ControllerState.MAX_RETRIES, result.outcome, text)
@@ -308,15 +309,12 @@ class ControllerExecution:
         return self._end(ControllerState.ROBOT_DISABLED if stuck else ControllerState.OSCILLATING, *problem)
 
     # ------------------------------------------------------------------------------------------- ends
-    def _canceled(self, last_words: str = "") -> ControllerEnd:
-        text = self._run.handle.cancel_reason or last_words or "the controller canceled"
+    def _canceled(self, message: str = "") -> ControllerEnd:
+        text = self._run.handle.cancel_reason or message or "the controller canceled"
         return self._end(ControllerState.CANCELED, ExePathOutcome.CANCELED, text)
 
-    def _waited_too_long(self) -> ControllerEnd:
-        return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, self._run.waiting_text())
-
     def _patience_end(self) -> ControllerEnd:
-        last = self._last_result.message if self._last_result is not None else ""
+        last = self.last_result.message if self.last_result is not None else ""
         text = f"no valid command for {self._run.patience:g} s" + (f"; the controller said: {last}" if last else "")
         return self._end(ControllerState.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED, text)
 
@@ -347,11 +345,5 @@ class ControllerExecution:
         """Record a change of state; the two states of a healthy cycle are not worth an event each."""
         quiet = {ControllerState.CONTROLLING, ControllerState.GOT_LOCAL_CMD}
         if state is not self.state and not (state in quiet and self.state in quiet):
-            self._runtime.events.emit(
-                EventKind.STATE_CHANGED,
-                "controller_execution",
-                goal_id=self._run.handle.id,
-                old=self.state.value,
-                new=state.value,
-            )
+            self._run.report_state("controller_execution", self.state.value, state.value)
         self.state = state

@@ -1,4 +1,4 @@
-"""What a controller execution takes and reports: its states, its plan, what a cycle knew, how it ended."""
+"""What a controller execution takes and reports: its plan, its states, how it ended."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from enum import Enum
 
 from mbf_abstract.execution.arrival import ArrivalCheck
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.geometry import Path, Pose, Twist
-from mbf_abstract.plugins import ControlResult
+from mbf_abstract.geometry import Path
 
 
 class ControllerState(Enum):
@@ -42,15 +41,6 @@ class ControllerEnd:
     state: ControllerState
     outcome: int
     message: str
-
-
-@dataclass(frozen=True)
-class Cycle:
-    """What one cycle knew, for feedback."""
-
-    pose: Pose
-    velocity: Twist
-    result: ControlResult
 
 
 @dataclass(frozen=True)

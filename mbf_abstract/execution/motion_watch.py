@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 
-from mbf_abstract.execution.oscillation import OscillationDetector
 from mbf_abstract.execution.path_tracker import PathTracker
-from mbf_abstract.execution.progress import ProgressDetector
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.outcomes import ExePathOutcome
-from mbf_abstract.time.clock import Stopwatch
+from mbf_abstract.time.clock import Clock, Stopwatch
+
+LEAST_PROGRESS = 0.1
+"""Progress along the path [m], or rotation towards the final heading [rad], that counts."""
+NEAR_END = 0.5
+"""Length [m] left of the path below which turning to the final heading is progress."""
 
 
 class MotionWatch:
@@ -65,3 +68,57 @@ class MotionWatch:
             left = f"{tracker.remaining:.2f} m before the path's end"
             return ExePathOutcome.OSCILLATION, f"no progress in {parameters.progress_timeout:g} s, {left}"
         return None
+
+
+class OscillationDetector:
+    """Fires when for ``timeout`` seconds the robot has neither moved nor turned far from a reference pose.
+
+    Moving at least ``distance`` [m] or turning at least ``angle`` [rad] away from the reference pose makes the present
+    pose the new reference and starts the time again.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self.stopwatch = Stopwatch(clock)
+        self._reference: Pose | None = None
+
+    def reset(self, pose: Pose | None = None) -> None:
+        """Start again, from ``pose`` or from the next one that is checked."""
+        self._reference = pose
+        self.stopwatch.restart()
+
+    def check(self, pose: Pose, timeout: float, distance: float, angle: float) -> bool:
+        """Take in a new pose; True if the robot oscillates. A ``timeout`` of 0 switches the detector off."""
+        if self._reference is None or pose.distance_to(self._reference) >= distance:
+            self.reset(pose)
+        elif pose.angle_to(self._reference) >= angle:
+            self.reset(pose)
+        return timeout > 0.0 and self.stopwatch.elapsed >= timeout
+
+
+class ProgressDetector:
+    """Fires when a robot has come no farther for some time, whatever it does meanwhile.
+
+    Farther is ``LEAST_PROGRESS`` along its path, also where a new one replaces it on the way, or as much nearer to the
+    final heading at its end. Turning, driving to and fro and driving back are none.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self.stopwatch = Stopwatch(clock)
+        self._tracker: PathTracker | None = None
+        self._last = 0.0
+        self._advanced = 0.0
+        self._least_turn = float("inf")
+
+    def check(self, pose: Pose, tracker: PathTracker, timeout: float) -> bool:
+        """Take in this cycle's pose and progress; True if it is time to end. A ``timeout`` of 0 switches it off."""
+        if self._tracker is None:
+            self.stopwatch.restart()
+        if self._tracker is not tracker:
+            self._tracker, self._last = tracker, 0.0
+        self._advanced += tracker.progress - self._last
+        self._last = tracker.progress
+        turn = pose.angle_to(tracker.goal) if tracker.remaining <= NEAR_END else float("inf")
+        if self._advanced >= LEAST_PROGRESS or turn < self._least_turn - LEAST_PROGRESS:
+            self._advanced, self._least_turn = 0.0, min(turn, self._least_turn)
+            self.stopwatch.restart()
+        return 0.0 < timeout <= self.stopwatch.elapsed

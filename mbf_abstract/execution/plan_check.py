@@ -1,7 +1,7 @@
-"""A look at what a planner calls success, and the way of poses and paths into the global frame.
+"""Checks of what a goal asks for and of the path a planner returns, and their transformation to the global frame.
 
-A plugin may lie: an empty path, a path in another frame, or one that starts or ends somewhere else. Each becomes a
-failure that names what is wrong, so that no controller ever follows such a path.
+A planner may report success for an empty path, a path in another frame, or one that starts or ends somewhere else.
+Each becomes a failure that names what is wrong, so that no controller ever follows such a path.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformError
 from mbf_abstract.goals.goal_area import GoalArea
+from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 
@@ -34,12 +35,21 @@ def area_problem(area: GoalArea | None, runtime: Runtime) -> str:
     return f"a goal area must be given in the global frame {frame!r}, got {area.frame_id!r}"
 
 
-def check_path(said: PlanResult, request: PlanRequest, runtime: Runtime, area: GoalArea | None = None) -> PlanResult:
+def arrival_problem(goal: ExePathGoal | MoveBaseGoal, runtime: Runtime) -> str:
+    """Why the tolerances or the goal area of a goal can not be used; empty if they can."""
+    for name in ("dist_tolerance", "angle_tolerance"):
+        value = getattr(goal, name)
+        if value is not None and not value > 0.0:  # not a number is no tolerance either
+            return f"{name} must be positive, got {value}"
+    return area_problem(goal.goal_area, runtime)
+
+
+def check_path(answer: PlanResult, request: PlanRequest, runtime: Runtime, area: GoalArea | None = None) -> PlanResult:
     """Check a successful answer; return it with the path in the global frame, or a failure without a path."""
-    if said.path is None or len(said.path) == 0:
+    if answer.path is None or len(answer.path) == 0:
         return PlanResult(GetPathOutcome.EMPTY_PATH, "the planner reported success but gave no poses")
     try:
-        path = path_in_global_frame(said.path, runtime)
+        path = path_in_global_frame(answer.path, runtime)
     except TransformError as error:
         return PlanResult(GetPathOutcome.TF_ERROR, f"the path can not be brought into the global frame: {error}")
     if area is not None and not area.contains(path[-1]):
@@ -55,4 +65,4 @@ def check_path(said: PlanResult, request: PlanRequest, runtime: Runtime, area: G
         if distance > tolerance + slack:
             text = f"pose {index} of the path is {distance:.2f} m from the {name}, allowed {tolerance + slack:.2f} m"
             return PlanResult(GetPathOutcome.INTERNAL_ERROR, text)
-    return PlanResult(said.outcome, said.message, path, said.cost)
+    return PlanResult(answer.outcome, answer.message, path, answer.cost)

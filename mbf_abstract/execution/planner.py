@@ -19,8 +19,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from mbf_abstract.events import EventKind
-from mbf_abstract.execution.loaded_plugin import PluginFault, checked_answer, plugin_events
+from mbf_abstract.execution.plugin_answer import PluginFault
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.goals.goal_area import GoalArea, plan_to_area
 from mbf_abstract.outcomes import GetPathOutcome
@@ -93,10 +92,7 @@ class PlannerExecution:
 
     def _call(self) -> PlanResult:
         planner = self._run.plugin.instance
-        with plugin_events(self._runtime, self._run.handle.id, self._run.plugin.name, "make_plan") as data:
-            answer = self._run.call("make_plan", lambda: self._plan_with(planner))
-            result = checked_answer(answer, PlanResult, self._run.plugin.name, "make_plan")
-            data.update(outcome=int(result.outcome), message=result.message)
+        result = self._run.ask_reported("make_plan", lambda: self._plan_with(planner), PlanResult)
         self.last_result = result
         return result
 
@@ -107,12 +103,6 @@ class PlannerExecution:
 
     def _enter(self, state: PlannerState) -> PlannerState:
         if state is not self.state:
-            self._runtime.events.emit(
-                EventKind.STATE_CHANGED,
-                "planner_execution",
-                goal_id=self._run.handle.id,
-                old=self.state.value,
-                new=state.value,
-            )
+            self._run.report_state("planner_execution", self.state.value, state.value)
             self.state = state
         return state

@@ -4,22 +4,29 @@ Patience runs from the start of the run (planner, recovery, refiner) or is resta
 is exceeded, or the client cancels, the plugin's token is set and its ``cancel`` called. A plugin that is still inside
 its call after ``cancel_grace`` more seconds is *abandoned*: the goal ends at once, the thread drains, and the
 instance stays quarantined until the call returns. While the goal is paused, or numba compiles a kernel at its first
-use, patience stands still. The same holds
-for calls of the robot's driver and of the map that are made beside the plugin.
+use, patience stands still. The same holds for calls of the robot's driver and of the map that are made beside the
+plugin.
+
+A call of the plugin passes one wrapper, ``PluginRun.call``: it is guarded against hanging, takes its modelled compute
+time, and what it raises becomes a ``PluginFault``. ``ask`` also checks the answer.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Generic, TypeVar
 
 from mbf_abstract.compiling.compilation import unwatch_compiler, watch_compiler
+from mbf_abstract.event_values import error_text
+from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
+from mbf_abstract.execution.plugin_answer import A, PluginFault, PluginNonFinite, checked_answer
 from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.geometry import NonFiniteError
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.plugins import Plugin
-from mbf_abstract.time.clock import Stopwatch
+from mbf_abstract.time.clock import Stopwatch, ThreadDetached
 
 P = TypeVar("P", bound=Plugin)
 T = TypeVar("T")
@@ -46,8 +53,8 @@ class PluginRun(Generic[P]):
     ----------
     suspect : str
         Who is being called, or was called last: the plugin, or a part of the driver or the map. For messages.
-    waited_for : str
-        Who had the plugin, if this run got tired of waiting for it.
+    waited : str
+        How long this run waited for the plugin in vain, and who had it; empty if it got it.
     """
 
     def __init__(
@@ -65,13 +72,12 @@ class PluginRun(Generic[P]):
         self.patience_exceeded = False
         self.abandoned = False
         self.suspect = plugin.title
-        self.waited_for = ""
+        self.waited = ""
         self._patience = patience
         self._on_abandon = on_abandon
         self._condition = runtime.clock.condition()
         self._over = False
         self._call_began: float | None = None
-        self._call_label = ""
         self._stop_asked: float | None = None
         self._hung = False
         self._compiling = False
@@ -109,25 +115,55 @@ class PluginRun(Generic[P]):
         """Present patience limit [s]; 0 = none."""
         return self._patience()
 
+    def report_state(self, execution: str, old: str, new: str) -> None:
+        """Record that an execution of this run has changed its state."""
+        self.runtime.events.emit(EventKind.STATE_CHANGED, execution, goal_id=self.handle.id, old=old, new=new)
+
     def acquire_plugin(self) -> bool:
         """Get the instance for this run; False if canceled or out of patience before it was free."""
-        acquired = self.plugin.acquire(self, lambda: self.canceled or self.is_patience_over())
-        self.waited_for = "" if acquired else self.plugin.user
-        return acquired
+        if self.plugin.acquire(self, lambda: self.canceled or self.is_patience_over()):
+            return True
+        self.waited = f"waited {self.patience:g} s for {self.plugin.title}, which {self.plugin.user} uses"
+        return False
 
-    def waiting_text(self) -> str:
-        """What a goal that ran out of patience while it waited for the plugin has to say."""
-        return f"waited {self.patience:g} s for {self.plugin.title}, which {self.waited_for} uses"
-
+    # --------------------------------------------------------------------------------------- the guarded call
     def call(self, method: str, function: Callable[[], T]) -> T:
         """Call into the plugin; raises PluginFault if it raises, Abandoned if the goal ended meanwhile."""
-        self._begin_call(self.plugin.title)
+        plugin, clock = self.plugin, self.runtime.clock
+        began = self._begin_call(plugin.title)
         watch_compiler(self._compiler_starts, self._compiler_ends)
         try:
-            return self.plugin.call(self.handle.id, method, function, self._declare_hung)
+            with clock.guarded(f"{plugin.name}.{method}", self._declare_hung):
+                answer = function()
+                if plugin.instance.modelled_compute_time > 0.0:
+                    clock.sleep_until(began + plugin.instance.modelled_compute_time)
+                return answer
+        except ThreadDetached:
+            raise
+        except BaseException as error:  # sys.exit() in a plugin must end its goal, not the thread of its slot
+            plugin.report(self.handle.id, method, error)
+            fault = PluginNonFinite if isinstance(error, NonFiniteError) else PluginFault
+            text = f"plugin {plugin.name!r} raised {type(error).__name__} in {method}: {error_text(error)}"
+            raise fault(text) from error
         finally:
             unwatch_compiler()
             self._end_call()
+
+    def ask(self, method: str, function: Callable[[], object], expected: type[A]) -> A:
+        """Call a main method and check its answer; raises as ``call``, also where the answer is no result."""
+        return checked_answer(self.call(method, function), expected, self.plugin.name, method)
+
+    def ask_reported(self, method: str, function: Callable[[], object], expected: type[A]) -> A:
+        """Do the same between two events, for methods that are not called many times a second."""
+        emit = self.runtime.events.emit
+        data: dict[str, object] = {"goal_id": self.handle.id, "method": method}
+        emit(EventKind.PLUGIN_CALL_STARTED, self.plugin.name, **data)
+        try:
+            answer = self.ask(method, function, expected)
+            data.update(outcome=int(answer.outcome), message=answer.message)
+            return answer
+        finally:
+            emit(EventKind.PLUGIN_CALL_ENDED, self.plugin.name, **data)
 
     def call_beside(self, who: str, function: Callable[[], T]) -> T:
         """Call what is no plugin but may hang like one, the driver or the map; raises Abandoned as ``call`` does."""
@@ -141,27 +177,21 @@ class PluginRun(Generic[P]):
     @contextmanager
     def map_in_use(self) -> Iterator[None]:
         """Have the map kept alive for a plugin of this kind."""
-        who = "the map's using_map()"
-        kept: list[AbstractContextManager[None]] = []
+        who, kept, hooks = "the map's using_map()", ExitStack(), self.runtime.map_hooks
         try:
-            self.call_beside(who, lambda: self._keep_map(kept))
+            self.call_beside(who, lambda: kept.enter_context(hooks.using_map(self.plugin.spec.kind)))
         except Abandoned:  # it did come back, but late
-            for keeper in kept:
-                keeper.__exit__(None, None, None)
+            kept.close()
             raise
         try:
             yield
         finally:
-            self.call_beside(who, lambda: kept[0].__exit__(None, None, None))
+            self.call_beside(who, kept.close)
 
-    def _keep_map(self, kept: list[AbstractContextManager[None]]) -> None:
-        keeper = self.runtime.map_hooks.using_map(self.plugin.spec.kind)
-        keeper.__enter__()
-        kept.append(keeper)
-
-    def _begin_call(self, who: str) -> None:
+    def _begin_call(self, who: str) -> float:
         self.suspect = who
-        self._call_began = self.runtime.clock.now()
+        self._call_began = began = self.runtime.clock.now()
+        return began
 
     def _end_call(self) -> None:
         """Note that a call has come back; raises Abandoned if that was too late."""

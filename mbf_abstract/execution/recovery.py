@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbf_abstract.drive.velocity_gate import Lease
-from mbf_abstract.execution.loaded_plugin import PluginFault, checked_answer, plugin_events
+from mbf_abstract.execution.plugin_answer import PluginFault
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
@@ -96,21 +96,14 @@ class RecoveryExecution:
             return self._ended_early(result.message)
         return result
 
-    def _ended_early(self, last_words: str = "") -> RecoveryResult:
-        name, tail = self._run.plugin.name, f"; it said: {last_words}" if last_words else ""
+    def _ended_early(self, message: str = "") -> RecoveryResult:
+        name, tail = self._run.plugin.name, f"; it said: {message}" if message else ""
         if self._run.canceled:
             return RecoveryResult(RecoveryOutcome.CANCELED, f"recovery {name!r} canceled{tail}")
-        if self._run.waited_for:
-            return RecoveryResult(RecoveryOutcome.PAT_EXCEEDED, self._run.waiting_text())
-        return RecoveryResult(
-            RecoveryOutcome.PAT_EXCEEDED, f"recovery {name!r} took over {self._run.patience:g} s{tail}"
-        )
+        text = self._run.waited or f"recovery {name!r} took over {self._run.patience:g} s{tail}"
+        return RecoveryResult(RecoveryOutcome.PAT_EXCEEDED, text)
 
     def _call(self) -> RecoveryResult:
         behavior = self._run.plugin.instance
         request = RecoveryRequest(self.motion, self._run.handle.cancel_token)
-        with plugin_events(self._run.runtime, self._run.handle.id, self._run.plugin.name, "run_behavior") as data:
-            answer = self._run.call("run_behavior", lambda: behavior.run_behavior(request))
-            result = checked_answer(answer, RecoveryResult, self._run.plugin.name, "run_behavior")
-            data.update(outcome=int(result.outcome), message=result.message)
-        return result
+        return self._run.ask_reported("run_behavior", lambda: behavior.run_behavior(request), RecoveryResult)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbf_abstract.execution.loaded_plugin import PluginFault, checked_answer, plugin_events
+from mbf_abstract.execution.plugin_answer import PluginFault
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import Path
 from mbf_abstract.outcomes import RefinePathOutcome
@@ -19,7 +19,7 @@ class RefinerExecution:
     def execute(self) -> RefineResult:
         """Call the refiner until it succeeds or ``refiner_max_retries`` is used up (DEPLETED)."""
         if not self._run.acquire_plugin() and not self._run.canceled:
-            return RefineResult(RefinePathOutcome.STOPPED, self._run.waiting_text())
+            return RefineResult(RefinePathOutcome.STOPPED, self._run.waited)
         if self._run.canceled:
             return RefineResult(RefinePathOutcome.CANCELED, "canceled while waiting for the refiner")
         calls = 0
@@ -49,10 +49,7 @@ class RefinerExecution:
         return None
 
     def _call(self) -> RefineResult:
-        refiner = self._run.plugin.instance
-        token = self._run.handle.cancel_token
-        with plugin_events(self._run.runtime, self._run.handle.id, self._run.plugin.name, "apply_refinement") as data:
-            answer = self._run.call("apply_refinement", lambda: refiner.apply_refinement(self._path, token))
-            result = checked_answer(answer, RefineResult, self._run.plugin.name, "apply_refinement")
-            data.update(outcome=int(result.outcome), message=result.message)
-        return result
+        refiner, token = self._run.plugin.instance, self._run.handle.cancel_token
+        return self._run.ask_reported(
+            "apply_refinement", lambda: refiner.apply_refinement(self._path, token), RefineResult
+        )

@@ -13,7 +13,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from mbf_abstract.drive.robot import RobotStateError
-from mbf_abstract.execution.oscillation import OscillationDetector
+from mbf_abstract.execution.motion_watch import OscillationDetector
 from mbf_abstract.executives.nodes import Decorator
 from mbf_abstract.geometry import Path
 from mbf_abstract.goals.goal_types import ActionResult

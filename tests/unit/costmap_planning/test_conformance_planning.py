@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mbf_abstract.execution.oscillation import OscillationDetector
+from mbf_abstract.execution.motion_watch import OscillationDetector
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_abstract.maps.layers.layer_stack import LayerStack

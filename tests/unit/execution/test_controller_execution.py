@@ -36,7 +36,7 @@ def run_execution(session, plan):
     run = PluginRun(session.server.runtime, plugin, handle, lambda: 5.0, lambda: None)
     handle.cancel_requested = False
     with run:
-        return ControllerExecution(run, lambda: plans.pop() if plans else None, lambda cycle: None).execute()
+        return ControllerExecution(run, lambda: plans.pop() if plans else None, lambda pose, result: None).execute()
 
 
 def test_f277_started_without_a_plan(make_session):

@@ -1,0 +1,49 @@
+"""What a plugin may answer, and the faults of one that answers something else or raises."""
+
+from __future__ import annotations
+
+import numbers
+from typing import Protocol, TypeVar
+
+MAX_OUTCOME = 2**32 - 1  # outcomes are unsigned integers of 32 bits in ``mbf_msgs``
+
+
+class Answer(Protocol):
+    """What the results of all plugins have."""
+
+    @property
+    def outcome(self) -> int:
+        """Outcome code."""
+
+    @property
+    def message(self) -> str:
+        """Text, may be empty."""
+
+
+A = TypeVar("A", bound=Answer)
+
+
+class PluginFault(Exception):
+    """A plugin raised, or returned something that is no result; the text names plugin, type and message."""
+
+
+class PluginNonFinite(PluginFault):
+    """A plugin made a pose, path or command that is not finite."""
+
+
+def checked_answer(answer: object, expected: type[A], plugin: str, method: str) -> A:
+    """Return a plugin's answer if it is a result that can be passed on; raises PluginFault if it is not."""
+    if not isinstance(answer, expected):
+        raise PluginFault(f"plugin {plugin!r} returned {type(answer).__name__} from {method}, not {expected.__name__}")
+    outcome: object = answer.outcome
+    message: object = answer.message
+    problem = ""
+    if isinstance(outcome, bool) or not isinstance(outcome, numbers.Integral):
+        problem = f"an outcome of type {type(outcome).__name__}, not an integer"
+    elif not 0 <= int(outcome) <= MAX_OUTCOME:
+        problem = f"an outcome that is not within 0 and {MAX_OUTCOME}"  # may have too many digits to be printed
+    elif not isinstance(message, str):
+        problem = f"a message of type {type(message).__name__}, not str"
+    if problem:
+        raise PluginFault(f"plugin {plugin!r} returned {problem}, from {method}")
+    return answer
