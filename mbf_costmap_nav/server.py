@@ -23,7 +23,7 @@ from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.server.map_server import MapServer
 from mbf_costmap_nav.files.map_description import MapError
-from mbf_costmap_nav.files.map_io import load_map_file
+from mbf_costmap_nav.files.map_io import load_map
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
@@ -135,7 +135,7 @@ class CostmapNavigationServer(MapServer):
         if file.suffix.lower() not in MAP_SUFFIXES:
             return None
         try:
-            content = load_map_file(file).axis_aligned()
+            content = load_map(file).axis_aligned()
         except MapError as error:
             raise ConfigError([Finding(str(error.file), 1, "", "a map", error.reason)]) from error
         return FloorMap(content.occupancy, content.resolution, *content.origin[:2])

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.control.path_handling import ControlCycle
-from mbf_costmap_nav.critics import ALL_CRITICS, Critic, CriticParameters, Rollouts
-from mbf_costmap_nav.critics.obstacle import COLLISION
+from mbf_costmap_nav.critics import CRITICS, CriticParameters, Rollouts
+from mbf_costmap_nav.critics.obstacle_critic import COLLISION
 from mbf_costmap_nav.grid.costmap import INSCRIBED, LETHAL
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.kernels.control.rollout import integrate
@@ -19,12 +18,6 @@ Float32Array = NDArray[np.float32]
 
 PATH_SPACING = 0.1
 """Distance [m] of the path points the critics compare with."""
-
-
-def build_critics(weights: CriticParameters) -> Mapping[str, Critic]:
-    """All critics that have a weight; the obstacle critic always, because it marks collisions."""
-    chosen = {name: getattr(weights, name) for name in ALL_CRITICS}
-    return {name: ALL_CRITICS[name](weight) for name, weight in chosen.items() if weight > 0.0 or name == "obstacle"}
 
 
 def roll_out(
@@ -98,13 +91,16 @@ def _free_points(cycle: ControlCycle, points: NDArray[np.float64]) -> NDArray[np
     return free
 
 
-def score(critics: Mapping[str, Critic], rollouts: Rollouts) -> Float32Array:
-    """Sum (samples,) of the weighted critics; a collision costs ``COLLISION``."""
+def score(weights: CriticParameters, rollouts: Rollouts) -> Float32Array:
+    """Sum (samples,) of the weighted critics; a collision costs ``COLLISION``, whatever the obstacles' weight."""
     total = np.zeros(rollouts.samples, dtype=np.float32)
-    for critic in critics.values():
-        cost = critic.score(rollouts)
+    for name, critic in CRITICS.items():
+        weight = getattr(weights, name)
+        if weight == 0.0 and name != "obstacle":
+            continue
+        cost = critic(rollouts)
         if cost is not None:
-            total += np.float32(critic.weight) * cost
+            total += np.float32(weight) * cost
     total[rollouts.collided] += np.float32(COLLISION)
     return total
 

@@ -20,11 +20,10 @@ from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower
-from mbf_costmap_nav.control.trajectory_scoring import build_critics, is_free, roll_out, score
+from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score
 from mbf_costmap_nav.critics import CriticParameters
-from mbf_costmap_nav.critics.obstacle import COLLISION
+from mbf_costmap_nav.critics.obstacle_critic import COLLISION
 from mbf_costmap_nav.kernels.control.rollout import clip_velocities
-from mbf_costmap_nav.plugins import CostmapContext
 
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
@@ -58,14 +57,6 @@ class DwaController(PathFollower):
     Parameters: ClassVar[type[PluginParameters]] = DwaParameters
     parameters: DwaParameters
 
-    def __init__(self, context: CostmapContext) -> None:
-        super().__init__(context)
-        self._critics = build_critics(self.parameters.critics)
-
-    def parameters_changed(self) -> None:
-        """Take over new weights."""
-        self._critics = build_critics(self.parameters.critics)
-
     @property
     def turns_on_the_spot(self) -> bool:
         """Always true."""
@@ -86,7 +77,7 @@ class DwaController(PathFollower):
         steps = max(2, round(p.sim_time / p.sim_step))
         velocities = self._ramps(cycle, candidates, steps)
         rollouts = roll_out(cycle, velocities, p.sim_step, p.max_vel_x * p.sim_time)
-        costs = score(self._critics, rollouts)
+        costs = score(p.critics, rollouts)
         checked_steps = round(p.footprint_check_time / cycle.limit_factor / p.sim_step)
         for sample in np.argsort(costs, kind="stable").tolist():
             if costs[sample] >= COLLISION:

@@ -28,9 +28,9 @@ from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult, PlannedMotion
 from mbf_costmap_nav.control.path_handling import ControlCycle, PathFollower
-from mbf_costmap_nav.control.trajectory_scoring import build_critics, is_free, roll_out, score
+from mbf_costmap_nav.control.trajectory_scoring import is_free, roll_out, score
 from mbf_costmap_nav.critics import CriticParameters
-from mbf_costmap_nav.critics.obstacle import COLLISION
+from mbf_costmap_nav.critics.obstacle_critic import COLLISION
 from mbf_costmap_nav.kernels.control.rollout import add_noise, blend, clip_velocities, integrate
 from mbf_costmap_nav.plugins import CostmapContext
 
@@ -105,9 +105,8 @@ class MppiController(PathFollower):
         self.parameters_changed()
 
     def parameters_changed(self) -> None:
-        """Take over new weights and limits."""
+        """Take over new limits."""
         p = self.parameters
-        self._critics = build_critics(p.critics)
         sideways = p.max_vel_y if p.motion_model == "omni" else 0.0
         self._low = np.array([p.min_vel_x, -sideways, -p.max_vel_theta], dtype=np.float32)
         self._high = np.array([p.max_vel_x, sideways, p.max_vel_theta], dtype=np.float32)
@@ -182,7 +181,7 @@ class MppiController(PathFollower):
         self._clip(cycle, velocities)
         reach = p.max_vel_x * p.model_dt * p.time_steps
         rollouts = roll_out(cycle, velocities, p.model_dt, reach, self._poses, self._radius)
-        costs = score(self._critics, rollouts)
+        costs = score(p.critics, rollouts)
         if rollouts.collided.all():
             return None
         controls = blend(velocities, costs + self._control_cost(velocities), p.temperature, self._smoothing)[:, :, None]

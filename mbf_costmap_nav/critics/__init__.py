@@ -1,28 +1,24 @@
-"""Trajectory critics, one a file: each adds one term to the cost of every sampled trajectory.
+"""The terms of a trajectory's cost that MPPI and DWA share.
 
-``costmap.mppi`` and ``costmap.dwa`` score with the same critics; their weights differ. To add one, derive
-``critics.base.Critic`` in a file of its own and list it in ``ALL_CRITICS``.
+A critic is a function from ``Rollouts`` to one cost a sample, (samples,) float32 without the weight, or None where it
+does not apply, as the goal's far from the goal. To add one, write the function, list it in ``CRITICS``, and add its
+weight to ``CriticParameters`` under the same name.
 """
 
-from mbf_costmap_nav.critics.base import Critic, CriticParameters, Rollouts
-from mbf_costmap_nav.critics.goal import GoalCritic
-from mbf_costmap_nav.critics.goal_angle import GoalAngleCritic
-from mbf_costmap_nav.critics.obstacle import ObstacleCritic
-from mbf_costmap_nav.critics.path_align import PathAlignCritic
-from mbf_costmap_nav.critics.path_angle import PathAngleCritic
-from mbf_costmap_nav.critics.path_follow import PathFollowCritic
-from mbf_costmap_nav.critics.prefer_forward import PreferForwardCritic
-from mbf_costmap_nav.critics.twirling import TwirlingCritic
+from collections.abc import Callable
 
-ALL_CRITICS: dict[str, type[Critic]] = {
-    "obstacle": ObstacleCritic,
-    "goal": GoalCritic,
-    "goal_angle": GoalAngleCritic,
-    "path_align": PathAlignCritic,
-    "path_follow": PathFollowCritic,
-    "path_angle": PathAngleCritic,
-    "prefer_forward": PreferForwardCritic,
-    "twirling": TwirlingCritic,
+from mbf_costmap_nav.critics.goal_critics import goal, goal_angle
+from mbf_costmap_nav.critics.motion_critics import prefer_forward, twirling
+from mbf_costmap_nav.critics.obstacle_critic import obstacle
+from mbf_costmap_nav.critics.path_critics import path_align, path_angle, path_follow
+from mbf_costmap_nav.critics.rollouts import CriticParameters, Float32Array, Rollouts
+
+Critic = Callable[[Rollouts], Float32Array | None]
+
+CRITICS: dict[str, Critic] = {
+    critic.__name__: critic
+    for critic in (obstacle, goal, goal_angle, path_align, path_follow, path_angle, prefer_forward, twirling)
 }
+"""The critics in the order in which their costs are summed up, by the names of their weights."""
 
-__all__ = ["ALL_CRITICS", "Critic", "CriticParameters", "Rollouts"]
+__all__ = ["CRITICS", "Critic", "CriticParameters", "Rollouts"]

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
@@ -102,7 +101,10 @@ class OccupancyMap:
 
 
 def load_map(file: Path | str, max_cells: int = MAX_CELLS, *, confined: bool = False) -> OccupancyMap:
-    """Read a map_server YAML file and the image it names.
+    """Read a map_server YAML file and the image it names, or a bare image.
+
+    A bare image is described by the YAML file of the same name beside it; without one its cells have
+    ``BARE_IMAGE_RESOLUTION`` and its lower left corner is the origin.
 
     Parameters
     ----------
@@ -115,6 +117,10 @@ def load_map(file: Path | str, max_cells: int = MAX_CELLS, *, confined: bool = F
         Either file is invalid, or the map has more than ``max_cells`` cells.
     """
     file = Path(file)
+    if file.suffix.lower() in IMAGE_SUFFIXES:
+        if not file.with_suffix(".yaml").is_file():
+            return load_image(file, BARE_IMAGE_RESOLUTION, max_cells=max_cells)
+        file = file.with_suffix(".yaml")
     description = read_description(file)
     image = file.parent / description.image
     if confined and not _lies_in(image, file.parent):
@@ -138,23 +144,8 @@ def load_costmap(
     confined: bool = False,
     max_cells: int = MAX_CELLS,
 ) -> Costmap:
-    """Read a map_server YAML file, or a bare image, as a costmap, see ``OccupancyMap.to_costmap``."""
-    occupancy = load_map_file(file, confined=confined, max_cells=max_cells)
-    return occupancy.to_costmap(frame_id, track_unknown_space, max_cells)
-
-
-def load_map_file(file: Path | str, *, confined: bool = False, max_cells: int = MAX_CELLS) -> OccupancyMap:
-    """Read a map_server YAML file, or a bare image.
-
-    A bare image is described by the YAML file of the same name beside it; without one its cells have
-    ``BARE_IMAGE_RESOLUTION`` and its lower left corner is the origin.
-    """
-    file = Path(file)
-    description = file.with_suffix(".yaml") if file.suffix.lower() in IMAGE_SUFFIXES else file
-    bare = description != file and not description.is_file()
-    if bare:
-        return load_image(file, BARE_IMAGE_RESOLUTION, max_cells=max_cells)
-    return load_map(description, max_cells, confined=confined)
+    """Read a map as ``load_map`` and turn it into a costmap, see ``OccupancyMap.to_costmap``."""
+    return load_map(file, max_cells, confined=confined).to_costmap(frame_id, track_unknown_space, max_cells)
 
 
 def load_image(
@@ -225,76 +216,3 @@ def _decode(file: Path, max_cells: int, description: MapDescription) -> Occupanc
     if description.mode is MapMode.SCALE:
         occupancy[pixels[..., 1] < 255] = UNKNOWN_OCCUPANCY
     return OccupancyMap(np.ascontiguousarray(occupancy[::-1]), description.resolution, description.origin)
-
-
-def save_map(
-    file: Path | str,
-    content: OccupancyMap,
-    *,
-    image_format: str = "pgm",
-    mode: MapMode | str = MapMode.TRINARY,
-    negate: bool = False,
-    occupied_thresh: float = 0.65,
-    free_thresh: float = 0.196,
-) -> None:
-    """Write ``file`` (YAML) and an image of the same name beside it, so that ``load_map`` gives the same map.
-
-    Parameters
-    ----------
-    image_format : {"pgm", "png", "bmp"}
-    mode : MapMode or its value
-        Trinary keeps 0, 100 and unknown; raw keeps every value; scale keeps 0..100, and unknown only in a png.
-    occupied_thresh, free_thresh : float
-        In scale mode 99 exists only if ``occupied_thresh`` is a multiple of 1/255, such as 0.6.
-
-    Raises
-    ------
-    MapError
-        The map is empty or holds an occupancy that this mode and these thresholds cannot express, an argument is not
-        legal, ``file`` has the image's name, or a file cannot be written.
-    """
-    file = Path(file)
-    image_file = file.with_suffix(f".{image_format}")
-    if image_format not in ("pgm", "png", "bmp"):
-        raise MapError(image_file, f"image_format must be pgm, png or bmp, got {image_format!r}")
-    if image_file == file:
-        raise MapError(file, "is the name of the image; the YAML file beside it needs another one, such as .yaml")
-    if content.occupancy.dtype != np.uint8 or content.occupancy.ndim != 2 or content.occupancy.size == 0:
-        got = f"{content.occupancy.dtype} {content.occupancy.shape}"
-        raise MapError(file, f"expected occupancies as (height, width) uint8 with at least one cell, got {got}")
-    keys: dict[str, object] = {
-        "image": image_file.name,
-        "mode": getattr(mode, "value", mode),
-        "resolution": content.resolution,
-        "origin": list(content.origin),
-        "negate": int(negate),
-        "occupied_thresh": occupied_thresh,
-        "free_thresh": free_thresh,
-    }
-    description = validated_description(file, keys)
-    grey, opaque = _encode(image_file, content.occupancy[::-1], description)
-    try:
-        image = Image.fromarray(grey)
-        if not opaque.all():
-            image.putalpha(Image.fromarray(np.where(opaque, np.uint8(255), np.uint8(0))))
-        image.save(image_file, format="PPM" if image_format == "pgm" else image_format.upper())
-        file.write_text(yaml.safe_dump(keys, sort_keys=False), encoding="utf-8")
-    except OSError as error:
-        raise MapError(file, error.strerror or str(error)) from error
-
-
-def _encode(
-    file: Path, occupancy: OccupancyArray, description: MapDescription
-) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-    """Grey values that decode to ``occupancy``, and which pixels are opaque."""
-    occupancy_of_grey = description.occupancy_of_grey()
-    grey_of_occupancy = np.zeros(256, dtype=np.uint8)
-    grey_of_occupancy[occupancy_of_grey] = np.arange(256)  # of several grey values the brightest wins
-    expressible = np.isin(np.arange(256), occupancy_of_grey)
-    opaque = np.ones(occupancy.shape, dtype=bool)
-    if description.mode is MapMode.SCALE and file.suffix == ".png":
-        opaque = occupancy != UNKNOWN_OCCUPANCY
-    lost = np.setdiff1d(np.unique(occupancy[opaque]), np.flatnonzero(expressible))
-    if lost.size:
-        raise MapError(file, f"mode {description.mode.value} cannot express the occupancies {lost.tolist()}")
-    return grey_of_occupancy[occupancy], opaque

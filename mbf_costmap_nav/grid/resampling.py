@@ -20,6 +20,7 @@ ON_A_BORDER = 1e-6
 """A centre this close [cells] below a border counts as above it, so that rounding cannot move it back and forth: on a
 grid half a cell beside its source every centre lies on one, and each wall would be lost here and twice as thick
 there."""
+_IDENTITY = Transform((0.0, 0.0, 0.0), parent="map", child="map")
 
 
 def sample_costmap(
@@ -42,69 +43,38 @@ def sample_costmap(
     -------
     (box rows, box columns) uint8
     """
+    values = np.full((max(box.y1 - box.y0, 0), max(box.x1 - box.x0, 0)), outside, dtype=np.uint8)
     if box.empty:
-        return np.full((max(box.y1 - box.y0, 0), max(box.x1 - box.x0, 0)), outside, dtype=np.uint8)
+        return values
     if T_source_grid is not None:
-        return _sample_transformed(source, geometry, box, outside, T_source_grid)
-    values = _at_centres(source, geometry, box, outside)
-    if source.resolution < geometry.resolution:
-        columns = _cells_of_centres(source.origin_x, source, source.width, geometry.origin_x, geometry, box.x0)
-        rows = _cells_of_centres(source.origin_y, source, source.height, geometry.origin_y, geometry, box.y0)
-        _raise_by_blocks(values, source.cells, rows, columns)
-    return values
-
-
-def _at_centres(source: Costmap, geometry: GridGeometry, box: CellBox, outside: int) -> CellArray:
-    """Value of the source at the centre of each cell."""
+        _fill_transformed(values, source, geometry, box, T_source_grid)
+        return _raised(values, source, geometry, box, T_source_grid)
     x = geometry.origin_x + (np.arange(box.x0, box.x1) + 0.5) * geometry.resolution
     y = geometry.origin_y + (np.arange(box.y0, box.y1) + 0.5) * geometry.resolution
     ix, iy = _cells(x, source.origin_x, source), _cells(y, source.origin_y, source)
     columns, rows = (ix >= 0) & (ix < source.width), (iy >= 0) & (iy < source.height)
-    values = np.full((len(y), len(x)), outside, dtype=np.uint8)
     values[np.ix_(rows, columns)] = source.cells[np.ix_(iy[rows], ix[columns])]
-    return values
+    if source.resolution >= geometry.resolution:
+        return values  # a centre lies in every cell of the source
+    return _raised(values, source, geometry, box, _IDENTITY)
 
 
-def _cells_of_centres(
-    source_origin: float, source: Costmap, count: int, origin: float, geometry: GridGeometry, start: int
-) -> NDArray[np.int64]:
-    """Index, counted from ``start``, of the cell in which each of the source's ``count`` centres along an axis lies."""
-    centres = source_origin + (np.arange(count) + 0.5) * source.resolution
-    return _cells(centres, origin, geometry) - start
-
-
-def _cells(
-    points: NDArray[np.floating[Any]], lower: float | NDArray[np.float64], grid: GridGeometry
-) -> NDArray[np.int64]:
-    """Index of the cell of ``grid``, counted from its corner ``lower`` [m], in which each point [m] lies."""
-    return np.asarray(np.floor((points - lower) / grid.resolution + ON_A_BORDER), dtype=np.int64)
-
-
-def _raise_by_blocks(values: CellArray, cells: CellArray, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> None:
-    """Raise each value to the highest cost of the source's cells in it; ``rows`` and ``columns`` never fall."""
-    seen_rows = slice(*np.searchsorted(rows, [0, values.shape[0]]).tolist())
-    seen_columns = slice(*np.searchsorted(columns, [0, values.shape[1]]).tolist())
-    into_rows, first_rows = np.unique(rows[seen_rows], return_index=True)
-    into_columns, first_columns = np.unique(columns[seen_columns], return_index=True)
-    if not (into_rows.size and into_columns.size):
-        return
-    costs = _known(cells[seen_rows, seen_columns])
-    highest = np.maximum.reduceat(np.maximum.reduceat(costs, first_rows, axis=0), first_columns, axis=1)
-    place = np.ix_(into_rows, into_columns)
-    values[place] = _higher(values[place], highest)
-
-
-def _sample_transformed(
-    source: Costmap, geometry: GridGeometry, box: CellBox, outside: int, T_source_grid: Transform
-) -> CellArray:
-    values = np.full((box.y1 - box.y0, box.x1 - box.x0), outside, dtype=np.uint8)
-    lower = np.array([geometry.origin_x, geometry.origin_y]) + np.array([box.x0, box.y0]) * geometry.resolution
+def _fill_transformed(
+    values: CellArray, source: Costmap, geometry: GridGeometry, box: CellBox, T_source_grid: Transform
+) -> None:
+    """Give each cell of the box the value of the source at its centre."""
     rows, columns = (axis.ravel() for axis in np.indices(values.shape))
-    centres = lower + (np.column_stack([columns, rows]) + 0.5) * geometry.resolution
+    centres = _corner(geometry, box) + (np.column_stack([columns, rows]) + 0.5) * geometry.resolution
     ix, iy = _cells(mapped(T_source_grid, centres), np.array([source.origin_x, source.origin_y]), source).T
     inside = (ix >= 0) & (ix < source.width) & (iy >= 0) & (iy < source.height)
     values[rows[inside], columns[inside]] = source.cells[iy[inside], ix[inside]]
 
+
+def _raised(
+    values: CellArray, source: Costmap, geometry: GridGeometry, box: CellBox, T_source_grid: Transform
+) -> CellArray:
+    """Raise each value to the highest cost of the source's cells whose centres lie in it."""
+    lower = _corner(geometry, box)
     part = _around(source, lower, values.shape, geometry.resolution, T_source_grid)
     costs = _known(source.cells[part.slices])
     iy, ix = np.nonzero(costs)
@@ -114,6 +84,18 @@ def _sample_transformed(
     highest = np.zeros_like(values)
     np.maximum.at(highest, (y[seen], x[seen]), costs[iy[seen], ix[seen]])
     return _higher(values, highest)
+
+
+def _corner(geometry: GridGeometry, box: CellBox) -> NDArray[np.float64]:
+    """Lower left corner (2,) [m] of a box of cells."""
+    return np.array([geometry.origin_x, geometry.origin_y]) + np.array([box.x0, box.y0]) * geometry.resolution
+
+
+def _cells(
+    points: NDArray[np.floating[Any]], lower: float | NDArray[np.float64], grid: GridGeometry
+) -> NDArray[np.int64]:
+    """Index of the cell of ``grid``, counted from its corner ``lower`` [m], in which each point [m] lies."""
+    return np.asarray(np.floor((points - lower) / grid.resolution + ON_A_BORDER), dtype=np.int64)
 
 
 def _around(

@@ -76,45 +76,22 @@ def rotated_to_axes(
         The new grid has more than ``max_cells`` cells.
     """
     shape, lower = axis_aligned_shape(occupancy.shape, yaw, max_cells)
-    upright = np.full(shape, UNKNOWN_OCCUPANCY, dtype=np.uint8)
-    rotation = plane_rotation(yaw)
-    for block in _row_blocks(shape):
-        _fill(upright, block, occupancy, lower, rotation)
-    for block in _row_blocks(occupancy.shape):
-        _write_obstacles(upright, block, occupancy, lower, rotation)
-    return upright, (float(lower[0]), float(lower[1]))
+    (height, width), rotation = occupancy.shape, plane_rotation(yaw)
+    aligned = np.full(shape, UNKNOWN_OCCUPANCY, dtype=np.uint8)
+    for block in _row_blocks(shape):  # 1. Each new cell takes the value at its centre.
+        columns, rows = np.meshgrid(np.arange(shape[1]), np.arange(block.start, block.stop))
+        source = np.floor(rotated_back(rotation, np.stack([columns, rows], axis=-1) + 0.5 + lower)).astype(np.int64)
+        inside = np.all((source >= 0) & (source < (width, height)), axis=-1)
+        aligned[block][inside] = occupancy[source[inside][:, 1], source[inside][:, 0]]
+    for block in _row_blocks(occupancy.shape):  # 2. Occupied cells are also written where their own centres lie.
+        part = occupancy[block]
+        iy, ix = np.nonzero((part >= OCCUPIED) & (part != UNKNOWN_OCCUPANCY))
+        points = rotated(rotation, np.column_stack([ix, iy + block.start]) + 0.5) - lower
+        cells = np.minimum(points.astype(np.int64), (shape[1] - 1, shape[0] - 1))
+        aligned[cells[:, 1], cells[:, 0]] = part[iy, ix]
+    return aligned, (float(lower[0]), float(lower[1]))
 
 
 def _row_blocks(shape: tuple[int, ...]) -> Iterator[slice]:
     rows = max(1, BLOCK_CELLS // shape[1])
     return (slice(start, min(start + rows, shape[0])) for start in range(0, shape[0], rows))
-
-
-def _fill(
-    upright: OccupancyArray,
-    block: slice,
-    occupancy: OccupancyArray,
-    lower: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-) -> None:
-    """Give each cell of the block the value at its centre."""
-    height, width = occupancy.shape
-    columns, rows = np.meshgrid(np.arange(upright.shape[1]), np.arange(block.start, block.stop))
-    source = np.floor(rotated_back(rotation, np.stack([columns, rows], axis=-1) + 0.5 + lower)).astype(np.int64)
-    inside = np.all((source >= 0) & (source < (width, height)), axis=-1)
-    upright[block][inside] = occupancy[source[inside][:, 1], source[inside][:, 0]]
-
-
-def _write_obstacles(
-    upright: OccupancyArray,
-    block: slice,
-    occupancy: OccupancyArray,
-    lower: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-) -> None:
-    """Write the occupied cells of the old block where their centres lie."""
-    part = occupancy[block]
-    rows, columns = np.nonzero((part >= OCCUPIED) & (part != UNKNOWN_OCCUPANCY))
-    points = rotated(rotation, np.column_stack([columns, rows + block.start]) + 0.5) - lower
-    cells = np.minimum(points.astype(np.int64), (upright.shape[1] - 1, upright.shape[0] - 1))
-    upright[cells[:, 1], cells[:, 0]] = part[rows, columns]

@@ -15,50 +15,31 @@ from __future__ import annotations
 import numpy as np
 
 from mbf_abstract.geometry import Pose
-from mbf_abstract.maps.layers.layer import LayerParameters
-from mbf_abstract.parameters import parameter
-from mbf_costmap_nav.files.map_io import load_costmap
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
-from mbf_costmap_nav.grid.placement import Placement
 from mbf_costmap_nav.grid.resampling import sample_costmap
-from mbf_costmap_nav.grid.zones import Zone, load_zones
 from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon
-from mbf_costmap_nav.map.layer import CombinationMethod, CostmapLayer, LayerContext, combine
+from mbf_costmap_nav.map.area_layer import AreaLayer, AreaLayerParameters
+from mbf_costmap_nav.map.layer import CombinationMethod, LayerContext, combine
 
 
-class KeepoutLayerParameters(LayerParameters):
+class KeepoutLayerParameters(AreaLayerParameters):
     """Parameters of the keep-out layer."""
 
-    zones: tuple[Zone, ...] = parameter((), "Polygons written in place.", dynamic=False)
-    zones_file: str = parameter("", "YAML file with more polygons.", dynamic=False)
-    mask_file: str = parameter("", "map_server YAML file of a mask image.", dynamic=False)
-    map_frame: str = parameter("", "Frame of zones and mask; empty = the costmap's.", dynamic=False)
 
-
-class KeepoutLayer(CostmapLayer):
-    """Forbidden areas; clearing the costmap does not remove them. See the module's text for when to use it."""
+class KeepoutLayer(AreaLayer):
+    """Forbidden areas. See the module's text for when to use it."""
 
     Parameters = KeepoutLayerParameters
-    clearable = False
-    parameters: KeepoutLayerParameters
 
     def __init__(self, context: LayerContext) -> None:
         super().__init__(context)
-        files = self.parameters
-        self._zones = files.zones + (load_zones(context.base_folder / files.zones_file) if files.zones_file else ())
-        self._mask = None
-        if files.mask_file:
-            mask_file = context.base_folder / files.mask_file
-            self._mask = load_costmap(
-                mask_file, context.frame_id, confined=context.confine_images, max_cells=context.max_cells
-            )
-        self._placement = Placement(files.map_frame, context)
+        self._costs = self.mask.to_costmap(context.frame_id) if self.mask is not None else None
         self._changed = EMPTY_BOX
 
     @property
     def permanent(self) -> bool:
         """Whether its areas are in the costmap's frame."""
-        return self._placement.in_costmap_frame
+        return self.placement.in_costmap_frame
 
     def match_geometry(self, geometry: GridGeometry) -> None:
         """Paint the areas onto the grid."""
@@ -73,26 +54,22 @@ class KeepoutLayer(CostmapLayer):
     def _paint(self) -> None:
         grid = self.geometry
         self.cells: CellArray = np.full((grid.height, grid.width), UNKNOWN, dtype=np.uint8)
-        if not self._placement.known:
+        if not self.placement.known:
             return
-        if self._mask is not None:
-            self.cells[:] = sample_costmap(self._mask, grid, grid.box, UNKNOWN, self._placement.T_data_costmap)
+        if self._costs is not None:
+            self.cells[:] = sample_costmap(self._costs, grid, grid.box, UNKNOWN, self.placement.T_data_costmap)
             self.cells[self.cells == FREE] = UNKNOWN
-        for zone in self._zones:
-            corners = self._placement.to_costmap(zone.corners) - (grid.origin_x, grid.origin_y)
+        for zone in self.zones:
+            corners = self.placement.to_costmap(zone.corners) - (grid.origin_x, grid.origin_y)
             fill_polygon(self.cells, corners / grid.resolution, LETHAL)
         self._changed = grid.box
 
     def update_bounds(self, robot_pose: Pose | None, now: float, box: CellBox) -> CellBox:
         """Report everything once after painting."""
-        if self._placement.refresh():
+        if self.placement.refresh():
             self._paint()
         changed, self._changed = self._changed, EMPTY_BOX
         return box.union(changed)
-
-    def stale_reason(self, now: float) -> str:
-        """Why the areas cannot be placed: their frame is unknown."""
-        return self._placement.problem
 
     def update_costs(self, cells: CellArray, box: CellBox) -> None:
         """Raise costs to those of the areas."""

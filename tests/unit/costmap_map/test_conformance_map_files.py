@@ -7,7 +7,8 @@ import pytest
 from PIL import Image
 
 from mbf_costmap_nav.files.map_description import UNKNOWN_OCCUPANCY, MapError, MapMode
-from mbf_costmap_nav.files.map_io import OccupancyMap, load_image, load_map, save_map
+from mbf_costmap_nav.files.map_io import OccupancyMap, load_image, load_map
+from mbf_costmap_nav.files.map_saver import save_map
 from mbf_costmap_nav.grid import rotated_map as turned_map
 
 # yaml file: (width, height, resolution, free, occupied, other cells)

@@ -12,7 +12,8 @@ from pydantic import ValidationError
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer_list import LayerListError
 from mbf_costmap_nav.files.map_description import MapError, MapMode
-from mbf_costmap_nav.files.map_io import OccupancyMap, save_map
+from mbf_costmap_nav.files.map_io import OccupancyMap
+from mbf_costmap_nav.files.map_saver import save_map
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import Pose, quaternion_from_yaw
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_costmap_nav.files.map_io import OccupancyMap, save_map
+from mbf_costmap_nav.files.map_io import OccupancyMap
+from mbf_costmap_nav.files.map_saver import save_map
 from mbf_costmap_nav.grid.costmap import LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 

@@ -11,7 +11,8 @@ from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.time.sim_clock import SimClock
-from mbf_costmap_nav.files.map_io import OccupancyMap, save_map
+from mbf_costmap_nav.files.map_io import OccupancyMap
+from mbf_costmap_nav.files.map_saver import save_map
 
 CONFIG = """
 backend: costmap

@@ -13,7 +13,7 @@ from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_costmap_nav.control.trajectory_scoring import footprint_discs
 from mbf_costmap_nav.controllers.dwa import DwaController, sample_velocities, sample_window, slowed_down
 from mbf_costmap_nav.controllers.mppi import MppiController
-from mbf_costmap_nav.critics.obstacle import VALUE_OF_COST
+from mbf_costmap_nav.critics.obstacle_critic import VALUE_OF_COST
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.kernels.control.critics import alignment, furthest_reached, map_costs, mean_angle_to
 from mbf_costmap_nav.kernels.control.rollout import add_noise, clip_velocities, integrate

@@ -1,9 +1,8 @@
-"""What a critic sees and what it must do."""
+"""What the critics look at: sampled trajectories with the path, the goal and the map; and the critics' weights."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -129,14 +128,3 @@ class Rollouts:
     @property
     def _angle_off_path(self) -> float:
         return abs(normalize_angle(self.direction_ahead - float(self.poses[2, 0, 0])))
-
-
-class Critic(ABC):
-    """One term of a trajectory's cost."""
-
-    def __init__(self, weight: float) -> None:
-        self.weight = weight
-
-    @abstractmethod
-    def score(self, rollouts: Rollouts) -> Float32Array | None:
-        """Cost (samples,) without the weight; None where the critic does not apply (e.g. the goal is far)."""

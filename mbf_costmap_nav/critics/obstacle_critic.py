@@ -1,4 +1,4 @@
-"""Keeps away from obstacles: mean cell cost along the trajectory; marks trajectories that collide.
+"""The critic that keeps away from obstacles: mean cell cost along the trajectory; marks trajectories that collide.
 
 The footprint is approximated by a row of discs of the inscribed radius along the robot's x axis, each looked up as one
 cell of the inflated map. Corners stick out of the discs by up to 0.41 inscribed radii; the controllers check the chosen
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbf_costmap_nav.critics.base import Critic, Float32Array, Rollouts
+from mbf_costmap_nav.critics.rollouts import Float32Array, Rollouts
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
 from mbf_costmap_nav.kernels.control.critics import map_costs
 
@@ -23,21 +23,18 @@ VALUE_OF_COST = _VALUES.astype(np.float32)
 """(256,) what a cell adds: 0..1 by its cost, COLLISION from the inscribed one on, nothing if unknown."""
 
 
-class ObstacleCritic(Critic):
-    """Cost of the cells along the trajectory."""
-
-    def score(self, rollouts: Rollouts) -> Float32Array:
-        """Mean over the steps of the most expensive disc; marks ``rollouts.collided``."""
-        grid = rollouts.costmap
-        total = map_costs(
-            grid.cells,
-            grid.resolution,
-            grid.origin_x - rollouts.robot[0],
-            grid.origin_y - rollouts.robot[1],
-            rollouts.poses,
-            rollouts.discs,
-            STRIDE,
-            VALUE_OF_COST,
-        )
-        np.greater_equal(total, np.float32(COLLISION), out=rollouts.collided)
-        return np.asarray(total / np.float32(rollouts.poses.shape[1] / STRIDE))
+def obstacle(rollouts: Rollouts) -> Float32Array:
+    """Mean over the steps of the most expensive disc; marks ``rollouts.collided``."""
+    grid = rollouts.costmap
+    total = map_costs(
+        grid.cells,
+        grid.resolution,
+        grid.origin_x - rollouts.robot[0],
+        grid.origin_y - rollouts.robot[1],
+        rollouts.poses,
+        rollouts.discs,
+        STRIDE,
+        VALUE_OF_COST,
+    )
+    np.greater_equal(total, np.float32(COLLISION), out=rollouts.collided)
+    return np.asarray(total / np.float32(rollouts.poses.shape[1] / STRIDE))
