@@ -27,7 +27,6 @@ from mbf_costmap_nav.files.map_io import load_map
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
-from mbf_costmap_nav.map.served_costmap import ServedCostmap
 from mbf_costmap_nav.planning.nav_core import wrap_nav_core
 from mbf_costmap_nav.plugins import CostmapContext
 
@@ -75,6 +74,7 @@ class CostmapNavigationServer(MapServer):
         "global_costmap": CostmapParameters,
         "local_costmap": CostmapParameters,
     }
+    map_names: ClassVar[Sequence[str]] = ("local", "global")
 
     global_costmap: LayeredCostmap
     local_costmap: LayeredCostmap
@@ -140,7 +140,7 @@ class CostmapNavigationServer(MapServer):
             raise ConfigError([Finding(str(error.file), 1, "", "a map", error.reason)]) from error
         return FloorMap(content.occupancy, content.resolution, *content.origin[:2])
 
-    def _serve(self, config: Config, key: str) -> ServedCostmap:
+    def _serve(self, config: Config, key: str) -> ServedMap[LayeredCostmap]:
         section = config.sections[key]
         parameters = cast(CostmapParameters, section.parameters)
         layer_classes: dict[str, Any] = {layer.type_name: layer.layer_class for layer in section.layers}
@@ -151,4 +151,5 @@ class CostmapNavigationServer(MapServer):
             base_folder=config.path.parent,
             transforms=self.runtime.transforms,
         )
-        return ServedCostmap(costmap, self.runtime, parameters, key)
+        frequency, tolerance = parameters.update_frequency, parameters.transform_tolerance
+        return ServedMap(costmap, self.runtime, key, parameters, frequency, tolerance)

@@ -21,7 +21,7 @@ Two steps, because only the backend's server knows its sections: ``load_config``
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -167,6 +167,7 @@ def validate_config(
     sections: Mapping[str, type[ParameterModel]],
     registry: PluginRegistry,
     declaration: type[PluginDeclaration] = PluginDeclaration,
+    map_names: Sequence[str] = (),
 ) -> Config:
     """Check a whole configuration and load the classes it names.
 
@@ -179,13 +180,15 @@ def validate_config(
         Of the server's backend.
     declaration : type
         Items of the plugin lists.
+    map_names : sequence of str
+        Maps that a plugin's parameters can choose from; parameter models get them as ``info.context["map_names"]``.
 
     Raises
     ------
     ConfigError
         Everything that is wrong with the file.
     """
-    return _Validation(raw, sections, registry, declaration).run()
+    return _Validation(raw, sections, registry, declaration, map_names).run()
 
 
 class _Validation:
@@ -197,6 +200,7 @@ class _Validation:
         sections: Mapping[str, type[ParameterModel]],
         registry: PluginRegistry,
         declaration: type[PluginDeclaration],
+        map_names: Sequence[str],
     ) -> None:
         self.raw = raw
         self.document = raw.document
@@ -204,6 +208,7 @@ class _Validation:
         self.sections = sections
         self.registry = registry
         self.declaration = declaration
+        self.context = {"map_names": map_names}
         self.findings = list(raw.findings)
         self.plugins: list[PluginSpec] = []
         self.skipped: list[SkippedPlugin] = []
@@ -260,10 +265,11 @@ class _Validation:
                 self._report((*path, "type"), f"a type of {kind.value} that loads", repr(declared.type), error.reason)
             return
         block = self.data.get(declared.name)
-        parameters = validate(plugin_class.Parameters, block, self.document, (declared.name,), self.findings)
+        key_path = (declared.name,)
+        parameters = validate(plugin_class.Parameters, block, self.document, key_path, self.findings, self.context)
         if parameters is None:
             return
-        self._inner_plugins(plugin_class, parameters, (declared.name,))
+        self._inner_plugins(plugin_class, parameters, key_path)
         options = declared.model_dump(exclude=set(PluginDeclaration.model_fields))
         line, name = self.document.line(path), declared.name
         spec = PluginSpec(kind, name, declared.type, plugin_class, parameters, options, line, declared.optional)
@@ -280,7 +286,7 @@ class _Validation:
                 self._report((*path, inner.type_key), expected, repr(type_name), error.reason)
                 continue
             block = getattr(parameters, inner.block_key)
-            checked = validate(inner_class.Parameters, block, self.document, block_path, self.findings)
+            checked = validate(inner_class.Parameters, block, self.document, block_path, self.findings, self.context)
             if checked is not None:
                 self._inner_plugins(inner_class, checked, block_path)
 

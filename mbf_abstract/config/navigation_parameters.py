@@ -147,11 +147,11 @@ class NavigationParameters(ParameterModel):
     )
 
     # Life of the maps
-    shutdown_costmaps: bool = parameter(False, "Whether costmaps stop updating while no goal runs.")
+    shutdown_costmaps: bool = parameter(False, "Whether maps, of any kind, stop updating while no goal runs.")
     shutdown_costmaps_delay: float = parameter(
         1.0, "Time after the last goal before they do.", unit="s", ge=0.0, le=60.0
     )
-    clear_on_shutdown: bool = parameter(False, "Whether costmaps forget their obstacles when they stop.", dynamic=False)
+    clear_on_shutdown: bool = parameter(False, "Whether maps forget their obstacles when they stop.", dynamic=False)
     restore_defaults: bool = parameter(False, "Set all dynamic parameters back to their configured values.")
 
     @model_validator(mode="after")

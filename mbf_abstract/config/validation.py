@@ -47,7 +47,12 @@ _NUMBER_ERRORS = {
 
 
 def validate(
-    model: type[Model], data: object, document: YamlDocument, key_path: KeyPath, findings: list[Finding]
+    model: type[Model],
+    data: object,
+    document: YamlDocument,
+    key_path: KeyPath,
+    findings: list[Finding],
+    context: Mapping[str, Any] | None = None,
 ) -> Model | None:
     """Make a ``model`` of one block of a document.
 
@@ -62,6 +67,8 @@ def validate(
         Where the block stands in the document.
     findings : list of Finding
         Everything that is wrong is appended here.
+    context : mapping, optional
+        What validators of the model may ask for as ``info.context``.
 
     Returns
     -------
@@ -70,7 +77,7 @@ def validate(
     """
     block = {} if data is None else _with_absolute_paths(model, data, document.path.parent)
     try:
-        return model.model_validate_json(json.dumps(block, default=str), strict=True)
+        return model.model_validate_json(json.dumps(block, default=str), strict=True, context=context)
     except ValidationError as error:
         findings.extend(_findings_of(model, block, error.errors(include_url=False), document, key_path))
         return None

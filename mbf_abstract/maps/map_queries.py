@@ -1,37 +1,30 @@
-"""The map-independent questions, answered for the maps of a server: choose the map, transform, keep it alive, ask."""
+"""Map-independent questions: what a point, a pose or a path costs, and where the robot fits.
+
+An executive asks these before it sends a goal. Poses may be in any known frame; TransformError where it is not known.
+"""
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import AS_CONFIGURED, CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_abstract.maps.served_map import ServedMap
+
+Served: TypeAlias = ServedMap[Any]
 
 
-class AskedMap(Protocol):
-    """A ``ServedMap``, as far as questions need it."""
-
-    map: Any
-
-    def in_use(self) -> AbstractContextManager[None]:
-        """Keep the map updated for the time of a ``with`` block."""
-
-    def update(self) -> None:
-        """Bring the map up to date now."""
-
-
-class NavigationMapQueries:
-    """A ``MapQueries`` over one or two maps.
+class MapQueries:
+    """The questions to the one or two maps of a server.
 
     Parameters
     ----------
-    global_map : AskedMap
+    global_map : ServedMap
         The map plans are made on.
-    local_map : AskedMap
+    local_map : ServedMap
         The map the robot drives on; the same one where a server has only one.
     robot : RobotInformation
         Where the robot is, for questions without a pose.
@@ -40,7 +33,7 @@ class NavigationMapQueries:
     """
 
     def __init__(
-        self, global_map: AskedMap, local_map: AskedMap, robot: RobotInformation, transforms: TransformBuffer
+        self, global_map: Served, local_map: Served, robot: RobotInformation, transforms: TransformBuffer
     ) -> None:
         self._global, self._local, self._robot, self._transforms = global_map, local_map, robot, transforms
 
@@ -105,13 +98,13 @@ class NavigationMapQueries:
             with served.in_use():
                 served.update()
 
-    def _all(self) -> list[AskedMap]:
+    def _all(self) -> list[Served]:
         return [self._local, self._global] if self._local is not self._global else [self._global]
 
-    def _of(self, query: PlaceQuery) -> AskedMap:
+    def _of(self, query: PlaceQuery) -> Served:
         return self._local if query.local else self._global
 
-    def _on(self, served: AskedMap, pose: Pose | None) -> Pose:
+    def _on(self, served: Served, pose: Pose | None) -> Pose:
         return self._transforms.transform_pose(pose or self._robot.pose(), served.map.frame_id)
 
 

@@ -1,7 +1,6 @@
-"""Map-independent questions: what a point, a pose or a path costs, and where the robot fits.
+"""Requests and answers of the map-independent questions, see ``map_queries.MapQueries``.
 
-An executive asks these before it sends a goal. The request and answer fields are those of the services of
-``mbf_costmap_nav``; every server with a map answers them. States are ordered: for a footprint or a path the worst
+Their fields are those of the services of ``mbf_costmap_nav``. States are ordered: for a footprint or a path the worst
 one counts.
 """
 
@@ -10,9 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol
 
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Pose
 
 
 class CellState(IntEnum):
@@ -86,34 +84,3 @@ class PlaceQuery:
 
 AS_CONFIGURED = PlaceQuery()
 """The robot with its configured outline, and costs as they are."""
-
-
-class MapQueries(Protocol):
-    """What a server with a map answers. Poses may be in any known frame; TransformError where it is not known."""
-
-    def check_point(self, point: Pose, local: bool = False) -> PlaceAnswer:
-        """Return state and cost of one point of the map."""
-
-    def check_pose(self, pose: Pose | None, query: PlaceQuery = PlaceQuery()) -> PlaceAnswer:
-        """Return state and cost of the robot's outline at ``pose`` (None = where the robot is)."""
-
-    def check_path(
-        self,
-        path: Path,
-        query: PlaceQuery = PlaceQuery(),
-        return_on: CellState | None = None,
-        skip_poses: int = 0,
-        path_cells_only: bool = False,
-    ) -> PathAnswer:
-        """Return worst state and summed cost along a path; stop at a state of at least ``return_on``."""
-
-    def find_valid_pose(
-        self, pose: Pose | None, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery = PlaceQuery()
-    ) -> PoseAnswer:
-        """Return the nearest pose within the tolerances [m, rad] where the robot fits."""
-
-    def clear_map(self) -> None:
-        """Forget what sensors have marked."""
-
-    def update_map(self) -> None:
-        """Bring the map up to date now."""

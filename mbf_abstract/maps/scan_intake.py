@@ -14,42 +14,18 @@ and a map that cannot place what another one takes.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from typing import Any
 
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry.transform_buffer import TransformError
-from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE, RangeScan
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.served_map import ServedMap
 
 MAX_REPORTED = 100
 """Bound of what is remembered as reported, however many names a faulty driver invents."""
-
-
-@dataclass(frozen=True)
-class ScanTarget:
-    """A map that takes scans.
-
-    Attributes
-    ----------
-    frame_id : str
-        Frame in which it takes them.
-    source_names : callable
-        Names of the sources that its layers ask for.
-    listens_to : callable
-        Whether a layer takes scans of a source.
-    insert : callable
-        Takes a scan in the frame of the map.
-    transform_tolerance : float
-        How much newer [s] than the newest transform a scan may be.
-    """
-
-    frame_id: str
-    source_names: Callable[[], tuple[str, ...]]
-    listens_to: Callable[[str], bool]
-    insert: Callable[[RangeScan], object]
-    transform_tolerance: float = TRANSFORM_TOLERANCE
 
 
 class ScanIntake:
@@ -59,10 +35,10 @@ class ScanIntake:
     ----------
     runtime : Runtime
         Of the server.
-    maps : mapping of name to ScanTarget
+    maps : mapping of name to ServedMap
     """
 
-    def __init__(self, runtime: Runtime, maps: Mapping[str, ScanTarget]) -> None:
+    def __init__(self, runtime: Runtime, maps: Mapping[str, ServedMap[Any]]) -> None:
         self._runtime = runtime
         self._maps = maps
         self._reported: set[tuple[str, str]] = set()
@@ -79,7 +55,7 @@ class ScanIntake:
         """
         if not math.isfinite(scan.stamp):
             raise ValueError(f"the stamp of a scan must be finite, got {scan.stamp} from source {scan.source!r}")
-        listening = [name for name, target in self._maps.items() if target.listens_to(scan.source)]
+        listening = [name for name, served in self._maps.items() if served.map.listens_to(scan.source)]
         if not listening:
             self._report_unknown(scan.source)
             return
@@ -90,13 +66,13 @@ class ScanIntake:
             self._report_refused(name, scan.source, refused.get(name))
 
     def _insert(self, name: str, scan: RangeScan) -> TransformError | None:
-        target = self._maps[name]
+        served = self._maps[name]
         try:
-            placed = scan.in_frame(target.frame_id, self._runtime.transforms, target.transform_tolerance)
+            placed = scan.in_frame(served.map.frame_id, self._runtime.transforms, served.transform_tolerance)
         except TransformError as error:
             return error
         try:
-            target.insert(placed)
+            served.map.insert_scan(placed)
         except ValueError:  # of the scan itself: its driver is to blame
             raise
         except Exception as error:  # of a layer: the scan is good for the other maps
@@ -105,7 +81,7 @@ class ScanIntake:
         return None
 
     def _report_unknown(self, source: str) -> None:
-        known = sorted({name for target in self._maps.values() for name in target.source_names()})
+        known = sorted({name for served in self._maps.values() for name in served.map.source_names})
         if known:  # maps without any source are meant to see nothing
             self._report("take_scan", source, f"no layer listens to the source {source!r}, known are {known}")
 

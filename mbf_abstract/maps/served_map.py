@@ -1,9 +1,15 @@
-"""A map as a server runs it: fed with scans, updated at its own rate, and changed at run time."""
+"""A map as a server runs it: fed with scans, updated at its own rate, stopped while idle, and changed at run time.
+
+Like MBF's costmap wrapper it counts its users. With ``shutdown_costmaps`` it is updated no more once it has had none
+for ``shutdown_costmaps_delay``, so that a get_path followed by an exe_path does not restart it. Every start brings an
+update: no user sees the map of the last stop.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Generic, TypeVar
 
 from mbf_abstract.drive.robot import RobotStateError
@@ -12,7 +18,6 @@ from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformError
 from mbf_abstract.maps.navigation_map import NavigationMap
-from mbf_abstract.maps.scan_intake import ScanTarget
 from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE
 from mbf_abstract.parameters import ParameterModel, with_changes
 from mbf_abstract.time.ticker import Ticker
@@ -21,7 +26,7 @@ Map = TypeVar("Map", bound=NavigationMap)
 
 
 class ServedMap(Generic[Map]):
-    """Keeps one map up to date, and changes its parameters.
+    """Keeps one map up to date while it is needed, and changes its parameters.
 
     Parameters
     ----------
@@ -58,23 +63,25 @@ class ServedMap(Generic[Map]):
         self.name = name
         self.parameters = parameters
         self._runtime = runtime
-        self._transform_tolerance = transform_tolerance
+        self.transform_tolerance = transform_tolerance
+        self._lock = threading.Lock()
+        self._users, self._running, self._idle_since = 0, False, runtime.clock.now()
+        if not runtime.parameters.shutdown_costmaps:
+            self._start()
         self._ticker = Ticker(runtime.clock, runtime.events, self._tick, 1.0 / update_frequency, name)
 
-    @property
-    def scan_target(self) -> ScanTarget:
-        """The map as something that takes scans."""
-        return ScanTarget(
-            self.map.frame_id,
-            lambda: self.map.source_names,
-            lambda source: self.map.listens_to(source),
-            lambda scan: self.map.insert_scan(scan),
-            self._transform_tolerance,
-        )
-
-    def in_use(self) -> AbstractContextManager[None]:
-        """Keep the map updated for the time of a ``with`` block."""
-        return nullcontext()
+    @contextmanager
+    def in_use(self) -> Iterator[None]:
+        """Keep the map updated for the time of a ``with`` block; raises what its first update raises."""
+        with self._lock:
+            self._start()
+            self._users += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._users -= 1
+                self._idle_since = self._runtime.clock.now()
 
     def update(self) -> None:
         """Bring the map up to date now; a map that follows the robot keeps its place while the pose is unknown."""
@@ -86,8 +93,22 @@ class ServedMap(Generic[Map]):
                 pose = None
         self.map.update(pose, self._runtime.clock.now())
 
+    def _start(self) -> None:
+        if not self._running:
+            self.update()
+            self._running = True
+
     def _tick(self) -> None:
-        self.update()
+        parameters, now = self._runtime.parameters, self._runtime.clock.now()
+        with self._lock:
+            if self._users or not parameters.shutdown_costmaps:
+                self._idle_since, self._running = now, True
+            elif self._running and now - self._idle_since >= parameters.shutdown_costmaps_delay:
+                if parameters.clear_on_shutdown:
+                    self.map.clear()
+                self._running = False
+        if self._running:
+            self.update()
 
     def set_parameters(self, changes: Mapping[str, Any]) -> None:
         """Change parameters of the map, all or none; raises ValueError where a value is not legal or cannot change."""

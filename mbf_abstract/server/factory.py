@@ -38,7 +38,7 @@ def read_config(path: str | os.PathLike[str]) -> tuple[type[AbstractNavigationSe
     raw = load_config(path)
     cls = server_class(raw)
     registry = cls.plugin_registry(raw.allow_module_types)
-    return cls, validate_config(raw, cls.config_sections, registry, cls.plugin_declaration)
+    return cls, validate_config(raw, cls.config_sections, registry, cls.plugin_declaration, cls.map_names)
 
 
 def installed_servers() -> Iterator[type[AbstractNavigationServer]]:

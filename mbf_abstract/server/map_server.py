@@ -12,8 +12,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from mbf_abstract.config.configuration import Config
-from mbf_abstract.maps.map_queries import NavigationMapQueries
-from mbf_abstract.maps.queries import MapQueries
+from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.scan_intake import ScanIntake
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.served_map import ServedMap
@@ -46,7 +45,7 @@ class MapServer(AbstractNavigationServer):
         self.served = {}
         for served in self.serve_maps(config):
             self.served[served.name] = served  # at once: what is there is closed if the next one fails
-        self._scans = ScanIntake(self.runtime, {name: served.scan_target for name, served in self.served.items()})
+        self._scans = ScanIntake(self.runtime, self.served)
         for served in self.served.values():
             served.report_configuration_warnings()
 
@@ -54,14 +53,14 @@ class MapServer(AbstractNavigationServer):
     def queries(self) -> MapQueries:
         """The map-independent questions."""
         maps = list(self.served.values())
-        return NavigationMapQueries(maps[0], maps[-1], self.runtime.robot, self.runtime.transforms)
+        return MapQueries(maps[0], maps[-1], self.runtime.robot, self.runtime.transforms)
 
     def take_scan(self, scan: RangeScan) -> None:
         """Hand a scan to every map with a layer that listens to its source, as ``ScanIntake.take``."""
         self._scans.take(scan)
 
     def map_problem(self) -> str:
-        """Why the map that the robot drives on is stale, if it is."""
+        """Why the map that the robot drives on is stale; empty while it is fresh. Plans are made on a stale map, too."""
         reason: str = list(self.served.values())[-1].map.stale_reason(self.runtime.clock.now())
         return reason
 

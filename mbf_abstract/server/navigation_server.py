@@ -8,7 +8,7 @@ driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_co
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields
 from pathlib import Path as FilePath
@@ -32,7 +32,7 @@ from mbf_abstract.execution.supervisor import Supervisor
 from mbf_abstract.geometry import Path, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.callbacks import CallbackThread
-from mbf_abstract.maps.queries import MapQueries
+from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.view import FieldView, FloorMap, MapView
 from mbf_abstract.parameters import ParameterModel
@@ -64,6 +64,8 @@ class AbstractNavigationServer(PluginHost):
 
     config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {}
     """Top-level blocks of a configuration that describe this server's map."""
+    map_names: ClassVar[Sequence[str]] = ()
+    """Names of the maps that a plugin can choose from, as in ``MapContext.maps``, of a server with several."""
 
     def __init__(
         self,

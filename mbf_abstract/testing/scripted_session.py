@@ -19,7 +19,7 @@ from mbf_abstract.config.configuration import Config, NavigationParameters, Plug
 from mbf_abstract.drive.robot import Robot
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.maps.queries import MapQueries
+from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.plugins import PLUGIN_BASES, Plugin, PluginContext, PluginKind
 from mbf_abstract.server.navigation_server import AbstractNavigationServer

@@ -291,3 +291,11 @@ def test_relaxing_may_leave_the_inflation_as_it_is(world, run):
 def test_a_server_with_one_map_has_no_map_to_choose(world, run, name):
     with pytest.raises(ValueError, match="costmaps: local: the server has one map only"):
         run(name, world.map_of(nothing), costmaps="local")
+
+
+@pytest.mark.parametrize("name", ["clear", "relax"])
+def test_no_map_can_be_chosen_at_run_time_either(world, run, name):
+    _, motion = run(name, world.map_of(nothing))
+    motion.plugin.parameters = motion.plugin.parameters.model_copy(update={"costmaps": "global"})
+    with pytest.raises(ValueError, match="costmaps: global: the server has one map only"):
+        motion.plugin.parameters_changed()

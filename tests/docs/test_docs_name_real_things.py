@@ -14,7 +14,7 @@ from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.geometry import Path as GeometricPath
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.handle import GoalHandle
-from mbf_abstract.maps.queries import MapQueries
+from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult

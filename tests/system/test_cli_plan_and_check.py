@@ -211,6 +211,16 @@ def test_check_finds_a_missing_map_file_of_a_configuration_without_mistakes(hill
     assert mbf("check", bad, "--no-load").exit_code == 0
 
 
+def test_check_finds_a_choice_of_maps_where_there_is_one_only_without_loading_it(hill, tmp_path):
+    file = tmp_path / "robot.yaml"
+    text = "backend: mesh\nrecovery_behaviors: [{{name: clear, type: clear}}]\nclear: {{costmaps: {}}}\n"
+    expected = 'clear.costmaps: expected "both", as the server has one map only, got \'local\''
+    for costmaps, code in (("local", 2), ("both", 0)):
+        file.write_text(text.format(costmaps) + f"mesh_map: {{mesh_file: {hill}}}\n")
+        result = mbf("check", file, "--no-load")
+        assert (result.exit_code, f"{file}:3: {expected}" in result.output.replace("\n", "")) == (code, code == 2)
+
+
 def test_cached_layers_lie_beside_the_configuration_wherever_it_is_read_from(hill, tmp_path, monkeypatch):
     (tmp_path / "elsewhere").mkdir()
     file = tmp_path / "robot.yaml"

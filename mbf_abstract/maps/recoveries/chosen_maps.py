@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from pydantic import ValidationInfo, field_validator
+
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformError
@@ -16,6 +18,14 @@ class ChosenMapsParameters(PluginParameters):
     """Parameters of a recovery that changes maps."""
 
     costmaps: Literal["local", "global", "both"] = parameter("both", "Which maps, of a server that has two.")
+
+    @field_validator("costmaps")
+    @classmethod
+    def _names_maps_of_the_server(cls, costmaps: str, info: ValidationInfo) -> str:
+        """Refuse a choice where a configuration's server has one map; without a context it is not known here."""
+        if info.context is not None and costmaps not in ("both", *info.context["map_names"]):
+            raise ValueError('"both", as the server has one map only')
+        return costmaps
 
 
 class ChosenMapsRecovery(MapPlugin, AbstractRecovery):
@@ -31,6 +41,10 @@ class ChosenMapsRecovery(MapPlugin, AbstractRecovery):
 
     def __init__(self, context: MapContext[Any]) -> None:
         super().__init__(context)
+        self.parameters_changed()
+
+    def parameters_changed(self) -> None:
+        """Refuse a choice of maps where there is one only."""
         if not self.chosen_maps():
             raise ValueError(f"costmaps: {self.parameters.costmaps}: the server has one map only")
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal, RecoveryGoal
-from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome, RecoveryOutcome
-from mbf_abstract.testing.conformance.planning import WALL
+from mbf_abstract.maps.queries import CellState
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
+from mbf_abstract.testing.conformance.planning import FACE, WALL
 from mbf_abstract.testing.conformance.rig import MAX_SILENCE, SENSOR
 from mbf_abstract.testing.conformance.site import Site, situation, somewhere
 
@@ -78,3 +79,16 @@ def a_stamp_from_the_future_is_no_sign_of_life(site: Site) -> None:
     site.expect_stands(2.0, "the newest stamp lies a minute in the future")
     site.rig.sensing = True
     site.expect_outcome(handle.wait(30.0), ExePathOutcome.SUCCESS)
+
+
+@situation(shutdown_costmaps=True, shutdown_costmaps_delay=1.0)
+def an_idle_map_stops_and_the_next_goal_gets_a_fresh_one(site: Site) -> None:
+    """With shutdown_costmaps a map without goals is updated no more, until the next goal or question needs it."""
+    site.rig.clock.sleep(2.0)
+    site.rig.boxes = [WALL]
+    site.rig.clock.sleep(1.0)
+    idle = site.map.point_check()(FACE).state
+    site.expect(idle in (CellState.FREE, CellState.UNKNOWN), f"the idle map has been updated: it says {idle.name}")
+    site.expect_outcome(site.navigator.get_path(FACE, dist_tolerance=0.0), GetPathOutcome.BLOCKED_GOAL)
+    site.expect_state(FACE, CellState.LETHAL)
+    site.expect_outcome(site.navigator.go_to(somewhere(2.5, 6.0)), MoveBaseOutcome.SUCCESS)

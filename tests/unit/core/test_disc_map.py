@@ -9,7 +9,7 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer, TransformError
 from mbf_abstract.maps.disc_map import DiscMap
-from mbf_abstract.maps.map_queries import NavigationMapQueries
+from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery
 
 
@@ -49,7 +49,7 @@ class Robot:
 def queries():
     transforms = TransformBuffer()
     transforms.set(Transform((-1.0, 0.0, 0.0), parent="map", child="dock", static=True))
-    return NavigationMapQueries(Served(), Served(), Robot(), transforms)
+    return MapQueries(Served(), Served(), Robot(), transforms)
 
 
 def test_without_a_pose_the_robot_is_asked_for(queries):

@@ -9,7 +9,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer, TransformError
-from mbf_abstract.maps.map_queries import NavigationMapQueries
+from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 
 
@@ -59,7 +59,7 @@ def queries(build, seeing, transforms):
         build("obstacle", obstacle=seeing),
     )
     robot = KnownRobot(Pose.planar(1.5, 4.5, frame_id="odom"))
-    answers = NavigationMapQueries(Served(global_costmap), Served(local_costmap), robot, transforms)
+    answers = MapQueries(Served(global_costmap), Served(local_costmap), robot, transforms)
     answers.update_map()
     return answers
 
@@ -100,7 +100,7 @@ def test_an_unknown_frame_raises(queries):
 
 def test_without_a_known_pose_only_questions_about_it_fail(build, transforms):
     served = Served(build("static"))
-    queries = NavigationMapQueries(served, served, KnownRobot(None), transforms)
+    queries = MapQueries(served, served, KnownRobot(None), transforms)
     queries.update_map()
     assert served.map.last_update == 7.0
     with pytest.raises(RobotStateError):
@@ -110,9 +110,7 @@ def test_without_a_known_pose_only_questions_about_it_fail(build, transforms):
 def test_a_map_is_kept_alive_while_it_is_asked_even_if_that_fails(build, transforms):
     served = Served(build("static"))
     with pytest.raises(TransformError):
-        NavigationMapQueries(served, served, KnownRobot(None), transforms).check_point(
-            Pose.planar(0.0, 0.0, frame_id="nowhere")
-        )
+        MapQueries(served, served, KnownRobot(None), transforms).check_point(Pose.planar(0.0, 0.0, frame_id="nowhere"))
     assert served.users == ["in use", "done"]
 
 

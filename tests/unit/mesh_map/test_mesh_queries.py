@@ -7,7 +7,7 @@ import pytest
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.maps.map_queries import NavigationMapQueries
+from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_mesh_nav.map.layer import MeshLayer
 from mbf_mesh_nav.map.map_builder import MeshMapParameters, build_mesh_map
@@ -55,12 +55,12 @@ class Served:
         self.map.update(None, 0.0)
 
 
-def ask(mesh_map: MeshMap, robot: Pose) -> NavigationMapQueries:
-    return NavigationMapQueries(Served(mesh_map), Served(mesh_map), StandingRobot(robot), TransformBuffer())
+def ask(mesh_map: MeshMap, robot: Pose) -> MapQueries:
+    return MapQueries(Served(mesh_map), Served(mesh_map), StandingRobot(robot), TransformBuffer())
 
 
 @pytest.fixture
-def queries(walled_map: MeshMap) -> NavigationMapQueries:
+def queries(walled_map: MeshMap) -> MapQueries:
     return ask(walled_map, Pose.planar(1.0, 1.0))
 
 
@@ -75,24 +75,22 @@ def queries(walled_map: MeshMap) -> NavigationMapQueries:
         (9.0, 0.0, CellState.OUTSIDE),
     ],
 )
-def test_state_of_a_point_depends_on_the_wall_and_the_storey(
-    queries: NavigationMapQueries, x: float, z: float, state: CellState
-):
+def test_state_of_a_point_depends_on_the_wall_and_the_storey(queries: MapQueries, x: float, z: float, state: CellState):
     assert queries.check_point(Pose.planar(x, 1.0, z=z)).state == state
 
 
-def test_cost_of_a_point_is_interpolated(queries: NavigationMapQueries):
+def test_cost_of_a_point_is_interpolated(queries: MapQueries):
     assert queries.check_point(Pose.planar(1.03, 1.07)).cost == pytest.approx(0.5)
     assert queries.check_point(Pose.planar(1.95, 1.0)).cost == pytest.approx(1.0)
 
 
-def test_robot_fits_until_its_disc_touches_the_wall(queries: NavigationMapQueries):
+def test_robot_fits_until_its_disc_touches_the_wall(queries: MapQueries):
     assert queries.check_pose(Pose.planar(1.7, 1.0)).state == CellState.FREE
     assert queries.check_pose(Pose.planar(1.8, 1.0)).state == CellState.LETHAL
     assert queries.check_pose(Pose.planar(1.7, 1.0), PlaceQuery(safety_dist=0.1)).state == CellState.LETHAL
 
 
-def test_cost_of_a_pose_sums_the_vertices_below_it_with_multipliers(queries: NavigationMapQueries):
+def test_cost_of_a_pose_sums_the_vertices_below_it_with_multipliers(queries: MapQueries):
     below = sum(np.hypot(i, j) <= 2.5 for i in range(-3, 4) for j in range(-3, 4))
 
     assert queries.check_pose(Pose.planar(1.0, 1.0)).cost == pytest.approx(0.5 * below)
@@ -100,11 +98,11 @@ def test_cost_of_a_pose_sums_the_vertices_below_it_with_multipliers(queries: Nav
     assert queries.check_pose(Pose.planar(2.0, 1.0), PlaceQuery(lethal_cost_mult=2.0)).cost > plain
 
 
-def test_pose_of_the_robot_is_taken_without_a_pose(queries: NavigationMapQueries):
+def test_pose_of_the_robot_is_taken_without_a_pose(queries: MapQueries):
     assert queries.check_pose(None) == queries.check_pose(Pose.planar(1.0, 1.0))
 
 
-def test_path_is_checked_pose_by_pose_up_to_the_wanted_state(queries: NavigationMapQueries):
+def test_path_is_checked_pose_by_pose_up_to_the_wanted_state(queries: MapQueries):
     path = Path.from_poses([Pose.planar(x, 1.0) for x in np.arange(1.0, 3.01, 0.2)])
 
     whole = queries.check_path(path)
@@ -118,7 +116,7 @@ def test_path_is_checked_pose_by_pose_up_to_the_wanted_state(queries: Navigation
     assert queries.check_path(path, skip_poses=9).state == CellState.FREE
 
 
-def test_nearest_valid_pose_is_beside_the_wall_on_the_same_storey(queries: NavigationMapQueries):
+def test_nearest_valid_pose_is_beside_the_wall_on_the_same_storey(queries: MapQueries):
     wanted = Pose.planar(1.9, 1.0, yaw=0.3)
 
     found = queries.find_valid_pose(wanted, 0.5, 0.0)
@@ -129,7 +127,7 @@ def test_nearest_valid_pose_is_beside_the_wall_on_the_same_storey(queries: Navig
     assert found.pose.orientation == wanted.orientation
 
 
-def test_pose_that_fits_is_returned_as_it_is_and_none_where_nothing_fits(queries: NavigationMapQueries):
+def test_pose_that_fits_is_returned_as_it_is_and_none_where_nothing_fits(queries: MapQueries):
     wanted = Pose.planar(1.033, 1.0)
 
     assert queries.find_valid_pose(wanted, 0.5, 0.0).pose == wanted
@@ -159,12 +157,12 @@ def test_ground_of_unknown_cost_is_no_place_for_a_robot():
 
 
 @pytest.mark.parametrize("skipped", [-1, -2])
-def test_a_path_of_which_less_than_no_pose_is_skipped_is_misuse(queries: NavigationMapQueries, skipped: int):
+def test_a_path_of_which_less_than_no_pose_is_skipped_is_misuse(queries: MapQueries, skipped: int):
     with pytest.raises(ValueError, match=f"skip_poses must not be negative, got {skipped}"):
         queries.check_path(Path.from_poses([Pose.planar(1.0, 1.0), Pose.planar(2.0, 1.0)]), skip_poses=skipped)
 
 
 @pytest.mark.parametrize("tolerance", [-0.1, float("nan")])
-def test_a_tolerance_that_is_negative_or_no_number_is_misuse(queries: NavigationMapQueries, tolerance: float):
+def test_a_tolerance_that_is_negative_or_no_number_is_misuse(queries: MapQueries, tolerance: float):
     with pytest.raises(ValueError, match="tolerances must not be negative"):
         queries.find_valid_pose(Pose.planar(2.0, 1.0), tolerance, 0.0)
