@@ -1,7 +1,7 @@
-"""A map for a round robot: what is at a place, where the obstacles around it are, and where the robot might stand.
+"""A map for a round robot, on which the recoveries and queries of the core run.
 
-Derive from ``DiscMap`` in a map backend of your own: recoveries and questions of the core run on it. Not for robots
-whose outline matters, nor for surfaces above each other.
+When to use: derive ``DiscMap`` in a map backend of your own. When not: robots whose outline matters, surfaces above
+each other.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mbf_abstract.maps.navigation_map import NavigationMap, PlaceCheck
 from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery, PoseAnswer
 
 STRIDE = 0.05
-"""Distance [m] between two places that are looked at along a motion."""
+"""Distance [m] between two checked places of a motion."""
 
 
 class DiscMap(NavigationMap):
@@ -38,7 +38,7 @@ class DiscMap(NavigationMap):
 
     @abstractmethod
     def candidates(self, x: float, y: float, dist_tolerance: float) -> FloatArray:
-        """Places (n, 3) [m] where the robot might fit, in any order; those beyond the tolerance [m] are passed over."""
+        """Places (n, 3) [m] where the robot might fit, in any order; those beyond the tolerance [m] are ignored."""
 
     @abstractmethod
     def obstacles_near(self, x: float, y: float, within: float) -> FloatArray:

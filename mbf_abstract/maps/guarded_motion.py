@@ -1,7 +1,7 @@
 """Moving the robot inside a recovery, the same on every map: slowly, cancelable, stopped at the end.
 
-``GuardedRecovery`` is the base of the recoveries that move. The map says two things: why its data are too old to drive
-on, and what the robot would touch along a motion. The loop does the rest:
+``GuardedRecovery`` is the base of the recoveries that move. The map gives two answers: why its data are too
+old to drive on, and what the robot would touch along a motion. The loop does the rest:
 
 =================================  =====================================================================
 what happens                       how the behaviour ends
@@ -13,7 +13,7 @@ time over                          PAT_EXCEEDED
 something ahead would be touched   IMPASSABLE, the place
 the gate refuses a command         STOPPED
 no fresh pose                      TF_ERROR
-the map is stale                   it stands, and goes on when the map is fresh again within its time
+the map is stale                   it waits, and goes on when the map is fresh again within its time
 =================================  =====================================================================
 
 Whatever happens, the last command is zero.
@@ -51,14 +51,14 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
 
     @abstractmethod
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
-        """Do the behaviour's work; the robot is stopped afterwards in any case."""
+        """Run the behaviour; the robot is stopped afterwards in any case."""
 
     def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
         """What the robot would touch if it moved on with ``command``, and where; empty if the motion is free."""
         return self.navigation_map.obstacle_ahead(self.on_map(pose), command, self.parameters.check_ahead_time)
 
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
-        """Run ``recover``, report a lost pose as TF_ERROR, and send zero velocity at the end, whatever it was."""
+        """Run ``recover``, report a lost pose as TF_ERROR, and send zero velocity at the end."""
         try:
             return self.recover(request)
         except (RobotStateError, TransformError) as error:
@@ -74,8 +74,8 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
     ) -> RecoveryResult:
         """Send ``velocity(pose)`` each period until ``finished(pose)``, a result instead of a velocity, or another end.
 
-        While the map is stale the robot stands and ``velocity`` is not asked. A command that is refused because the
-        goal is paused is no end: the sleep lasts until it is resumed. Two refusals one after the other are.
+        While the map is stale the robot stands and ``velocity`` is not called. One refused command does not end the
+        motion, as the goal may be paused and the sleep lasts until it is resumed; two refusals in a row do.
         """
         motion, token, limit = request.motion, request.cancel_token, self.parameters.time_limit
         deadline, refusals = self.clock.now() + limit, 0

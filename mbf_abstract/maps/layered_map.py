@@ -1,4 +1,4 @@
-"""The base of a map made of layers: what sensors bring in, and parameters for a while, the same on every backend."""
+"""The base of maps made of layers: scan intake, and parameters that are overridden for a time."""
 
 from __future__ import annotations
 
@@ -43,8 +43,7 @@ class LayeredMap(NavigationMap):
     def insert_scan(self, scan: RangeScan) -> None:
         """Hand a scan to the layers that listen to its source; the next update takes it into the map.
 
-        Never waits for an update. Rays whose end is not finite are left out; a scan that has only such rays says
-        nothing and is passed over.
+        Never waits for an update. Rays whose end is not finite are left out; a scan of such rays only is ignored.
 
         Raises
         ------
@@ -93,7 +92,7 @@ class LayeredMap(NavigationMap):
         KeyError
             There is no such layer.
         Exception
-            Whatever the layer raises that cannot use them; the old ones stay.
+            What the layer raises where it cannot use them; the old ones stay.
         """
         with self._lock:
             usual = self.usual_parameters(name)

@@ -1,4 +1,4 @@
-"""The contract of a navigation map with the core: what every map answers, so that behaviours are written once.
+"""The contract of a navigation map with the core, so that behaviours are written once for all maps.
 
 ``rotate``, ``back_up``, ``drive_on_heading``, ``move_away``, ``clear`` and ``relax`` know their map by this contract
 only. A map of a backend derives ``NavigationMap``; a server hands it to its plugins in a ``MapContext``. A map without
@@ -77,11 +77,11 @@ class NavigationMap(ABC):
     # -------------------------------------------------------------------------------------------------- places
     @abstractmethod
     def point_check(self) -> PlaceCheck:
-        """Return a function that gives state and cost of points, on the map as it is now."""
+        """Return a function that gives state and cost of points, on the present map."""
 
     @abstractmethod
     def pose_check(self, query: PlaceQuery, *, center_only: bool = False) -> PlaceCheck:
-        """Return a function that gives state and summed cost of the robot's outline, on the map as it is now.
+        """Return a function that gives state and summed cost of the robot's outline, on the present map.
 
         With ``center_only`` only the point below the robot's origin is looked at.
         """
@@ -97,20 +97,20 @@ class NavigationMap(ABC):
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:
         """What the robot would touch, and where, if it kept ``command`` for ``duration`` [s]; empty = nothing.
 
-        The end of the map counts, and whatever else forbids the motion. A robot in a collision may leave it: what it
-        touches already is no obstacle as long as the motion leads no deeper.
+        The end of the map counts as an obstacle. A robot in a collision may leave it: what it touches already is no
+        obstacle unless the motion leads deeper into it.
         """
 
     @abstractmethod
     def nearest_obstacle(self, pose: Pose, within: float) -> tuple[float, float, float] | None:
         """Offset [m] from ``pose`` to the nearest obstacle, along the axes of the map; None if none is ``within`` [m].
 
-        What lies on another storey is none.
+        Obstacles on other storeys do not count.
         """
 
     # -------------------------------------------------------------------------------------------------- layers
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
-        """Forget what sensors have marked in layers, in all by default; return the names of those cleared.
+        """Remove what sensors have marked in layers, in all by default; return the names of those cleared.
 
         Visible after the next ``update``. Raises KeyError where a name is no layer.
         """
@@ -130,7 +130,7 @@ class NavigationMap(ABC):
         return self.layers[name].parameters
 
     def configuration_warnings(self) -> list[str]:
-        """What is legal but hardly meant in the parameters of the map and its layers."""
+        """Legal but suspicious parameters of the map and its layers, a text each."""
         return []
 
     def take_parameters(self, parameters: Any) -> None:  # noqa: B027 - for maps with parameters that can change

@@ -51,7 +51,7 @@ class PoseAnswer:
 
 @dataclass(frozen=True)
 class PlaceQuery:
-    """How a place is judged.
+    """How a place is checked.
 
     Attributes
     ----------

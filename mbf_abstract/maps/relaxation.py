@@ -1,9 +1,9 @@
-"""Slack that a recovery behaviour grants for a while: wider tolerances, which end by themselves.
+"""Wider tolerances that a recovery behaviour grants for a time.
 
-A grant carries the time of its end, and every reader compares it with its own clock. So nothing has to be put back,
-and nothing can be forgotten: not when the behaviour is canceled, the plugin is unloaded, or no goal runs meanwhile.
+A grant carries the time of its end, and every reader compares it with the clock. So nothing has to be restored when the
+behaviour is canceled, the plugin is unloaded or no goal runs.
 
-When to use: a recovery that lets planning or driving be less exact until a hard place is passed. When not: a lasting
+When to use: a recovery that makes planning or driving less exact until a narrow place is passed. When not: a lasting
 change of a tolerance is a change of parameters (``set_parameters``).
 """
 
@@ -15,7 +15,7 @@ from dataclasses import astuple, dataclass
 
 @dataclass(frozen=True)
 class Slack:
-    """How much less exact everything may be; the default changes nothing.
+    """How much wider tolerances are; the default changes nothing.
 
     Attributes
     ----------

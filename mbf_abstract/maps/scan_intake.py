@@ -1,14 +1,14 @@
-"""Scans on their way into the maps: to each map that listens, placed by the transform of the moment they were measured.
+"""Scans on their way into the maps, each placed by the transform at its own stamp.
 
 A robot that turns at 1 rad/s turns by 6 degrees in the 0.1 s that a scan may be old when it arrives; placed by the
-newest transform, everything it saw would be marked beside its place. So a scan is placed by the transform at its own
+newest transform, all obstacles would be marked beside their places. So a scan is placed by the transform at its own
 stamp, interpolated. A scan that is newer than the newest transform by at most ``transform_tolerance`` is placed by
-that one, as a driver that delivers scans before the odometry of the same moment would otherwise never be heard; nothing
-is extrapolated. A scan that is newer still, or older than the history (``tf_cache_time``), is not used.
+that one, as some drivers deliver scans before the odometry of the same moment; nothing is extrapolated. A scan that is
+newer still, or older than the history (``tf_cache_time``), is not used.
 
-One map that cannot place a scan, or has a layer that raises, does not keep it from the others. What a user would
-otherwise look for in vain is reported once in the event log: a source that no layer listens to, a layer that raises,
-and a map that cannot place what another one takes.
+A map that cannot place a scan, or has a layer that raises, does not keep it from the other maps. Three faults are
+reported once in the event log: a source that no layer listens to, a layer that raises, and a map that cannot place what
+another one takes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.served_map import ServedMap
 
 MAX_REPORTED = 100
-"""Bound of what is remembered as reported, however many names a faulty driver invents."""
+"""Most reports that are remembered; a faulty driver may send any number of source names."""
 
 
 class ScanIntake:

@@ -1,4 +1,4 @@
-"""What a range sensor saw, in a form that every server's map can take."""
+"""Scans of range sensors, in the form that every map takes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TRANSFORM_TOLERANCE = 0.3
 """How much newer [s] than the newest transform a scan may be; costmap_2d's and Nav2's default."""
 
 MAX_STAMP_LEAD = 0.2
-"""How far [s] a stamp may lie in the future: what clocks of two computers differ by, not what a broken one does."""
+"""How far [s] a stamp may lie in the future; clocks of two computers differ by less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class RangeScan:
     def of_rays(
         cls, source: str, origin: ArrayLike, ends: ArrayLike, hits: ArrayLike, stamp: float, frame_id: str = "map"
     ) -> RangeScan:
-        """Copy what a driver gives: origin (3,), ends (n, 3), hits (n,), see the attributes; lists will do.
+        """Copy a driver's origin (3,), ends (n, 3) and hits (n,), arrays or lists, see the attributes.
 
         Raises
         ------
@@ -74,7 +74,7 @@ class RangeScan:
         return cls.of_rays(source, origin, cloud, np.ones(len(cloud), dtype=np.bool_), stamp, frame_id)
 
     def checked(self) -> RangeScan:
-        """A copy as arrays, without the rays whose end is not finite: a driver may use its buffers again.
+        """A copy as arrays, as a driver may reuse its buffers, without the rays whose end is not finite.
 
         Raises
         ------

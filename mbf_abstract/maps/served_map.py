@@ -26,7 +26,7 @@ Map = TypeVar("Map", bound=NavigationMap)
 
 
 class ServedMap(Generic[Map]):
-    """Keeps one map up to date while it is needed, and changes its parameters.
+    """Keeps one map up to date while it is in use, and changes its parameters.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class ServedMap(Generic[Map]):
         self.report_configuration_warnings()
 
     def report_configuration_warnings(self) -> None:
-        """Report what is legal but hardly meant: in the event log, and to the user as a note of the server."""
+        """Report legal but suspicious parameters in the event log and as notes of the server."""
         for warning in self.map.configuration_warnings():
             self._runtime.events.emit(EventKind.MAP, self.name, message=f"{self.name}: {warning}")
 

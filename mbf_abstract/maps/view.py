@@ -1,4 +1,4 @@
-"""What a map looks like from outside, for pictures and viewers: an image of costs, a mesh with costs, directions."""
+"""Views of a map for pictures and viewers: an image of costs, a mesh with costs, directions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 OCCUPIED, UNKNOWN_OCCUPANCY = 100, 255
-"""Occupancies of cells: from the one on surely occupied, but for the other, which nobody has seen."""
+"""Occupancies of cells: occupied from the first value on, unknown at the second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class GridView:
 
 @dataclass(frozen=True, eq=False)
 class FloorMap:
-    """What a map file says of a floor, before any server works on it.
+    """Content of a map file of a floor.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class MeshView:
 
 @dataclass(frozen=True, eq=False)
 class FieldView:
-    """Where a plan would lead the robot from places beside its path, too.
+    """Directions in which a plan leads, also from places beside its path.
 
     Attributes
     ----------

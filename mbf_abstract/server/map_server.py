@@ -59,9 +59,13 @@ class MapServer(AbstractNavigationServer):
         """Hand a scan to every map with a layer that listens to its source, as ``ScanIntake.take``."""
         self._scans.take(scan)
 
-    def map_problem(self) -> str:
-        """Why the map that the robot drives on is stale; empty while it is fresh. Plans are made on a stale map, too."""
-        reason: str = list(self.served.values())[-1].map.stale_reason(self.runtime.clock.now())
+    def map_problem(self, name: str = "") -> str:
+        """Why a map is stale, by default the one that the robot drives on; empty while it is fresh.
+
+        Plans are made on a stale map, too. Raises ServerError if there is no map of that name.
+        """
+        served = self._served(name) if name else list(self.served.values())[-1]
+        reason: str = served.map.stale_reason(self.runtime.clock.now())
         return reason
 
     @contextmanager
@@ -99,9 +103,7 @@ class MapServer(AbstractNavigationServer):
 
     def set_map_parameters(self, name: str, /, **changes: Any) -> None:
         """Change parameters of one map itself, by the name of its section; raises as for a layer."""
-        if name not in self.served:
-            raise ServerError(f"there is no map {name!r}, only {', '.join(self.served)}")
-        self.served[name].set_parameters(changes)
+        self._served(name).set_parameters(changes)
 
     def set_footprint(self, footprint: str | Sequence[Sequence[float]] | float) -> None:
         """Replace the robot's outline on all maps, e.g. when it lifts a load.
@@ -127,6 +129,11 @@ class MapServer(AbstractNavigationServer):
             for served, before in zip(changed, old, strict=False):
                 served.set_parameters(before)
             raise
+
+    def _served(self, name: str) -> ServedMap[Any]:
+        if name not in self.served:
+            raise ServerError(f"there is no map {name!r}, only {', '.join(self.served)}")
+        return self.served[name]
 
     def _layer(self, layer: str) -> tuple[ServedMap[Any], str]:
         places = {f"{name}.{one}": (served, one) for name, served in self.served.items() for one in served.map.layers}

@@ -1,8 +1,8 @@
-"""Follow a path on any map: pure pursuit that stops before what the map says the robot would touch.
+"""Follow a path on any map: pure pursuit that stops before an obstacle of the map.
 
-When to use: a backend of your own, which drives with it before it has a controller of its own. When not: obstacles that
-are not in the path (it ends with BLOCKED_PATH and never drives around; plan anew while driving), slopes, speed limits
-of layers: the controllers of the costmap and the mesh know their maps better.
+When to use: a map backend without a controller of its own. When not: to drive around obstacles (it ends with
+BLOCKED_PATH; plan again while driving), on slopes, with speed limits of layers: the controllers of the costmap and the
+mesh server do more.
 Formula: pure pursuit (Coulter 1992), the arc through a point ahead on the path.
 """
 
@@ -42,7 +42,7 @@ class FollowPathParameters(PluginParameters):
     )
 
 
-MIN_SPEED = 0.05  # m/s; slower a robot would not come to the end of its path
+MIN_SPEED = 0.05  # m/s; below it a robot would not reach the end of its path
 
 
 class FollowPath(MapPlugin, AbstractController):
@@ -55,7 +55,7 @@ class FollowPath(MapPlugin, AbstractController):
 
     @property
     def turns_on_the_spot(self) -> bool:
-        """It does."""
+        """True."""
         return True
 
     def set_plan(self, path: Path) -> bool:
@@ -64,7 +64,7 @@ class FollowPath(MapPlugin, AbstractController):
         return self._tracker is not None
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
-        """Find the point ahead, steer to it, and look whether that is free."""
+        """Find the point ahead, steer to it, and check the motion for obstacles."""
         p, pose, tracker = self.parameters, request.pose, self._tracker
         if tracker is None:
             return ControlResult(ExePathOutcome.INVALID_PATH, "no path has been set")
@@ -92,7 +92,7 @@ class FollowPath(MapPlugin, AbstractController):
         return tracker.has_arrived(dist_tolerance) and gap <= dist_tolerance and abs(turn) <= angle_tolerance
 
     def _steer(self, pose: Pose, tracker: PathTracker) -> Twist:
-        """Turn on the spot to what is far off, or at the goal to its heading; else drive along the arc."""
+        """Turn on the spot at a large heading error, or at the goal to its heading; else drive along the arc."""
         p = self.parameters
         gap, turn = self._from_goal(pose, tracker)
         if tracker.on_last_section and tracker.remaining < 0.5 * MIN_SPEED and gap < MIN_SPEED:

@@ -15,7 +15,7 @@ from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 
 MAX_WAITING = 64
-"""So many scans wait for an update at most; older ones are lost."""
+"""Most scans that wait for an update; older ones are dropped."""
 
 
 class ObstacleParameters(LayerParameters):
@@ -25,12 +25,12 @@ class ObstacleParameters(LayerParameters):
     expected_update_rate: float = parameter(
         1.0, "Longest allowed time between two scans of a sensor; 0 switches the check off.", unit="s", ge=0.0
     )
-    robot_height: float = parameter(1.0, "What hangs higher above the ground is no obstacle.", unit="m", gt=0.0)
+    robot_height: float = parameter(1.0, "Hits higher above the ground are no obstacle.", unit="m", gt=0.0)
     ground_tolerance: float = parameter(0.05, "Hits lower above the ground are part of it.", unit="m", ge=0.0)
 
 
 class ObstacleLayer(MapLayer):
-    """The newest scan of each sensor; what it does not show any more is forgotten."""
+    """The newest scan of each sensor; obstacles that it no longer shows are removed."""
 
     parameters: ObstacleParameters
 
@@ -70,7 +70,7 @@ class ObstacleLayer(MapLayer):
             watch.cleared()
 
     def stale_reason(self, now: float) -> str:
-        """Which sensor is silent, or has not been heard since it was cleared."""
+        """Which sensor is silent, or has sent nothing since the layer was cleared."""
         limit = self.parameters.expected_update_rate
         return first_reason(watch.stale_reason(now, limit) for watch in self._watches.values())
 

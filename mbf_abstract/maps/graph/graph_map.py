@@ -1,7 +1,7 @@
 """A map that is a graph: places on the ground, edges between neighbours, and obstacles that sensors see.
 
-Derive ``GraphMap`` in a backend of your own and say where its nodes are and which node lies at a place. What follows is
-the same for every graph and written here: obstacle intake, inflation, freshness, what a robot would touch.
+Derive ``GraphMap`` in a backend of your own: give it the nodes, and the node at a place. Obstacle intake, inflation,
+freshness and collision checks are the same for every graph and done here.
 
 When to use: a round robot on one storey, up to some 100,000 nodes. When not: outlines that are not round, bridges.
 Cost: one tree query of all nodes an update, about 5 ms for 10,000.
@@ -31,7 +31,7 @@ BoolArray = NDArray[np.bool_]
 
 
 class GraphMapParameters(ParameterModel):
-    """What every map of this kind is configured with; a backend derives it and adds its own."""
+    """Parameters of every map of this kind; a backend derives it and adds its own."""
 
     robot_radius: float = parameter(0.3, "Radius of the robot.", unit="m", gt=0.0)
     obstacles: ObstacleParameters = parameter(ObstacleParameters(), "The layer of what sensors see.")
@@ -40,7 +40,7 @@ class GraphMapParameters(ParameterModel):
 
 @dataclass(frozen=True, eq=False)
 class GraphState:
-    """What the map knows at one moment; never changed, a new one replaces it.
+    """State of the map at one moment; never changed, a new one replaces it.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class GraphState:
     clearance : (n,) float64
         Distance [m] from each node to the nearest lethal one; 0 = lethal, inf = there is none.
     costs : (n,) float64
-        What a metre costs beside its length: the ground's own, and up to 1 near obstacles.
+        Cost of a metre in addition to its length: that of the ground, and up to 1 near obstacles.
     """
 
     lethal: BoolArray
@@ -71,7 +71,7 @@ class GraphMap(LayeredMap, DiscMap):
     parameters : GraphMapParameters
     frame_id : str
     ground_costs : (n,) float, optional
-        What a metre of the ground costs beside its length.
+        Cost of a metre of the ground in addition to its length.
 
     Attributes
     ----------
@@ -105,10 +105,10 @@ class GraphMap(LayeredMap, DiscMap):
 
     # ------------------------------------------------------------------------------------------------- sensors
     def take_in(self, scan: RangeScan) -> None:
-        """Add a scan to what is remembered beside the newest one of each sensor; part of an update."""
+        """Add a scan to a memory of the map, beside the newest scan of each sensor; called in an update."""
 
     def seen_nodes(self) -> IntArray:
-        """Nodes that sensors have found something on: those below hits, up to the height of the robot."""
+        """Nodes with obstacles that sensors have seen: those below hits, up to the height of the robot."""
         limits, hits = self.obstacles.parameters, self.obstacles.hits()
         nodes = self.nodes_at(hits)
         height = hits[:, 2] - self.nodes[nodes, 2]
@@ -116,7 +116,7 @@ class GraphMap(LayeredMap, DiscMap):
         return np.asarray(nodes[(nodes >= 0) & blocking])
 
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
-        """Forget what sensors have marked; the map is not current before they have seen again."""
+        """Remove what sensors have marked; the map is stale until the next scan of each sensor."""
         cleared = [layer for layer in self.layers.chosen(layer_names) if layer is self.obstacles]
         with self._lock:
             for layer in cleared:
@@ -125,11 +125,11 @@ class GraphMap(LayeredMap, DiscMap):
         return [layer.name for layer in cleared]
 
     def stale_reason(self, now: float) -> str:
-        """Which layer raised, or which sensor is silent or has not been heard since the map was cleared."""
+        """Which layer raised, or which sensor is silent or has sent nothing since the map was cleared."""
         return self.layers.stale_reason(now)
 
     def update(self, robot_pose: Pose | None, now: float) -> None:
-        """Show what was seen and changed since the last update; raises what a layer raises, and then tries again."""
+        """Take in scans and changes since the last update; raises what a layer raises, the next one tries again."""
         with self._lock:
             self.end_overrides(now)
             with self.layers.computing(self.obstacles):
@@ -141,7 +141,7 @@ class GraphMap(LayeredMap, DiscMap):
                 self._outdated, self.layers.problem = False, ""
 
     def _compute(self) -> None:
-        """Compute the layers anew."""
+        """Compute the layers again."""
         lethal = self._ground_lethal.copy()
         with self.layers.computing(self.obstacles):
             if self.obstacles.parameters.enabled:
@@ -167,13 +167,13 @@ class GraphMap(LayeredMap, DiscMap):
         self.layers[name].parameters = parameters
         self._outdated = True
 
-    # ------------------------------------------------------------------------------------------- what is where
+    # ------------------------------------------------------------------------------------------- places
     def node_at(self, x: float, y: float) -> int:
         """Node next to a place [m]; -1 where there is no ground."""
         return int(self.nodes_at(np.array([[x, y]]))[0])
 
     def place(self, x: float, y: float, safety_dist: float = 0.0) -> PlaceAnswer:
-        """State and cost of a place [m] for the robot's middle; INSCRIBED where it would touch something."""
+        """State and cost of a place [m] for the robot's centre; INSCRIBED where it would touch something."""
         node, state = self.node_at(x, y), self.state
         if node < 0:
             return PlaceAnswer(CellState.OUTSIDE, 0.0)
@@ -183,11 +183,11 @@ class GraphMap(LayeredMap, DiscMap):
         return PlaceAnswer(CellState.INSCRIBED if touches else CellState.FREE, float(state.costs[node]))
 
     def candidates(self, x: float, y: float, dist_tolerance: float) -> FloatArray:
-        """All nodes on which the robot's middle may be."""
+        """All nodes on which the robot's centre may be."""
         return np.asarray(self.nodes[self.free_nodes()])
 
     def free_nodes(self) -> BoolArray:
-        """Nodes (n,) on which the robot's middle may be."""
+        """Nodes (n,) on which the robot's centre may be."""
         return np.asarray(self.state.clearance > self.robot_radius)
 
     def obstacles_near(self, x: float, y: float, within: float) -> FloatArray:

@@ -1,7 +1,7 @@
-"""Dijkstra's search over the free nodes of a ``GraphMap``: by via points to the goal, or as near as its tolerance says.
+"""Dijkstra's search over the free nodes of a ``GraphMap``, by via points to the goal or within its tolerance.
 
 When to use: the graph of a backend of your own. When not: paths between the directions of the edges; on a grid of eight
-directions they are up to 8 % longer. Cost: 10 to 20 ms for 10,000 nodes a leg; a cancel is looked at between legs.
+directions they are up to 8 % longer. Cost: 10 to 20 ms for 10,000 nodes a leg; a cancel takes effect between legs.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ START, GOAL = GetPathOutcome.BLOCKED_START, GetPathOutcome.BLOCKED_GOAL
 
 
 class GraphPlanner(AbstractPlanner):
-    """Finds the cheapest way over the graph; costs lengthen its edges."""
+    """Finds the cheapest path over the graph; costs lengthen its edges."""
 
     def __init__(self, context: MapContext[GraphMap]) -> None:
         super().__init__(context)
@@ -54,7 +54,7 @@ class GraphPlanner(AbstractPlanner):
         return PlanResult(GetPathOutcome.SUCCESS, f"{path.length:.2f} m over {len(chain)} nodes", path, cost)
 
     def _ends(self, pose: Pose, tolerance: float, free: BoolArray) -> Any:
-        """Free nodes at a pose: its own, then the others within the tolerance [m], nearest first."""
+        """Free nodes at a pose: the nearest one, then the others within the tolerance [m] in order of distance."""
         own = self._map.node_at(pose.x, pose.y)
         itself = np.array([own] if own >= 0 and free[own] else [], dtype=np.intp)
         if own < 0 or tolerance == 0.0:
@@ -80,7 +80,7 @@ class GraphPlanner(AbstractPlanner):
         return csr_array((lengths, (start, end)), shape=(len(nodes), len(nodes)))
 
     def _path(self, chain: list[int], request: PlanRequest) -> Path:
-        """Path over nodes, which begins and ends exactly where it was asked to if these are its nodes."""
+        """Path over nodes; it ends exactly at start and goal where these lie at its end nodes."""
         points: FloatArray = self._map.nodes[chain].copy()
         if chain[-1] == self._map.node_at(request.goal.x, request.goal.y):
             points[-1, :2] = request.goal.x, request.goal.y

@@ -1,4 +1,4 @@
-"""A server on a ``GraphMap``: scans go in, questions are answered, the map is kept up to date.
+"""A server on a ``GraphMap``, with scan intake, queries and updates.
 
 >>> class MyServer(GraphMapServer):
 ...     backend = "mine"

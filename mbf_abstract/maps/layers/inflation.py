@@ -1,4 +1,4 @@
-"""What the inflation layers of all maps have in common: radii that ``relax`` may shrink for a while."""
+"""Parameters of the inflation layers of all maps: radii that ``relax`` may shrink for a time."""
 
 from __future__ import annotations
 

@@ -60,5 +60,5 @@ class MapLayer(ABC):
         return ""
 
     def configuration_warning(self) -> str:
-        """What is legal but hardly meant in the layer's parameters; empty if nothing is."""
+        """A legal but suspicious parameter of the layer; empty if there is none."""
         return ""

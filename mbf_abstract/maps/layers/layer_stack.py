@@ -1,4 +1,4 @@
-"""The layers of one map by name, in their order, and what can be asked of all of them together."""
+"""The layers of one map by name, in their order."""
 
 from __future__ import annotations
 
@@ -84,5 +84,5 @@ class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
         return first_reason(f"layer {name!r}: {reason}" for name, reason in reasons if reason)
 
     def configuration_warnings(self) -> list[str]:
-        """What is legal but hardly meant in the parameters of the layers."""
+        """Legal but suspicious parameters of the layers, a text each."""
         return [f"layer {layer.name!r}: {text}" for layer in self.enabled if (text := layer.configuration_warning())]

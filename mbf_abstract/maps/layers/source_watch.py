@@ -1,7 +1,7 @@
-"""Notices when a sensor falls silent.
+"""Freshness of the sensors of a layer.
 
-A silent source is the classic reason for a robot to drive into something it can no longer see. So
-``expected_update_rate`` is on by default: a layer with a late source makes the whole map stale.
+A robot whose sensor is silent would drive into what it no longer sees. So ``expected_update_rate`` is on by default: a
+layer with a late source makes the whole map stale.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class SourceWatch:
         self._in_map = True
 
     def cleared(self) -> None:
-        """Note that the map has lost what the source saw: it must not be driven on before it is seen again."""
+        """Note that the map has lost what the source saw: it must not be driven on before the next scan."""
         self._in_map = False
 
     def stale_reason(self, now: float, limit: float) -> str:

@@ -1,12 +1,11 @@
 """Back up: straight, or along the track that the robot has driven; the simplest escape from a dead end.
 
 With ``along_track`` it follows the driven track by pure pursuit in reverse, over ground that was free a moment ago;
-where the track ends, is unknown or does not lie behind the robot (it turned on the spot since) it backs up straight. A
-long robot in a narrow place should not: steering backward swings its front outward. Ends (IMPASSABLE) before what the
-robot would touch behind it.
+where the track ends, is unknown or does not lie behind the robot (it has turned on the spot) it backs up straight. Not
+for a long robot in a narrow place: steering backward swings its front outward. Ends with IMPASSABLE before an obstacle.
 
-When to use: the robot stands too close to something in front to turn. When not: it is hemmed in;
-what came up behind it unseen is not in the map.
+When to use: the robot is too close to an obstacle in front to turn. When not: obstacles may have come up behind it that
+no sensor sees.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 LOOKAHEAD = 0.3
 """Distance [m] to the point of the track that is steered to."""
 TRACK_GAP = 0.5
-"""A track whose newest point is farther than this [m] from the robot is not the way it came."""
+"""A track whose newest point is farther than this [m] from the robot is not where it came from."""
 
 
 class BackUpParameters(GuardedMotionParameters):

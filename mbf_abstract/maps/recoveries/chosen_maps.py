@@ -54,7 +54,7 @@ class ChosenMapsRecovery(MapPlugin, AbstractRecovery):
         return {name: one for name, one in maps.items() if which in (name, "both")}
 
     def unknown_layer(self, names: tuple[str, ...]) -> str:
-        """Say which layer none of the maps has; empty if there is none."""
+        """Return which of the layers no map has; empty if there is none."""
         maps = self.chosen_maps()
         missing = [name for name in names if all(name not in one.layers for one in maps.values())]
         known = described({name: list(one.layers) for name, one in maps.items()}, "no layers")

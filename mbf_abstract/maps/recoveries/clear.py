@@ -1,11 +1,11 @@
-"""Forget what the sensors have marked: all of it, or around the robot, on one map or all of a server.
+"""Remove what the sensors have marked: everything, or around the robot, on one map or on all maps of a server.
 
-When to use: ghosts of moved obstacles block the way. When not: real obstacles; they come back with the next scan, but
-until then a planner may plan through them, so clear small areas first (a list with two instances does that).
+When to use: obstacles that have moved on are still in the map. When not: real obstacles; they come back with the next
+scan, but until then a planner may plan through them, so clear small areas first (list two instances).
 
 With a radius, what no sensor would bring back stays: floor plan, keep-out areas. A static layer loses the area only if
-``layers`` names it. Without a radius it returns to its map. No controller drives before a sensor that must speak has
-seen again: what was forgotten may still be there.
+``layers`` names it; without a radius it is reset to its file. No controller drives until each sensor with an expected
+rate has sent a scan, as the obstacles may still be there.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class ClearRecovery(ChosenMapsRecovery):
         return RecoveryResult(RecoveryOutcome.SUCCESS, f"cleared {text}")
 
     def _clear(self, navigation_map: NavigationMap, request: RecoveryRequest) -> list[str]:
-        """Clear what there is of the chosen layers, and return their names."""
+        """Clear the chosen layers that the map has, and return their names."""
         p = self.parameters
         names = [name for name in p.layers if name in navigation_map.layers] if p.layers else None
         if p.radius == 0.0:

@@ -1,6 +1,6 @@
-"""Drive straight on, forward or back, to come free of a spot where planning fails.
+"""Drive straight, forward or back, to leave a place where planning fails.
 
-When to use: the way ahead is known to be free (out of an elevator, across a sill). When not: anything that needs
+When to use: the ground ahead is known to be free (out of an elevator, across a sill). When not: anything that needs
 steering; it keeps the present heading and ends with IMPASSABLE before an obstacle.
 """
 

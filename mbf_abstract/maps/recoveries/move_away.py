@@ -22,9 +22,9 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 
 PROBE = 0.05
-"""How far on [m] the clearance is looked at before a move."""
+"""Distance ahead [m] at which the clearance is checked before a move."""
 LEAST_GAIN = 0.2
-"""Metres of clearance a metre of motion must bring; with less the robot slides along an obstacle or nears another."""
+"""Metres of clearance a metre of motion must bring; with less the robot slides along an obstacle."""
 
 
 class MoveAwayParameters(GuardedMotionParameters):

@@ -1,14 +1,14 @@
-"""Be less strict for a while: smaller inflation, wider tolerances of planner and arrival, wider controller limits.
+"""Relax limits for a time: smaller inflation, wider tolerances of planner and arrival, wider controller limits.
 
-When to use: NO_PATH_FOUND or NO_VALID_CMD in a passage that the robot really fits through (inflation), a goal that is
-just occupied (planner tolerance), a controller that cannot reach its goal or its path exactly (arrival, controller
-factor). Two instances with different parameters make the "relax planner" and "relax controller" of the Move Base Flex
-paper. When not: on stale obstacles, for which ``clear`` is the cure. The inflation never gets narrower than the robot's
-inscribed circle as the map knows it, so nothing becomes passable that the robot would hit.
+When to use: NO_PATH_FOUND or NO_VALID_CMD in a passage that is wide enough for the robot (inflation), a goal that is
+occupied (planner tolerance), a controller that cannot reach its goal or its path exactly (arrival, controller factor).
+Two instances with different parameters make the "relax planner" and "relax controller" of the Move Base Flex paper.
+When not: obstacles that are no longer there; use ``clear``. The inflation never gets narrower than the robot's inscribed
+circle, so nothing becomes passable that the robot would hit.
 
-The behaviour returns at once. What it changes ends by the clock, not by this plugin: the inflation with the map's first
-update after ``duration``, the tolerances at that very time, also if the goal was canceled or the plugin unloaded
-meanwhile. Running it again while relaxed only prolongs it. Cost: the layers are computed twice.
+The behaviour returns at once. Its changes end with the map's first update after ``duration`` (inflation) or at that
+time (tolerances), also if the goal was canceled or the plugin unloaded meanwhile. Running it again while relaxed only
+prolongs it. Cost: the layers are computed twice.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Turn in place, to let the sensors see all around.
+"""Turn in place, so that the sensors see all around.
 
 When to use: after clearing, for a robot with a narrow field of view that can turn in place. When not: car-like robots,
 long ones in narrow places (it ends with IMPASSABLE before the footprint would sweep an obstacle), and slopes on which

@@ -1,6 +1,6 @@
 """Stand still for a while, e.g. until a person has passed.
 
-When to use: first in the list, before anything that moves or clears. When not: static trouble; it only costs time.
+When to use: first in the list, before anything that moves or clears. When not: obstacles that stay; it only costs time.
 """
 
 from __future__ import annotations

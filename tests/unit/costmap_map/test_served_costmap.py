@@ -13,6 +13,7 @@ from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
 from mbf_abstract.plugins import PluginKind
+from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.time.sim_clock import SimClock
 
@@ -172,6 +173,17 @@ def test_a_controller_on_the_global_map_needs_that_one_to_be_current(start):
     assert not ended.success and ended.plugin_outcome == ExePathOutcome.MAP_ERROR
     assert "source 'scan' has not sent anything yet" in ended.plugin_message and ended.final_pose.x == 0.0
     assert navigator.server.exe_path.send(follow(1.0)).wait().success
+
+
+def test_a_stale_global_map_is_reported_by_its_name_and_keeps_neither_a_plan_nor_the_robot(start):
+    navigator, clock = start(rate=0.5, local="{rolling_window: true, width: 4.0, height: 4.0, robot_radius: 0.2}")
+    clock.sleep(1.0)
+    server = navigator.server
+    assert server.map_problem() == server.map_problem("local_costmap") == ""
+    assert "source 'scan' has not sent anything yet" in server.map_problem("global_costmap")
+    with pytest.raises(ServerError, match="there is no map 'mesh_map', only global_costmap, local_costmap"):
+        server.map_problem("mesh_map")
+    assert navigator.go_to(Pose.planar(1.0, 0.0)).success
 
 
 def test_a_recovery_stands_while_its_map_is_not_current(start):
