@@ -214,7 +214,7 @@ def test_check_finds_a_missing_map_file_of_a_configuration_without_mistakes(hill
 def test_check_finds_a_choice_of_maps_where_there_is_one_only_without_loading_it(hill, tmp_path):
     file = tmp_path / "robot.yaml"
     text = "backend: mesh\nrecovery_behaviors: [{{name: clear, type: clear}}]\nclear: {{costmaps: {}}}\n"
-    expected = 'clear.costmaps: expected "both", as the server has one map only, got \'local\''
+    expected = "clear.costmaps: expected \"both\", as the server has one map only, got 'local'"
     for costmaps, code in (("local", 2), ("both", 0)):
         file.write_text(text.format(costmaps) + f"mesh_map: {{mesh_file: {hill}}}\n")
         result = mbf("check", file, "--no-load")

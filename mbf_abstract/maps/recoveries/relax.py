@@ -3,8 +3,8 @@
 When to use: NO_PATH_FOUND or NO_VALID_CMD in a passage that is wide enough for the robot (inflation), a goal that is
 occupied (planner tolerance), a controller that cannot reach its goal or its path exactly (arrival, controller factor).
 Two instances with different parameters make the "relax planner" and "relax controller" of the Move Base Flex paper.
-When not: obstacles that are no longer there; use ``clear``. The inflation never gets narrower than the robot's inscribed
-circle, so nothing becomes passable that the robot would hit.
+When not: obstacles that are no longer there; use ``clear``. The inflation never gets narrower than the robot's
+inscribed circle, so nothing becomes passable that the robot would hit.
 
 The behaviour returns at once. Its changes end with the map's first update after ``duration`` (inflation) or at that
 time (tolerances), also if the goal was canceled or the plugin unloaded meanwhile. Running it again while relaxed only
