@@ -34,7 +34,8 @@ from mbf_mesh_nav.plugins import MeshPlanner
 from terrain.scenarios.scenario import Scenario
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.sweeps.log import SweepLog
-from terrain.sweeps.sweep import Job, SweepRun, hash_of, run_all
+from terrain.sweeps.sweep import Job, SweepRun, hash_of, run_once
+from terrain.sweeps.worker_pool import run_in_workers
 from terrain.viewer.results import write_results
 
 SLOPE_ONLY = {  # what mesh_navigation's steepness and inflation layers know: slopes without a direction, no footprint
@@ -85,7 +86,7 @@ def evaluate(chosen: list[tuple[Scenario, int]], methods: list[str], workers: in
     jobs = [(scenario, SweepRun(seed, METHODS[method])) for scenario, seed in chosen for method in methods]
     keys = [run.key(hash_of(scenario)) for scenario, run in jobs]
     left = [job for key, job in zip(keys, jobs, strict=True) if key not in log.rows]
-    for (scenario, run), metrics in run_all(left, workers):
+    for (scenario, run), metrics in run_in_workers(run_once, left, workers):
         row = {**metrics, **describe(scenario, run), "failure": failure_of(metrics)}
         log.append(run.key(hash_of(scenario)), row)
         answer = (row["terrain"], f"seed {run.seed}", row["method"], "" if row["route"] else "no route", row["outcome"])

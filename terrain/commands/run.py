@@ -147,7 +147,8 @@ def compare(
         from rich.table import Table
 
         from terrain.recording.run_folder import read_run
-        from terrain.viewer.reports.comparison import compare_digests, compare_metrics, write_comparison
+        from terrain.recording.whole_files import write_whole
+        from terrain.viewer.reports.comparison import compare_digests, compare_metrics, comparison_html
 
         runs = read_run(left), read_run(right)
         names = (left.name, right.name) if left.name != right.name else (str(left), str(right))
@@ -157,7 +158,7 @@ def compare(
         Console().print(table)
         typer.echo(compare_digests(runs[0][1], runs[1][1]))
         with waiting("writing the page"):
-            write_comparison(out, names, *runs)
+            write_whole(out, comparison_html(names, *runs))
     typer.echo(out.resolve())
 
 

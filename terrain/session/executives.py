@@ -6,7 +6,9 @@ All of them block the thread that calls ``drive`` until the goal has ended and c
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
+from typing import Protocol
 
 from py_trees.common import Status
 from py_trees.composites import Sequence
@@ -21,56 +23,73 @@ from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import MoveBaseOutcome
 from mbf_abstract.plugins import PluginKind
-from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase
+from terrain.experiments.classic_move_base.state_machine import ClassicMoveBase, ClassicSettings
 
 EXECUTIVES = ("move_base", "classic", *READY_TREES)
 
 
-class GoalExecutive(ABC):
+class OneDrive(Protocol):
+    """What goes to one goal, once."""
+
+    def run(self, goal: Pose) -> MoveBaseResult:
+        """Go to a pose and return when the goal has ended."""
+
+    def cancel(self, reason: str) -> None:
+        """End the goal soon, from any thread; never waits."""
+
+
+class GoalExecutive:
     """Drives to one goal at a time.
 
-    Attributes
+    Parameters
     ----------
+    make : callable
+        Makes what goes to a goal with a planner and a controller; plugins without a name are the first ones loaded.
     arrives : bool
         Whether success means that the robot is there; one that only plans leaves it where it is.
     """
 
-    arrives = True
+    def __init__(self, make: Callable[[str, str], OneDrive], arrives: bool = True) -> None:
+        self.arrives = arrives
+        self._make = make
+        self._present: OneDrive | None = None
 
-    def __init__(self, navigator: Navigator) -> None:
-        self.navigator = navigator
-
-    @abstractmethod
     def drive(self, goal: Pose, planner: str = "", controller: str = "") -> MoveBaseResult:
-        """Go to a pose and return when the goal has ended; plugins without a name are the first ones loaded."""
+        """Go to a pose and return when the goal has ended."""
+        self._present = self._make(planner, controller)
+        return self._present.run(goal)
 
-    @abstractmethod
     def cancel(self, reason: str) -> None:
         """End the present goal soon, from any thread; never waits, does nothing where no goal runs."""
+        if self._present is not None:
+            self._present.cancel(reason)
 
 
 def make_executive(executive: str, navigator: Navigator) -> GoalExecutive:
     """Make the executive of a name in ``EXECUTIVES``; raises ConfigError for another one."""
     if executive == "move_base":
-        return MoveBaseExecutive(navigator)
+        return GoalExecutive(partial(MoveBaseDrive, navigator))
     if executive == "classic":
-        return ClassicExecutive(navigator)
+        return GoalExecutive(partial(ClassicMoveBase, navigator, ClassicSettings()))
     if executive in READY_TREES:
-        return ReferenceTreeExecutive(navigator, executive)
+        return GoalExecutive(partial(TreeDrive, navigator, executive), arrives=executive != "planning")
     raise ConfigError([Finding("--executive", 1, "", f"one of {', '.join(EXECUTIVES)}", repr(executive))])
 
 
-class MoveBaseExecutive(GoalExecutive):
-    """The ``move_base`` action of the server."""
+class MoveBaseDrive:
+    """A goal of the server's ``move_base`` action."""
 
-    def __init__(self, navigator: Navigator) -> None:
-        super().__init__(navigator)
+    def __init__(self, navigator: Navigator, planner: str, controller: str) -> None:
+        self._navigator = navigator
+        self._planner = planner
+        self._controller = controller
         self._handle: AnyGoalHandle | None = None
 
-    def drive(self, goal: Pose, planner: str = "", controller: str = "") -> MoveBaseResult:
+    def run(self, goal: Pose) -> MoveBaseResult:
         """Send the goal and wait for its result."""
-        handle = self.navigator.send(MoveBaseGoal(goal, planner=planner, controller=controller))
-        self._handle = handle
+        handle = self._handle = self._navigator.send(
+            MoveBaseGoal(goal, planner=self._planner, controller=self._controller)
+        )
         return handle.wait()
 
     def cancel(self, reason: str) -> None:
@@ -79,62 +98,41 @@ class MoveBaseExecutive(GoalExecutive):
             self._handle.cancel(reason)
 
 
-class ClassicExecutive(GoalExecutive):
-    """The fixed state machine of ROS 1's move_base."""
-
-    def __init__(self, navigator: Navigator) -> None:
-        super().__init__(navigator)
-        self._machine: ClassicMoveBase | None = None
-
-    def drive(self, goal: Pose, planner: str = "", controller: str = "") -> MoveBaseResult:
-        """Run a machine made for these plugins."""
-        self._machine = ClassicMoveBase(self.navigator, planner=planner, controller=controller)
-        return self._machine.run(goal)
-
-    def cancel(self, reason: str) -> None:
-        """End the machine's run."""
-        if self._machine is not None:
-            self._machine.cancel(reason)
-
-
-class ReferenceTreeExecutive(GoalExecutive):
+class TreeDrive:
     """A reference behaviour tree, with those of its recoveries that the server has loaded.
 
     The tree ``control`` follows a path it is given, so ``planning`` goes before it; ``planning`` alone only plans.
     """
 
-    def __init__(self, navigator: Navigator, tree: str) -> None:
-        super().__init__(navigator)
-        self.arrives = tree != "planning"
-        self._tree = tree
-        self._executive: TreeExecutive | None = None
-
-    def drive(self, goal: Pose, planner: str = "", controller: str = "") -> MoveBaseResult:
-        """Tick a new tree until it ends."""
+    def __init__(self, navigator: Navigator, name: str, planner: str, controller: str) -> None:
+        self._navigator = navigator
         options = self._options(planner, controller)
-        tree = READY_TREES[self._tree](options)
-        if self._tree == "control":
+        tree = READY_TREES[name](options)
+        if name == "control":
             tree = Sequence("plan, then drive", memory=True, children=[planning_tree(options), tree])
-        self._executive = TreeExecutive(tree, self.navigator)
+        self._executive = TreeExecutive(tree, navigator)
+
+    def run(self, goal: Pose) -> MoveBaseResult:
+        """Tick the tree until it ends."""
         return self._as_move_base(self._executive.run(goal), goal)
 
     def cancel(self, reason: str) -> None:
         """End the tree's run."""
-        if self._executive is not None:
-            self._executive.cancel(reason)
+        self._executive.cancel(reason)
 
     def _options(self, planner: str, controller: str) -> TreeOptions:
-        loaded = self.navigator.server.plugins.names(PluginKind.RECOVERY)
-        clear, back_up, relax, move_away = (
-            name if name in loaded else "" for name in ("clear", "back_up", "relax", "move_away")
-        )
+        plugins = self._navigator.server.plugins.names(PluginKind.RECOVERY)
+
+        def loaded(name: str) -> str:
+            return name if name in plugins else ""
+
         return TreeOptions(
             planner=planner,
             controller=controller,
-            clear=clear,
-            out_of_collision=back_up,
-            relax_controller=relax,
-            move_away=move_away,
+            clear=loaded("clear"),
+            out_of_collision=loaded("back_up"),
+            relax_controller=loaded("relax"),
+            move_away=loaded("move_away"),
         )
 
     def _as_move_base(self, result: TreeResult, goal: Pose) -> MoveBaseResult:
@@ -146,7 +144,7 @@ class ReferenceTreeExecutive(GoalExecutive):
         else:
             outcome = result.mission.failure_code or int(MoveBaseOutcome.FAILURE)
         try:
-            pose = self.navigator.robot_pose()
+            pose = self._navigator.robot_pose()
         except RobotStateError:
             return MoveBaseResult(outcome, result.message)
         return MoveBaseResult(outcome, result.message, pose, pose.distance_to(goal), pose.angle_to(goal))

@@ -7,10 +7,11 @@ thread. A worker that dies costs nothing but time, Dask gives its runs to anothe
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
 
-from terrain.sweeps.sweep import Job, run_once
+J = TypeVar("J")
+R = TypeVar("R")
 
 CONNECTION_TIMEOUT = 20.0  # s
 
@@ -19,12 +20,13 @@ class ClusterError(Exception):
     """The cluster cannot be used; the text names the remedy."""
 
 
-def run_on_cluster(jobs: Sequence[Job], address: str) -> Iterator[tuple[Job, dict[str, Any]]]:
-    """Do all jobs on the workers of a scheduler and yield each with its metrics as it finishes.
+def run_on_cluster(do: Callable[[J], R], jobs: Sequence[J], address: str) -> Iterator[tuple[J, R]]:
+    """Do all jobs on the workers of a scheduler and yield each with its result as it finishes.
 
     Parameters
     ----------
-    jobs : sequence of Job
+    do, jobs
+        As for ``terrain.sweeps.worker_pool.run_in_workers``.
     address : str
         Of the scheduler, such as ``tcp://10.0.0.1:8786``.
 
@@ -45,7 +47,7 @@ def run_on_cluster(jobs: Sequence[Job], address: str) -> Iterator[tuple[Job, dic
         raise ClusterError(f"no scheduler answers at {address}: {error}") from error
     with client:
         _refuse_threads(client)
-        running = {client.submit(run_once, *job, pure=False): job for job in jobs}
+        running = {client.submit(do, job, pure=False): job for job in jobs}
         for finished in as_completed(running, loop=client.loop):
             yield running.pop(finished), finished.result()
 

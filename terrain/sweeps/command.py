@@ -38,7 +38,8 @@ def sweep(
         from terrain.sweeps.cluster import run_on_cluster
         from terrain.sweeps.log import SweepLog
         from terrain.sweeps.report import summarise, write_tables
-        from terrain.sweeps.sweep import hash_of, plan_sweep, run_all
+        from terrain.sweeps.sweep import hash_of, plan_sweep, run_once
+        from terrain.sweeps.worker_pool import run_in_workers
 
         loaded = load_scenario(scenario)
         planned = plan_sweep(parse_seeds(seeds), parse_settings(settings))
@@ -47,7 +48,10 @@ def sweep(
             left = [run for run in planned if run.key(hashed) not in log.rows]
             console.print(f"{len(planned)} runs, {len(planned) - len(left)} of them done before")
             jobs = [(loaded, run) for run in left]
-            finished = run_all(jobs, workers) if scheduler is None else run_on_cluster(jobs, scheduler)
+            if scheduler is None:
+                finished = run_in_workers(run_once, jobs, workers)
+            else:
+                finished = run_on_cluster(run_once, jobs, scheduler)
             for (_, run), metrics in track(
                 finished, escape(well_formed(loaded.name)), len(left), console=console, disable=not console.is_terminal
             ):

@@ -1,7 +1,7 @@
-"""Many runs of one scenario: every seed with every variant, in worker processes, each run exactly once.
+"""Many runs of one scenario: every seed with every variant, each run exactly once.
 
-Finished runs stand in ``runs.jsonl`` of the sweep's folder, so a sweep that was killed goes on where it was. Workers
-run on this machine; each run is as deterministic as ``mbf run`` with the same seed and settings.
+Finished runs are kept in ``runs.jsonl`` of the sweep's folder, so a sweep that was killed goes on where it was. Each
+run is as deterministic as ``mbf run`` with the same seed and settings.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from typing import Any
 
 from mbf_abstract.config.yaml_source import load_yaml
 from terrain.scenarios.scenario import Scenario
-from terrain.sweeps.worker_pool import run_in_workers
 
 MAX_NAME = 200  # bytes; a longer text is no file's name
 
@@ -81,10 +80,11 @@ def plan_sweep(seeds: Sequence[int], settings: Mapping[str, Sequence[str]]) -> l
     return [SweepRun(seed, variant) for seed in seeds for variant in variants]
 
 
-def run_once(scenario: Scenario, run: SweepRun) -> dict[str, Any]:
+def run_once(job: Job) -> dict[str, Any]:
     """Run a scenario and return its metrics; a run that cannot even begin has the outcome of its error."""
     from terrain.session.runner import RunOptions, run_scenario
 
+    scenario, run = job
     settings = dict(run.settings)
     backend = settings.pop("backend", None)
     with tempfile.TemporaryDirectory(prefix="mbf_sweep_") as folder:
@@ -95,18 +95,3 @@ def run_once(scenario: Scenario, run: SweepRun) -> dict[str, Any]:
             name, message = type(error).__name__, str(error)
             return {"success": False, "verdict": f"{name}: {message}", "outcome": name, "message": message}
     return result.metrics
-
-
-def run_all(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, dict[str, Any]]]:
-    """Do all jobs in ``workers`` processes and yield each with its metrics as it finishes.
-
-    Raises
-    ------
-    BrokenProcessPool
-        Workers died again and again.
-    """
-    return run_in_workers(_run_job, jobs, workers)
-
-
-def _run_job(job: Job) -> dict[str, Any]:
-    return run_once(*job)

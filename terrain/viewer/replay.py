@@ -9,16 +9,13 @@ Use ``terrain.viewer.pictures.picture`` where one look is enough.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrain.recording.recording import Recording
-from terrain.recording.whole_files import write_whole
-from terrain.viewer.pictures.legend import legend_of
-from terrain.viewer.replay_panel import with_panel
+from terrain.viewer.replay_panel import legend_of, with_panel
 from terrain.viewer.scene import (
     ActorModels,
     RobotModel,
@@ -43,13 +40,8 @@ FIRST_PORT = 18080  # viser takes the next free one
 OUTCOME_TIME = 3.0  # s for which the outcome is shown at the end
 
 
-def write_replay(file: str | Path, recording: Recording) -> None:
-    """Write a recording as one HTML page; raises ViewerMissing where viser is not installed or cannot run."""
-    write_whole(file, replay_html(recording))
-
-
 def replay_html(recording: Recording) -> str:
-    """Return the text of the page; raises ViewerMissing where viser is not installed or cannot run."""
+    """Return a recording as one HTML page; raises ViewerMissing where viser is not installed or cannot run."""
     with page_server(FIRST_PORT) as server:
         look_at_route(server.initial_camera, recording)
         add_world(server.scene, recording)

@@ -10,14 +10,23 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import SYMBOLS
-from terrain.viewer.pictures.legend import Entry, legend_html
+from terrain.recording.recording import Recording
+from terrain.viewer.pictures.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, SCAN, Colour, slope_legend
+from terrain.viewer.pictures.shading import FLAT_GROUND
 from terrain.viewer.reports.event_lines import is_shown, line_of
 from terrain.viewer.reports.tree_html import COLOURS, INDENT
 
+Entry = tuple[str, Colour]
+
 SHOWN_LINES = 8
 MAX_LINES = 2000  # a run with more leaves out the oldest
+
+ENTRY_STYLE = "display:inline-flex;align-items:center;gap:4px;margin-right:10px"
+BOX = "width:10px;height:10px;border-radius:2px;background:rgb({},{},{})"
 
 STYLE = """
 #run { position: fixed; left: 10px; top: 10px; width: 300px; max-height: calc(100vh - 90px); overflow: auto;
@@ -105,3 +114,26 @@ def _take_tree_event(trees: list[dict[str, Any]], time: float, data: dict[str, A
         trees.append({"time": time, "nodes": nodes, "changes": []})
     elif trees:
         trees[-1]["changes"] += [[time, *change] for change in data["changes"]]
+
+
+def legend_of(recording: Recording) -> list[Entry]:
+    """Names and colours of lines, points and things, then of slopes where the ground is not flat."""
+    entries = [("plan", PLANNED), ("driven", DRIVEN)]
+    if recording.scans:
+        entries.append(("seen by a sensor", SCAN))
+    if recording.obstacles is not None:
+        entries.append(("on no map", OBSTACLE))
+    entries += [(thing, ACTORS[thing]) for thing in sorted({track.thing for track in recording.actors})]
+    ground = recording.ground
+    if ground is not None and np.ptp(ground.vertices[:, 2]) >= FLAT_GROUND:
+        entries += [(f"slope {angle}", colour) for angle, colour in slope_legend()]
+    return entries
+
+
+def legend_html(entries: Iterable[Entry]) -> str:
+    """Return a line of small boxes, each with its name."""
+    items = (
+        f'<span style="{ENTRY_STYLE}"><span style="{BOX.format(*colour)}"></span><span>{name}</span></span>'
+        for name, colour in entries
+    )
+    return "".join(items)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from mbf_abstract.event_values import error_text
 from terrain.recording.recording import Recording
-from terrain.viewer.pictures.picture import ViewerMissing, write_picture
-from terrain.viewer.replay import write_replay
-from terrain.viewer.reports.report import write_report
+from terrain.recording.whole_files import write_whole
+from terrain.viewer.pictures.picture import ViewerMissing, picture_png
+from terrain.viewer.replay import replay_html
+from terrain.viewer.reports.report import report_html
 
 
 def write_results(
@@ -26,10 +26,10 @@ def write_results(
         made is made.
     """
     makers: list[tuple[str, str, Callable[[Path], None]]] = [
-        ("drawing the picture", "picture.png", partial(write_picture, recording=recording)),
-        ("writing the report", "report.html", partial(write_report, recording=recording, metrics=metrics)),
-        ("writing the replay", "replay.html", partial(write_replay, recording=recording)),
-        ("writing the log for Foxglove", "run.mcap", partial(_write_log, recording=recording)),
+        ("drawing the picture", "picture.png", lambda file: write_whole(file, picture_png(recording))),
+        ("writing the report", "report.html", lambda file: write_whole(file, report_html(recording, metrics))),
+        ("writing the replay", "replay.html", lambda file: write_whole(file, replay_html(recording))),
+        ("writing the log for Foxglove", "run.mcap", lambda file: _write_log(file, recording)),
     ]
     problems: list[str] = []
     for step, name, make in makers:

@@ -19,18 +19,15 @@ from terrain.viewer.pictures.colours import (
     ACTORS,
     BODY,
     DRIVEN,
-    GOAL,
     OBSTACLE,
     PLANNED,
     SCAN,
-    START,
-    WALL,
     WHEEL,
     Colour,
     linear_for_viewer,
 )
 from terrain.viewer.pictures.shading import LIGHT, Colours, vertex_colours
-from terrain.viewer.pictures.shapes import cut_walls, prism
+from terrain.viewer.pictures.shapes import marks, prism, robot_body, standing_things
 from terrain.worlds.surface import Surface
 
 FloatArray = NDArray[np.float64]
@@ -56,15 +53,10 @@ def add_surroundings(scene: Scene, recording: Recording) -> None:
     """Add what does not move apart from the ground."""
     scene.set_up_direction("+z")
     _add_light(scene)
-    if recording.walls is not None:
-        _add_solid(scene, "/walls", cut_walls(recording.walls), WALL)
-    if recording.obstacles is not None:
-        _add_solid(scene, "/obstacles", recording.obstacles, OBSTACLE)
-    height = pin_height(recording)
-    add_pin(scene, "/start", recording.start, START, "start", height)
-    for index, goal in enumerate(recording.goals):
-        label = "goal" if len(recording.goals) == 1 else f"goal {index + 1}"
-        add_pin(scene, f"/goal_{index}", goal, GOAL, label, height)
+    for name, surface, colour in standing_things(recording):
+        _add_solid(scene, f"/{name}", surface, colour)
+    for name, pose, colour in marks(recording):
+        add_pin(scene, f"/{name}", pose, colour, name, pin_height(recording))
 
 
 def _add_light(scene: Scene) -> None:
@@ -166,8 +158,7 @@ class RobotModel:
         self._shape = shape
         self._frame = scene.add_frame("/robot", show_axes=False)
         top = shape.height
-        body = prism(shape.footprint * np.array([0.98, 0.78]), 0.6 * shape.wheel_radius, top)
-        _add_solid(scene, "/robot/body", body, BODY)
+        _add_solid(scene, "/robot/body", robot_body(shape), BODY)
         forward = np.array([0.6 * shape.footprint[:, 0].max(), 0.0])
         nose = prism(shape.footprint * np.array([0.25, 0.5]) + forward, top, top + 0.03)
         _add_solid(scene, "/robot/nose", nose, WHEEL)

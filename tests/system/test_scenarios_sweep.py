@@ -17,7 +17,7 @@ from terrain.sweeps.cluster import ClusterError, run_on_cluster
 pytestmark = pytest.mark.timeout(300)
 
 COMMAND = "import typer; from terrain.sweeps.command import sweep; typer.run(sweep)"
-CONNECT = "import sys; from terrain.sweeps.cluster import run_on_cluster; list(run_on_cluster([], sys.argv[1]))"
+CONNECT = "import sys; from terrain.sweeps.cluster import run_on_cluster; list(run_on_cluster(print, [], sys.argv[1]))"
 SCENARIO = """
 name: trial
 proves: A short drive.
@@ -138,7 +138,7 @@ def test_a_cluster_that_loses_a_worker_at_work_does_every_run_once(arguments, sc
 
 def test_a_scheduler_that_does_not_answer_is_reported():
     with pytest.raises(ClusterError, match="no scheduler answers at nonsense://here"):
-        list(run_on_cluster([], "nonsense://here"))
+        list(run_on_cluster(print, [], "nonsense://here"))
 
 
 def test_workers_with_several_threads_are_refused(scheduler, worker):

@@ -18,9 +18,9 @@ from mbf_abstract.geometry import Pose
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recording import Recording, RobotShape
 from terrain.viewer.logs.foxglove_messages import colour, points, pose, timestamp, triangles
-from terrain.viewer.pictures.colours import ACTORS, BODY, DRIVEN, GOAL, OBSTACLE, START, WALL, WHEEL, Colour
+from terrain.viewer.pictures.colours import ACTORS, BODY, DRIVEN, WHEEL, Colour
 from terrain.viewer.pictures.shading import vertex_colours
-from terrain.viewer.pictures.shapes import cut_walls, prism
+from terrain.viewer.pictures.shapes import marks, robot_body, standing_things
 from terrain.worlds.surface import Surface
 
 FloatArray = NDArray[np.float64]
@@ -35,23 +35,15 @@ TRACK_WIDTH = 4.0  # pixels
 def world(recording: Recording) -> SceneUpdate:
     """Ground, walls, obstacles, start and goals; they stay for the whole run."""
     frame = recording.start.frame_id
-    entities = []
-    for name, surface, paint in (("walls", recording.walls, WALL), ("obstacles", recording.obstacles, OBSTACLE)):
-        if surface is not None:
-            shown = cut_walls(surface) if name == "walls" else surface
-            entities.append(_solid(frame, name, shown, paint))
+    entities = [_solid(frame, *thing) for thing in standing_things(recording)]
     if recording.ground is not None:
         entities.append(_solid(frame, "ground", recording.ground, vertex_colours(recording.ground)))
-    entities.append(_mark("start", recording.start, START))
-    for number, goal in enumerate(recording.goals, start=1):
-        entities.append(_mark(f"goal {number}" if len(recording.goals) > 1 else "goal", goal, GOAL))
-    return SceneUpdate(entities=entities)
+    return SceneUpdate(entities=[*entities, *(_mark(*mark) for mark in marks(recording))])
 
 
 def robot(shape: RobotShape) -> SceneUpdate:
     """The body in ``base_link`` and each wheel in a frame of its own, so that it can turn."""
-    body = prism(shape.footprint * np.array([0.98, 0.78]), 0.6 * shape.wheel_radius, shape.height)
-    entities = [_solid("base_link", "body", body, BODY)]
+    entities = [_solid("base_link", "body", robot_body(shape), BODY)]
     for index in range(len(shape.wheels)):
         diameter, width = 2.0 * shape.wheel_radius, 0.64 * shape.wheel_radius
         drum = CylinderPrimitive(

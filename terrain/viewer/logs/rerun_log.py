@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from terrain.recording.recording import Recording
 from terrain.recording.whole_files import replacing
-from terrain.viewer.pictures.colours import BODY, DRIVEN, GOAL, OBSTACLE, PLANNED, SCAN, START, WALL, Colour
+from terrain.viewer.pictures.colours import BODY, DRIVEN, PLANNED, SCAN, Colour
 from terrain.viewer.pictures.picture import ViewerMissing
 from terrain.viewer.pictures.shading import vertex_colours
-from terrain.viewer.pictures.shapes import cut_walls, prism
-from terrain.viewer.reports.event_text import event_text
+from terrain.viewer.pictures.shapes import marks, robot_body, standing_things
+from terrain.viewer.reports.event_lines import event_text
 from terrain.worlds.surface import Surface
 
 TIMELINE = "run"
@@ -47,17 +47,12 @@ def _log_world(rerun: Any, stream: Any, recording: Recording) -> None:
     """What does not move."""
     if recording.ground is not None:
         _log_mesh(rerun, stream, "world/ground", recording.ground, vertex_colours(recording.ground))
-    if recording.walls is not None:
-        _log_mesh(rerun, stream, "world/walls", cut_walls(recording.walls), WALL)
-    if recording.obstacles is not None:
-        _log_mesh(rerun, stream, "world/obstacles", recording.obstacles, OBSTACLE)
-    names = ["start", *("goal" for _ in recording.goals)]
-    colours = [START, *(GOAL for _ in recording.goals)]
-    places = [pose.position for pose in (recording.start, *recording.goals)]
+    for name, surface, paint in standing_things(recording):
+        _log_mesh(rerun, stream, f"world/{name}", surface, paint)
+    names, poses, colours = zip(*marks(recording), strict=True)
+    places = [pose.position for pose in poses]
     stream.log("world/marks", rerun.Points3D(places, radii=BALL, colors=colours, labels=names), static=True)
-    shape = recording.robot
-    body = prism(shape.footprint, 0.6 * shape.wheel_radius, shape.height)
-    _log_mesh(rerun, stream, "world/robot/body", body, BODY)
+    _log_mesh(rerun, stream, "world/robot/body", robot_body(recording.robot), BODY)
 
 
 def _log_mesh(rerun: Any, stream: Any, name: str, surface: Surface, paint: NDArray[np.uint8] | Colour) -> None:

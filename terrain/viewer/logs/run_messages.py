@@ -36,7 +36,7 @@ from terrain.recording.recording import Recording
 from terrain.viewer.logs import foxglove_mesh_costs as mesh_costs
 from terrain.viewer.logs import foxglove_messages as message
 from terrain.viewer.logs import foxglove_scene as scene
-from terrain.viewer.reports.event_text import NOTABLE, event_text
+from terrain.viewer.reports.event_lines import NOTABLE, event_text
 from terrain.viewer.reports.timeline import ACTIONS
 from terrain.viewer.scene import wheel_angles
 

@@ -18,9 +18,9 @@ from trimesh.remesh import subdivide_to_size
 from mbf_abstract.geometry import Pose
 from terrain.recording.recording import Recording
 from terrain.recording.whole_files import replacing
-from terrain.viewer.pictures.colours import BODY, DRIVEN, GOAL, OBSTACLE, PLANNED, SCAN, START, WALL, Colour
-from terrain.viewer.pictures.shading import AMBIENT, LIGHT, face_colours, face_normals
-from terrain.viewer.pictures.shapes import cut_walls, prism
+from terrain.viewer.pictures.colours import BODY, DRIVEN, GOAL, PLANNED, SCAN, START, Colour
+from terrain.viewer.pictures.shading import lit_colours
+from terrain.viewer.pictures.shapes import marks, prism, standing_things
 from terrain.viewer.replay import status_text
 from terrain.viewer.scene import look_at_route
 from terrain.worlds.surface import NO_SURFACE, Surface, joined
@@ -40,7 +40,6 @@ ZOOM = 1.3  # the replay's first view leaves room for its buttons
 TEXT: Colour = (30, 30, 30)
 PAINTED = (PLANNED, DRIVEN, START, GOAL, SCAN, BODY, TEXT)
 SWATCH = 20  # rows of pixels
-NO_LEAD = np.zeros(1)
 
 
 def write_animation(file: str | Path, recording: Recording) -> None:
@@ -100,14 +99,17 @@ def draw_world(recording: Recording) -> Image.Image:
     """Draw what does not move, with smooth edges."""
     fine = SMOOTHING * SIZE[0], SMOOTHING * SIZE[1]
     image = Image.new("RGB", fine, SKY)
-    walls = None if recording.walls is None else cut_walls(recording.walls)
-    parts = [(recording.ground, None, 0.0), (walls, WALL, LARGEST_FACE), (recording.obstacles, OBSTACLE, LARGEST_FACE)]
+    parts: list[tuple[Surface, Colour | None, float]] = [
+        (surface, paint, LARGEST_FACE) for _, surface, paint in standing_things(recording)
+    ]
+    if recording.ground is not None:
+        parts.insert(0, (recording.ground, None, 0.0))
     surfaces, colours, nearer = [NO_SURFACE], [np.zeros((0, 3))], [np.zeros(0)]
     for surface, paint, lead in parts:
-        if surface is not None and len(surface.faces):
+        if len(surface.faces):
             small, of_face = _cut_small(surface)
             surfaces.append(small)
-            colours.append(_shaded(surface, paint)[of_face])
+            colours.append(lit_colours(surface, paint)[of_face])
             nearer.append(np.full(len(of_face), lead))
     painter, camera = ImageDraw.Draw(image), Camera(recording, fine)
     _paint_faces(painter, camera, joined(surfaces), np.concatenate(colours), np.concatenate(nearer))
@@ -136,20 +138,13 @@ def _paint_faces(
         painter.polygon(pixels[face], fill=fills[face])
 
 
-def _shaded(surface: Surface, paint: Colour | None) -> FloatArray:
-    normals = face_normals(surface)
-    base = face_colours(surface, normals) if paint is None else np.tile(np.array(paint, float), (len(normals), 1))
-    brightness = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ LIGHT, 0.0, 1.0) / LIGHT[2]
-    return np.asarray(np.clip(base * brightness[:, None], 0.0, 255.0))
-
-
 def _frames(recording: Recording) -> Iterator[Image.Image]:
     camera = Camera(recording, SIZE)
     world = draw_world(recording)
     for index in np.linspace(0, max(len(recording.times) - 1, 0), FRAMES).astype(int).tolist():
         frame = world.copy()
         painter = ImageDraw.Draw(frame)
-        for pose, colour in ((recording.start, START), *((goal, GOAL) for goal in recording.goals)):
+        for _, pose, colour in marks(recording):
             _disc(painter, camera.project(np.array([pose.position]))[0], MARK, colour)
         if len(recording.times):
             _paint_moment(painter, camera, recording, index)
@@ -183,7 +178,7 @@ def _paint_robot(painter: ImageDraw.ImageDraw, camera: Camera, recording: Record
     turned = Pose((0.0, 0.0, 0.0), tuple(row[3:].tolist())).rotation
     vertices = scale * body.vertices @ turned.T + row[:3]
     placed = Surface(vertices, body.faces)
-    _paint_faces(painter, camera, placed, _shaded(placed, BODY))
+    _paint_faces(painter, camera, placed, lit_colours(placed, BODY))
 
 
 def _disc(painter: ImageDraw.ImageDraw, centre: FloatArray, radius: int, colour: Colour) -> None:

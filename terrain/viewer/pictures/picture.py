@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import warnings
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,9 +15,9 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import Pose
 from terrain.recording.recording import Recording, StampedPoints
-from terrain.recording.whole_files import write_whole
-from terrain.viewer.pictures.colours import ACTORS, DRIVEN, GOAL, OBSTACLE, PLANNED, START, WALL, slope_legend
+from terrain.viewer.pictures.colours import ACTORS, DRIVEN, GOAL, PLANNED, START, slope_legend
 from terrain.viewer.pictures.shading import shaded_triangles
+from terrain.viewer.pictures.shapes import standing_things
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,11 +33,6 @@ HALO = 1.6  # points of white around lines, so that they show on any ground
 
 class ViewerMissing(Exception):
     """A package that draws is not installed; the text names the command that installs it."""
-
-
-def write_picture(file: str | Path, recording: Recording) -> None:
-    """Draw a recording and write it as PNG; raises ViewerMissing without matplotlib."""
-    write_whole(file, picture_png(recording))
 
 
 def picture_png(recording: Recording) -> bytes:
@@ -93,11 +87,10 @@ def _extent(recording: Recording) -> tuple[float, float, float, float]:
 def _draw_world(axes: Axes, recording: Recording) -> None:
     if recording.ground is not None:
         draw_triangles(axes, *shaded_triangles(recording.ground))
-    for surface, colour, label in ((recording.walls, WALL, None), (recording.obstacles, OBSTACLE, "in no map")):
-        if surface is not None:
-            corners = surface.vertices[surface.faces][:, :, :2]
-            draw_triangles(axes, corners, np.tile(np.array(colour) / 255.0, (len(corners), 1)))
-            axes.plot([], [], "s", color=np.array(colour) / 255.0, markersize=9, label=label)
+    for name, surface, colour in standing_things(recording):
+        corners, label = surface.vertices[surface.faces][:, :, :2], "on no map" if name == "obstacles" else None
+        draw_triangles(axes, corners, np.tile(np.array(colour) / 255.0, (len(corners), 1)))
+        axes.plot([], [], "s", color=np.array(colour) / 255.0, markersize=9, label=label)
     if recording.ground is not None and np.ptp(recording.ground.vertices[:, 2]) > 0.5:
         _draw_slope_legend(axes)
 

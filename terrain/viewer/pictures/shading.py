@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from terrain.viewer.pictures.colours import FLOOR, slope_colours
+from terrain.viewer.pictures.colours import FLOOR, Colour, slope_colours
 from terrain.worlds.surface import Surface
 
 FloatArray = NDArray[np.float64]
@@ -44,20 +44,25 @@ def shaded_triangles(surface: Surface, colours: Colours | None = None) -> tuple[
     colours : (F, 3) float64
         0..1, in the light.
     """
-    normals = face_normals(surface)
     order = np.argsort(surface.vertices[surface.faces, 2].mean(axis=1), kind="stable")
-    unlit = face_colours(surface, normals, colours) / 255.0
+    return surface.vertices[surface.faces][order][:, :, :2], lit_colours(surface, colours)[order] / 255.0
+
+
+def lit_colours(surface: Surface, colours: Colours | Colour | None = None) -> FloatArray:
+    """Colours (F, 3) 0..255 of the faces in the light; ``colours`` as for ``face_colours``."""
+    normals = face_normals(surface)
     brightness = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ LIGHT, 0.0, 1.0) / LIGHT[2]
-    shaded = np.clip(unlit * brightness[:, None], 0.0, 1.0)
-    return surface.vertices[surface.faces][order][:, :, :2], shaded[order]
+    return np.asarray(np.clip(face_colours(surface, normals, colours) * brightness[:, None], 0.0, 255.0))
 
 
-def face_colours(surface: Surface, normals: FloatArray, colours: Colours | None = None) -> FloatArray:
-    """Colours (F, 3) 0..255 without light: those of the vertices, if given; a floor's grey; or by slope."""
+def face_colours(surface: Surface, normals: FloatArray, colours: Colours | Colour | None = None) -> FloatArray:
+    """Colours (F, 3) 0..255 without light: one for all or those of the vertices, if given; a floor's grey; by slope."""
+    if isinstance(colours, tuple):
+        return np.tile(np.array(colours, dtype=np.float64), (len(surface.faces), 1))
     if colours is not None:
         return np.asarray(colours[surface.faces].mean(axis=1), dtype=np.float64)
     if np.ptp(surface.vertices[:, 2]) < FLAT_GROUND:
-        return np.tile(np.array(FLOOR, dtype=np.float64), (len(surface.faces), 1))
+        return face_colours(surface, normals, FLOOR)
     return slope_colours(np.degrees(np.arccos(np.clip(normals[:, 2], -1.0, 1.0))))
 
 

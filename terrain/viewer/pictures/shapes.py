@@ -1,15 +1,37 @@
-"""Surfaces that the replay and the logs draw alike: walls cut low, and the prism of a robot's body."""
+"""What all views of a run draw alike: what stands in the world, start and goals, and a robot's body."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry import Pose
+from terrain.recording.recording import Recording, RobotShape
+from terrain.viewer.pictures.colours import GOAL, OBSTACLE, START, WALL, Colour
 from terrain.worlds.surface import Surface
 
 FloatArray = NDArray[np.float64]
 
 WALL_CUT = 0.9  # m above the lowest point of the walls
+
+
+def standing_things(recording: Recording) -> list[tuple[str, Surface, Colour]]:
+    """Names, surfaces and colours of what stands in the world, as far as there is any; walls are cut low."""
+    walls = None if recording.walls is None else cut_walls(recording.walls)
+    things = [("walls", walls, WALL), ("obstacles", recording.obstacles, OBSTACLE)]
+    return [(name, surface, colour) for name, surface, colour in things if surface is not None]
+
+
+def marks(recording: Recording) -> list[tuple[str, Pose, Colour]]:
+    """Names, poses and colours of start and goals; several goals are numbered."""
+    names = ["goal"] if len(recording.goals) == 1 else [f"goal {k}" for k in range(1, len(recording.goals) + 1)]
+    goals = [(name, goal, GOAL) for name, goal in zip(names, recording.goals, strict=True)]
+    return [("start", recording.start, START), *goals]
+
+
+def robot_body(shape: RobotShape) -> Surface:
+    """A robot's body in base_link, a little narrower than its footprint so that its wheels can be seen."""
+    return prism(shape.footprint * np.array([0.98, 0.78]), 0.6 * shape.wheel_radius, shape.height)
 
 
 def cut_walls(walls: Surface) -> Surface:

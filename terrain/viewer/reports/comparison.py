@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from html import escape
-from pathlib import Path
 from typing import Any
 
 from terrain.recording.recording import Recording
-from terrain.recording.whole_files import write_whole
 from terrain.viewer.reports import report
 from terrain.viewer.reports.page import beside, cell, page, table
 from terrain.viewer.reports.timeline import timeline_svg
@@ -18,13 +16,11 @@ WIDTH = 1700  # pixels
 Run = tuple[Recording, Mapping[str, Any]]
 
 
-def write_comparison(file: Path, names: tuple[str, str], left: Run, right: Run) -> None:
-    """Write the page; raises ViewerMissing without matplotlib."""
-    write_whole(file, comparison_html(names, left, right))
-
-
 def comparison_html(names: tuple[str, str], left: Run, right: Run) -> str:
-    """Return the page's text: ``names`` identify the runs, a run is its recording and its metrics."""
+    """Return the page's text: ``names`` identify the runs, a run is its recording and its metrics.
+
+    Raises ViewerMissing without matplotlib.
+    """
     runs = (left[0], right[0])
     heads = [f"<p>{escape(name)}</p>{report.summary(run)}" for name, run in zip(names, runs, strict=True)]
     parts = [

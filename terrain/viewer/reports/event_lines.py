@@ -1,4 +1,4 @@
-"""The events that a page shows while it goes through a run: one line each, with a colour for good and bad."""
+"""Events as text: which of them a report shows, and one line for each, with a colour for good and bad."""
 
 from __future__ import annotations
 
@@ -6,11 +6,27 @@ from dataclasses import dataclass
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.outcomes import is_success, outcome_name
-from terrain.viewer.reports.event_text import NOTABLE, event_text
 
+NOTABLE = {
+    EventKind.GOAL_REJECTED,
+    EventKind.GOAL_CANCEL,
+    EventKind.RECOVERY,
+    EventKind.ROBOT_STOPPED,
+    EventKind.COMMAND_DROPPED,
+    EventKind.GATE_CLOSED,
+    EventKind.FAULT,
+    EventKind.QUARANTINE,
+    EventKind.SINK_FAILED,
+}
+LEFT_OUT = ("traceback", "goal_id")
 SHOWN = NOTABLE | {EventKind.GOAL_FINISHED, EventKind.GOAL_PAUSED, EventKind.GOAL_RESUMED, EventKind.CUSTOM}
 REPLACED = "preempted by a new plan"  # message of exe_path's goal when the robot continues on a newer path
 GOOD, BAD, NEITHER = "#1a7f37", "#cf222e", "#6b7280"
+
+
+def event_text(event: Event) -> str:
+    """Return the data of an event as ``key: value`` pairs."""
+    return ", ".join(f"{key}: {value}" for key, value in event.data.items() if key not in LEFT_OUT)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ import base64
 import io
 from collections.abc import Iterable, Mapping
 from html import escape
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,18 +19,12 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.recording.metrics import cross_track_errors
 from terrain.recording.recording import Recording
-from terrain.recording.whole_files import write_whole
 from terrain.viewer.pictures.picture import ViewerMissing, picture_png
-from terrain.viewer.reports.event_text import NOTABLE, event_text
+from terrain.viewer.reports.event_lines import NOTABLE, event_text
 from terrain.viewer.reports.page import page, table
 from terrain.viewer.reports.timeline import timeline_svg
 
 FloatArray = NDArray[np.float64]
-
-
-def write_report(file: str | Path, recording: Recording, metrics: Mapping[str, Any]) -> None:
-    """Write the report; raises ViewerMissing without matplotlib."""
-    write_whole(file, report_html(recording, metrics))
 
 
 def report_html(recording: Recording, metrics: Mapping[str, Any]) -> str:

@@ -13,7 +13,7 @@ from html import escape
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.outcomes import is_success, outcome_name
-from terrain.viewer.reports.event_text import NOTABLE, event_text
+from terrain.viewer.reports.event_lines import NOTABLE, event_text
 
 ACTIONS = ("move_base", "get_path", "exe_path", "recovery", "refine_path")
 MARKS_ROW = "stops, faults"

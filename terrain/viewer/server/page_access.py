@@ -48,7 +48,7 @@ class PageAccess:
 
     @classmethod
     def by_token(cls, host: str = LOOPBACK, read_only: bool = False) -> PageAccess:
-        """Make a new token for who may steer, unless ``read_only``, and one for who may only watch."""
+        """Make a new token for those who may steer, unless ``read_only``, and one for those who may only watch."""
         roles = (Role.WATCH,) if read_only else (Role.STEER, Role.WATCH)
         return cls(host, {secrets.token_urlsafe(TOKEN_BYTES): role for role in roles})
 

@@ -69,12 +69,10 @@ def test_a_name_or_message_ruins_no_result(text, tmp_path):
 
 
 def test_what_cannot_be_made_is_reported_and_the_rest_is_made(hill_recording, tmp_path, monkeypatch):
-    def broken(file, recording):
-        with replacing(file) as part:
-            part.write_text("half a pict")
-            raise ValueError("no ink")
+    def broken(recording):
+        raise ValueError("no ink")
 
-    monkeypatch.setattr(results, "write_picture", broken)
+    monkeypatch.setattr(results, "picture_png", broken)
     problems = write_results(tmp_path, hill_recording, {})
 
     assert problems == ["picture.png could not be made: ValueError: no ink"]

@@ -14,7 +14,7 @@ from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, WALL, linear_for_viewer, slope_colours
-from terrain.viewer.pictures.picture import picture_png, write_picture
+from terrain.viewer.pictures.picture import picture_png
 from terrain.viewer.pictures.shading import face_colours, face_normals, shaded_triangles, vertex_colours
 from terrain.worlds.surface import Surface
 
@@ -45,7 +45,7 @@ def test_the_picture_of_an_office_shows_where_people_have_been(office_recording)
 
 
 def test_the_picture_of_hills_is_written_to_the_file(hill_recording, tmp_path):
-    write_picture(tmp_path / "picture.png", hill_recording)
+    (tmp_path / "picture.png").write_bytes(picture_png(hill_recording))
 
     pixels = pixels_of((tmp_path / "picture.png").read_bytes())
     assert min(pixels.shape[:2]) > 600

@@ -15,7 +15,7 @@ from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
-from terrain.viewer.replay import FRAME_RATE, MAX_FRAMES, frame_indices, replay_html, status_text, write_replay
+from terrain.viewer.replay import FRAME_RATE, MAX_FRAMES, frame_indices, replay_html, status_text
 from terrain.viewer.scene import wheel_angles
 from terrain.worlds.surface import cylinder
 
@@ -56,7 +56,7 @@ def test_the_text_over_the_robot_shows_time_speed_and_tilt(hill_recording):
 
 @pytest.mark.parametrize("name", ["hill_recording", "office_recording"])
 def test_a_replay_is_one_html_file_of_a_few_megabytes(name, request, tmp_path, capsys):
-    write_replay(tmp_path / "replay.html", request.getfixturevalue(name))
+    (tmp_path / "replay.html").write_text(replay_html(request.getfixturevalue(name)), encoding="utf-8")
 
     page = (tmp_path / "replay.html").read_text(encoding="utf-8")
     assert page.lstrip().lower().startswith("<!doctype html>")

@@ -9,8 +9,7 @@ import numpy as np
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import NodeState
 from terrain.recording.actor_track import ActorTrack
-from terrain.viewer.pictures.legend import legend_of
-from terrain.viewer.replay_panel import with_panel
+from terrain.viewer.replay_panel import legend_of, with_panel
 from terrain.viewer.reports.tree_html import worth_showing
 
 PAGE = "<html><body><p>scene</p></body></html>"

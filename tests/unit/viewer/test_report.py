@@ -14,7 +14,7 @@ from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.viewer.reports.page import MAX_ROWS
-from terrain.viewer.reports.report import report_html, write_report
+from terrain.viewer.reports.report import report_html
 from terrain.viewer.reports.timeline import Bar, action_bars, plugin_bars, timeline_svg
 
 
@@ -29,10 +29,8 @@ def test_the_report_reports_outcome_metrics_and_stops(office_recording):
         assert words in page
 
 
-def test_the_report_is_one_file_without_script_and_links(hill_recording, tmp_path):
-    write_report(tmp_path / "report.html", hill_recording, measure(hill_recording).to_json())
-
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+def test_the_report_is_one_file_without_script_and_links(hill_recording):
+    page = report_html(hill_recording, measure(hill_recording).to_json())
     assert "<script" not in page
     assert re.findall(r'(?:src|href)="(?!data:|#)', page) == []
     assert page.count("<svg") == 2

@@ -8,13 +8,13 @@ import numpy as np
 from PIL import Image
 
 from mbf_abstract.events import Event, EventKind
-from terrain.viewer.replay import write_replay
+from terrain.viewer.replay import replay_html
 
 DRAWN = "document.querySelector('canvas') !== null && document.querySelector('canvas').clientWidth > 300"
 
 
 def test_a_replay_opens_from_disk_and_plays(chromium, hill_recording, tmp_path):
-    write_replay(tmp_path / "replay.html", hill_recording)
+    (tmp_path / "replay.html").write_text(replay_html(hill_recording), encoding="utf-8")
 
     async def watch(page):
         await page.open((tmp_path / "replay.html").as_uri())
@@ -41,7 +41,7 @@ def test_a_replay_reports_the_state_of_the_tree_along_its_time_bar(chromium, hil
         Event(1.0, EventKind.TREE, "tree", {"tree": "get there", "tick": 2, "changes": [[1, "FAILURE", "walled in"]]}),
         *hill_recording.events,
     ]
-    write_replay(tmp_path / "replay.html", replace(hill_recording, events=tuple(events)))
+    (tmp_path / "replay.html").write_text(replay_html(replace(hill_recording, events=tuple(events))), encoding="utf-8")
 
     async def watch(page):
         await page.open((tmp_path / "replay.html").as_uri())
