@@ -19,8 +19,7 @@ from terrain.scenarios.scenario import PlanarPose, Scenario, load_scenario
 from terrain.session.executives import make_executive
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session
-from terrain.viewer.live.options import ViewOptions
-from terrain.viewer.live.session import LiveSession
+from terrain.viewer.live.session import LiveSession, ViewOptions
 
 LIMITS = {"cpu_ratio": 1.10, "wall_ratio": 1.10}
 PORT = 18600

@@ -23,8 +23,7 @@ from PIL import Image
 
 from terrain.scenarios.scenario import load_scenario
 from terrain.session.runner import RunOptions, run_scenario
-from terrain.viewer.live.options import ViewOptions
-from terrain.viewer.live.session import LiveSession
+from terrain.viewer.live.session import LiveSession, ViewOptions
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PICTURES = REPOSITORY / "docs" / "pictures"

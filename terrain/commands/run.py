@@ -62,8 +62,7 @@ def run(
         from terrain.scenarios.on_map import on_map
         from terrain.scenarios.scenario import load_scenario
         from terrain.session.runner import RunOptions, run_scenario
-        from terrain.viewer.live.options import ViewOptions
-        from terrain.viewer.live.session import LiveSession
+        from terrain.viewer.live.session import LiveSession, ViewOptions
         from terrain.viewer.results import write_results
 
         loaded = load_scenario(scenario)

@@ -19,8 +19,7 @@ from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.maps.view import GridView, MapView, MeshView
 from terrain.physics.actors import Actor
 from terrain.recording.actor_track import ActorTrack
-from terrain.recording.recorded_grid import RecordedGrid
-from terrain.recording.recorded_mesh import RecordedMesh, add_if_changed
+from terrain.recording.recorded_maps import RecordedGrid, RecordedMesh, add_if_changed
 from terrain.recording.recording import Recording, RobotShape, StampedPoints
 from terrain.recording.verdict import UNFINISHED, Verdict
 from terrain.worlds.surface import Surface

@@ -22,8 +22,14 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.arithmetic import arccos
 from terrain.physics.robot_models import Drive, RobotSpec
 from terrain.recording.actor_track import ActorTrack, track_arrays, tracks_from
-from terrain.recording.recorded_grid import RecordedGrid, grid_arrays, grids_from
-from terrain.recording.recorded_mesh import RecordedMesh, mesh_arrays, meshes_from
+from terrain.recording.recorded_maps import (
+    RecordedGrid,
+    RecordedMesh,
+    grid_arrays,
+    grids_from,
+    mesh_arrays,
+    meshes_from,
+)
 from terrain.recording.verdict import Verdict
 from terrain.recording.whole_files import replacing
 from terrain.worlds.surface import Surface

@@ -23,8 +23,7 @@ from mbf_abstract.time.clock import wall_seconds
 from terrain.physics.incidents import IncidentKind
 from terrain.recording.metrics import measure
 from terrain.recording.recording import Recording
-from terrain.recording.recording_parts import RecordingParts, has_parts
-from terrain.recording.run_folder import clear_results
+from terrain.recording.run_folder import RecordingParts, clear_results, has_parts
 from terrain.recording.verdict import Verdict, judge
 from terrain.recording.versions import write_versions
 from terrain.recording.whole_files import write_whole

@@ -17,13 +17,11 @@ import terrain
 from mbf_abstract.cli import make_app
 from mbf_abstract.events import EventKind
 from terrain.recording.recording import Recording, RecordingError
-from terrain.recording.recording_parts import PARTS, read_parts
-from terrain.recording.run_folder import read_run
+from terrain.recording.run_folder import PARTS, read_parts, read_run
 from terrain.scenarios.actors import Walker
 from terrain.scenarios.scenario import PlanarPose, load_scenario
 from terrain.session.runner import RunOptions, run_scenario
-from terrain.viewer.live.options import ViewOptions
-from terrain.viewer.live.session import LiveSession
+from terrain.viewer.live.session import LiveSession, ViewOptions
 
 pytestmark = pytest.mark.timeout(300)
 

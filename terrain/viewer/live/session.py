@@ -10,22 +10,84 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from types import FrameType
 
 from mbf_abstract.events import EventKind
-from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.clock import Clock, WallClock
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
-from terrain.viewer.live.options import ViewOptions
-from terrain.viewer.live.pace import Pace
 from terrain.viewer.live.page import LivePage, tilt_of
 from terrain.viewer.live.plots import PERIOD, UNWATCHED_PERIOD, History
-from terrain.viewer.server.page_access import Role, is_loopback
+from terrain.viewer.server.page_access import LOOPBACK, PageAccess, Role, is_loopback
 from terrain.viewer.server.page_server import page_server
 
 FRAME_PERIOD = 0.1  # s of wall time between two drawings
+MAX_LAG = 0.5  # s; who is further behind does not catch up
+
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """Where the page is served and how time passes.
+
+    Attributes
+    ----------
+    host : str
+        Interface to listen at.
+    port : int
+        The first one tried; the next free one is taken.
+    speed : float
+        Simulated seconds per second at most; 0 = as fast as possible.
+    token : bool
+        Put a token into the address, so that only those who know it have access; without it, all who can reach it have.
+    read_only : bool
+        Watching only; else there are two addresses, one to steer and one to watch.
+
+    Raises
+    ------
+    ValueError
+        A negative speed, or no token on an interface that other machines can reach.
+    """
+
+    host: str = LOOPBACK
+    port: int = 8080
+    speed: float = 1.0
+    token: bool = True
+    read_only: bool = False
+
+    def __post_init__(self) -> None:
+        if self.speed < 0.0:
+            raise ValueError(f"speed must not be negative, got {self.speed}")
+        if not self.token and not is_loopback(self.host):
+            raise ValueError(f"without a token a page is served at loopback only, not at {self.host!r}")
+
+    def access(self) -> PageAccess:
+        """Decide who gets in, with new tokens each time."""
+        make = PageAccess.by_token if self.token else PageAccess.open
+        return make(self.host, self.read_only)
+
+
+class Pace:
+    """Waits on a wall clock, with the whole simulation waiting too, until simulated time may go on.
+
+    Parameters
+    ----------
+    wall : Clock
+        Real time; a simulated clock in tests.
+    """
+
+    def __init__(self, wall: Clock) -> None:
+        self._wall = wall
+        self._stamp = 0.0  # wall time [s] of the last step
+        self._time = 0.0  # simulated time [s] of that step
+
+    def wait(self, time: float, speed: float) -> None:
+        """Wait until simulated time ``time`` [s] is due at ``speed`` simulated seconds per second; 0 = no wait."""
+        due = self._stamp + (time - self._time) / speed if speed > 0.0 else self._wall.now()
+        self._wall.sleep_until(due)
+        self._stamp, self._time = max(due, self._wall.now() - MAX_LAG), time
 
 
 class LiveSession:

@@ -15,7 +15,7 @@ from foxglove_schemas_protobuf.SceneEntityDeletion_pb2 import SceneEntityDeletio
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import NDArray
 
-from terrain.recording.recorded_mesh import RecordedMesh, highest_cost
+from terrain.recording.recorded_maps import RecordedMesh, highest_cost
 from terrain.viewer.logs.foxglove_messages import MAP_LIFT, timestamp, triangles
 from terrain.viewer.pictures.colours import cost_colours_up_to
 

@@ -22,7 +22,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 from numpy.typing import NDArray
 
-from terrain.recording.recorded_grid import RecordedGrid
+from terrain.recording.recorded_maps import RecordedGrid
 from terrain.viewer.pictures.colours import Colour
 from terrain.viewer.pictures.plan_picture import cost_colours
 

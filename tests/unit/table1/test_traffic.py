@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from terrain.experiments.table1.environments.robot import HALF_LENGTH
 from terrain.experiments.table1.environments.traffic import (
     DWELL,
+    HALF_LENGTH,
     STOP_DISTANCE,
     Box,
     Shuttle,

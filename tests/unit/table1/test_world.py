@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 from scipy import ndimage
 
-from terrain.experiments.table1.environments.robot import CARRIER, HALF_WIDTH
-from terrain.experiments.table1.environments.traffic import make_traffic
+from terrain.experiments.table1.environments.traffic import CARRIER, HALF_WIDTH, make_traffic
 from terrain.experiments.table1.environments.world import load_world
 
 

@@ -1,4 +1,6 @@
-"""The other robots: each shuttles on a fixed route, stops for what is near ahead of it, and never replans.
+"""The robot model of Table I, and the other robots.
+
+Each shuttles on a fixed route, stops for what is near ahead of it, and never replans.
 
 A shuttle's motion is a function of its route, its speed and its phase; the executive that is measured acts on it only
 by standing on its route. ``polite=False`` removes even that.
@@ -15,9 +17,31 @@ from numpy.typing import NDArray
 
 from mbf_abstract.geometry import normalize_angle
 from mbf_abstract.geometry.arithmetic import arctan2, plane_rotation, rotated_back
-from terrain.experiments.table1.environments.robot import CARRIER, HALF_LENGTH, HALF_WIDTH
+from terrain.physics.robot_models import Drive, RobotSpec, rectangle
 
 FloatArray = NDArray[np.float64]
+
+HALF_LENGTH, HALF_WIDTH = 0.35, 0.25  # m
+
+CARRIER = RobotSpec(
+    name="carrier",
+    drive=Drive.DIFFERENTIAL,
+    footprint=rectangle(-HALF_LENGTH, HALF_LENGTH, HALF_WIDTH),
+    height=0.4,
+    mass=60.0,
+    wheel_radius=0.1,
+    track=0.44,
+    wheelbase=0.0,
+    left_wheels=("left",),
+    right_wheels=("right",),
+    max_speed=0.6,
+    max_yaw_rate=1.0,
+    max_acceleration=0.5,
+    max_yaw_acceleration=2.0,
+    motor_torque=10.0,
+    lidar_position=(0.0, 0.0, 0.3),
+)
+"""Model of all robots of Table I; it has no body file, because only ``KinematicRobot`` drives it."""
 
 STOP_DISTANCE = 0.6  # m ahead of its front: nearer than this a polite robot stops
 SIDE_MARGIN = 0.05  # m; what is this far beside its route is not ahead of it

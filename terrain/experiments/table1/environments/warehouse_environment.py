@@ -15,8 +15,7 @@ import numpy as np
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
 from terrain.experiments.table1.conditions import Surroundings
-from terrain.experiments.table1.environments.robot import CARRIER
-from terrain.experiments.table1.environments.traffic import TrafficRays, make_traffic
+from terrain.experiments.table1.environments.traffic import CARRIER, TrafficRays, make_traffic
 from terrain.experiments.table1.environments.warehouse_world import WarehouseRobot, WarehouseWorld
 from terrain.experiments.table1.environments.world import Table1World
 from terrain.experiments.table1.plugin_wrappers import SOURCE, wrap_plugins

@@ -10,8 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from mbf_abstract.geometry import Pose
-from terrain.experiments.table1.environments.robot import CARRIER
-from terrain.experiments.table1.environments.traffic import Box, Shuttle
+from terrain.experiments.table1.environments.traffic import CARRIER, Box, Shuttle
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import TIME_STEP, KinematicWorld
 from terrain.worlds.occupancy import OccupancyGrid

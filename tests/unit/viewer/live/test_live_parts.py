@@ -12,10 +12,9 @@ from terrain.viewer.live.follow import first_direction
 from terrain.viewer.live.ground import costs_at, legend_html
 from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.moving import AHEAD, AHEAD_STEPS, field_arrows, motion_of, predicted_points
-from terrain.viewer.live.options import ViewOptions
 from terrain.viewer.live.overlay import Overlay
-from terrain.viewer.live.pace import MAX_LAG, Pace
 from terrain.viewer.live.plots import LENGTH, PERIOD, History
+from terrain.viewer.live.session import MAX_LAG, Pace, ViewOptions
 from terrain.viewer.live.status_html import lines_html
 from terrain.viewer.pictures.colours import FLOOR, WALL, cost_ramp
 from terrain.viewer.reports.tree_html import tree_html

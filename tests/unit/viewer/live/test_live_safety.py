@@ -17,8 +17,7 @@ from terrain.session.executives import make_executive
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.session.session import Session
-from terrain.viewer.live.options import ViewOptions
-from terrain.viewer.live.session import LiveSession
+from terrain.viewer.live.session import LiveSession, ViewOptions
 
 CAMERA = {
     "type": "ViewerCameraMessage", "wxyz": [1.0, 0.0, 0.0, 0.0], "position": [0.0, 0.0, 5.0],

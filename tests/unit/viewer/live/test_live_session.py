@@ -13,8 +13,7 @@ from terrain.session.executives import EXECUTIVES, make_executive
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.session.session import Session, SessionOptions
-from terrain.viewer.live.options import ViewOptions
-from terrain.viewer.live.session import LiveSession
+from terrain.viewer.live.session import LiveSession, ViewOptions
 from terrain.viewer.pictures.picture import ViewerMissing
 
 
