@@ -1,8 +1,8 @@
 """Recorded maps: the costs of a grid, or of a mesh whose surface is kept once, as often as they were looked at.
 
 Made from ``GridView`` and ``MeshView``, which a server gives of its map. The costs of a grid are kept in steps of a
-hundredth, one byte each, so that the maps of a run of some minutes need a few hundred kilobytes; those of a mesh in half
-precision, because three digits are enough for a colour and infinity stays infinity.
+hundredth, one byte each, so that the maps of a run of some minutes need a few hundred kilobytes; those of a mesh in
+half precision, because three digits are enough for a colour and infinity stays infinity.
 """
 
 from __future__ import annotations
