@@ -67,7 +67,7 @@ class WaypointSequence:
 
 
 class PlanLeg(GetPath):
-    """Plan the next leg nobody has planned yet, between two places where the robot is not."""
+    """Plan the next leg without a path, between two waypoints."""
 
     def __init__(self, sequence: WaypointSequence) -> None:
         super().__init__("plan leg")

@@ -33,7 +33,7 @@ class OctreeParameters(GraphMapParameters):
 
 
 class OctreeMap(GraphMap):
-    """The columns of an octree; a node is the middle of one on the ground, and what was never seen counts as free."""
+    """The columns of an octree; a node is the centre of one on the ground; unseen columns are free."""
 
     def __init__(self, parameters: OctreeParameters, frame_id: str) -> None:
         p = parameters

@@ -1,6 +1,6 @@
 """Controller `chase_on_mesh`: turn towards a point ahead on the path and drive.
 
-When to use: as a start for a controller of your own. When not: crowds and tight corners; it looks at one point only.
+When to use: as a start for a controller of your own. When not: crowds and tight corners; it checks one point only.
 """
 
 from __future__ import annotations

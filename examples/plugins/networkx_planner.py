@@ -1,7 +1,7 @@
 """A planner by networkx on the mesh's vertex graph: a few lines for trying an idea.
 
 When to use: experiments with graph algorithms. When not: on a robot; it is some hundred times slower than `mesh.astar`
-and looks at its cancel token only before the search.
+and checks its cancel token only before the search.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ MAX_DISTANCE = 1.0  # m; how far a pose may be from the surface
 
 
 class NetworkxPlanner(MeshPlanner):
-    """Cheapest way along edges by ``networkx.shortest_path``; lethal edges are not in the graph."""
+    """Cheapest path along edges by ``networkx.shortest_path``; lethal edges are not in the graph."""
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
         """Search from the corner next to the start to the corner next to the goal; via poses in between."""

@@ -1,6 +1,6 @@
 """Planner `straight_on_costmap`: straight over the costmap, from pose to pose, and no search.
 
-When to use: short ways over open ground. When not: anything must be driven around; it answers NO_PATH_FOUND.
+When to use: short paths over open ground. When not: anything must be driven around; it answers NO_PATH_FOUND.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class StraightOnCostmapParameters(PluginParameters):
 
 
 class StraightOnCostmap(CostmapPlanner):
-    """Looks at the cells below a straight line."""
+    """Checks the cells below a straight line."""
 
     Parameters = StraightOnCostmapParameters
     parameters: StraightOnCostmapParameters

@@ -1,6 +1,6 @@
 """Planner `straight_on_mesh`: straight over the surface, from pose to pose, and no search.
 
-When to use: short ways over open ground. When not: anything must be driven around; it answers NO_PATH_FOUND.
+When to use: short paths over open ground. When not: anything must be driven around; it answers NO_PATH_FOUND.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ class StraightOnMeshParameters(PluginParameters):
 
 
 class StraightOnMesh(MeshPlanner):
-    """Drops a straight line onto the surface and looks at the vertices below it."""
+    """Drops a straight line onto the surface and checks the vertices below it."""
 
     Parameters = StraightOnMeshParameters
     parameters: StraightOnMeshParameters
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
-        """Connect start, via poses and goal; NO_PATH_FOUND where a lethal vertex is in the way."""
+        """Connect start, via poses and goal; NO_PATH_FOUND where a vertex below is lethal."""
         if request.cancel_token.cancelled:
             return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
         stops = [np.array(pose.position) for pose in (request.start, *request.via, request.goal)]

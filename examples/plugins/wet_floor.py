@@ -1,6 +1,6 @@
 """Layer `wet_floor`: a round place that is better avoided, e.g. a wet floor.
 
-When to use: the place may be crossed if there is no other way. When not: it must not be entered; use `keepout`.
+When to use: the place may be crossed if there is no other path. When not: it must not be entered; use `keepout`.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from mbf_costmap_nav.map.layer import CostmapLayer, LayerParameters
 class WetFloorParameters(LayerParameters):
     """Parameters of `wet_floor`."""
 
-    x: float = parameter(0.0, "X of the middle, in the costmap's frame.", unit="m")
-    y: float = parameter(0.0, "Y of the middle.", unit="m")
+    x: float = parameter(0.0, "X of the centre, in the costmap's frame.", unit="m")
+    y: float = parameter(0.0, "Y of the centre.", unit="m")
     radius: float = parameter(0.5, "Radius of the place.", unit="m", gt=0.0)
     cost: int = parameter(200, "Cost of its cells; below 253, which is forbidden.", ge=1, le=252)
 

@@ -60,7 +60,7 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
     Parameters
     ----------
     unknown : {"", "free", "lethal"}
-        What cells that a bare map does not know shall be; "" is free, and a configuration says that itself.
+        State of the unknown cells of a bare map; "" is free. A configuration has its own parameters for it.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
         raise ConfigError([Finding(str(file), 1, "", "a configuration, map or mesh file", "no such file")])
     if file.suffix.lower() in YAML_SUFFIXES and not _is_map_description(file):
         if unknown:
-            expected = "a bare map: a configuration says itself what is unknown (track_unknown_space, allow_unknown)"
+            expected = "a bare map: a configuration has track_unknown_space and allow_unknown for this"
             raise ConfigError([Finding(str(file), 1, "", expected, f"--unknown {unknown} with a configuration")])
         return *read_config(file), []
     for cls in installed_servers():
@@ -88,7 +88,7 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
 
 
 def _unknown_note(floor: FloorMap | None, unknown: str) -> list[str]:
-    """Say that cells of a bare map which nobody knows count as free, unless that was asked for."""
+    """Note that unknown cells of a bare map count as free, unless that was asked for."""
     count = 0 if floor is None else int(np.count_nonzero(floor.occupancy == UNKNOWN_OCCUPANCY))
     if floor is None or count == 0 or unknown:
         return []

@@ -5,20 +5,6 @@ Nothing here is meant for a real robot. Start with ``scripted_session.ScriptedSe
 a map backend of your own.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from mbf_abstract.testing.conformance import check_map_backend
+from mbf_abstract.testing.conformance import check_map_backend
 
 __all__ = ["check_map_backend"]
-
-
-def __getattr__(name: str) -> object:
-    """Import the suite at its first use: it needs a whole server, a loopback robot does not."""
-    if name == "check_map_backend":
-        from mbf_abstract.testing.conformance import check_map_backend
-
-        return check_map_backend
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,4 +1,4 @@
-"""Bad answers for scripted plugins: everything a plugin can do wrong, one name each.
+"""Bad answers for scripted plugins, one function for each fault.
 
 Give them to ``play`` of a scripted plugin. Those that need time take the clock.
 """
@@ -18,7 +18,7 @@ from mbf_abstract.time.clock import Clock
 
 
 class Hang:
-    """Never returns, whatever the cancel token says, until ``release`` is called.
+    """Never returns until ``release`` is called, also when it is canceled.
 
     It waits on the clock, so simulated time goes on around it. For a call that keeps the processor busy and so stops
     simulated time use ``BusyHang``.
@@ -104,7 +104,7 @@ def nan_path(request: PlanRequest) -> PlanResult:
 
 
 def wrong_frame_path(request: PlanRequest) -> PlanResult:
-    """Give a path in a frame that nobody knows."""
+    """Give a path in an unknown frame."""
     plan = straight_plan(request)
     assert plan.path is not None
     return replace(plan, path=replace(plan.path, frame_id="nowhere"))

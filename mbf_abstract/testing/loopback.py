@@ -1,4 +1,4 @@
-"""A robot without physics: it moves exactly as commanded, on the clock, and can be made to fail in known ways.
+"""A robot without physics: it moves exactly as commanded, on the clock, and can be made to fail.
 
 Use it to test plugins, executives and the framework. It has no mass, no slip and no walls; for behaviour on
 ground use the worlds of ``terrain``.

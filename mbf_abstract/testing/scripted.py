@@ -1,4 +1,4 @@
-"""Plugins that do what a test scripts, and three honest ones that need no map.
+"""Plugins that play the answers of a test; without answers they work, and need no map.
 
 ``play`` gives a plugin its answers, one per call; the last one is repeated for ever. An answer is a result, an
 exception to raise, or a function of the request that makes either. ``mbf_abstract.testing.faulty`` has bad ones.

@@ -44,22 +44,22 @@ class MapFreeServer(AbstractNavigationServer):
     map_trouble = ""
 
     def load_map(self, config: Config) -> None:
-        """There is none."""
+        """Do nothing."""
 
     def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
-        """Return the context as it is."""
+        """Return the context unchanged."""
         return base
 
     @property
     def queries(self) -> MapQueries:
-        """Nothing to ask; raises NotImplementedError."""
+        """None; raises NotImplementedError."""
         raise NotImplementedError("a server without a map answers no questions about it")
 
     def take_scan(self, scan: RangeScan) -> None:
-        """Look away."""
+        """Ignore it."""
 
     def map_problem(self) -> str:
-        """Return what the test has set."""
+        """Return ``map_trouble``."""
         return self.map_trouble
 
 

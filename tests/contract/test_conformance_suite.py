@@ -73,7 +73,7 @@ FAULTS = {
         "a_sensor_that_stays_silent_ends_the_path_with_map_error",
         "a_cleared_map_is_not_driven_on_until_it_sees_again",
         "a_stamp_from_the_future_is_no_sign_of_life",
-        "a_scan_of_nothing_but_nan_says_nothing",
+        "a_scan_of_nothing_but_nan_is_ignored",
     },
     takes_clearing_for_news: {"a_cleared_map_is_not_driven_on_until_it_sees_again"},
     drives_recoveries_on_silent_maps: {"a_silent_sensor_holds_a_recovery"},

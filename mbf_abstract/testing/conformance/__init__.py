@@ -7,7 +7,7 @@
 ...     check_map_backend(make_server)
 
 ``CONFIG`` is the text of a configuration: 12 m x 8 m of flat, empty, known ground, a robot of 0.3 m radius, scans of
-the source ``lidar``, a planner, a controller, and the recoveries under the names of their types. The suite looks at the
+the source ``lidar``, a planner, a controller, and the recoveries under the names of their types. The suite uses the
 server's public interface only. ``SITUATIONS`` are its parts by name, for one test each.
 """
 

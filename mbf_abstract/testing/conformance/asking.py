@@ -19,18 +19,18 @@ AWAY = somewhere(3.2, 4.0)
 
 @situation()
 def a_point_is_free_inscribed_lethal_or_outside(site: Site) -> None:
-    """check_point says FREE, INSCRIBED where a robot would touch something, LETHAL, and that there is no ground."""
+    """check_point returns FREE, INSCRIBED where a robot would touch something, LETHAL, and OUTSIDE or UNKNOWN."""
     site.place(WALL)
     site.expect_free(AWAY)
     site.expect_state(NEAR, CellState.INSCRIBED)
     site.expect_state(FACE, CellState.LETHAL)
     outside = site.server.queries.check_point(somewhere(40.0, 4.0)).state
-    site.expect(outside in (CellState.OUTSIDE, CellState.UNKNOWN), f"off the ground check_point says {outside.name}")
+    site.expect(outside in (CellState.OUTSIDE, CellState.UNKNOWN), f"off the ground check_point returns {outside.name}")
 
 
 @situation()
 def a_pose_is_lethal_where_the_robot_touches_something(site: Site) -> None:
-    """check_pose says FREE, or LETHAL where the robot touches something; without a pose it looks at the robot."""
+    """check_pose returns FREE, or LETHAL where the robot touches something; without a pose it checks the robot's."""
     site.place(WALL)
     check = site.server.queries.check_pose
     for pose, state in (
@@ -39,15 +39,17 @@ def a_pose_is_lethal_where_the_robot_touches_something(site: Site) -> None:
         (NEAR, CellState.LETHAL),
         (FACE, CellState.LETHAL),
     ):
-        said = check(pose).state
-        site.expect(said is state, f"check_pose({pose}) says {said.name}, expected {state.name}")
+        found = check(pose).state
+        site.expect(found is state, f"check_pose({pose}) returns {found.name}, expected {state.name}")
     grown = check(AWAY, PlaceQuery(safety_dist=0.7)).state
-    site.expect(grown is CellState.LETHAL, f"with 0.7 m of safety check_pose says {grown.name} 0.8 m before the wall")
+    site.expect(
+        grown is CellState.LETHAL, f"with 0.7 m of safety check_pose returns {grown.name} 0.8 m before the wall"
+    )
 
 
 @situation()
 def a_path_is_as_bad_as_its_worst_pose(site: Site) -> None:
-    """check_path gives the worst state, stops where it is asked to, and looks at no pose of an empty path."""
+    """check_path returns the worst state, stops where it is asked to, and checks no pose of an empty path."""
     site.place(WALL)
     queries, path = site.server.queries, site.path((2.0, 4.0), (4.2, 4.0))
     whole, early = queries.check_path(path), queries.check_path(path, return_on=CellState.LETHAL)
@@ -57,27 +59,25 @@ def a_path_is_as_bad_as_its_worst_pose(site: Site) -> None:
     site.expect(5 < early.last_checked < 21, f"return_on ended it at pose {early.last_checked}")
     some = queries.check_path(path[:9], skip_poses=3)
     site.expect(some.state is CellState.FREE, f"the state of the free part is {some.state.name}")
-    site.expect(
-        some.last_checked == 8, f"with skip_poses 3 the last pose looked at was {some.last_checked}, expected 8"
-    )
+    site.expect(some.last_checked == 8, f"with skip_poses 3 the last checked pose was {some.last_checked}, expected 8")
     none = queries.check_path(Path.from_poses([]))
-    site.expect(none.last_checked == -1, f"of a path without poses it looked at pose {none.last_checked}")
+    site.expect(none.last_checked == -1, f"of a path without poses it checked pose {none.last_checked}")
     site.expect_raises(ValueError, lambda: queries.check_path(path, skip_poses=-2), "skip_poses of -2")
 
 
 @situation()
 def a_valid_pose_is_the_nearest_one(site: Site) -> None:
-    """find_valid_pose returns a free pose as it is, else the nearest free one within the tolerance, else none."""
+    """find_valid_pose returns a free pose unchanged, else the nearest free one within the tolerance, else none."""
     site.place(WALL)
     find = site.server.queries.find_valid_pose
     free, beside, none = find(AWAY, 1.0, 0.0), find(NEAR, 1.0, 0.0), find(FACE, 0.1, 0.0)
     for name, answer, least, most in (("a free pose", free, 0.0, 0.15), ("a blocked one", beside, 0.0, 0.6)):
         asked = AWAY if answer is free else NEAR
         gap = math.inf if answer.pose is None else answer.pose.distance_to(asked)
-        site.expect(least <= gap <= most, f"asked about {name} it answers with one {gap:.2f} m away")
-        site.expect(answer.state <= CellState.INSCRIBED, f"asked about {name} it answers with {answer.state.name}")
+        site.expect(least <= gap <= most, f"asked about {name} it returns one {gap:.2f} m away")
+        site.expect(answer.state <= CellState.INSCRIBED, f"asked about {name} it returns {answer.state.name}")
     site.expect(none.pose is None, f"within 0.1 m of the wall it found {none.pose}")
-    site.expect(none.state >= CellState.LETHAL, f"where nothing fits it says {none.state.name}")
+    site.expect(none.state >= CellState.LETHAL, f"where nothing fits it returns {none.state.name}")
     site.expect_raises(ValueError, lambda: find(AWAY, -1.0, 0.0), "a negative tolerance")
 
 
@@ -93,7 +93,7 @@ def poses_of_other_frames_are_transformed(site: Site) -> None:
     site.expect(queries.check_path(path).state is CellState.LETHAL, "check_path misses the wall in another frame")
     found = queries.find_valid_pose(there, 1.0, 0.0).pose
     site.expect(
-        found is not None and found.frame_id == "map", f"find_valid_pose answers {found}, not in the map's frame"
+        found is not None and found.frame_id == "map", f"find_valid_pose returns {found}, not in the map's frame"
     )
     lost = somewhere(1.0, 1.0, "nowhere")
     site.expect_raises(TransformError, lambda: queries.check_point(lost), "check_point in an unknown frame")
@@ -108,7 +108,7 @@ def poses_of_other_frames_are_transformed(site: Site) -> None:
 
 @situation()
 def a_cleared_map_has_forgotten(site: Site) -> None:
-    """clear_map forgets what sensors have marked, update_map shows what was seen since."""
+    """clear_map removes what sensors have marked, update_map takes in what was seen since."""
     site.place(WALL)
     site.rig.sensing = False
     site.server.queries.clear_map()

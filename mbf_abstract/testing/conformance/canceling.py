@@ -1,4 +1,4 @@
-"""A cancel at every stage of a goal: it ends CANCELED with the client's reason, and the robot stands."""
+"""A cancel at every step of a goal: it ends CANCELED with the client's reason, and the robot stands."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def a_bad_change_changes_nothing(site: Site) -> None:
     server = site.server
     set_parameters = server.set_plugin_parameters
     site.expect_raises(ValueError, lambda: server.set_parameters(controller_frequency=-1.0), "a negative frequency")
-    wrong: list[tuple[type[Exception], str, float]] = [(ValueError, "wait", -1.0), (ServerError, "nobody", 1.0)]
+    wrong: list[tuple[type[Exception], str, float]] = [(ValueError, "wait", -1.0), (ServerError, "unknown", 1.0)]
     for error, name, duration in wrong:
 
         def change(name: str = name, duration: float = duration) -> None:
@@ -76,7 +76,7 @@ def a_layer_that_raises_holds_the_robot(site: Site) -> None:
         site.expect_stands(2.5, f"the layer {layer.name!r} raises")
         problem = site.server.map_problem()
         for word in (repr(layer.name), "RuntimeError", "broken by the suite"):
-            site.expect(word in problem, f"map_problem does not say {word}: {problem!r}")
+            site.expect(word in problem, f"map_problem does not name {word}: {problem!r}")
         repair()
         site.expect_moves(2.5, f"the layer {layer.name!r} works again")
         handle.cancel("next layer")

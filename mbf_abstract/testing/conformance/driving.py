@@ -63,7 +63,7 @@ def an_obstacle_on_the_path_stops_the_robot(site: Site) -> None:
 
 @situation(planner_frequency=2.0)
 def a_goal_behind_an_obstacle_is_reached(site: Site) -> None:
-    """move_base drives around an obstacle that it sees on its way."""
+    """move_base drives around an obstacle that it sees while it drives."""
     handle = site.navigator.send(MoveBaseGoal(somewhere(7.0, 4.0)))
     site.rig.clock.sleep(0.5)
     site.rig.boxes = [Box(4.5, 3.5, 4.8, 4.6)]

@@ -14,7 +14,7 @@ SILENT = MAX_SILENCE + 0.5  # s after which the robot must stand
 
 @situation(controller_patience=20.0)
 def a_silent_sensor_holds_the_robot_while_it_drives(site: Site) -> None:
-    """The robot stands while its sensor is silent, and drives on when it speaks again."""
+    """The robot stands while its sensor is silent, and drives on when it sends again."""
     handle = site.navigator.send(MoveBaseGoal(somewhere(8.0, 4.0)))
     site.expect_moves(1.0, "with a sensor that works")
     site.rig.sensing = False
@@ -24,7 +24,7 @@ def a_silent_sensor_holds_the_robot_while_it_drives(site: Site) -> None:
         SENSOR in site.server.map_problem(), f"map_problem does not name the sensor: {site.server.map_problem()!r}"
     )
     site.rig.sensing = True
-    site.expect_moves(1.5, "the sensor speaks again")
+    site.expect_moves(1.5, "the sensor sends again")
     site.expect_outcome(handle.wait(60.0), MoveBaseOutcome.SUCCESS)
 
 
@@ -39,14 +39,14 @@ def a_sensor_that_stays_silent_ends_the_path_with_map_error(site: Site) -> None:
 
 @situation()
 def a_silent_sensor_holds_a_recovery(site: Site) -> None:
-    """A recovery stands while the sensor is silent, and finishes when it speaks again."""
+    """A recovery stands while the sensor is silent, and finishes when it sends again."""
     handle = site.navigator.send(RecoveryGoal("rotate"))
     site.expect_moves(0.5, "with a sensor that works")
     site.rig.sensing = False
     site.rig.clock.sleep(SILENT)
     site.expect_stands(3.0, "the sensor is silent")
     site.rig.sensing = True
-    site.expect_moves(1.5, "the sensor speaks again")
+    site.expect_moves(1.5, "the sensor sends again")
     site.expect_outcome(handle.wait(60.0), RecoveryOutcome.SUCCESS)
 
 
@@ -88,7 +88,7 @@ def an_idle_map_stops_and_the_next_goal_gets_a_fresh_one(site: Site) -> None:
     site.rig.boxes = [WALL]
     site.rig.clock.sleep(1.0)
     idle = site.map.point_check()(FACE).state
-    site.expect(idle in (CellState.FREE, CellState.UNKNOWN), f"the idle map has been updated: it says {idle.name}")
+    site.expect(idle in (CellState.FREE, CellState.UNKNOWN), f"the idle map has been updated: it is {idle.name}")
     site.expect_outcome(site.navigator.get_path(FACE, dist_tolerance=0.0), GetPathOutcome.BLOCKED_GOAL)
     site.expect_state(FACE, CellState.LETHAL)
     site.expect_outcome(site.navigator.go_to(somewhere(2.5, 6.0)), MoveBaseOutcome.SUCCESS)

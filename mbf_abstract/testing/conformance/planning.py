@@ -1,4 +1,4 @@
-"""What every backend answers when it is asked for a path: goals free and blocked, tolerances, via points, frames."""
+"""Paths of every backend: goals free and blocked, tolerances, via points, frames."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def a_free_goal_gets_a_free_path(site: Site) -> None:
     site.expect(7.2 < plan.path.length < 8.6, f"the path is {plan.path.length:.2f} m long, the goal 7.28 m away")
     site.expect(plan.cost > 0.0, f"the path costs {plan.cost:g}")
     worst = site.server.queries.check_path(plan.path).state
-    site.expect(worst in (CellState.FREE, CellState.UNKNOWN), f"check_path says {worst.name} of the path")
+    site.expect(worst in (CellState.FREE, CellState.UNKNOWN), f"check_path returns {worst.name} for the path")
 
 
 @situation()
@@ -112,7 +112,7 @@ def via_points_are_passed(site: Site) -> None:
 
 @situation()
 def any_member_of_a_goal_area_will_do(site: Site) -> None:
-    """A goal area is reached at another place where its middle is blocked."""
+    """A goal area whose centre is blocked is reached at another place."""
     site.place(WALL)
     area = DiscArea(somewhere(4.0, 4.0), 1.2)
     plan = site.navigator.get_path(somewhere(4.0, 4.0), goal_area=area)

@@ -1,4 +1,4 @@
-"""How the recoveries of every backend end: done, out of time, refused by the gate, in the way, lost."""
+"""How the recoveries of every backend end: done, out of time, refused by the gate, blocked, lost."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def move_away_gains_distance(site: Site) -> None:
     site.server.set_plugin_parameters(PluginKind.RECOVERY, "move_away", clearance=0.9)
     site.expect_outcome(site.navigator.recover("move_away"), RecoveryOutcome.SUCCESS)
     gap = 2.5 - site.rig.robot.pose.x
-    site.expect(0.75 < gap < 1.1, f"the robot's middle is {gap:.2f} m from the obstacle, wanted is 0.9 m")
+    site.expect(0.75 < gap < 1.1, f"the robot's centre is {gap:.2f} m from the obstacle, wanted is 0.9 m")
 
 
 @situation()
@@ -119,7 +119,7 @@ def a_recovery_beyond_the_patience_ends_with_pat_exceeded(site: Site) -> None:
 
 @situation()
 def a_recovery_beside_a_drive_is_stopped(site: Site) -> None:
-    """A recovery whose commands the gate refuses, as somebody else drives, ends with STOPPED; the drive goes on."""
+    """A recovery whose commands the gate refuses, as another goal drives, ends with STOPPED; the drive goes on."""
     drive = site.navigator.send(ExePathGoal(site.path((2.0, 4.0), (9.0, 4.0))))
     site.rig.clock.sleep(0.5)
     for behavior in ("wait", *MOVING):

@@ -1,4 +1,4 @@
-"""What a backend under test is put on: a simulated clock, a loopback robot, boxes on flat ground and a lidar."""
+"""The world of a backend under test: a simulated clock, a loopback robot, boxes on flat ground and a lidar."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MAX_SILENCE = 1.0
 START = Pose.planar(2.0, 4.0)
 """Where the robot stands first; it looks along +x."""
 T_map_dock = Transform((3.0, 5.0, 0.0), quaternion_from_yaw(math.pi / 2.0), "map", "dock", static=True)
-"""A frame beside the map's, for poses of clients that do not think in the map's frame."""
+"""A frame beside the map's, for poses of clients in another frame than the map's."""
 
 TICK, TICKS_PER_SCAN = 0.1, 2  # s; every tick the robot's track is noted
 
@@ -116,7 +116,7 @@ class BackendRig(LoopbackSession):
         return RangeScan(SENSOR, SENSOR, np.zeros(3), ends, hits, self.clock.now())
 
     def least_gap(self) -> float:
-        """Least distance [m] between the robot's middle and a box on the whole track."""
+        """Least distance [m] between the robot's centre and a box on the whole track."""
         return min((box.gap(x, y) for box in self.boxes for _, x, y in self.track), default=math.inf)
 
     def _stop_sensor(self) -> None:

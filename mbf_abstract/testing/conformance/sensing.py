@@ -1,4 +1,4 @@
-"""How every backend takes scans: good ones, broken ones, those of strangers."""
+"""How every backend takes scans: good ones, broken ones, those of unknown sources."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def an_unknown_source_is_reported_once(site: Site) -> None:
 
 
 @situation()
-def a_scan_of_nothing_but_nan_says_nothing(site: Site) -> None:
+def a_scan_of_nothing_but_nan_is_ignored(site: Site) -> None:
     """A scan without any finite ray neither marks nor clears, and is no sign of life of its sensor."""
     site.place(WALL)
     site.rig.sensing = False
@@ -91,6 +91,6 @@ def a_scan_from_nowhere_or_never_is_refused(site: Site) -> None:
 
 @situation()
 def a_scan_before_all_transforms_is_refused(site: Site) -> None:
-    """A scan that is older than the history of transforms is a TransformError: nobody knows where it was taken."""
+    """A scan that is older than the history of transforms is a TransformError."""
     scan = replace(site.rig.scan(), stamp=-100.0)
     site.expect_raises(TransformError, lambda: site.server.take_scan(scan), "a stamp of long ago")

@@ -33,7 +33,7 @@ PARAMETERS: dict[str, Any] = {
     "angle_tolerance": 3.14,
     "tf_timeout": 1.0,
 }
-"""Of every situation that does not say otherwise; the robot need not turn at its goals."""
+"""Parameters of every situation without others; the robot need not turn at its goals."""
 SPACING = 0.1  # m between the poses of a path
 
 
@@ -62,15 +62,15 @@ class Site:
         """Record what is wrong unless the condition holds."""
         self._report.expect(condition, text)
 
-    def expect_outcome(self, result: ActionResult, outcome: int, *words: str) -> None:
-        """Expect an outcome, and that the message names every one of ``words``."""
+    def expect_outcome(self, result: ActionResult, outcome: int, *texts: str) -> None:
+        """Expect an outcome, and that the message contains each of ``texts``."""
         wanted = "success" if is_success(outcome) else outcome_name(outcome)
         got = f"{result.outcome_name}: {result.message}"
         self.expect(
             result.outcome == outcome or (result.success and is_success(outcome)), f"expected {wanted}, got {got}"
         )
-        for word in words:
-            self.expect(word in result.message, f"expected a message that names {word!r}, got {got}")
+        for text in texts:
+            self.expect(text in result.message, f"expected a message that contains {text!r}, got {got}")
 
     def expect_raises(self, errors: type[Exception], call: Callable[[], object], what: str) -> None:
         """Expect an exception."""
@@ -111,9 +111,9 @@ class Site:
         )
 
     def expect_no_contact(self) -> None:
-        """Expect that the robot's middle was never nearer to a box than its radius, but for what maps round."""
+        """Expect that the robot's centre was never nearer to a box than 0.2 m: its radius less the rounding of maps."""
         gap = self.rig.least_gap()
-        self.expect(gap > 0.2, f"the robot's middle came to {gap:.2f} m from an obstacle")
+        self.expect(gap > 0.2, f"the robot's centre came to {gap:.2f} m from an obstacle")
 
     def expect_visits(self, places: Sequence[tuple[float, float]], distance: float = 0.4) -> None:
         """Expect that the robot came to all places [m], in their order."""
@@ -127,25 +127,27 @@ class Site:
         )
 
     def expect_state(self, place: Pose, state: CellState) -> None:
-        """Expect what ``check_point`` says of a place."""
-        said = self.server.queries.check_point(place).state
-        self.expect(said is state, f"check_point says {said.name} at ({place.x:g}, {place.y:g}), expected {state.name}")
+        """Expect the state that ``check_point`` returns for a place."""
+        found = self.server.queries.check_point(place).state
+        self.expect(
+            found is state, f"check_point returns {found.name} at ({place.x:g}, {place.y:g}), expected {state.name}"
+        )
 
     def expect_free(self, place: Pose) -> None:
-        """Expect that nothing is known to be at a place; a map that has forgotten may say UNKNOWN."""
-        said = self.server.queries.check_point(place).state
-        free = said in (CellState.FREE, CellState.UNKNOWN)
-        self.expect(free, f"check_point says {said.name} at ({place.x:g}, {place.y:g}), expected FREE")
+        """Expect that nothing is known to be at a place; UNKNOWN is as good as FREE."""
+        found = self.server.queries.check_point(place).state
+        free = found in (CellState.FREE, CellState.UNKNOWN)
+        self.expect(free, f"check_point returns {found.name} at ({place.x:g}, {place.y:g}), expected FREE")
 
-    # ------------------------------------------------------------------------------------------ doing things
+    # ------------------------------------------------------------------------------------------ steps
     def place(self, *boxes: Box) -> None:
-        """Replace what stands on the ground, and let the sensor see it."""
+        """Replace the obstacles, and let the sensor see them."""
         self.rig.boxes = list(boxes)
         self.rig.clock.sleep(0.6)
         self.server.queries.update_map()
 
     def sees(self, scan: RangeScan) -> None:
-        """Hand over one scan several times, for maps that want evidence, and bring the map up to date."""
+        """Hand over one scan several times, for maps that need several hits, and update the map."""
         for _ in range(4):
             self.server.take_scan(scan)
         self.server.queries.update_map()
@@ -167,16 +169,16 @@ class Site:
 
 @dataclass(frozen=True)
 class Situation:
-    """One thing that every backend does alike.
+    """One situation in which every backend has to do the same.
 
     Attributes
     ----------
     name : str
-        In one word, for identifiers of tests.
+        Identifier of the situation.
     sentence : str
-        What is true of a backend that passes.
+        The rule that it checks.
     check : callable
-        Looks whether it is.
+        Checks the rule.
     parameters : mapping
         Parameters of the server that differ from those of all situations.
     """
@@ -187,7 +189,7 @@ class Situation:
     parameters: Mapping[str, Any] = field(default_factory=dict)
 
     def run(self, make_server: MakeServer) -> None:
-        """Make a server and look; raises ContractBroken with everything that is wrong."""
+        """Make a server and check it; raises ContractBroken with everything that is wrong."""
         report = Report(self.name, contract=f"contract of map backends, by which {self.sentence}")
         with report.no_exception("the situation"), site(make_server, report, **self.parameters) as made:
             self.check(made)
@@ -197,7 +199,7 @@ class Situation:
 
 
 def situation(**parameters: Any) -> Callable[[Callable[[Site], None]], Situation]:
-    """Make a situation of a check; the first line of its text is the sentence."""
+    """Make a situation of a check; the first line of its docstring is the sentence."""
 
     def decorate(check: Callable[[Site], None]) -> Situation:
         sentence = (check.__doc__ or "").strip().split("\n")[0].rstrip(".")

@@ -6,7 +6,7 @@
 
 Each check runs the plugin through many situations and raises one ``ContractBroken`` with everything it found: results
 that are not legal, runs that differ although the seed is the same, a cancel that is ignored, inputs that were changed,
-exceptions where a result is asked for. What a good path or a smooth drive is, it does not judge.
+exceptions where a result is asked for. It does not judge how good a path or how smooth a drive is.
 """
 
 from mbf_abstract.testing.contract.controller import check_controller

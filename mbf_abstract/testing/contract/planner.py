@@ -131,7 +131,7 @@ class _PlannerCheck:
             self.report.expect(not far, f"{situation}: the path is {result.path.length:.2f} m long")
 
     def there_and_back(self, start: Pose, goal: Pose, tolerance: float) -> None:
-        """Ask for a way back to the start by a via pose: a path that ignores the pose must not pass for a success."""
+        """Ask for a path back to the start by a via pose: a path that ignores the pose must not be a success."""
         situation = f"from {_short(start)} via {_short(goal)} and back"
         request = PlanRequest(start, start, via=(goal,))
         with self._fresh(start) as planner:

@@ -1,4 +1,4 @@
-"""Collects what a plugin, or a map backend, does against its contract."""
+"""Collects how a plugin or a map backend breaks its contract."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Report:
         Returns
         -------
         object or None
-            The result, or None if it cannot be looked at further.
+            The result, or None if it cannot be checked further.
         """
         try:
             result = function()

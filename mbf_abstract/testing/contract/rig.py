@@ -1,4 +1,4 @@
-"""What a plugin under test is put into: a simulated clock, a loopback robot and a context of its own."""
+"""A plugin under test with a simulated clock, a loopback robot and a context."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from mbf_abstract.time.clock import Clock, WallClock, wall_seconds
 P = TypeVar("P", bound=Plugin)
 ContextMaker = Callable[[PluginContext], PluginContext]
 
-SHORTEST_CANCELED_RUN = 0.005  # s of wall time; a faster call needs no look at its token
+SHORTEST_CANCELED_RUN = 0.005  # s of wall time; a faster call need not check its token
 CANCEL_MOMENTS = (0.1, 0.5, 0.9)  # as a share of the time of a whole call
 
 
 def same_context(base: PluginContext) -> PluginContext:
-    """Give a plugin that needs no map the context as it is."""
+    """Return the context unchanged, for plugins that need no map."""
     return base
 
 
