@@ -7,9 +7,7 @@ the bound is loose and nearly everything is settled, then ``mesh.dijkstra`` is f
 
 from __future__ import annotations
 
-from mbf_mesh_nav.kernels.search.astar import search_towards
-from mbf_mesh_nav.mesh.surface_point import corner_distances
-from mbf_mesh_nav.search.leg_search import Leg, LegQuery, seeded_arrays, vertex_path_leg
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery, propagate_from, vertex_path_leg
 from mbf_mesh_nav.search.surface_planner import SurfacePlanner
 
 
@@ -18,22 +16,7 @@ class AStarPlanner(SurfacePlanner):
 
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Search from the start's corners to the goal's corners."""
-        mesh_map = self.mesh_map
-        distances, predecessors, seeds = seeded_arrays(mesh_map, query.blocked, query.start, query.snapshot)
-        targets, offsets = corner_distances(mesh_map, query.blocked, query.goal, query.snapshot)
-        visits = search_towards(
-            mesh_map.vertices,
-            mesh_map.neighbour_offsets,
-            mesh_map.neighbours,
-            query.snapshot.edge_weights,
-            query.blocked,
-            distances,
-            predecessors,
-            seeds,
-            targets,
-            offsets,
-            query.goal.point,
-            mesh_map.topology.mean_edge_length,
-            query.cancel_flag,
+        distances, predecessors, finished = propagate_from(
+            self.mesh_map, query.snapshot, query.blocked, query.start, query.cancel_flag, query.goal, guided=True
         )
-        return vertex_path_leg(mesh_map, query, distances, predecessors) if visits >= 0 else None
+        return vertex_path_leg(self.mesh_map, query, distances, predecessors) if finished else None

@@ -19,6 +19,7 @@ from mbf_mesh_nav.search.leg_search import (
     NO_TARGETS,
     Leg,
     LegQuery,
+    search_graph,
     seeded_arrays,
     threshold_step,
     vertex_path_leg,
@@ -48,32 +49,24 @@ class RepairingPlanner(SurfacePlanner):
         """Bring the remembered wave up to date, or start a new one, and trace the path."""
         wave, self._wave = self._wave, None  # a cancelled repair leaves no half-finished wave behind
         changed = self._changes_since(wave, query) if wave is not None else None
+        graph = search_graph(self.mesh_map, query.snapshot.edge_weights, query.blocked)
         if wave is None or changed is None:
             wave = self._new_wave(query)
             seeds = wave.roots
         else:
-            seeds = self._invalidate(changed, wave, query)
+            fields = wave.distances, wave.predecessors, wave.roots, wave.root_distances
+            seeds = invalidate_subtrees(graph, *fields, changed)
             wave.version = query.snapshot.version
-        finished = propagate_distances(
-            self.mesh_map.neighbour_offsets,
-            self.mesh_map.neighbours,
-            query.snapshot.edge_weights,
-            query.blocked,
-            wave.distances,
-            wave.predecessors,
-            seeds,
-            threshold_step(self.mesh_map),
-            NO_TARGETS,
-            NO_OFFSETS,
-            query.cancel_flag,
-        )
-        if not finished:
+        step = threshold_step(self.mesh_map)
+        if not propagate_distances(
+            graph, wave.distances, wave.predecessors, seeds, step, NO_TARGETS, NO_OFFSETS, query.cancel_flag
+        ):
             return None
         self._wave = wave
         return vertex_path_leg(self.mesh_map, query, wave.distances, wave.predecessors, rooted_at_goal=True)
 
     def _changes_since(self, wave: RememberedWave, query: LegQuery) -> IntArray | None:
-        """Vertices that changed since the wave; None if it leads elsewhere, or nobody remembers what changed."""
+        """Vertices that changed since the wave; None if it leads elsewhere, or the changes are not remembered."""
         roots, offsets = corner_distances(self.mesh_map, query.blocked, query.goal, query.snapshot)
         same_source = (
             wave.goal == query.goal.point.tolist()
@@ -90,17 +83,4 @@ class RepairingPlanner(SurfacePlanner):
         goal, version = query.goal.point.tolist(), query.snapshot.version
         return RememberedWave(
             goal, self.parameters.cost_limit, version, seeds, distances[seeds], distances, predecessors
-        )
-
-    def _invalidate(self, changed: IntArray, wave: RememberedWave, query: LegQuery) -> IntArray:
-        """Invalidate the subtrees of changed vertices; return the seeds of the repair."""
-        return invalidate_subtrees(
-            self.mesh_map.neighbour_offsets,
-            self.mesh_map.neighbours,
-            query.blocked,
-            wave.distances,
-            wave.predecessors,
-            wave.roots,
-            wave.root_distances,
-            changed,
         )

@@ -28,7 +28,7 @@ from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.surface_point import nearest_corner
 from mbf_mesh_nav.motion.goal_approach import clamp, ground_distance
 from mbf_mesh_nav.plugins import MeshRecovery
-from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, seeded_arrays, threshold_step
+from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, search_graph, seeded_arrays, threshold_step
 
 
 class EscapeParameters(GuardedMotionParameters):
@@ -141,9 +141,9 @@ class EscapeRecovery(MeshRecovery, GuardedRecovery):
         """Lengths of the paths from the robot to all vertices but the ``closed`` ones, and their predecessors."""
         mesh_map = self.mesh_map
         distances, predecessors, seeds = seeded_arrays(mesh_map, closed, spot)
-        graph = (mesh_map.neighbour_offsets, mesh_map.neighbours, mesh_map.neighbour_lengths, closed)
+        graph = search_graph(mesh_map, mesh_map.neighbour_lengths, closed)
         step = threshold_step(mesh_map)
-        propagate_distances(*graph, distances, predecessors, seeds, step, NO_TARGETS, NO_OFFSETS, flag)
+        propagate_distances(graph, distances, predecessors, seeds, step, NO_TARGETS, NO_OFFSETS, flag)
         return distances, predecessors
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mbf_abstract.geometry import Pose
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
-from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors, propagate_distances
+from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, follow_predecessors, propagate_distances
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.locate import SurfacePoint
@@ -63,6 +63,7 @@ def propagate_from(
     source: SurfacePoint,
     cancel_flag: FlagArray,
     target: SurfacePoint | None = None,
+    guided: bool = False,
 ) -> tuple[Float32Array, IntArray, bool]:
     """Shortest distances over the vertex graph from a surface point.
 
@@ -70,6 +71,8 @@ def propagate_from(
     ----------
     target : SurfacePoint, optional
         Stop as soon as the path to it is known; without it the whole field is computed.
+    guided : bool
+        Whether the straight line to the target guides the search (A*).
 
     Returns
     -------
@@ -84,20 +87,19 @@ def propagate_from(
     targets, offsets = NO_TARGETS, NO_OFFSETS
     if target is not None:
         targets, offsets = corner_distances(mesh_map, blocked, target, snapshot)
-    finished = propagate_distances(
-        mesh_map.neighbour_offsets,
-        mesh_map.neighbours,
-        snapshot.edge_weights,
-        blocked,
-        distances,
-        predecessors,
-        seeds,
-        threshold_step(mesh_map),
-        targets,
-        offsets,
-        cancel_flag,
-    )
+    graph, step = search_graph(mesh_map, snapshot.edge_weights, blocked), threshold_step(mesh_map)
+    search = graph, distances, predecessors, seeds
+    if guided and target is not None:
+        step, towards = mesh_map.topology.mean_edge_length, (mesh_map.vertices, target.point)
+        finished = propagate_distances(*search, step, targets, offsets, cancel_flag, towards)
+    else:
+        finished = propagate_distances(*search, step, targets, offsets, cancel_flag)
     return distances, predecessors, finished
+
+
+def search_graph(mesh_map: MeshMap, weights: Float32Array, blocked: BoolArray) -> SearchGraph:
+    """The vertex graph with weights (2E,) [m] of its edges, for searches that never enter ``blocked`` (V,)."""
+    return SearchGraph(mesh_map.neighbour_offsets, mesh_map.neighbours, weights, blocked)
 
 
 def seeded_arrays(

@@ -17,8 +17,7 @@ from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, 
 from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, Scratch, edge_use
 from mbf_mesh_nav.kernels.mesh.surface import Surface
-from mbf_mesh_nav.kernels.search.astar import straight_line_bound
-from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
+from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL, straight_line_bound
 from mbf_mesh_nav.kernels.search.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
 HEADINGS = 16
@@ -54,7 +53,7 @@ def search_with_heading(
     Parameters
     ----------
     surface, edge_weights, blocked
-        The graph, as in ``dijkstra.propagate_distances``.
+        The graph, as in ``dijkstra.SearchGraph``.
     edge_headings : (2E,) uint8
         Heading of each directed edge, 0 to 15.
     allowed, roll : (V, 16) bool, (V, 16) float32 [rad]

@@ -1,6 +1,6 @@
-"""Repairing a shortest-path field after local cost changes: forget what hung on the change, keep the rest.
+"""Repairing a shortest-path field after local cost changes: invalidate what depends on the change, keep the rest.
 
-The field is a tree of predecessors. Only vertices whose way leads over a changed vertex can be wrong; they are reset,
+The field is a tree of predecessors. Only vertices whose path leads over a changed vertex can be wrong; they are reset,
 and their intact neighbours become the seeds of a new wave that ``dijkstra.propagate_distances`` runs to the same fixed
 point a search from scratch reaches. (The idea of Ramalingam and Reps, 1996, with a whole subtree at a time.)
 """
@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from mbf_mesh_nav.arrays import BoolArray, Float32Array, IntArray
+from mbf_mesh_nav.arrays import Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Index, kernel
+from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph
 
 _RESET: Any = np.uint8(1)
 _SEED: Any = np.uint8(2)
@@ -20,22 +21,19 @@ _SEED: Any = np.uint8(2)
 
 @kernel
 def invalidate_subtrees(
-    neighbour_offsets: IntArray,
-    neighbours: IntArray,
-    blocked: BoolArray,
+    graph: SearchGraph,
     distances: Float32Array,
     predecessors: IntArray,
     roots: IntArray,
     root_distances: Float32Array,
     changed: IntArray,
 ) -> IntArray:
-    """Reset, in place, all vertices whose way leads over a changed vertex; return the seeds of the repair.
+    """Reset, in place, all vertices whose path leads over a changed vertex; return the seeds of the repair.
 
     Parameters
     ----------
-    neighbour_offsets, neighbours : (V+1,), (2E,) int32
-    blocked : (V,) bool
-        The new blocked vertices.
+    graph : SearchGraph
+        With the new weights and blocked vertices.
     distances, predecessors : (V,) float32, (V,) int32
         The old field; reset vertices get inf and -1.
     roots, root_distances : (r,) int32, (r,) float32
@@ -64,15 +62,15 @@ def invalidate_subtrees(
         reader += ONE
         distances[vertex] = np.inf
         predecessors[vertex] = -1
-        for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
-            child = Index(neighbours[slot])
+        for slot in range(Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])):
+            child = Index(graph.neighbours[slot])
             if Index(predecessors[child]) == vertex and state[child] == 0:
                 state[child] = _RESET
                 reset[count] = child
                 count += ONE
     for index in range(len(roots)):
         root = Index(roots[index])
-        if state[root] == _RESET and not blocked[root]:
+        if state[root] == _RESET and not graph.blocked[root]:
             distances[root] = root_distances[index]
             state[root] = _SEED
             seeds[seed_count] = root
@@ -80,8 +78,8 @@ def invalidate_subtrees(
     # 2. The wave starts again from what is intact around them.
     for index in range(count):
         vertex = Index(reset[index])
-        for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
-            other = Index(neighbours[slot])
+        for slot in range(Index(graph.offsets[vertex]), Index(graph.offsets[vertex + ONE])):
+            other = Index(graph.neighbours[slot])
             if state[other] == 0 and distances[other] < np.inf:
                 state[other] = _SEED
                 seeds[seed_count] = other

@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_mesh_nav.kernels.compiled import kernel
-from mbf_mesh_nav.kernels.search.astar import search_towards
-from mbf_mesh_nav.kernels.search.dijkstra import propagate_distances
+from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, propagate_distances
 from mbf_mesh_nav.kernels.search.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 from mbf_mesh_nav.kernels.wave.bucket_queue import (
     EMPTY,
@@ -63,15 +62,14 @@ def heap_dijkstra(offsets, neighbours, weights, blocked, source):
 
 
 def run_dijkstra(graph, source, step=0.7, targets=NO_INTS, flag=CALM):
-    _, offsets, neighbours, weights, blocked = graph
+    blocked = graph[-1]
     distances = np.full(len(blocked), np.inf, np.float32)
     distances[source] = 0
     predecessors = np.full(len(blocked), -1, np.int32)
     seeds = np.array([source], np.int32)
     offsets_of_targets = np.zeros(len(targets), np.float32)
-    finished = propagate_distances(
-        offsets, neighbours, weights, blocked, distances, predecessors, seeds, step, targets, offsets_of_targets, flag
-    )
+    graph = SearchGraph(*graph[1:])
+    finished = propagate_distances(graph, distances, predecessors, seeds, step, targets, offsets_of_targets, flag)
     return distances, predecessors, finished
 
 
@@ -96,12 +94,11 @@ def test_astar_finds_the_same_cost_and_looks_only_where_a_better_way_could_be(se
     predecessors = np.full(len(blocked), -1, np.int32)
     goal = len(blocked) - 1
     target, offset = np.array([goal], np.int32), np.full(1, 1e-6, np.float32)
-    visits = search_towards(
-        vertices, offsets, neighbours, weights, blocked, distances, predecessors,
-        np.array([0], np.int32), target, offset, vertices[goal], step, CALM,
-    )  # fmt: skip
+    graph, seeds = SearchGraph(offsets, neighbours, weights, blocked), np.array([0], np.int32)
+    assert propagate_distances(
+        graph, distances, predecessors, seeds, step, target, offset, CALM, (vertices, vertices[goal])
+    )
     assert distances[goal] == expected[goal]
-    assert visits > 0
     # Nothing is looked at that could not be better than the way found, but for the last step of the threshold.
     seen = np.flatnonzero(predecessors >= 0)
     bounds = np.linalg.norm(vertices[seen] - vertices[goal], axis=1)
@@ -119,15 +116,15 @@ def test_a_target_stops_the_wave_early_with_its_exact_distance():
     assert np.isfinite(distances).sum() < np.isfinite(full).sum() / 2
 
 
-def test_a_flag_set_before_the_call_cancels_both_kernels():
+def test_a_flag_set_before_the_call_cancels_both_searches():
     graph = random_grid_graph(1)
     assert not run_dijkstra(graph, 0, flag=CANCELLED)[2]
     vertices, offsets, neighbours, weights, blocked = graph
-    visits = search_towards(
-        vertices, offsets, neighbours, weights, blocked, np.zeros(81, np.float32), np.full(81, -1, np.int32),
-        np.array([0], np.int32), np.array([80], np.int32), np.zeros(1, np.float32), vertices[80], 1.0, CANCELLED,
+    assert not propagate_distances(
+        SearchGraph(offsets, neighbours, weights, blocked), np.zeros(81, np.float32), np.full(81, -1, np.int32),
+        np.array([0], np.int32), 1.0, np.array([80], np.int32), np.zeros(1, np.float32), CANCELLED,
+        (vertices, vertices[80]),
     )  # fmt: skip
-    assert visits == -1
 
 
 @given(st.lists(st.tuples(st.integers(0, 19), st.integers(0, 1000)), min_size=1, max_size=80))
