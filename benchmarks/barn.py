@@ -9,7 +9,7 @@ challenge: success * t_opt / clip(t, 4 t_opt, 8 t_opt), t_opt = reference length
 
 ``--results`` keeps every finished run as a JSON line; a run that is in the file with the same settings is not repeated.
 The published run's 50 worlds are compared on those of them that the data holds.
-``planner`` tells whether Theta* finds a way with 0.25 m clearance to all cylinders, and how long it is.
+``planner`` is whether Theta* finds a path with 0.25 m clearance to all cylinders, and how long it is.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@
 Truth: ``terrain/geodesic_reference.csv`` of the data folder (342 pairs, exact MMP lengths), and pygeodesic's exact
 solver on plane, sphere, bunny and parking garage in the same run. Per mesh: the potential of the continuous wave,
 the length of its traced path, the any-angle path and the path along edges, all over the exact length. For the whole
-fields, vertices in which two sheets touch are made two (bunny 28, garage 10): the exact solver does not pass from one
-sheet to the other there, the wave may, so the two would answer different questions.
+fields, vertices in which two surfaces touch are made two (bunny 28, garage 10): the exact solver does not pass from one
+surface to the other there, the wave may, so the two would answer different questions.
 Pairs nearer than five edges are left out, there any first-order method is as coarse as the mesh.
 """
 

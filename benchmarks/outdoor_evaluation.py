@@ -95,7 +95,7 @@ def evaluate(chosen: list[tuple[Scenario, int]], methods: list[str], workers: in
 
 
 def describe(scenario: Scenario, run: SweepRun) -> Row:
-    """What a run's metrics do not tell."""
+    """What a run's metrics leave out."""
     method = next(name for name, settings in METHODS.items() if settings == run.settings)
     return {"terrain": scenario.name, "seed": run.seed, "method": method, "route": has_route(scenario, run.seed)}
 

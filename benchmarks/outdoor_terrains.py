@@ -104,7 +104,7 @@ def terrains(data: Path, first_seed: int, generated_seeds: int, crops: int) -> l
     places = [(data / "terrain" / folder / name).resolve() for name in names for folder in ("dem", "mars")]
     files = [file for file in places if file.is_file()]
     chosen = []
-    for number in range(max(generated_seeds, crops)):  # easy and hard ones mixed, so that a part tells of the whole
+    for number in range(max(generated_seeds, crops)):  # easy and hard ones mixed, so that a part is representative
         seed = first_seed + number
         if number < generated_seeds:
             chosen += [(generated(level), seed) for level in range(LEVELS)]

@@ -78,7 +78,7 @@ def fault_table() -> str:
 def main() -> int:
     """Write or check all generated files."""
     parser = argparse.ArgumentParser(description="Generate the documentation's parts that come from the code.")
-    parser.add_argument("--check", action="store_true", help="write nothing, tell what is out of date")
+    parser.add_argument("--check", action="store_true", help="write nothing, list what is out of date")
     check = parser.parse_args().check
     old = [file for file, text in generate().items() if not file.is_file() or file.read_text("utf-8") != text]
     for file in old:

@@ -1,6 +1,6 @@
 """Environments in which drives are repeated, each in a process of its own, and the digests of what happened there.
 
-Other CPUs are emulated: OpenBLAS and numpy can be told to use what an older one has, numba to compile for any. With
+Other CPUs are emulated: OpenBLAS and numpy can be set to an older one, numba to compile for any. With
 MBF_SAME_BYTES=all every drive is repeated in every environment, kernels compiled anew for a generic CPU included, as
 ``.ci/run`` does; without it a few drives in fewer environments.
 """

@@ -42,7 +42,7 @@ def test_a_lie_becomes_a_failure_that_names_it(lie, outcome, text):
         session.planner.play(lie)
         handle = session.navigator.send(GetPathGoal(Pose.planar(3.0, 0.0)))
         result = handle.wait()
-        assert len(session.planner.requests) == 1  # the lie was told
+        assert len(session.planner.requests) == 1  # the wrong claim was made
         assert (result.outcome, result.path) == (outcome, None)
         assert text in result.message
         assert_ended_once(session, handle)

@@ -1,7 +1,7 @@
 """Fault table, row 32: Ctrl-C, SIGTERM, SIGHUP, an exception in the main thread, the end of the interpreter, a fork.
 
 Each test runs a small robot program in a process of its own. Its robot writes every command to a file at once, so the
-file tells what the robot was told last, however the process ended.
+file shows the last command to the robot, however the process ended.
 """
 
 import os

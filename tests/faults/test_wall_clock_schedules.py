@@ -93,7 +93,7 @@ class DelayingSink:
 
 
 class Ledger:
-    """What the callbacks of all goals were told, in order."""
+    """What the callbacks of all goals received, in order."""
 
     def __init__(self):
         self.handles = []

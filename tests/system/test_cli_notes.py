@@ -22,7 +22,7 @@ planners: [{name: dijkstra, type: dijkstra}]
 """
 SCENARIO = """
 name: notes
-proves: What was found in the configuration is told.
+proves: What was found in the configuration is reported.
 physics: kinematic
 backend: costmap
 world: {type: map, file: gap.yaml}

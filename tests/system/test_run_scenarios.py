@@ -55,7 +55,7 @@ def test_one_seed_is_one_drive_bit_for_bit(name, tmp_path):
 
 
 def test_the_robot_drives_in_a_real_building(tmp_path, shared_data):
-    """The TurtleBot world of the peers, with lidar and no walls but its own."""
+    """The TurtleBot world of ROS tutorials, with lidar and no walls but its own."""
     scenario = load_scenario("indoor").model_copy(
         update={
             "world": MapWorld(type="map", file=shared_data / "maps" / "nav2_bringup" / "tb3_sandbox.yaml"),

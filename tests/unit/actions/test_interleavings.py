@@ -41,7 +41,7 @@ def planner_answer(rng, clock):
         straight_plan,
         failure,
         slow(clock, seconds, straight_plan),
-        obedient(clock, seconds, straight_plan, PlanResult(GetPathOutcome.CANCELED, "as told")),
+        obedient(clock, seconds, straight_plan, PlanResult(GetPathOutcome.CANCELED, "as ordered")),
         RuntimeError("planner"),
         slow(clock, 1.5, failure),  # longer than patience and grace: quarantined for a while
     ][int(rng.choice(6, p=[0.4, 0.1, 0.2, 0.2, 0.05, 0.05]))]

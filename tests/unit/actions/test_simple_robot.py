@@ -1,4 +1,4 @@
-"""A server with trivial plugins and a robot that does as it is told: what Move Base Flex checks of its simple server.
+"""A server with trivial plugins and a robot that moves as commanded: what Move Base Flex checks of its simple server.
 
 One expectation goes beyond it: upstream could not get move_base to recover a stuck robot in its own test.
 """

@@ -19,7 +19,7 @@ from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 
 TARGET = Pose.planar(3.0, 0.0)
-CANCELED = PlanResult(Outcome.CANCELED, "as told")
+CANCELED = PlanResult(Outcome.CANCELED, "as ordered")
 
 
 def planners(count):
@@ -165,7 +165,7 @@ def test_f246_a_canceled_goal_keeps_the_last_words_of_its_plugin(make_session):
     handle.cancel()
     result = handle.wait()
     assert (handle.status, result.outcome) == (GoalStatus.CANCELED, Outcome.CANCELED)
-    assert result.plugin_message == "as told"
+    assert result.plugin_message == "as ordered"
 
 
 def test_f247_a_plugin_that_raises_aborts_its_goal(make_session):

@@ -1,4 +1,4 @@
-"""Tours over waypoints, one move_base goal after the other: order, failures, feedback, cancel, pause, tasks."""
+"""Waypoint sequences, one move_base goal after the other: order, failures, feedback, cancel, pause, tasks."""
 
 import asyncio
 

@@ -1,4 +1,4 @@
-"""Files from elsewhere: pipes and devices are told from files, arrays are read only if they fit."""
+"""Files from elsewhere: pipes and devices are refused, arrays are read only if they fit."""
 
 import os
 import tracemalloc

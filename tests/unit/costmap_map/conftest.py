@@ -66,7 +66,7 @@ def build(ten_by_ten: Costmap) -> Callable[..., LayeredCostmap]:
 
 @pytest.fixture
 def seeing() -> dict[str, Any]:
-    """Block of an obstacle layer with one source "laser" that sees far and remembers, as in the peers. tests."""
+    """Block of an obstacle layer with one source "laser" with a long range and no decay, as in costmap_2d."""
     laser = {
         "obstacle_max_range": 100.0,
         "raytrace_max_range": 100.0,

@@ -95,7 +95,7 @@ local_costmap: *map
 
 @pytest.fixture
 def site(tmp_path):
-    """A server on simulated time, and what it has told."""
+    """A server on simulated time, and what it has reported."""
     (tmp_path / "robot.yaml").write_text(CONFIG)
     clock, transforms, reported = SimClock(), TransformBuffer(), MemorySink()
     robot = LoopbackRobot(clock, transforms, Pose.planar(0.0, 0.0))

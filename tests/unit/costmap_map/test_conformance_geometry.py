@@ -1,4 +1,4 @@
-"""Facts from peers' unit tests about footprints, coordinates and voxels (F031-F047, F061-F063, F347)."""
+"""Facts of upstream unit tests about footprints, coordinates and voxels (F031-F047, F061-F063, F347)."""
 
 import math
 import sys

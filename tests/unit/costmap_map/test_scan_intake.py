@@ -32,7 +32,7 @@ CONNECTED = Transform((0.0, 0.0, 0.0), parent="map", child="drift", static=True)
 
 @pytest.fixture
 def site(tmp_path):
-    """A server with a global map in map and a local one in drift, its transforms, and what it has told."""
+    """A server with a global map in map and a local one in drift, its transforms, and what it has reported."""
     file = tmp_path / "robot.yaml"
     file.write_text(CONFIG)
     clock, transforms, reported = SimClock(), TransformBuffer(), MemorySink()

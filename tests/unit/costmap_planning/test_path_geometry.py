@@ -1,4 +1,4 @@
-"""Peer facts about path geometry."""
+"""Conformance tests of path geometry."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Regulated pure pursuit: the peer's numbers, its failures, and closed loops in a room."""
+"""Regulated pure pursuit: Nav2's numbers, its failures, and closed loops in a room."""
 
 import math
 

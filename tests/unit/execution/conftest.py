@@ -5,7 +5,7 @@ import pytest
 
 @pytest.fixture
 def make_session(make_session):
-    """F286: after whatever end, the robot is told to stand."""
+    """F286: after whatever end, the robot is commanded to stand."""
     made = []
 
     def make(*args, **parameters):

@@ -16,7 +16,7 @@ FORWARD = Twist.planar(0.5)
 
 
 class MoodyRobot:
-    """Writes a command down when the call with it returns; blocks or raises as long as it is told to."""
+    """Writes a command down when the call with it returns; blocks or raises as long as the test says."""
 
     def __init__(self, clock):
         self.clock, self.commands, self.inside = clock, [], 0

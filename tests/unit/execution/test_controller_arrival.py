@@ -1,4 +1,4 @@
-"""How a controller execution arrives, and what it tells; F-numbers are facts of the upstream tests, with their ids."""
+"""How a controller execution arrives and reports; F-numbers are facts of the upstream tests, with their ids."""
 
 import pytest
 
@@ -17,7 +17,7 @@ FAILS = ControlResult(Outcome.BLOCKED_PATH, "a chair")
 
 
 def _coasting(session, seconds):
-    """Odometry that says the robot still moves for a while after it was told to stand."""
+    """Odometry by which the robot still moves for a while after the zero command."""
     real = session.robot.odometry
     stopped_at = []
 

@@ -298,6 +298,6 @@ def test_a_refine_goal_that_can_not_be_served_is_rejected(make_session, goal, wo
 
 def test_an_obedient_behaviour_returns_soon_after_its_token_is_set(make_session):
     session = make_session(recovery_patience=0.5)
-    session.recovery.play(obedient(session.clock, 9.0, DONE, RecoveryResult(RecoveryOutcome.CANCELED, "as told")))
+    session.recovery.play(obedient(session.clock, 9.0, DONE, RecoveryResult(RecoveryOutcome.CANCELED, "as ordered")))
     assert session.navigator.recover().outcome == RecoveryOutcome.PAT_EXCEEDED
     assert session.clock.now() < 0.6

@@ -1,4 +1,4 @@
-"""A car's tightest curve: told by its driver once, kept to by the gate and known to every plugin."""
+"""A car's tightest curve: given by its driver once, enforced by the gate and known to every plugin."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A session for executives, and tree nodes that do what a test tells them."""
+"""A session for executives, and tree nodes that a test scripts."""
 
 import pytest
 from py_trees.behaviour import Behaviour

@@ -106,7 +106,7 @@ def test_wherever_a_file_is_cut_it_is_whole_or_refused(tmp_path_factory, ending,
     except MeshError:
         assert kept < len(content)
         return
-    # Of the very last number a digit may be missing: nothing in a text file tells.
+    # A digit of the very last number may be missing: a text file does not show it.
     assert len(faces) == len(FACES)
     assert kept > len(content) - 5
 

@@ -1,4 +1,4 @@
-"""Axes and units of mesh files: every format ends up in metres with z up, and what was turned is told."""
+"""Axes and units of mesh files: every format ends up in metres with z up, and every rotation is reported."""
 
 import json
 

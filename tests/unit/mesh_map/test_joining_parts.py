@@ -1,4 +1,4 @@
-"""Parts that meet become one surface: rounding of their transforms, mirrored parts, sheets that only touch."""
+"""Parts that meet become one surface: rounding of their transforms, mirrored parts, surfaces that only touch."""
 
 import numpy as np
 import pytest

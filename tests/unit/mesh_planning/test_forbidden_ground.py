@@ -44,7 +44,7 @@ def walled(paint):
 
 
 class Robot:
-    """A robot that does at once what it is told, on the plane z = 0."""
+    """A robot that moves at once as commanded, on the plane z = 0."""
 
     def __init__(self, x, y, yaw=0.0):
         self.x, self.y, self.yaw, self.places = x, y, yaw, [(x, y)]

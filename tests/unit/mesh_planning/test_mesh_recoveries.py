@@ -22,7 +22,7 @@ from mbf_mesh_nav.recoveries.escape import EscapeRecovery
 
 
 class SimulatedMotion:
-    """A unicycle on the surface; sleeping advances the recovery's clock. ``stop_after``: sleeps until told to end."""
+    """A unicycle on the surface; sleeping advances the recovery's clock. ``stop_after``: sleeps until a cancel."""
 
     def __init__(self, mesh_map, pose_on, clock, position, heading, stop_after=10**9, gate_open=True):
         self.mesh_map, self.pose_on, self.clock = mesh_map, pose_on, clock

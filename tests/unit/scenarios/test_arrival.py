@@ -1,4 +1,4 @@
-"""Truth decides whether a robot has arrived; what it believed is told beside it."""
+"""Truth decides whether a robot has arrived; its belief is reported beside it."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Scenario files: what is legal, and how mistakes are told."""
+"""Scenario files: what is legal, and how mistakes are reported."""
 
 import numpy as np
 import pytest

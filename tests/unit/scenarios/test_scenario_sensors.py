@@ -1,4 +1,4 @@
-"""The sensors of a scenario on a running session: what the server is told, and what faults do to it."""
+"""The sensors of a scenario on a running session: what the server gets, and what faults do to it."""
 
 import pytest
 

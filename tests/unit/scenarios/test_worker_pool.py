@@ -1,4 +1,4 @@
-"""Worker processes: each job is done once, also when a worker is told to end in the middle of one."""
+"""Worker processes: each job is done once, also when a worker is terminated in the middle of one."""
 
 import os
 import signal

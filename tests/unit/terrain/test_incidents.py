@@ -1,4 +1,4 @@
-"""Mishaps are counted once per occurrence, after they have held long enough."""
+"""Incidents are counted once per occurrence, after they have held long enough."""
 
 import math
 from collections.abc import Callable

@@ -12,7 +12,7 @@ from mbf_abstract.testing.scripted import ScriptedRecovery, straight_plan
 
 
 def _planning(session):
-    canceled = PlanResult(GetPathOutcome.CANCELED, "as told")
+    canceled = PlanResult(GetPathOutcome.CANCELED, "as ordered")
     session.planner.play(obedient(session.clock, 4.0, straight_plan, canceled))
 
 

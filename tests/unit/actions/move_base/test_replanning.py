@@ -51,7 +51,7 @@ def test_policy_recover_stops_recovers_and_plans_anew(make_session):
 
 def test_a_replanning_under_way_at_the_goal_is_canceled(make_session):
     session = make_session(planner_frequency=1.0)
-    canceled = PlanResult(GetPathOutcome.CANCELED, "as told")
+    canceled = PlanResult(GetPathOutcome.CANCELED, "as ordered")
     session.planner.play(straight_plan, obedient(session.clock, 4.0, straight_plan, canceled))
     assert session.send(1.0).wait().success
     session.clock.sleep(0.1)

@@ -1,4 +1,4 @@
-"""Nothing that a page asks for stops the world, and who may ask is told when the page is served."""
+"""Nothing that a page asks for stops the world, and who may ask is printed when the page is served."""
 
 import asyncio
 import math
