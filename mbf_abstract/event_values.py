@@ -46,11 +46,11 @@ def to_json_value(value: Any) -> JsonValue:
     """Turn ``value`` into plain JSON: numbers rounded to 9 decimals, arrays to lists, inf and nan to text.
 
     A type that JSON does not know becomes its ``str``; an enum becomes its name. What is too long, too deep or too
-    many is replaced by a text that says so.
+    many is replaced by a text that gives the reason.
     """
     if value is None or type(value) is bool:
         return value
-    if type(value) is str and len(value) <= MAX_TEXT and value.isascii():  # most fields; others go the long way
+    if type(value) is str and len(value) <= MAX_TEXT and value.isascii():  # most fields; others need a converter
         return value
     try:
         return _Converter().convert(value, 0)

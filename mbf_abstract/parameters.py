@@ -8,7 +8,7 @@ Example
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -27,8 +27,15 @@ class PluginParameters(ParameterModel):
 Parameters = TypeVar("Parameters", bound=ParameterModel)
 
 
-def with_changes(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
+def with_changes(
+    parameters: Parameters, changes: Mapping[str, Any], read_once: Collection[str] | None = None
+) -> Parameters:
     """Return validated parameters in which some values are changed at run time.
+
+    Parameters
+    ----------
+    read_once : collection of str, optional
+        What must stay; without it all that is declared as not dynamic.
 
     Raises
     ------
@@ -37,12 +44,10 @@ def with_changes(parameters: Parameters, changes: Mapping[str, Any]) -> Paramete
     """
     model = type(parameters)
     new = model.model_validate({**parameters.model_dump(), **changes})
-    fixed = [
-        name
-        for name, field in model.model_fields.items()
-        if not (field.json_schema_extra or {}).get("dynamic", True)  # type: ignore[union-attr]
-        and getattr(new, name) != getattr(parameters, name)
-    ]
+    if read_once is None:
+        fields = model.model_fields.items()
+        read_once = [name for name, field in fields if not (field.json_schema_extra or {}).get("dynamic", True)]  # type: ignore[union-attr]
+    fixed = [name for name in read_once if getattr(new, name) != getattr(parameters, name)]
     if fixed:
         raise ValueError(f"{', '.join(fixed)}: read once, at the start, and cannot be changed at run time")
     return new

@@ -117,6 +117,19 @@ class Plugin(ABC):
         """React to new ``self.parameters``, set at run time; called while no main method runs."""
 
 
+@dataclass(frozen=True)
+class PluginResult:
+    """What the answers of all plugins have: an outcome code, and a text that may be empty."""
+
+    outcome: int
+    message: str = ""
+
+    @property
+    def success(self) -> bool:
+        """Whether the outcome is below 10."""
+        return is_success(self.outcome)
+
+
 # ---------------------------------------------------------------------------------------------------- planner
 @dataclass(frozen=True)
 class PlanRequest:
@@ -130,7 +143,7 @@ class PlanRequest:
     angle_tolerance : float
         The same for the final heading [rad].
     via : tuple of Pose
-        Poses to pass on the way, in order.
+        Poses to pass between start and goal, in order.
     """
 
     start: Pose
@@ -142,27 +155,20 @@ class PlanRequest:
 
 
 @dataclass(frozen=True)
-class PlanResult:
+class PlanResult(PluginResult):
     """Answer of a planner: an outcome of ``GetPathOutcome`` (or a plugin's own), a text, the path and its cost.
 
-    A cost of exactly 0 is replaced by the path's length. ``permanent`` says of a failure that the same question will
-    get no other answer, whatever the sensors see: the goal ends at once, without retries and recoveries. That is
-    understood of OUT_OF_MAP, INVALID_START and INVALID_GOAL.
+    A cost of exactly 0 is replaced by the path's length. ``permanent`` marks a failure that planning again cannot
+    change, whatever the sensors see: the goal ends at once, without retries and recoveries. It is set for OUT_OF_MAP,
+    INVALID_START and INVALID_GOAL.
     """
 
-    outcome: int
-    message: str = ""
     path: Path | None = None
     cost: float = 0.0
     permanent: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "permanent", self.permanent or self.outcome in PERMANENT_OUTCOMES)
-
-    @property
-    def success(self) -> bool:
-        """Whether the outcome is below 10."""
-        return is_success(self.outcome)
 
 
 class AbstractPlanner(Plugin):
@@ -184,20 +190,13 @@ class ControlRequest:
 
 
 @dataclass(frozen=True)
-class ControlResult:
+class ControlResult(PluginResult):
     """Answer of a controller: an outcome of ``ExePathOutcome`` (or a plugin's own), a text and the command.
 
     The command is sent only if the outcome is a success; ``None`` then counts as NO_VALID_CMD.
     """
 
-    outcome: int
-    message: str = ""
     command: Command | None = None
-
-    @property
-    def success(self) -> bool:
-        """Whether the outcome is below 10."""
-        return is_success(self.outcome)
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +220,7 @@ class AbstractController(Plugin):
 
     @property
     def turns_on_the_spot(self) -> bool:
-        """Whether it counts on a robot that can; a server whose robot cannot says so."""
+        """Whether it needs a robot that can turn on the spot; a server whose robot cannot reports it."""
         return False
 
     @abstractmethod
@@ -241,7 +240,7 @@ class AbstractController(Plugin):
         return False
 
     def planned_motion(self) -> PlannedMotion | None:
-        """Return what shall follow the present command, for viewers; None where nothing is planned beyond it."""
+        """Return the motion planned after the present command, for viewers; None if there is none."""
         return None
 
 
@@ -271,16 +270,8 @@ class RecoveryRequest:
 
 
 @dataclass(frozen=True)
-class RecoveryResult:
+class RecoveryResult(PluginResult):
     """Answer of a recovery: an outcome of ``RecoveryOutcome`` (or a plugin's own) and a text."""
-
-    outcome: int
-    message: str = ""
-
-    @property
-    def success(self) -> bool:
-        """Whether the outcome is below 10."""
-        return is_success(self.outcome)
 
 
 class AbstractRecovery(Plugin):
@@ -293,20 +284,13 @@ class AbstractRecovery(Plugin):
 
 # ---------------------------------------------------------------------------------------------------- refiner
 @dataclass(frozen=True)
-class RefineResult:
+class RefineResult(PluginResult):
     """Answer of a refiner: outcome of ``RefinePathOutcome``, text, and the refined path.
 
     Without success a client gets the path it gave, whatever stands here.
     """
 
-    outcome: int
-    message: str = ""
     path: Path | None = None
-
-    @property
-    def success(self) -> bool:
-        """Whether the outcome is below 10."""
-        return is_success(self.outcome)
 
 
 class AbstractRefiner(Plugin):

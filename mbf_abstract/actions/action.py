@@ -70,7 +70,7 @@ class GoalJob(Generic[G, R, F]):
             action.finish(self.handle, action.internal_error_outcome, text)
 
     def preempt(self) -> None:
-        """Make way for a newer goal."""
+        """Cancel the goal because a newer one waits."""
         self.handle.cancel(PREEMPTED)
 
     def _end_unstarted(self, reason: str) -> None:

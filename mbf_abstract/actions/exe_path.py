@@ -17,7 +17,7 @@ from mbf_abstract.execution.controller_state import ControllerEnd, Plan
 from mbf_abstract.execution.plan_check import arrival_problem, path_in_global_frame
 from mbf_abstract.execution.progress import PathProgress
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import ExePathFeedback, ExePathGoal, ExePathResult
 from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import ExePathOutcome

@@ -1,8 +1,8 @@
 """The ``follow_waypoints`` action: a sequence of waypoints, each reached with a ``move_base`` goal of its own.
 
 Steps of one visit: wait while paused - send the goal - pass cancel and pause on to it - run the task, while
-the robot stands there - next. A visit that somebody else cancels, or takes the robot away from with another goal, ends
-the sequence as CANCELED; one that is rejected ends it whatever ``stop_on_failure`` says.
+the robot stands there - next. A visit that another client cancels, or replaces by another goal, ends the sequence
+as CANCELED; one that is rejected ends it regardless of ``stop_on_failure``.
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ class _TaskRun:
             name, goal_id = self._job.action.name, self._job.handle.id
             self._runtime.events.emit(EventKind.FAULT, name, goal_id=goal_id, message=problem)
         with self._condition:
-            self._over = True  # from now on nobody gives up on it any more
+            self._over = True  # from now on it cannot be abandoned
         supervisor.stop(watch)
         if self._abandoned:
             self._runtime.hanging.discard(self)

@@ -15,7 +15,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.plan_check import area_problem, check_path, in_global_frame
 from mbf_abstract.execution.planner import PlannerExecution, PlannerState
 from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult, NoFeedback
 from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import GetPathOutcome

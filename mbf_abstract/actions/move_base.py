@@ -35,7 +35,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.plan_check import arrival_problem, in_global_frame
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import ExePathFeedback, MoveBaseGoal, MoveBaseResult
 from mbf_abstract.goals.handle import GoalHandle
 from mbf_abstract.outcomes import MoveBaseOutcome

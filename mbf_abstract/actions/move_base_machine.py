@@ -15,7 +15,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.motion_watch import OscillationDetector
 from mbf_abstract.execution.plan_check import in_global_frame
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import (
     ExePathFeedback,
     ExePathGoal,
@@ -91,7 +91,7 @@ class MoveBaseMachine:
             while end is None:
                 end = self._react(self._next_message())
             return end
-        finally:  # e.g. a replanning that is still under way when the robot arrives
+        finally:  # e.g. a replanning that still runs when the robot arrives
             for handle in self._sub_goals():
                 handle.cancel("move_base is over")
 

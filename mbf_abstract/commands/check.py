@@ -18,7 +18,7 @@ def check(
     config: Path = typer.Argument(..., help="Configuration file."),
     load: bool = typer.Option(True, "--load/--no-load", help="Also read the map files and construct the plugins."),
 ) -> None:
-    """Check a configuration: all mistakes at once, exit code 2 if there is any. Tells what was found in its map."""
+    """Check a configuration: all mistakes at once, exit code 2 if there is any. Prints what was found in its map."""
     with readable_errors():
         from mbf_abstract.commands.standing_server import standing_server
         from mbf_abstract.server.factory import read_config

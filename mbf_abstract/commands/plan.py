@@ -42,7 +42,7 @@ def plan(
     unknown: Unknown | None = typer.Option(
         None,
         "--unknown",
-        help="What a bare map does not know is free (as without this option, which says so), or lethal.",
+        help="Whether unknown cells of a bare map are free (the default, with a note) or lethal.",
     ),
     png: Path | None = typer.Option(None, "--png", help="Draw map and path into this file."),
 ) -> None:

@@ -14,7 +14,7 @@ TRACEBACK_VARIABLE = "MBF_TRACEBACK"
 
 
 def text_of(error: Exception) -> str:
-    """Return what an exception says, with its name where that is nothing or too little to understand."""
+    """Return the text of an exception; its name where it has none."""
     if isinstance(error, MemoryError):
         return f"not enough memory for that: {error}".removesuffix(": ")
     return str(error).strip() or type(error).__name__

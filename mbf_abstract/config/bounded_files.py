@@ -1,7 +1,7 @@
-"""Opening files that come from somebody else: no pipes and devices, and no array larger than a limit.
+"""Opening untrusted files: no pipes and devices, and no array larger than a limit.
 
 When to use: by every reader of a file whose name or content a configuration, a download or a colleague chose. A pipe
-blocks its reader until somebody writes, and a compressed file of a megabyte may hold gigabytes.
+blocks its reader until it is written to, and a compressed file of a megabyte may hold gigabytes.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ _SPECIAL = (
 
 
 class ArrayFileError(ValueError):
-    """A file of arrays is damaged, or holds more than its reader wants; the text does not name the file."""
+    """A file of arrays is damaged, or holds more than its reader's limit; the text does not name the file."""
 
 
 def special_file(path: Path) -> str:
     """What a path is if it is no file with contents: "a pipe", "a socket" or "a device"; "" otherwise.
 
-    Also "" where there is nothing, or a folder: who opens it learns that from the operating system.
+    Also "" where there is nothing, or a folder: opening it raises the operating system's error.
     """
     try:
         mode = path.stat().st_mode

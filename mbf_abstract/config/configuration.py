@@ -27,28 +27,13 @@ from pathlib import Path
 from typing import Any, cast
 
 from mbf_abstract.config.findings import ConfigError, Finding, KeyPath, suggest
-from mbf_abstract.config.map_section import LayerSpec, Section, SectionValidator
+from mbf_abstract.config.map_section import Section, SectionValidator
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.config.registry import PluginError, PluginRegistry
 from mbf_abstract.config.validation import validate
 from mbf_abstract.config.yaml_source import YamlDocument, read_yaml
 from mbf_abstract.parameters import ParameterModel, PluginParameters, parameter
 from mbf_abstract.plugins import Plugin, PluginKind
-
-__all__ = [
-    "Config",
-    "ConfigError",
-    "Finding",
-    "LayerSpec",
-    "NavigationParameters",
-    "PluginDeclaration",
-    "PluginSpec",
-    "RawConfig",
-    "Section",
-    "SkippedPlugin",
-    "load_config",
-    "validate_config",
-]
 
 PLUGIN_LISTS: dict[str, PluginKind] = {
     "planners": PluginKind.PLANNER,
@@ -133,10 +118,6 @@ class Config:
     plugins: tuple[PluginSpec, ...] = ()
     skipped: tuple[SkippedPlugin, ...] = ()
     sections: Mapping[str, Section] = field(default_factory=dict)
-
-    def plugins_of(self, kind: PluginKind) -> list[PluginSpec]:
-        """Plugins of one kind, in order."""
-        return [spec for spec in self.plugins if spec.kind is kind]
 
 
 def load_config(path: str | os.PathLike[str]) -> RawConfig:
@@ -256,13 +237,8 @@ class _Validation:
         return True
 
     def _plugin(self, kind: PluginKind, declared: PluginDeclaration, path: KeyPath) -> None:
-        try:
-            plugin_class = cast("type[Plugin]", self.registry.load(kind, declared.type))
-        except PluginError as error:
-            if declared.optional:
-                self.skipped.append(SkippedPlugin(kind, declared.name, str(error)))
-            else:
-                self._report((*path, "type"), f"a type of {kind.value} that loads", repr(declared.type), error.reason)
+        plugin_class = self._load(kind, declared.type, (*path, "type"), declared.name if declared.optional else "")
+        if plugin_class is None:
             return
         block = self.data.get(declared.name)
         key_path = (declared.name,)
@@ -279,16 +255,24 @@ class _Validation:
         """Check the plugins that stand in the block of another one, by the same registry and the same rules."""
         for inner in plugin_class.inner_plugins:
             type_name, block_path = getattr(parameters, inner.type_key), (*path, inner.block_key)
-            try:
-                inner_class = cast("type[Plugin]", self.registry.load(inner.kind, type_name))
-            except PluginError as error:
-                expected = f"a type of {inner.kind.value} that loads"
-                self._report((*path, inner.type_key), expected, repr(type_name), error.reason)
+            inner_class = self._load(inner.kind, type_name, (*path, inner.type_key))
+            if inner_class is None:
                 continue
             block = getattr(parameters, inner.block_key)
             checked = validate(inner_class.Parameters, block, self.document, block_path, self.findings, self.context)
             if checked is not None:
                 self._inner_plugins(inner_class, checked, block_path)
+
+    def _load(self, kind: PluginKind, type_name: str, path: KeyPath, optional: str = "") -> type[Plugin] | None:
+        """Load a plugin class; one that cannot be loaded is a finding, or skipped under the name ``optional``."""
+        try:
+            return cast("type[Plugin]", self.registry.load(kind, type_name))
+        except PluginError as error:
+            if optional:
+                self.skipped.append(SkippedPlugin(kind, optional, str(error)))
+            else:
+                self._report(path, f"a type of {kind.value} that loads", repr(type_name), error.reason)
+            return None
 
     def _unknown_keys(self) -> None:
         known = [*_OWN_KEYS, *NavigationParameters.model_fields, *self.sections, *self.lines_of_names]

@@ -55,7 +55,7 @@ class ConfigError(Exception):
         super().__init__("\n".join(finding.text for finding in self.findings))
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        """Survive the way back from a worker process."""
+        """Survive pickling, for the return from a worker process."""
         return type(self), (self.findings,)
 
 

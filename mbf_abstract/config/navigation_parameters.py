@@ -140,7 +140,7 @@ class NavigationParameters(ParameterModel):
     )
     min_turning_radius: float | None = parameter(
         None,
-        "Radius of the tightest curve of commands; 0 = turning on the spot is allowed, absent = what the driver says.",
+        "Radius of the tightest curve of commands; 0 = turning on the spot is allowed, absent = the driver's.",
         unit="m",
         ge=0.0,
         le=100.0,
@@ -155,7 +155,7 @@ class NavigationParameters(ParameterModel):
     restore_defaults: bool = parameter(False, "Set all dynamic parameters back to their configured values.")
 
     @model_validator(mode="after")
-    def _limits_leave_a_way_to_move(self) -> NavigationParameters:
+    def _commands_come_before_the_timeout(self) -> NavigationParameters:
         if self.command_timeout < 1.0 / self.controller_frequency:
             raise ValueError(
                 f"a command_timeout ({self.command_timeout:g} s) of at least one control period "

@@ -27,7 +27,7 @@ Adapter = Callable[[str, type], type | None]
 
 
 class PluginError(Exception):
-    """A plugin type cannot be used; ``group``, ``type`` and ``reason`` say which and why."""
+    """A plugin type cannot be used; see ``group``, ``type`` and ``reason``."""
 
     def __init__(self, group: str, type_name: str, reason: str) -> None:
         super().__init__(f"{group}: {type_name}: {reason}")
@@ -36,7 +36,7 @@ class PluginError(Exception):
         self.reason = reason
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        """Survive the way back from a worker process."""
+        """Survive pickling, for the return from a worker process."""
         return type(self), (self.group, self.type, self.reason)
 
 

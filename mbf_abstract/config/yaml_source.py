@@ -1,9 +1,9 @@
 """Safe YAML with line numbers: plain values only, and for each key path the line where it stands.
 
 Only YAML's own types are read (mapping, list, text, number, bool, null). A file is refused if it is too large, nested
-too deep, expands too many aliases, holds a key twice, or is not a mapping at the top. Half of a surrogate pair, which
-no file or page can hold, is spelled out as its escape. Merge keys (``<<``) are refused,
-because a key would then not have one line. Numbers such as ``1e-3`` are numbers, as in YAML 1.2.
+too deep, expands too many aliases, holds a key twice, or is not a mapping at the top. Merge keys (``<<``) are refused,
+because a key would then not have one line. Half of a surrogate pair, which no file can hold, is spelled out as its
+escape. Numbers such as ``1e-3`` are numbers, as in YAML 1.2.
 """
 
 from __future__ import annotations

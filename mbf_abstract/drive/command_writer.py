@@ -48,7 +48,7 @@ class CommandWriter:
 
     @property
     def busy(self) -> bool:
-        """Whether a call is under way, or hangs."""
+        """Whether a call is running, or hangs."""
         return self._calls > 0
 
     @property
@@ -57,7 +57,7 @@ class CommandWriter:
         return stands_still(self.last_command)
 
     def wait_until_free(self, limit: float) -> bool:
-        """Wait at most ``limit`` [s] for the end of the call that is under way; whether there is none any more."""
+        """Wait at most ``limit`` [s] for the end of the running call; whether there is none any more."""
         deadline = self._clock.now() + limit
         self._waiting += 1
         try:
@@ -77,7 +77,7 @@ class CommandWriter:
         return command
 
     def begin_stop(self, although_busy: bool = False) -> Command | None:
-        """Announce the zero that ``deliver`` is to send; None where the call that is under way will send it.
+        """Announce the zero that ``deliver`` is to send; None where the running call will send it.
 
         With ``although_busy`` zero is sent beside a call that hangs, and once more when that call returns.
         """
@@ -114,7 +114,7 @@ class CommandWriter:
                 answer: object = self._robot.send_command(command)  # type: ignore[func-returns-value]
             if inspect.iscoroutine(answer):
                 answer.close()
-                raise TypeError("it returned a coroutine, which nobody awaits")
+                raise TypeError("it returned a coroutine, which is not awaited")
         except BaseException as error:
             if isinstance(error, ThreadDetached) or is_for_the_program(error):
                 raise

@@ -1,6 +1,6 @@
 """The robot as the framework sees it: a sink for commands, odometry, and poses through the transform buffer.
 
-``RobotInformation`` is what plugins and executions ask. It never answers with old data: a pose or a velocity beyond
+``RobotInformation`` is what plugins and executions ask. It never returns old data: a pose or a velocity beyond
 its age limit raises ``RobotStateError`` with the measured age, so no command is computed on it (promise P6).
 """
 
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from mbf_abstract.event_values import error_text
 from mbf_abstract.geometry import Command, Pose, Twist
-from mbf_abstract.geometry.transform_buffer import TransformBuffer, TransformError
+from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.time.clock import Clock, ThreadDetached
 
 MAX_ODOMETRY_LEAD = 0.2
@@ -27,7 +28,7 @@ TRACK_POINTS = 200
 
 
 class RobotStateError(Exception):
-    """The robot's pose or velocity is unknown or too old; the text says which, and how old."""
+    """The robot's pose or velocity is unknown or too old; the text names which, and its age."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,8 @@ def odometry_problem(answer: object) -> str:
 class Robot(Protocol):
     """What a robot driver implements: two plain functions, called from several threads.
 
-    The driver of a car may say its tightest curve in an attribute ``min_turning_radius`` [m]; the velocity gate,
-    planners and controllers keep to it where no configuration says otherwise.
+    The driver of a car may give its tightest curve in an attribute ``min_turning_radius`` [m]; the velocity gate,
+    planners and controllers respect it unless the configuration gives another one.
 
     A driver built on asyncio hands a command to its loop with ``asyncio.run_coroutine_threadsafe`` and answers
     ``odometry`` from a variable.
@@ -75,7 +76,7 @@ class Robot(Protocol):
 
 
 def turning_radius_of(robot: Robot) -> float:
-    """Radius [m] of the tightest curve, as the driver says; 0 = the robot turns on the spot."""
+    """Radius [m] of the tightest curve, from the driver; 0 = the robot turns on the spot."""
     return float(getattr(robot, "min_turning_radius", 0.0))
 
 
@@ -129,7 +130,7 @@ class RobotInformation:
         return pose
 
     def recent_track(self) -> NDArray[np.float64]:
-        """Positions (n, 3) [m] in the global frame the robot came by, oldest first; what ``pose()`` was asked for.
+        """Positions (n, 3) [m] of the robot in the global frame, oldest first, as returned by ``pose()``.
 
         A robot that drives back rolls its track up, so the last points always lead further back.
         """

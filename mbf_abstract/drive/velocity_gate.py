@@ -22,14 +22,24 @@ CLOSING_TRIES = 3
 
 
 class Lease:
-    """The right to drive, until released or revoked. Thread-safe."""
+    """The right to drive, until released or revoked. Thread-safe.
+
+    Attributes
+    ----------
+    owner : str
+    paused : bool
+        Whether commands are dropped until ``resume``.
+    problem : str
+        Why the last command through this lease did not reach the robot; empty if it did.
+    """
 
     def __init__(self, gate: VelocityGate, owner: str) -> None:
         self._gate = gate
+        self._condition = gate._condition
+        self._writer = gate._writer
         self.owner = owner
         self.paused = False
         self.problem = ""
-        """Why the last command through this lease did not reach the robot; empty if it did."""
 
     @property
     def active(self) -> bool:
@@ -38,15 +48,39 @@ class Lease:
 
     def send(self, command: Command) -> bool:
         """Send one command, limited; False if it was dropped."""
-        return self._gate._send(self, command)
+        with self._condition:
+            problem = command_problem(command)
+            if not problem and self._writer.busy and self.active:
+                self._writer.wait_until_free(self._gate.command_timeout)
+            reason = problem or self._reason_to_drop()
+            if reason:
+                dropped = [] if problem else command_data(command)
+                self._emit(EventKind.COMMAND_DROPPED, command=dropped, reason=reason)
+                begun = self._writer.begin_stop() if problem and self.active else None
+            else:
+                begun = self._writer.begin(self._limited(command))
+        delivered = self._writer.deliver(begun) and not reason
+        self.problem = "" if delivered else reason or self._writer.problem
+        return delivered
 
     def stop(self) -> None:
         """Send zero velocity now, keeping the lease."""
-        self._gate._stop(self, "asked by the lease's owner")
+        with self._condition:
+            if not self.active or self._writer.stands:
+                return
+            self._emit(EventKind.ROBOT_STOPPED, reason="asked by the lease's owner")
+            stop = self._writer.begin_stop()
+        self._writer.deliver(stop)
 
     def pause(self) -> None:
         """Stop the robot and drop commands until ``resume``; idempotent."""
-        self._gate._pause(self)
+        with self._condition:
+            if not self.active or self.paused:
+                return
+            self.paused = True
+            self._emit(EventKind.ROBOT_STOPPED, reason="paused")
+            stop = self._writer.begin_stop()
+        self._writer.deliver(stop)
 
     def resume(self) -> None:
         """Let commands pass again; idempotent."""
@@ -54,15 +88,41 @@ class Lease:
 
     def release(self, stop: bool = True, reason: str = "released") -> None:
         """Give the right back; sends zero unless ``stop`` is False (the watchdog then does, a little later)."""
-        self._gate._release(self, stop, reason)
+        with self._condition:
+            if not self.active:
+                return
+            self._gate._end_lease(reason)
+            zero = self._writer.begin_stop() if stop else None
+        self._writer.deliver(zero)
 
     def ask_stop(self, reason: str) -> None:
         """Have the watchdog send zero at once, keeping the lease; for other threads than the owner's, never waits."""
-        self._gate._ask_stop(self, reason)
+        with self._condition:
+            if self.active and not self._writer.stands:
+                self._gate._wake_watchdog(reason)
 
     def revoke(self, reason: str) -> None:
         """Take the right away from its owner and have the watchdog send zero at once; never waits."""
-        self._gate._revoke(self, reason)
+        with self._condition:
+            if self.active:
+                self._gate._end_lease(reason)
+                self._gate._wake_watchdog(reason)
+
+    def _reason_to_drop(self) -> str:
+        if not self.active:
+            return "the lease is over"
+        if self.paused:
+            return "the lease is paused"
+        return "the robot's driver has not come back from an earlier command" if self._writer.busy else ""
+
+    def _limited(self, command: Command) -> Command:
+        limited = self._gate.limits.apply(command)
+        if limited is not command:
+            self._emit(EventKind.COMMAND_CLAMPED, requested=command_data(command), sent=command_data(limited))
+        return limited
+
+    def _emit(self, kind: EventKind, **data: object) -> None:
+        self._gate._events.emit(kind, self.owner, **data)
 
 
 class VelocityGate:
@@ -86,7 +146,7 @@ class VelocityGate:
 
     @property
     def holder(self) -> str:
-        """Owner of the present lease, empty if nobody drives."""
+        """Owner of the present lease; empty without one."""
         lease = self._lease
         return lease.owner if lease else ""
 
@@ -107,7 +167,7 @@ class VelocityGate:
             self._condition.notify_all()
 
     def acquire(self, owner: str) -> Lease | None:
-        """Hand out the lease, or None while somebody holds it or the gate is closed."""
+        """Hand out the lease, or None while there is one or the gate is closed."""
         with self._condition:
             if self._lease is not None or self._closed:
                 return None
@@ -118,7 +178,7 @@ class VelocityGate:
     def close(self, reason: str = "server shut down") -> None:
         """Stop the robot for good: revoke the lease, refuse new ones, end the watchdog. Idempotent.
 
-        Where another call of the driver is under way, zero follows it; that is waited for, at most ``command_timeout``.
+        Where another call of the driver is running, zero follows it; that is waited for, at most ``command_timeout``.
         """
         with self._condition:
             if self._closed:
@@ -133,77 +193,9 @@ class VelocityGate:
                 self._writer.wait_until_free(self._command_timeout)
         self._writer.deliver(stop)
 
-    # ------------------------------------------------------------------------------------ from leases
-    def _send(self, lease: Lease, command: Command) -> bool:
-        with self._condition:
-            problem = command_problem(command)
-            if not problem and self._writer.busy and self._lease is lease:
-                self._writer.wait_until_free(self._command_timeout)
-            reason = problem or self._reason_to_drop(lease)
-            if reason:
-                sent = [] if problem else command_data(command)
-                self._events.emit(EventKind.COMMAND_DROPPED, lease.owner, command=sent, reason=reason)
-                begun = self._writer.begin_stop() if problem and self._lease is lease else None
-            else:
-                begun = self._writer.begin(self._limited(lease, command))
-        delivered = self._writer.deliver(begun) and not reason
-        lease.problem = "" if delivered else reason or self._writer.problem
-        return delivered
-
-    def _reason_to_drop(self, lease: Lease) -> str:
-        if self._lease is not lease:
-            return "the lease is over"
-        if lease.paused:
-            return "the lease is paused"
-        return "the robot's driver has not come back from an earlier command" if self._writer.busy else ""
-
-    def _limited(self, lease: Lease, command: Command) -> Command:
-        limited = self.limits.apply(command)
-        if limited is not command:
-            self._events.emit(
-                EventKind.COMMAND_CLAMPED, lease.owner, requested=command_data(command), sent=command_data(limited)
-            )
-        return limited
-
-    def _stop(self, lease: Lease, reason: str) -> None:
-        with self._condition:
-            if self._lease is not lease or self._writer.stands:
-                return
-            self._events.emit(EventKind.ROBOT_STOPPED, lease.owner, reason=reason)
-            stop = self._writer.begin_stop()
-        self._writer.deliver(stop)
-
-    def _pause(self, lease: Lease) -> None:
-        with self._condition:
-            if self._lease is not lease or lease.paused:
-                return
-            lease.paused = True
-            self._events.emit(EventKind.ROBOT_STOPPED, lease.owner, reason="paused")
-            stop = self._writer.begin_stop()
-        self._writer.deliver(stop)
-
-    def _release(self, lease: Lease, stop: bool, reason: str) -> None:
-        with self._condition:
-            if self._lease is not lease:
-                return
-            self._end_lease(lease, reason)
-            zero = self._writer.begin_stop() if stop else None
-        self._writer.deliver(zero)
-
-    def _ask_stop(self, lease: Lease, reason: str) -> None:
-        with self._condition:
-            if self._lease is lease and not self._writer.stands:
-                self._wake_watchdog(reason)
-
-    def _revoke(self, lease: Lease, reason: str) -> None:
-        with self._condition:
-            if self._lease is lease:
-                self._end_lease(lease, reason)
-                self._wake_watchdog(reason)
-
-    def _end_lease(self, lease: Lease, reason: str) -> None:
-        self._lease = None
-        self._events.emit(EventKind.LEASE_REVOKED, "velocity_gate", holder=lease.owner, reason=reason)
+    def _end_lease(self, reason: str) -> None:
+        holder, self._lease = self.holder, None
+        self._events.emit(EventKind.LEASE_REVOKED, "velocity_gate", holder=holder, reason=reason)
 
     # ------------------------------------------------------------------------------------- the watchdog
     def _wake_watchdog(self, reason: str) -> None:
@@ -226,11 +218,11 @@ class VelocityGate:
                     stop = self._writer.begin_stop(although_busy=overdue)
                 if self._writer.deliver(stop):
                     self._events.emit(EventKind.ROBOT_STOPPED, "velocity_gate", reason=reason, holder=holder)
-        except ThreadDetached:  # the driver kept the processor busy: somebody else has to watch
+        except ThreadDetached:  # the driver kept the processor busy: another thread has to watch
             self._spawn_watchdog()
 
     def _wait_for_reason(self) -> str:
-        """Wait until the robot must be stopped and say why; empty once the gate is closed and nothing is left to do."""
+        """Wait until the robot must be stopped; returns why, or nothing once the gate is closed and all is done."""
         while True:
             if self._stop_asked:
                 return self._stop_asked

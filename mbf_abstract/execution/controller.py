@@ -20,7 +20,7 @@ from mbf_abstract.execution.motion_watch import MotionWatch
 from mbf_abstract.execution.plugin_answer import PluginFault, PluginNonFinite
 from mbf_abstract.execution.plugin_run import Abandoned, PluginRun
 from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
 from mbf_abstract.time.clock import Stopwatch
@@ -56,6 +56,7 @@ class ControllerExecution:
     ) -> None:
         self._run = run
         self._runtime = run.runtime
+        self._controller = run.plugin.instance
         self._take_new_plan = take_new_plan
         self._on_cycle = on_cycle
         self._plan: Plan | None = None
@@ -63,7 +64,6 @@ class ControllerExecution:
         self._cycles = 0
         self._failed_cycles = 0
         self.last_result: ControlResult | None = None
-        self._hold_reason: tuple[int, str] | None = None
         self._motion = MotionWatch(run.runtime)
         self._graceful_stop: Stopwatch | None = None
         self._lease: Lease | None = None
@@ -124,10 +124,13 @@ class ControllerExecution:
             end = self._handle_cancel()
         if end is not None or self._hold_while_paused(lease):
             return end
-        state = self._fresh_state(lease)
-        if state is None:
-            return self._holding_too_long()
-        pose, measured = state
+        problem, robot = self._map_problem(), self._runtime.robot
+        if problem:
+            return self._hold(lease, ExePathOutcome.MAP_ERROR, problem)
+        try:
+            pose, measured = robot.pose(), self._run.call_beside("the robot's odometry()", robot.measured_velocity)
+        except RobotStateError as error:
+            return self._hold(lease, ExePathOutcome.TF_ERROR, str(error))
         velocity = measured or Twist()
         if self._is_arrived(pose):
             return self._come_to_rest(velocity, lease)
@@ -150,8 +153,7 @@ class ControllerExecution:
             return None
         if len(plan.path) == 0:
             return self._end(ControllerState.EMPTY_PLAN, ExePathOutcome.INVALID_PATH, "the path has no poses")
-        controller = self._run.plugin.instance
-        if not self._run.call("set_plan", lambda: controller.set_plan(plan.path)):
+        if not self._run.call("set_plan", partial(self._controller.set_plan, plan.path)):
             text = f"controller {self._run.plugin.name!r} refused the path"
             return self._end(ControllerState.INVALID_PLAN, ExePathOutcome.INVALID_PATH, text)
         self._plan = plan
@@ -163,8 +165,7 @@ class ControllerExecution:
     def _handle_cancel(self) -> ControllerEnd | None:
         """Let a controller that can stop smoothly do so, for at most ``cancel_grace``; else end now."""
         if self._graceful_stop is None:
-            controller = self._run.plugin.instance
-            if self._run.handle.paused or not self._run.call("cancel", controller.cancel):
+            if self._run.handle.paused or not self._run.call("cancel", self._controller.cancel):
                 return self._canceled()
             self._graceful_stop = Stopwatch(self._runtime.clock)
         if self._graceful_stop.elapsed > self._runtime.parameters.cancel_grace:
@@ -183,21 +184,6 @@ class ControllerExecution:
             self._enter(ControllerState.PAUSED)
         return True
 
-    def _fresh_state(self, lease: Lease) -> tuple[Pose, Twist | None] | None:
-        """Pose and measured velocity, if the map is current too; else stop the robot and remember why it holds."""
-        problem = self._map_problem()
-        if problem:
-            self._hold(lease, ExePathOutcome.MAP_ERROR, problem)
-            return None
-        robot = self._runtime.robot
-        try:
-            state = robot.pose(), self._run.call_beside("the robot's odometry()", robot.measured_velocity)
-        except RobotStateError as error:
-            self._hold(lease, ExePathOutcome.TF_ERROR, str(error))
-            return None
-        self._hold_reason = None
-        return state
-
     def _map_problem(self) -> str:
         """Why the map must not be driven on: also where its hook raises."""
         try:
@@ -208,17 +194,11 @@ class ControllerExecution:
             return f"map_problem raised {type(error).__name__}: {error_text(error)}"
         return str(problem) if problem else ""
 
-    def _hold(self, lease: Lease, outcome: int, reason: str) -> None:
+    def _hold(self, lease: Lease, outcome: int, reason: str) -> ControllerEnd | None:
+        """Stop the robot, which must not be driven on old data; the end once patience is over."""
         self._write_to_robot(lease.stop)
         self._enter(ControllerState.HOLDING)
-        self._hold_reason = (outcome, reason)
-
-    def _holding_too_long(self) -> ControllerEnd | None:
-        assert self._hold_reason is not None
-        if not self._run.is_patience_over():
-            return None
-        outcome, reason = self._hold_reason
-        return self._end(ControllerState.PAT_EXCEEDED, outcome, reason)
+        return self._end(ControllerState.PAT_EXCEEDED, outcome, reason) if self._run.is_patience_over() else None
 
     def _is_arrived(self, pose: Pose) -> bool:
         """Ask once; a robot that has arrived and coasts out of the tolerance while it stops has still arrived."""
@@ -226,11 +206,11 @@ class ControllerExecution:
         if self.state is ControllerState.STOPPING:
             return True
         slack = self._runtime.relaxation.slack(self._runtime.clock.now())
-        arrival, controller = self._plan.arrival.relaxed(slack), self._run.plugin.instance
+        arrival, is_goal_reached = self._plan.arrival.relaxed(slack), self._controller.is_goal_reached
         self._plan.tracker.update(pose.position)
         plugin_agrees = self._run.call(
             "is_goal_reached",
-            lambda: bool(controller.is_goal_reached(pose, arrival.dist_tolerance, arrival.angle_tolerance)),
+            lambda: bool(is_goal_reached(pose, arrival.dist_tolerance, arrival.angle_tolerance)),
         )
         return arrival.reached(pose, self._plan.tracker, plugin_agrees)
 
@@ -251,12 +231,10 @@ class ControllerExecution:
 
     def _compute(self, pose: Pose, velocity: Twist) -> ControlResult:
         self._enter(ControllerState.CONTROLLING)
-        controller = self._run.plugin.instance
         request = ControlRequest(pose, velocity, self._run.handle.cancel_token)
+        compute = partial(self._controller.compute_velocity_commands, request)
         try:
-            result = self._run.ask(
-                "compute_velocity_commands", lambda: controller.compute_velocity_commands(request), ControlResult
-            )
+            result = self._run.ask("compute_velocity_commands", compute, ControlResult)
         except PluginNonFinite as error:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, str(error))
         if result.success and result.command is None:

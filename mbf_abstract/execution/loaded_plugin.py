@@ -57,7 +57,7 @@ class LoadedPlugin(Generic[P]):
         return str(self._user)
 
     def acquire(self, user: object, give_up: Callable[[], bool]) -> bool:
-        """Wait for exclusive use; False once ``give_up()``, asked 20 times a second, says so.
+        """Wait for exclusive use; False once ``give_up()``, asked 20 times a second, is true.
 
         ``str(user)`` appears in the messages of those who wait meanwhile.
 
@@ -77,7 +77,7 @@ class LoadedPlugin(Generic[P]):
             return True
 
     def release(self, user: object) -> None:
-        """End the use by ``user`` (nobody else's) and lift a quarantine: the late call has come back."""
+        """End the use by ``user``, no other, and lift a quarantine: the late call has come back."""
         with self._condition:
             if self._user is not user:
                 return

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_area import GoalArea
 from mbf_abstract.goals.goal_types import ExePathGoal, MoveBaseGoal
 from mbf_abstract.outcomes import GetPathOutcome

@@ -10,9 +10,10 @@ n > 0      > 0         whichever comes first, retries tested first
 -1         0           forever, until canceled
 =========  ==========  ==============================================================================
 
-A permanent failure (OUT_OF_MAP, INVALID_START, INVALID_GOAL, or where the planner says so) ends the goal at once, with
-the planner's own code. A success that comes after the patience but before the grace is over still counts. Between two
-calls there is a pause of ``planner_retry_delay``, so that a planner that fails at once does not keep a core busy.
+A permanent failure (OUT_OF_MAP, INVALID_START, INVALID_GOAL, or any that the planner marks as such) ends the goal at
+once, with the planner's own code. A success that comes after the patience but before the grace is over still counts.
+Between two calls there is a pause of ``planner_retry_delay``, so that a planner that fails at once does not keep a core
+busy.
 """
 
 from __future__ import annotations

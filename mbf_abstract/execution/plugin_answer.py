@@ -3,24 +3,13 @@
 from __future__ import annotations
 
 import numbers
-from typing import Protocol, TypeVar
+from typing import TypeVar
+
+from mbf_abstract.plugins import PluginResult
 
 MAX_OUTCOME = 2**32 - 1  # outcomes are unsigned integers of 32 bits in ``mbf_msgs``
 
-
-class Answer(Protocol):
-    """What the results of all plugins have."""
-
-    @property
-    def outcome(self) -> int:
-        """Outcome code."""
-
-    @property
-    def message(self) -> str:
-        """Text, may be empty."""
-
-
-A = TypeVar("A", bound=Answer)
+A = TypeVar("A", bound=PluginResult)
 
 
 class PluginFault(Exception):

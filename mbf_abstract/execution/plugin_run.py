@@ -89,7 +89,7 @@ class PluginRun(Generic[P]):
 
     def __exit__(self, *exc: object) -> None:
         with self._condition:
-            self._over = True  # from now on nobody gives up on this run any more
+            self._over = True  # from now on this run cannot be abandoned
         self.runtime.supervisor.stop(self._watch)
         self.plugin.release(self)
         self.runtime.hanging.discard(self)
@@ -196,7 +196,7 @@ class PluginRun(Generic[P]):
     def _end_call(self) -> None:
         """Note that a call has come back; raises Abandoned if that was too late."""
         if self._hung:
-            self._abandon()  # the clock has given up on this thread, whoever comes first to say so
+            self._abandon()  # the clock has given up on this thread, and the supervisor may not have seen it yet
         with self._condition:
             self._call_began = None
             abandoned = self.abandoned

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from itertools import count
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.drive.robot import RobotInformation
@@ -19,9 +19,6 @@ from mbf_abstract.maps.relaxation import Relaxation
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.time.clock import Clock
 
-if TYPE_CHECKING:
-    pass
-
 
 class MapHooks(Protocol):
     """What a server of a map may add to every execution."""
@@ -31,18 +28,6 @@ class MapHooks(Protocol):
 
     def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
         """Keep the map alive while a goal of this kind runs."""
-
-
-class NoMap:
-    """Hooks of a server without a map: always current, nothing to keep alive."""
-
-    def map_problem(self) -> str:
-        """No map, no problem."""
-        return ""
-
-    def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
-        """Nothing to keep alive."""
-        return nullcontext()
 
 
 @dataclass
@@ -57,7 +42,7 @@ class Runtime:
     robot: RobotInformation
     transforms: TransformBuffer
     parameters: NavigationParameters
-    map_hooks: MapHooks = field(default_factory=NoMap)
+    map_hooks: MapHooks
     relaxation: Relaxation = field(default_factory=Relaxation)
     """Slack that recoveries grant for a while."""
     goal_ids: Iterator[int] = field(default_factory=lambda: count(1))

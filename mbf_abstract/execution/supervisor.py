@@ -1,8 +1,8 @@
 """One thread that looks after all running plugin calls: patience, and the grace after a cancel.
 
-A *watch* is a function that does what is due and answers in how many seconds it wants to be asked again (None =
-never). It runs on the supervisor's thread and must be short. A check that raises (no more threads can be made, say) is
-reported and asked again a little later: all promises of an end rest on this thread.
+A *check* is a function that does what is due and returns in how many seconds it is to be called again (None = never).
+It runs on the supervisor's thread and must be short. One that raises, e.g. because no more threads can be made, is
+reported and called again a little later: the end of every goal depends on this thread.
 """
 
 from __future__ import annotations

@@ -57,12 +57,12 @@ class MissionContext:
 
     @property
     def failure_code(self) -> int:
-        """Code of the last failure, 0 without one; where patience ran out, what the plugin itself complained of."""
+        """Code of the last failure, 0 without one; where patience ran out, the plugin's own."""
         if self.failure is None:
             return 0
-        said = getattr(self.failure, "plugin_outcome", None)
-        if self.failure.outcome in PATIENCE_CODES and said is not None and not is_success(said):
-            return int(said)
+        own = getattr(self.failure, "plugin_outcome", None)
+        if self.failure.outcome in PATIENCE_CODES and own is not None and not is_success(own):
+            return int(own)
         return self.failure.outcome
 
     def robot_pose(self) -> Pose:
@@ -93,7 +93,7 @@ class MissionContext:
 
     @property
     def paused(self) -> bool:
-        """Whether somebody holds a goal of this mission."""
+        """Whether a goal of this mission is paused."""
         return any(goal.paused for goal in self.running_goals())
 
     def end_goals(self, reason: str) -> None:

@@ -35,7 +35,7 @@ class Leaf(MissionNode, Behaviour):  # type: ignore[misc, unused-ignore]
 
 
 class Decorator(MissionNode, PyTreesDecorator):  # type: ignore[misc, unused-ignore]
-    """A node with one child, ticked before ``update`` unless ``wants_tick`` says no."""
+    """A node with one child, ticked before ``update`` if ``wants_tick``."""
 
     def wants_tick(self) -> bool:
         """Whether the child is ticked this time; asked after ``initialise``."""

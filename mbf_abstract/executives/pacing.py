@@ -33,7 +33,7 @@ class Paced(Decorator):
         """Note that the child starts now."""
 
     def wants_tick(self) -> bool:
-        """Tick a child that is under way or whose turn has come."""
+        """Tick a child that is running or whose turn has come."""
         self._ticked = self.decorated.status == Status.RUNNING
         if not self._ticked and (not self._started or self.is_due()):
             self.begin_turn()

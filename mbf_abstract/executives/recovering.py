@@ -17,7 +17,50 @@ from py_trees.common import Status
 from mbf_abstract.executives.nodes import Composite, Decorator
 
 
-class MemRec(Composite):
+class TaskWithRecoveries(Composite):
+    """Run a task; while it fails, run the next recovery of a list and the task again, until the list is used up.
+
+    ``MemRec`` and ``RecoveryNode`` differ in what a recovery that fails means.
+    """
+
+    recovery_must_succeed = False
+    turn = "recovery"
+    """What one use of the list is called in the node's message."""
+
+    def __init__(
+        self, name: str, task: Behaviour, recoveries: Sequence[Behaviour], turns: int, give_up_on: Collection[int] = ()
+    ) -> None:
+        super().__init__(name, [task, *recoveries])
+        self.turns = turns
+        self.give_up_on = frozenset(give_up_on)
+        self._used = 0
+        self._recovering = False
+
+    def initialise(self) -> None:
+        """Begin with the task and a fresh list."""
+        self._used = 0
+        self._recovering = False
+
+    def tick_children(self) -> Generator[Behaviour, None, Status]:
+        """Go on with the task or the recovery that is running."""
+        task, *recoveries = self.children
+        while True:
+            if self._recovering:
+                status = yield from self.tick_child(recoveries[(self._used - 1) % len(recoveries)])
+                if status == Status.RUNNING or (status == Status.FAILURE and self.recovery_must_succeed):
+                    return status
+                self._recovering = False
+            status = yield from self.tick_child(task)
+            if status != Status.FAILURE or self._used == self.turns:
+                return status
+            if self.give_up_on and self.mission.failure_code in self.give_up_on:
+                return Status.FAILURE
+            self._used += 1
+            self._recovering = True
+            self.feedback_message = f"{self.turn} {self._used} of {self.turns}"
+
+
+class MemRec(TaskWithRecoveries):
     """Check; while that fails, run the next recovery of the list and check again, until the list is used up.
 
     How a recovery ended does not matter: the check decides. The place in the list is remembered until this node ends.
@@ -31,70 +74,24 @@ class MemRec(Composite):
     def __init__(
         self, name: str, check: Behaviour, recoveries: Sequence[Behaviour], give_up_on: Collection[int] = ()
     ) -> None:
-        super().__init__(name, [check, *recoveries])
-        self.give_up_on = frozenset(give_up_on)
-        self._used = 0
-        self._recovering = False
-
-    def initialise(self) -> None:
-        """Begin with the check and a fresh list."""
-        self._used = 0
-        self._recovering = False
-
-    def tick_children(self) -> Generator[Behaviour, None, Status]:
-        """Go on with the check or the recovery that is under way."""
-        check, *recoveries = self.children
-        while True:
-            if self._recovering:
-                if (yield from self.tick_child(recoveries[self._used - 1])) == Status.RUNNING:
-                    return Status.RUNNING
-                self._recovering = False
-            status = yield from self.tick_child(check)
-            if status != Status.FAILURE or self._used == len(recoveries):
-                return status
-            if self.give_up_on and self.mission.failure_code in self.give_up_on:
-                return Status.FAILURE
-            self._used += 1
-            self._recovering = True
-            self.feedback_message = f"recovery {self._used} of {len(recoveries)}"
+        super().__init__(name, check, recoveries, len(recoveries), give_up_on)
 
 
-class RecoveryNode(Composite):
+class RecoveryNode(TaskWithRecoveries):
     """Run a task; where it fails, run the recovery and the task again, ``retries`` times at most.
 
     A recovery that fails ends the node: then there is nothing more to try.
     """
+
+    recovery_must_succeed = True
+    turn = "retry"
 
     def __init__(self, name: str, children: Sequence[Behaviour], retries: int = 1) -> None:
         if len(children) != 2:
             raise ValueError(f"{name!r} needs exactly a task and a recovery, got {len(children)} children")
         if retries < 0:
             raise ValueError(f"retries must not be negative, got {retries}")
-        super().__init__(name, children)
-        self.retries = retries
-        self._retried = 0
-        self._recovering = False
-
-    def initialise(self) -> None:
-        """Begin with the task."""
-        self._retried = 0
-        self._recovering = False
-
-    def tick_children(self) -> Generator[Behaviour, None, Status]:
-        """Go on with the task or the recovery that is under way."""
-        task, recovery = self.children
-        while True:
-            if self._recovering:
-                status = yield from self.tick_child(recovery)
-                if status != Status.SUCCESS:
-                    return status
-                self._recovering = False
-            status = yield from self.tick_child(task)
-            if status != Status.FAILURE or self._retried == self.retries:
-                return status
-            self._retried += 1
-            self._recovering = True
-            self.feedback_message = f"retry {self._retried} of {self.retries}"
+        super().__init__(name, children[0], children[1:], retries)
 
 
 class RoundRobin(Composite):
@@ -196,7 +193,7 @@ class InOrder(Composite):
         self._index = 0
 
     def tick_children(self) -> Generator[Behaviour, None, Status]:
-        """Go on with the child that is under way."""
+        """Go on with the child that is running."""
         while self._index < len(self.children):
             status = yield from self.tick_child(self.children[self._index])
             if status != Status.SUCCESS:

@@ -94,7 +94,7 @@ def _check(name: str, states: Mapping[str, State]) -> None:
         if target not in states and target not in ends
     ]
     problems += [
-        f"state {key!r} does not say what follows {end.value}"
+        f"state {key!r} has no transition for {end.value}"
         for key, state in states.items()
         for end in ends
         if end not in state.transitions

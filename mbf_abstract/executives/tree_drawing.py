@@ -12,6 +12,8 @@ from xml.sax.saxutils import escape
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from mbf_abstract.executives.tree_events import in_order
+
 ROW_HEIGHT = 34.0
 BOX_HEIGHT = 26.0
 CHARACTER_WIDTH = 7.0
@@ -28,27 +30,24 @@ FORMATS = ("text", "dot", "svg")
 
 def draw_tree(tree: Behaviour, form: str = "text") -> str:
     """Draw as ``text``, ``dot`` or ``svg``; raises ValueError for any other form."""
-    if form == "text":
-        return as_text(tree)
-    if form == "dot":
-        return as_dot(tree)
-    if form == "svg":
-        return as_svg(tree)
-    raise ValueError(f"expected one of {', '.join(FORMATS)}, got {form!r}")
+    if form not in FORMATS:
+        raise ValueError(f"expected one of {', '.join(FORMATS)}, got {form!r}")
+    return {"text": as_text, "dot": as_dot, "svg": as_svg}[form](tree)
 
 
-def as_text(tree: Behaviour, show_status: bool = False) -> str:
+def as_text(tree: Behaviour) -> str:
     """One line for each node, children indented."""
     from py_trees.display import unicode_tree
 
-    return str(unicode_tree(tree, show_status=show_status))
+    return str(unicode_tree(tree))
 
 
 def as_dot(tree: Behaviour) -> str:
     """Return the tree in the language of Graphviz."""
     lines = ["digraph tree {", "  rankdir=LR; node [shape=box, fontname=sans];"]
-    numbers = {id(node): number for number, node in enumerate(_in_order(tree))}
-    for node in _in_order(tree):
+    nodes = [node for node, _ in in_order(tree)]
+    numbers = {id(node): number for number, node in enumerate(nodes)}
+    for node in nodes:
         shape = "" if node.children else ", style=rounded"
         label = _label(node).replace("\\", "\\\\").replace('"', '\\"')
         lines.append(f'  n{numbers[id(node)]} [label="{label}"{shape}];')
@@ -58,8 +57,10 @@ def as_dot(tree: Behaviour) -> str:
 
 def as_svg(tree: Behaviour) -> str:
     """Return the tree as one SVG document."""
-    columns: list[float] = []
-    _measure(tree, 0, columns)
+    widest: dict[int, float] = {}  # box of each depth
+    for node, depth in in_order(tree):
+        widest[depth] = max(widest.get(depth, 0.0), _width(node))
+    columns = [widest[depth] for depth in range(len(widest))]
     boxes: list[_Box] = []
     rows = _place(tree, 0, 0.0, columns, boxes)
     width = MARGIN + sum(columns) + COLUMN_GAP * (len(columns) - 1) + MARGIN
@@ -105,23 +106,14 @@ def _label(node: Behaviour) -> str:
     return f"{node.name} ({type(node).__name__})"
 
 
-def _in_order(node: Behaviour) -> list[Behaviour]:
-    return [node, *(below for child in node.children for below in _in_order(child))]
-
-
-def _measure(node: Behaviour, depth: int, columns: list[float]) -> None:
-    """Widest box of each depth."""
-    if depth == len(columns):
-        columns.append(0.0)
-    columns[depth] = max(columns[depth], CHARACTER_WIDTH * len(_label(node)) + 12.0)
-    for child in node.children:
-        _measure(child, depth + 1, columns)
+def _width(node: Behaviour) -> float:
+    return CHARACTER_WIDTH * len(_label(node)) + 12.0
 
 
 def _place(node: Behaviour, depth: int, row: float, columns: list[float], boxes: list[_Box]) -> float:
     """Place a node and all below it from ``row`` on; returns the number of rows they take."""
     x = MARGIN + sum(columns[:depth]) + COLUMN_GAP * depth
-    box = _Box(node, x, 0.0, CHARACTER_WIDTH * len(_label(node)) + 12.0)
+    box = _Box(node, x, 0.0, _width(node))
     boxes.append(box)
     rows, children = 0.0, []
     for child in node.children:

@@ -37,8 +37,8 @@ class TreeReporter:
         self._reported: list[str] = []
 
     def begin(self) -> None:
-        """Tell what the tree is made of; all its nodes are idle."""
-        placed = list(_in_order(self._tree, 0))
+        """Report the nodes of the tree; all of them are idle."""
+        placed = list(in_order(self._tree))
         self._nodes = [node for node, _ in placed]
         self._reported = [IDLE] * len(placed)
         nodes = [{"name": node.name, "type": type(node).__name__, "depth": depth} for node, depth in placed]
@@ -58,11 +58,11 @@ class TreeReporter:
         self._events.emit(EventKind.TREE, "tree", tree=self._tree.name, tick=tick, changes=changes)
 
 
-def _in_order(node: Behaviour, depth: int) -> Iterator[tuple[Behaviour, int]]:
+def in_order(node: Behaviour, depth: int = 0) -> Iterator[tuple[Behaviour, int]]:
     """Yield a node and all below it with their depths, parents first."""
     yield node, depth
     for child in node.children:
-        yield from _in_order(child, depth + 1)
+        yield from in_order(child, depth + 1)
 
 
 @dataclass

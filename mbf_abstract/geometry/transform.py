@@ -151,7 +151,7 @@ def rotate(q: Quaternion, v: Vector3) -> Vector3:
 
 
 def slerp(a: Quaternion, b: Quaternion, ratio: float) -> Quaternion:
-    """Rotate from ``a`` (ratio 0) to ``b`` (ratio 1) at constant speed on the shorter way (Shoemake, 1985)."""
+    """Rotate from ``a`` (ratio 0) to ``b`` (ratio 1) at constant speed along the shorter arc (Shoemake, 1985)."""
     dot = sum(p * q for p, q in zip(a, b, strict=True))
     sign = -1.0 if dot < 0.0 else 1.0
     angle = math.acos(min(1.0, abs(dot)))

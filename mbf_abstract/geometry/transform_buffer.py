@@ -11,9 +11,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from numpy.typing import ArrayLike
-
-from mbf_abstract.geometry import FloatArray, Path, Pose
+from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import (
     IDENTITY_ROTATION,
     InvalidTransformError,
@@ -22,17 +20,6 @@ from mbf_abstract.geometry.transform import (
     frame_name_problem,
 )
 from mbf_abstract.geometry.transform_cache import TransformCache
-
-__all__ = [
-    "ConnectivityError",
-    "ExtrapolationError",
-    "InvalidTransformError",
-    "StaleTransformError",
-    "Transform",
-    "TransformBuffer",
-    "TransformError",
-    "UnknownFrameError",
-]
 
 MAX_LEAD = 2.0
 """How far [s] a transform may be stamped in the future. Localisations post-date theirs, commonly by up to a second."""
@@ -106,14 +93,14 @@ class TransformBuffer:
         """
         with self._lock:
             self._refuse_loop(transform)
-            heard = math.inf if self._now is None else self._now()
-            if not transform.static and transform.stamp > heard + MAX_LEAD:
-                ahead = f"{transform.stamp - heard:.3f} s ahead of the clock, limit {MAX_LEAD:.3f} s"
+            received = math.inf if self._now is None else self._now()
+            if not transform.static and transform.stamp > received + MAX_LEAD:
+                ahead = f"{transform.stamp - received:.3f} s ahead of the clock, limit {MAX_LEAD:.3f} s"
                 self._refused[transform.child] = f"{transform.parent}->{transform.child} ({ahead})"
                 return
             self._refused.pop(transform.child, None)
             cache = self._caches.setdefault(transform.child, TransformCache(self.cache_time))
-            cache.insert(transform, heard)
+            cache.insert(transform, received)
             self._frame_names.update({transform.parent: None, transform.child: None})
             answered = self._take_answered_requests()
         for request, answer in answered:
@@ -178,7 +165,7 @@ class TransformBuffer:
     def when_available(
         self, target: str, source: str, time: float | None, callback: Callable[[Transform], None]
     ) -> Callable[[], None]:
-        """Call ``callback`` with the transform once it can be answered, perhaps at once; return a way to withdraw.
+        """Call ``callback`` with the transform once there is one, perhaps at once; returns a function to withdraw.
 
         The callback runs in the thread that delivers the missing transform, and not under the buffer's lock.
 
@@ -208,10 +195,6 @@ class TransformBuffer:
         if path.frame_id == target:
             return path
         return self.lookup(target, path.frame_id, time).apply_to_path(path)
-
-    def transform_points(self, points: ArrayLike, source: str, target: str, time: float | None = None) -> FloatArray:
-        """Express (n, 3) points [m] of the frame ``source`` in ``target``; raises TransformError."""
-        return self.lookup(target, source, time).apply(points)
 
     # ------------------------------------------------------------------------ private; the caller holds the lock
     def _lookup(
@@ -246,7 +229,7 @@ class TransformBuffer:
             if name in target_names:
                 return target_steps[: target_names.index(name)], source_steps[:count]
         for top in (source_names[-1], target_names[-1]):
-            if top in self._caches:  # there is a way up, but not at this time
+            if top in self._caches:  # the frame has a parent, but not at this time
                 raise ExtrapolationError(self._text(target, source, self._gap_text(top, time), now))
         reason = f"they are in separate trees with the roots {source_names[-1]!r} and {target_names[-1]!r}"
         raise ConnectivityError(self._text(target, source, reason, now))
@@ -267,9 +250,9 @@ class TransformBuffer:
             raise InvalidTransformError(f"transform {transform.parent!r} -> {transform.child!r}: a frame in itself")
         ancestors = [transform.parent, *(step.parent for step in self._walk(transform.parent, None))]
         if transform.child in ancestors:
-            way = " -> ".join([*ancestors[: ancestors.index(transform.child) + 1], transform.parent])
+            loop = " -> ".join([*ancestors[: ancestors.index(transform.child) + 1], transform.parent])
             raise InvalidTransformError(
-                f"transform {transform.parent!r} -> {transform.child!r} closes a loop: {way} (child -> parent)"
+                f"transform {transform.parent!r} -> {transform.child!r} closes a loop: {loop} (child -> parent)"
             )
 
     def _take_answered_requests(self) -> list[tuple[_Request, Transform]]:

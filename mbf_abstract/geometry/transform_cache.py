@@ -30,7 +30,7 @@ class TransformCache:
     def __init__(self, window: float) -> None:
         self.window = window
         self._samples: list[Transform] = []  # oldest first; of equal stamps the last inserted comes last
-        self._heard = math.inf  # when the newest sample came
+        self._received = math.inf  # when the newest sample came
 
     def __len__(self) -> int:
         return len(self._samples)
@@ -52,16 +52,16 @@ class TransformCache:
     @property
     def fresh_at(self) -> float:
         """Time [s] up to which the newest sample is known to hold: its stamp, but never later than it came."""
-        return min(self.newest.stamp, self._heard)
+        return min(self.newest.stamp, self._received)
 
-    def insert(self, sample: Transform, heard: float = math.inf) -> bool:
-        """Keep a sample that came at the time ``heard`` [s]; False if it is a duplicate or older than the window.
+    def insert(self, sample: Transform, received: float = math.inf) -> bool:
+        """Keep a sample that came at the time ``received`` [s]; False if it is a duplicate or older than the window.
 
         A static transform replaces the history, and a moving one replaces a static one.
         """
         if not self._samples or sample.static or self.newest.static:
             self._samples = [sample]
-            self._heard = heard
+            self._received = received
             return True
         if sample.stamp < self.newest.stamp - self.window:
             return False
@@ -71,7 +71,7 @@ class TransformCache:
             return False
         self._samples.insert(index, sample)
         if index == len(self._samples) - 1:
-            self._heard = heard
+            self._received = received
         self._prune()
         return True
 

@@ -19,15 +19,8 @@ from mbf_abstract.time.clock import Clock, Priority
 
 Callback = Callable[[], None]
 
-
-class _Call:
-    """One run of a callback."""
-
-    __slots__ = ("callback", "taker")
-
-    def __init__(self, taker: Hashable, callback: Callback) -> None:
-        self.taker = taker
-        self.callback = callback
+Call = tuple[Hashable, Callback]
+"""Who takes it, and what is called."""
 
 
 class CallbackThread:
@@ -44,7 +37,7 @@ class CallbackThread:
         self._condition = clock.condition()
         self._queue: OrderedDict[Hashable, Callback] = OrderedDict()
         self._blocked: set[Hashable] = set()
-        self._running: _Call | None = None
+        self._running: Call | None = None
         self._serving = False
         self._closed = False
 
@@ -86,34 +79,34 @@ class CallbackThread:
                 if not self._queue:
                     self._serving = False
                     return
-                self._running = call = _Call(*self._queue.popitem(last=False))
+                self._running = call = self._queue.popitem(last=False)
             self._run(call)
             with self._condition:
                 if self._running is not call:  # it had been left alone
-                    self._blocked.discard(call.taker)
+                    self._blocked.discard(call[0])
                     self._serve()
                     return
                 self._running = None
 
-    def _run(self, call: _Call) -> None:
+    def _run(self, call: Call) -> None:
         """Run one callback; only its own thread may be lost with it."""
         watch = self._supervisor.watch(lambda: self._give_up_on(call), self._patience)
         try:
             with self._clock.guarded("a user callback"):
-                call.callback()
+                call[1]()
         except BaseException as error:
             text = f"a user callback raised: {error_text(error)}"
             self._events.emit(EventKind.FAULT, "callbacks", type=type(error).__name__, message=text)
         self._supervisor.stop(watch)
 
-    def _give_up_on(self, call: _Call) -> None:
+    def _give_up_on(self, call: Call) -> None:
         with self._condition:
             if self._running is not call:
                 return
             self._running = None
             self._serving = False
-            self._blocked.add(call.taker)
-            self._queue.pop(call.taker, None)
+            self._blocked.add(call[0])
+            self._queue.pop(call[0], None)
             self._serve()
         text = f"a user callback blocked for over {self._patience} s"
         self._events.emit(EventKind.FAULT, "callbacks", message=text)

@@ -35,7 +35,7 @@ class GoalArea(ABC):
 
     @abstractmethod
     def depth(self, pose: Pose) -> float:
-        """How far [m] a robot at ``pose`` can move any way and stays inside; negative where it is outside."""
+        """How far [m] a robot at ``pose`` can move in any direction and stay inside; negative where it is outside."""
 
     @abstractmethod
     def members(self) -> tuple[Pose, ...]:
@@ -91,7 +91,7 @@ class PolygonArea(GoalArea):
             raise ValueError("the polygon encloses no area")
 
     def depth(self, pose: Pose) -> float:
-        """Distance [m] from the nearest edge; what is inside says the even-odd rule."""
+        """Distance [m] from the nearest edge; inside is defined by the even-odd rule."""
         nearest = math.inf
         for (x1, y1, _), (x2, y2, _) in zip(self.corners, self.corners[1:] + self.corners[:1], strict=True):
             dx, dy, px, py = x2 - x1, y2 - y1, pose.x - x1, pose.y - y1

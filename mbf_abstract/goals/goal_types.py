@@ -31,9 +31,9 @@ class GetPathGoal:
         How far [m, rad] from the target the path may end where the target itself cannot be reached; 0 = exactly there,
         None = the server's tolerances (with a ``goal_area`` 0: the area is tolerance enough).
     via : tuple of Pose
-        Poses to pass on the way, in order.
+        Poses to pass between start and target, in order.
     goal_area : GoalArea, optional
-        Any place inside will do; ``target_pose`` is then not looked at.
+        Any place inside counts as reached; ``target_pose`` is then ignored.
     concurrency_slot : int
         0..255; goals in different slots run in parallel, a new goal in a used slot preempts.
     """
@@ -52,7 +52,7 @@ class GetPathGoal:
 class ExePathGoal:
     """Follow a path. Tolerances [m, rad] of None are the server's ``dist_tolerance`` and ``angle_tolerance``.
 
-    With a ``goal_area`` the robot has arrived as soon as it is inside, whatever controller and tolerances say.
+    With a ``goal_area`` the robot has arrived as soon as it is inside, regardless of controller and tolerances.
     """
 
     path: Path

@@ -3,8 +3,8 @@
 A handle works in three styles: block (``wait``), poll (``status``, ``feedback``) or ``await``. Callbacks run on the
 server's callback thread, so one that raises or is slow harms neither the robot nor the sender.
 
-An asyncio task that is canceled, or times out, while it awaits a handle cancels the goal: nobody waits for the robot
-any more, so it stops. To give up waiting only, shield the handle:
+An asyncio task that is canceled, or times out, while it awaits a handle cancels the goal, and the robot stops. To
+give up waiting only, shield the handle:
 ``await asyncio.wait_for(asyncio.shield(handle), 5.0)``.
 """
 
@@ -151,7 +151,7 @@ class GoalHandle(Generic[G, R, F]):
 
         def wake(_: object) -> None:
             if self.done and not loop.is_closed():
-                with suppress(RuntimeError):  # the loop was closed in this very moment: nobody waits any more
+                with suppress(RuntimeError):  # the loop was closed at this moment
                     loop.call_soon_threadsafe(set_finished)
 
         self.subscribe(wake)

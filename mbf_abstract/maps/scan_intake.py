@@ -20,7 +20,7 @@ from typing import Any
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.served_map import ServedMap
 

@@ -16,7 +16,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE
 from mbf_abstract.parameters import ParameterModel, with_changes

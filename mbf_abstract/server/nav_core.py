@@ -1,4 +1,4 @@
-"""For plugins written the nav_core way: three interfaces, and how they answer as MBF plugins.
+"""For plugins written for nav_core: its three interfaces, and how they answer as MBF plugins.
 
 Move Base Flex runs plugins of the older ``move_base`` by wrapping them; so do we. Here are the interfaces, which know
 no map, and what is common to the wrappers; a server of a map binds them to it (``mbf_costmap_nav.planning.nav_core``)

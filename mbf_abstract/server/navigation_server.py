@@ -1,7 +1,7 @@
 """The abstract navigation server: owns the runtime, the plugins and the six actions. It knows no map.
 
-A server of a map derives it and overrides hooks only: make the map, make a plugin's context, say whether the map may be
-driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_costmap_nav.server``,
+A server of a map derives it and overrides hooks only: make the map, make a plugin's context, decide whether the map may
+be driven on, keep it alive while goals run, answer map queries. Examples: ``mbf_costmap_nav.server``,
 ``mbf_mesh_nav.server``.
 """
 
@@ -35,7 +35,7 @@ from mbf_abstract.goals.callbacks import CallbackThread
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.view import FieldView, FloorMap, MapView
-from mbf_abstract.parameters import ParameterModel
+from mbf_abstract.parameters import ParameterModel, with_changes
 from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
 from mbf_abstract.server.plugin_host import PluginHost
 from mbf_abstract.server.process_end import ProcessEndWatch
@@ -114,13 +114,13 @@ class AbstractNavigationServer(PluginHost):
     def config_for_map(cls, file: FilePath, unknown_is_free: bool = True) -> str | None:
         """YAML text of a sane configuration for a bare map file; None if this server does not read such files.
 
-        ``unknown_is_free`` states whether plans may lead over what the map does not know, where it can say so.
+        ``unknown_is_free``: whether plans may lead over cells that the map does not know, where it has such.
         """
         return None
 
     @classmethod
     def read_floor(cls, file: FilePath) -> FloorMap | None:
-        """What a map file says of a floor; None if this server does not read such files, or maps have no cells.
+        """The floor that a map file describes; None if this server does not read such files, or maps have no cells.
 
         Raises
         ------
@@ -134,7 +134,7 @@ class AbstractNavigationServer(PluginHost):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user should know of the configuration: what was left out of it, and what the map server found."""
+        """Notes for the user: what was left out of the configuration, and what the map server found."""
         left_out = (
             f"left out: optional {skipped.kind.name.lower()} {skipped.name!r}: {skipped.reason}"
             for skipped in self.config.skipped
@@ -197,13 +197,9 @@ class AbstractNavigationServer(PluginHost):
         ValueError
             A value is not legal (pydantic's ValidationError is one), or a parameter is read once, at the start.
         """
-        old = self.runtime.parameters
-        base = self.config.parameters if changes.pop("restore_defaults", False) else old
-        new = NavigationParameters.model_validate({**base.model_dump(), **changes})
-        fixed = [name for name in READ_ONCE if getattr(new, name) != getattr(old, name)]
-        if fixed:
-            raise ValueError(f"{', '.join(fixed)}: read once, at the start, and cannot be changed at run time")
-        self.runtime.parameters = new
+        restored = changes.pop("restore_defaults", False)
+        base = self.config.parameters if restored else self.runtime.parameters
+        self.runtime.parameters = new = with_changes(base, changes, READ_ONCE)
         self._put_into_effect(new)
         self.runtime.events.emit(EventKind.PARAMETER_CHANGED, "server", **changes)
 
@@ -224,7 +220,7 @@ class AbstractNavigationServer(PluginHost):
         start, goal : Pose
             In the global frame; a plan between them is made with every planner.
         on_step : callable
-            Told the name of each plugin before its turn, and which of how many it is.
+            Called with a text before each plugin's turn: its name, and which of how many it is.
         """
         path = Path.from_poses([start, goal])
         planners, controllers = self.plugins.all_of(PluginKind.PLANNER), self.plugins.all_of(PluginKind.CONTROLLER)
@@ -271,7 +267,7 @@ class AbstractNavigationServer(PluginHost):
             self.runtime.callbacks.close()
             self.runtime.supervisor.close()
             self.close_map()
-        self.runtime.clock.settle()  # or the threads would stay for ever where nobody uses the clock any more
+        self.runtime.clock.settle()  # or the threads would stay where the clock is not used any more
 
     def __enter__(self) -> AbstractNavigationServer:
         return self

@@ -1,7 +1,7 @@
 """The plugins of a server at run time: load, unload, reload, change parameters. Refused while a goal uses the plugin.
 
-The server derives it. A server of a map says in ``make_context`` what its plugins are constructed with, and in the
-class attributes what types and options it knows.
+The server derives it. A server of a map defines in ``make_context`` what its plugins are constructed with, and in
+class attributes which types and options it knows.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from mbf_abstract.server.plugin_table import PluginTable
 
 
 class ServerError(Exception):
-    """A plugin can not be loaded, unloaded or changed; the text says why."""
+    """A plugin can not be loaded, unloaded or changed; the text gives the reason."""
 
 
 class PluginHost(ABC):
@@ -113,7 +113,7 @@ class PluginHost(ABC):
         except (Exception, SystemExit) as error:
             raise ServerError(_failure(old.spec, error)) from error
         if not old.retire():
-            raise ServerError(f"{kind.name.lower()} {name!r} is in use")
+            raise ServerError(f"{old.title} is in use")
         self.plugins.replace(kind, new)
 
     def _construct(self, spec: PluginSpec) -> LoadedPlugin[Any]:
@@ -141,7 +141,7 @@ class PluginHost(ABC):
         """Remove a plugin; raises ServerError if there is none of that name or a goal is using it."""
         plugin = self._loaded(kind, name)
         if not plugin.retire():
-            raise ServerError(f"{kind.name.lower()} {name!r} is in use")
+            raise ServerError(f"{plugin.title} is in use")
         self.plugins.remove(kind, name)
 
     def set_plugin_parameters(self, kind: PluginKind, name: str, **changes: Any) -> None:
@@ -160,7 +160,7 @@ class PluginHost(ABC):
         old, new = instance.parameters, with_changes(instance.parameters, changes)
         user = "a change of its parameters"
         if not plugin.acquire(user, lambda: True):
-            raise ServerError(f"{kind.name.lower()} {name!r} is in use")
+            raise ServerError(f"{plugin.title} is in use")
         try:
             instance.parameters = new
             instance.parameters_changed()

@@ -7,7 +7,7 @@ from typing import Any
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin, PluginGone
 from mbf_abstract.plugins import PluginKind
 
-_WORDS = {
+_KIND_NAMES = {
     PluginKind.PLANNER: "planner",
     PluginKind.CONTROLLER: "controller",
     PluginKind.RECOVERY: "recovery behavior",
@@ -24,7 +24,7 @@ class PluginTable:
     def add(self, kind: PluginKind, plugin: LoadedPlugin[Any]) -> None:
         """Add a plugin; raises ValueError if the name is taken."""
         if plugin.name in self._plugins[kind]:
-            raise ValueError(f"a {_WORDS[kind]} named {plugin.name!r} is loaded already")
+            raise ValueError(f"a {_KIND_NAMES[kind]} named {plugin.name!r} is loaded already")
         self._plugins[kind][plugin.name] = plugin
 
     def replace(self, kind: PluginKind, plugin: LoadedPlugin[Any]) -> None:
@@ -32,7 +32,7 @@ class PluginTable:
         self._plugins[kind][plugin.name] = plugin
 
     def remove(self, kind: PluginKind, name: str) -> None:
-        """Forget a plugin; raises KeyError if there is none of that name."""
+        """Remove a plugin; raises KeyError if there is none of that name."""
         del self._plugins[kind][name]
 
     def names(self, kind: PluginKind) -> list[str]:
@@ -60,8 +60,8 @@ class PluginTable:
         plugin = self.find(kind, name)
         if plugin is None:
             loaded = ", ".join(self._plugins[kind]) or "none"
-            wanted = f"no {_WORDS[kind]} named {name!r}" if name else f"no {_WORDS[kind]} is loaded"
+            wanted = f"no {_KIND_NAMES[kind]} named {name!r}" if name else f"no {_KIND_NAMES[kind]} is loaded"
             return f"{wanted}; loaded: {loaded}" if name else wanted
         if plugin.quarantined:
-            return f"{_WORDS[kind]} {plugin.name!r} is quarantined: {plugin.quarantined}"
+            return f"{_KIND_NAMES[kind]} {plugin.name!r} is quarantined: {plugin.quarantined}"
         return ""

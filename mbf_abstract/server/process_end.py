@@ -67,7 +67,7 @@ def _exchange_handlers(old: object, new: object) -> None:
 
 def _on_signal(number: int, frame: FrameType | None) -> None:
     watches = [watch for watch in tuple(_watches) if watch.is_of_this_process]
-    if not watches:  # a forked child: it ends as if nobody had asked
+    if not watches:  # a forked child: it ends as without this watch
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
         return

@@ -15,7 +15,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mbf_abstract.config.configuration import Config, NavigationParameters, PluginSpec
+from mbf_abstract.config.configuration import Config, PluginSpec
+from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.drive.robot import Robot
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Path, Pose

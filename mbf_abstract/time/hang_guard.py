@@ -57,7 +57,7 @@ class HangGuard:
             threading.Thread(target=self._watch, name="hang guard", daemon=True).start()
 
     def stop(self) -> None:
-        """End the guard's thread: nobody is left whom it could give up on."""
+        """End the guard's thread: no thread is left to watch."""
         self._running = False
         self._alone.set()
 

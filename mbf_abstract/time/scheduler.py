@@ -1,7 +1,7 @@
 """The lockstep scheduler: which thread runs next, and when virtual time moves.
 
 Exactly one known thread runs at a time: the one that has the baton. When it waits, the baton goes to the next thread
-in the order (time, priority, sequence), and time jumps to the earliest wake-up once nobody is ready. Threads the
+in the order (time, priority, sequence), and time jumps to the earliest wake-up once no thread is ready. Threads the
 scheduler does not know are served beside the lockstep.
 
 ``SimClock`` adds threads, conditions and the hang guard to it. Use that.
@@ -25,7 +25,7 @@ STALLED_AFTER = 5.0
 
 
 class ClockDeadlock(RuntimeError):
-    """A wait can never end: nobody is left to notify it, or who should move time waits for something else."""
+    """A wait can never end: no thread is left to notify it, or the one that should move time waits by other means."""
 
 
 class LockstepScheduler:
@@ -223,7 +223,7 @@ class LockstepScheduler:
         heapq.heappush(self._ready, (who.priority, self._sequence, who))
 
     def dispatch(self) -> None:
-        """Choose who runs next, moving time if nobody is ready; the mutex is held, nobody runs."""
+        """Choose who runs next, moving time if none is ready; the mutex is held, no thread runs."""
         while True:
             if not self._ready and not self._advance_time():
                 self._report_deadlock()
@@ -237,7 +237,7 @@ class LockstepScheduler:
                 self._turns += 1
                 nxt.baton.release()
                 return
-            nxt.baton.release()  # a foreign thread goes its way beside the lockstep
+            nxt.baton.release()  # a foreign thread runs on beside the lockstep
 
     def _add_timer(self, me: Participant, stamp: float) -> None:
         me.ticket += 1
@@ -314,7 +314,7 @@ class LockstepScheduler:
 
     def _describe_waiters(self) -> str:
         names = sorted(p.name for p in self.known if p is not self.founder)
-        return f"at t={self._now:.3f} s every thread waits for another one: main, {', '.join(names) or 'nobody else'}"
+        return f"at t={self._now:.3f} s every thread waits for another one: main, {', '.join(names) or 'no other'}"
 
     def _forbid_waiting_with_lock(self, me: Participant, allowed: int) -> None:
         if me.held_locks > allowed:

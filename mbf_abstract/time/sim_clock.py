@@ -2,7 +2,7 @@
 
 Every thread of the framework is known to the clock. Exactly one of them runs at a time; when it waits, the clock
 hands the baton to the next one in the order (time, priority, sequence), and time jumps to the earliest wake-up once
-nobody is ready (``scheduler``). So the same scenario and seed give the same order of events, bit for bit.
+no thread is ready (``scheduler``). So the same scenario and seed give the same order of events, bit for bit.
 
 Threads the clock does not know (a viewer's callbacks) may call into the framework at any moment: their waits are
 served too, but they run beside the lockstep and a run they touch is no longer repeatable.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, normalize_angle
 from mbf_abstract.geometry.arithmetic import plane_rotation, rotated_back
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.plugins import ControlRequest, ControlResult
 from mbf_costmap_nav.grid.costmap import Costmap

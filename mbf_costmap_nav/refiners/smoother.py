@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from mbf_abstract.execution.path_tracker import PathTracker, polyline_lengths
 from mbf_abstract.geometry import Path
 from mbf_abstract.geometry.arithmetic import arctan2
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RefineResult

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mbf_abstract.drive.robot import RobotStateError
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.recoveries.chosen_maps import ChosenMapsParameters, ChosenMapsRecovery, described
 from mbf_abstract.outcomes import RecoveryOutcome

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mbf_abstract.geometry import Path
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.testing.conformance.planning import FACE, WALL
 from mbf_abstract.testing.conformance.rig import T_map_dock

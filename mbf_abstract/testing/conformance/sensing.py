@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mbf_abstract.events import EventKind
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.testing.conformance.planning import FACE, WALL
 from mbf_abstract.testing.conformance.rig import SENSOR

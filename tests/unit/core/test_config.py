@@ -105,7 +105,7 @@ def test_a_good_configuration_becomes_classes_and_models(tmp_path):
         (PluginKind.PLANNER, "second", Cvp),
         (PluginKind.RECOVERY, "pause", Wait),
     ]
-    assert [spec.parameters.cost_limit for spec in config.plugins_of(PluginKind.PLANNER)] == [1.0, 0.5]
+    assert [spec.parameters.cost_limit for spec in config.plugins if spec.kind is PluginKind.PLANNER] == [1.0, 0.5]
     assert config.plugins[1].line == 5
     section = config.sections["mesh_map"]
     assert section.parameters.mesh_file == tmp_path / "hill.ply"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.geometry.transform_buffer import TransformBuffer, TransformError
+from mbf_abstract.geometry.transform import Transform, TransformError
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.disc_map import DiscMap
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery

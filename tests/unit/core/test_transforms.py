@@ -305,7 +305,7 @@ def test_poses_paths_and_points_are_mapped_alike():
     pose = Pose.planar(1.0, 2.0, 0.3, frame_id="odom", stamp=9.0)
     mapped = buffer.transform_pose(pose, "map")
     path = buffer.transform_path(Path.from_poses([pose, pose]), "map")
-    points = buffer.transform_points([pose.position], "odom", "map")
+    points = buffer.lookup("map", "odom").apply([pose.position])
     c, s = math.cos(0.7), math.sin(0.7)
     assert mapped.position == pytest.approx((5 + c - 2 * s, 1 + s + 2 * c, 0.0))
     assert (mapped.frame_id, mapped.stamp) == ("map", 9.0)

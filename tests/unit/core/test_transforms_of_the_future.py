@@ -2,8 +2,8 @@
 
 import pytest
 
-from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.geometry.transform_buffer import MAX_LEAD, StaleTransformError, TransformBuffer, TransformError
+from mbf_abstract.geometry.transform import Transform, TransformError
+from mbf_abstract.geometry.transform_buffer import MAX_LEAD, StaleTransformError, TransformBuffer
 
 UNIX = 1.79e9  # time.time() where the clock began at zero
 

@@ -7,8 +7,8 @@ import pytest
 
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Path, Pose
-from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.geometry.transform_buffer import TransformBuffer, TransformError
+from mbf_abstract.geometry.transform import Transform, TransformError
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.queries import CellState, PlaceQuery
 

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Pose, quaternion_from_yaw
-from mbf_abstract.geometry.transform import Transform
-from mbf_abstract.geometry.transform_buffer import ExtrapolationError, TransformBuffer, TransformError
+from mbf_abstract.geometry.transform import Transform, TransformError
+from mbf_abstract.geometry.transform_buffer import ExtrapolationError, TransformBuffer
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.testing.loopback import LoopbackRobot

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist, quaternion_from_yaw
-from mbf_abstract.geometry.transform_buffer import Transform, TransformBuffer
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.recoveries.back_up import BackUpRecovery
 from mbf_abstract.maps.recoveries.clear import ClearRecovery
 from mbf_abstract.maps.recoveries.move_away import MoveAwayRecovery

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.config.registry import PluginError
 from mbf_abstract.geometry import Path, Pose, Twist, quaternion_from_yaw
-from mbf_abstract.geometry.transform_buffer import Transform, TransformBuffer
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.outcomes import RefinePathOutcome
 from mbf_abstract.plugins import ControlRequest, PlanRequest
 from mbf_abstract.server.factory import read_config

@@ -8,7 +8,7 @@ from mbf_abstract.executives.map_leaves import CheckPath, CheckPoint, CheckPose,
 from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.transform_buffer import TransformError
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.queries import CellState, PathAnswer, PlaceAnswer
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.testing.scripted_session import MapFreeServer

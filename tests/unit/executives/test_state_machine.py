@@ -70,8 +70,8 @@ def test_all_mistakes_are_reported_at_once(scripted):
         StateMachine("m", {"a": State(scripted("S"), {S: "nowhere"}), "b": State(scripted("S"), {F: F})})
     text = str(error.value)
     assert "'nowhere', which is no state" in text
-    assert "state 'a' does not say what follows FAILURE" in text
-    assert "state 'b' does not say what follows SUCCESS" in text
+    assert "state 'a' has no transition for FAILURE" in text
+    assert "state 'b' has no transition for SUCCESS" in text
 
 
 def test_a_machine_is_a_node_of_a_tree(make_session):

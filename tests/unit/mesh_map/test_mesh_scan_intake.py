@@ -8,7 +8,8 @@ import trimesh
 
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Pose
-from mbf_abstract.geometry.transform_buffer import TransformBuffer, TransformError
+from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.testing.loopback import LoopbackRobot
