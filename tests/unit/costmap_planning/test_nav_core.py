@@ -8,7 +8,7 @@ import pytest
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
-from mbf_abstract.goals.simple_goal import SimpleGoal
+from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.testing.loopback import LoopbackRobot
@@ -70,13 +70,12 @@ def test_an_old_recovery_always_succeeds(navigator):
 
 
 def test_a_bare_pose_runs_move_base_and_the_newest_counts(navigator):
-    go_to = SimpleGoal(navigator)
-    first, second = go_to(Pose.planar(5.0, 0.0)), go_to(Pose.planar(1.0, 0.0))
+    first, second = (navigator.send(MoveBaseGoal(Pose.planar(x, 0.0))) for x in (5.0, 1.0))
     assert second.wait(60.0).success
     assert first.status.value == "canceled"
-    go_to(Pose.planar(9.0, 0.0))
-    go_to.cancel()
-    assert go_to.handle.wait(10.0).outcome_name == "CANCELED"
+    third = navigator.send(MoveBaseGoal(Pose.planar(9.0, 0.0)))
+    third.cancel()
+    assert third.wait(10.0).outcome_name == "CANCELED"
 
 
 def test_a_class_that_is_neither_is_refused(tmp_path):
