@@ -1,4 +1,4 @@
-"""The status line in the terminal while a run goes on: the present step, a bar, and the time.
+"""The status line in the terminal during a run: the present step, a bar, and the time.
 
 Where there is no terminal, and with ``mbf run --json`` and ``--quiet``, only notes are printed.
 """

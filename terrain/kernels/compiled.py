@@ -21,7 +21,7 @@ def kernel(function: KernelFunction) -> KernelFunction:
 
 
 def inlined_kernel(function: KernelFunction) -> KernelFunction:
-    """Compile ``function`` as a part of each kernel that calls it, for bodies of loops that shall become vectors.
+    """Compile ``function`` as a part of each kernel that calls it, for bodies of loops to be vectorised.
 
     A loop round a call is unrolled before the call is opened, and then there is no loop left to vectorise.
     """

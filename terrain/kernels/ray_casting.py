@@ -1,7 +1,7 @@
 """Casting rays at a tree of boxes (``ray_tree``), eight boxes or triangles at a time.
 
-The two loops over lanes write nothing but bits of a number. That is what lets the compiler turn them into vector
-instructions without asking first whether one array lies on another. A triangle's arithmetic is the same in every
+The two loops over lanes write nothing but bits of a number, so the compiler can turn them into vector instructions
+without a check whether two arrays overlap. A triangle's arithmetic is the same in every
 lane and on every CPU, and the nearest of all hits does not depend on their order.
 """
 

@@ -2,8 +2,8 @@
 
 A node has up to eight children, found by halving its triangles three times along their longest side. A child is a
 node or a leaf of eight triangles. What a ray needs of the eight children of a node, or of the eight triangles of a
-leaf, lies side by side in memory, so that vector units work on eight at once. How the tree is cut decides how fast a
-ray is, never what it hits.
+leaf, lies side by side in memory, so that vector units work on eight at once. The cuts decide how fast a ray is
+cast, not what it hits.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Things that move by themselves: people and other robots on routes, doors that close. Only sensors see them.
+"""Things that move by themselves: people and other robots on routes, doors that close. No map shows them.
 
 Their positions are functions of the world's time and of their parameters; only those with ``gives_way`` depend on the
 robot too. Seeds go into the routes. They are as heavy as walls: an actor that does not give way pushes a robot aside.
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from terrain.physics.incidents import Thing
 from terrain.physics.kinematic_world import KinematicWorld
@@ -26,8 +26,6 @@ from terrain.physics.world import BulletWorld
 from terrain.recording.recording import RobotShape
 from terrain.worlds.occupancy import OccupancyGrid
 from terrain.worlds.surface import Surface, box, cylinder, joined
-
-FloatArray = NDArray[np.float64]
 
 AnyWorld = BulletWorld | KinematicWorld
 
@@ -198,7 +196,7 @@ class SlidingDoor:
 def other_robot(
     world: AnyWorld, spec: RobotSpec, route: FloatArray, speed: float, start: float = 0.0, gives_way: bool = False
 ) -> RouteWalker:
-    """Put in another robot that follows a route: a box as large as the model, with its body and wheels to look at."""
+    """Put in another robot that follows a route: a box as large as the model, drawn with its body and wheels."""
     length, width = np.ptp(spec.footprint_array(), axis=0).tolist()
     size = (length, width, spec.height)
     body = Body(size, Thing.ROBOT, _robot_looks(spec, size))

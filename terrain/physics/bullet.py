@@ -22,9 +22,9 @@ class SimulatorMissingError(ImportError):
 
 @contextmanager
 def quiet_native_output() -> Iterator[None]:
-    """Send what native code prints to nowhere, for the duration of the block; exceptions pass.
+    """Discard what native code prints during the block; exceptions pass.
 
-    Works on file descriptors, so it also hides what another thread prints meanwhile: keep the block short.
+    Works on file descriptors, so it also hides what other threads print during the block: keep it short.
     """
     sys.stdout.flush()
     sys.stderr.flush()

@@ -1,8 +1,8 @@
 """Penetration depth of a convex outline in walls and other things: the shortest motion that frees it, in metres.
 
 Separating axes: two convex shapes are apart if and only if their projections on some edge normal are; else the
-narrowest overlap of the projections is the depth (Ericson, Real-Time Collision Detection, 2005, 4.4). Depths below zero
-are those of shapes that are apart, by at least so much.
+narrowest overlap of the projections is the depth (Ericson, Real-Time Collision Detection, 2005, 4.4). A negative
+depth means that the shapes are apart by at least its magnitude.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import plane_rotation, rotated
-
-FloatArray = NDArray[np.float64]
 
 
 def placed(corners: FloatArray, x: float, y: float, yaw: float) -> FloatArray:

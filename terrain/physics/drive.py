@@ -1,7 +1,8 @@
 """Velocity commands to wheel speeds and back, for the three drives of ``terrain.physics.robot_models``; pure functions.
 
 Skid-steered and differential: left and right speed differ by yaw rate x effective track. Car: bicycle model, with the
-two front wheels turned so that all axles meet in one point (Ackermann), and rear wheels as fast as their circles ask.
+two front wheels turned so that all axles meet in one point (Ackermann), and the rear wheels at the speeds of their
+circles.
 """
 
 from __future__ import annotations

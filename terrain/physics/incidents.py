@@ -1,6 +1,6 @@
-"""Detects when driving goes wrong: tipped over, slipping, high-centred, stuck, collided. Pure, fed with samples.
+"""Detects when driving goes wrong: tipped over, slipping, high-centred, stuck, collided. It works on samples alone.
 
-Use it on the simulator's ground truth, to count what physics did to a run; a controller must not look at it. Each
+Use it on the simulator's ground truth, to count the incidents of a run; it is no input for a controller. Each
 kind has a condition that must hold for a while, then counts once until it has been false again.
 """
 

@@ -123,7 +123,7 @@ class KinematicRobot:
         return Odometry(self.velocity(), self.world.time)
 
     def motion_sample(self) -> MotionSample:
-        """Collect what ``IncidentMonitor`` looks at; all that was touched since the last sample counts.
+        """Return the sample that ``IncidentMonitor`` takes; all that was touched since the last sample counts.
 
         What stops a robot leaves a gap of up to a step's length; the contact lasts until the robot is farther away.
         """

@@ -1,4 +1,4 @@
-"""Ground, walls, obstacles and actors without physics: what ``terrain.physics.kinematic_robot`` drives in."""
+"""Ground, walls, obstacles and actors without physics: the world of ``terrain.physics.kinematic_robot``."""
 
 from __future__ import annotations
 
@@ -7,18 +7,15 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from terrain.physics.contact_depth import depth_in_cells, placed
 from terrain.physics.incidents import Thing
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.surface import Surface, joined
 from terrain.worlds.upright_solids import UprightSolid
-
-FloatArray = NDArray[np.float64]
 
 TIME_STEP = 1.0 / 60.0
 NOTHING: frozenset[Thing] = frozenset()
@@ -85,7 +82,7 @@ class KinematicWorld:
         self.close()
 
     def add_box(self, pose: Pose, size: Sequence[float], moving: bool = False) -> int:
-        """Stand a box of ``size`` (3,) [m] with its middle at ``pose``; ``moving`` if it will be put elsewhere."""
+        """Stand a box of ``size`` (3,) [m] with its middle at ``pose``; ``moving`` if it will be moved."""
         self.solids.append(UprightSolid(pose, size, moving))
         return len(self.solids) - 1
 

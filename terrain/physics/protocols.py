@@ -52,4 +52,4 @@ class SimulatedRobot(Protocol):
         """Ground truth of the velocity, stamped with the world's time."""
 
     def motion_sample(self) -> MotionSample:
-        """Collect what ``IncidentMonitor`` looks at."""
+        """Return the sample that ``IncidentMonitor`` takes."""

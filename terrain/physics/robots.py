@@ -1,8 +1,8 @@
-"""A wheeled robot in a PyBullet world: commands act on wheels through motors with limits, physics does the rest.
+"""A wheeled robot in a PyBullet world: commands act on wheels through motors with limits; physics moves the robot.
 
 It implements the core's ``Robot`` protocol (``send_command``, ``odometry``) and gives ground truth (``pose``,
 ``velocity``). Commands are only stored by ``send_command`` and reach the motors at the next step, so the velocity gate
-may call from any thread. Motors of a real robot stop when commands cease to come: ``command_timeout``.
+may call from any thread. As on a real robot, the motors stop when no command arrives: ``command_timeout``.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class WheeledRobot:
     world : BulletWorld
     spec : RobotSpec
     pose : Pose
-        Where base_link shall stand on the ground; the robot is dropped from a little above (see ``settle``).
+        Of base_link on the ground; the robot is dropped from a little above (see ``settle``).
     command_timeout : float
         Motors stop this long [s of the world] after the last command; ``math.inf`` keeps driving.
     friction : float
@@ -129,7 +129,7 @@ class WheeledRobot:
         self._command_stamp, self._last_state = 0.0, None
 
     def _drive_motors(self) -> None:
-        """Hand new targets to the motors before a step; Bullet keeps them by itself."""
+        """Set new targets of the motors before a step; Bullet keeps them until the next change."""
         if self.world.time - self._command_stamp > self.command_timeout:
             self._command = STANDSTILL
         if self._command is self._applied:
@@ -209,7 +209,7 @@ class WheeledRobot:
         return twist_from_wheels(self.spec, left, right, steering)
 
     def motion_sample(self) -> MotionSample:
-        """Collect what ``IncidentMonitor`` looks at."""
+        """Return the sample that ``IncidentMonitor`` takes."""
         pose, velocity = self._state()
         left, right, steering, power = self.wheel_state()
         rolling = twist_from_wheels(self.spec, left, right, steering)

@@ -1,6 +1,6 @@
 """One simulated world with its robot and sensors, stepped in lockstep by the owner of the clock.
 
-``advance_to`` is a pure function of what the simulation was made of, its seeds and the commands sent: no thread, no
+``advance_to`` is a pure function of the simulation's parts, its seeds and the commands sent: no thread, no
 clock, no global state. In a run, a thread of ``SimClock`` calls it at a steady period; in a test, call it directly.
 
 Example
@@ -33,7 +33,7 @@ class Simulation:
     Parameters
     ----------
     world : SimulatedWorld
-        With its clock at the instant the run shall start, that is after ``robot.settle()``.
+        With its clock at the instant at which the run starts, that is after ``robot.settle()``.
     robot : SimulatedRobot
     sensors : mapping of str to Sensor
         By topic; each measures at its own rate, the first time at once.
@@ -86,7 +86,7 @@ class Simulation:
             self._observe()
 
     def _observe(self) -> None:
-        """Let everything that is due at this step look at the world."""
+        """Take the measurements that are due at this step."""
         if self._steps % self._monitor_period == 0:
             sample = self.robot.motion_sample()
             self.track.append(sample.pose)

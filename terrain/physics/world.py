@@ -1,7 +1,7 @@
 """A PyBullet world without a window: ground, walls and things put in, and fixed steps of 1/240 s.
 
-Use it where contact matters: slopes, bumps, wheels that slip, doors that push. For sweeps on ground that does not
-matter take ``terrain.physics.kinematic_robot`` instead, which is some thirty times faster.
+Use it where contact matters: slopes, bumps, wheels that slip, doors that push. For sweeps in which contact does not
+matter use ``terrain.physics.kinematic_robot`` instead, which is some thirty times faster.
 
 There are two kinds of ground. ``add_heightfield`` is Bullet's own heightfield; the planner's mesh from
 ``Heightfield.surface`` is the same surface to a fraction of a millimetre. ``add_mesh`` is a concave triangle mesh:
@@ -20,14 +20,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from terrain.physics.bullet import connect, quiet_native_output
 from terrain.physics.incidents import Thing
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.surface import Surface, box, cylinder, joined
-
-FloatArray = NDArray[np.float64]
 
 TIME_STEP = 1.0 / 240.0
 GRAVITY = 9.81

@@ -10,13 +10,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.events import Event, EventKind
+from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import arcsin, arctan2, norm
 from terrain.recording.recording import Recording
-
-FloatArray = NDArray[np.float64]
 
 STANDING_SPEED = 0.02  # m/s; slower counts as standing
 STANDING_YAW_RATE = 0.05  # rad/s

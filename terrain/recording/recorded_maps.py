@@ -1,4 +1,4 @@
-"""Recorded maps: the costs of a grid, or of a mesh whose surface is kept once, as often as they were looked at.
+"""Recorded maps: the costs of a grid, or of a mesh whose surface is kept once, at several times of a run.
 
 Made from ``GridView`` and ``MeshView``, which a server gives of its map. The costs of a grid are kept in steps of a
 hundredth, one byte each, so that the maps of a run of some minutes need a few hundred kilobytes; those of a mesh in

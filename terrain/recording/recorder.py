@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,8 +31,7 @@ MAX_MESH_VERTICES = 1_000_000  # nor are these
 MAX_MAP_COSTS = 200_000_000  # of all maps of a run together, a byte or two each; later ones are not recorded
 
 
-@dataclass(frozen=True)
-class Taken:
+class Taken(NamedTuple):
     """How much of each kind has been taken from a recorder."""
 
     samples: int = 0
@@ -122,14 +122,16 @@ class Recorder:
         meshes = self.meshes[before.meshes :]
         if before.meshes:  # the surface has been taken
             meshes = [replace(mesh, vertices=np.zeros((0, 3)), faces=np.zeros((0, 3), np.int32)) for mesh in meshes]
-        surfaces = (self.ground, self.walls, self.obstacles) if before == Taken() else (None, None, None)
+        ground, walls, obstacles = (
+            (self.ground, self.walls, self.obstacles) if before == Taken() else (None, None, None)
+        )
         return Recording(
             scenario=well_formed(self.scenario),
             backend=well_formed(self.backend),
             robot=self.robot,
-            ground=surfaces[0],
-            walls=surfaces[1],
-            obstacles=surfaces[2],
+            ground=ground,
+            walls=walls,
+            obstacles=obstacles,
             start=self.start,
             goals=tuple(self.goals),
             times=rows[:, 0].copy(),

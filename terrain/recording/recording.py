@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.config.bounded_files import read_arrays
 from mbf_abstract.events import Event
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import arccos
 from terrain.physics.robot_models import Drive, RobotSpec
 from terrain.recording.actor_track import ActorTrack, track_arrays, tracks_from
@@ -34,7 +33,6 @@ from terrain.recording.verdict import Verdict
 from terrain.recording.whole_files import replacing
 from terrain.worlds.surface import Surface
 
-FloatArray = NDArray[np.float64]
 StampedPoints = tuple[float, FloatArray]
 
 MAX_BYTES = 4 * 2**30
@@ -99,7 +97,7 @@ class Recording:
     scans : list of (time, (k, 3) float64)
         Points a range sensor hit, in the map.
     ground, walls, obstacles : Surface or None
-        Obstacles are things that are in no map.
+        Obstacles are things that are on no map.
     goals : tuple of Pose
         In the order they were given.
     events : tuple of Event

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from mbf_abstract.events import Event, EventBus, EventKind
+from mbf_abstract.geometry import FloatArray
 from terrain.recording.metrics import measure
 from terrain.recording.recorded_maps import RecordedMesh
 from terrain.recording.recorder import Recorder
-from terrain.recording.recording import FloatArray, Recording, RecordingError
+from terrain.recording.recording import Recording, RecordingError
 
 RESULTS = ("metrics.json", "timing.json", "recording.npz", "picture.png", "report.html", "replay.html", "run.mcap")
 PARTS = "recording.parts"
@@ -148,7 +149,7 @@ def _joined(parts: list[Recording], name: str) -> list[Any]:
 
 
 def _with_surface(meshes: list[RecordedMesh]) -> list[RecordedMesh]:
-    """Give all records the surface, which stands in the first one only."""
+    """Give all records the surface, which only the first one has."""
     return [replace(mesh, vertices=meshes[0].vertices, faces=meshes[0].faces) for mesh in meshes]
 
 

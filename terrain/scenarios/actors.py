@@ -26,7 +26,7 @@ from terrain.worlds.occupancy import OccupancyGrid
 
 
 class Walker(ParameterModel):
-    """A person who walks a closed route again and again."""
+    """A person who walks a closed route without end."""
 
     type: Literal["walker"]
     route: tuple[tuple[float, float], ...] = parameter(..., "Corners; the last leg leads back to the first.", unit="m")
@@ -38,7 +38,7 @@ class Walker(ParameterModel):
 
 
 class OtherRobot(ParameterModel):
-    """Another robot that drives a closed route again and again."""
+    """Another robot that drives a closed route without end."""
 
     type: Literal["robot"]
     model: Literal["husky", "turtlebot", "car"] = parameter("turtlebot", "Its size and looks.")

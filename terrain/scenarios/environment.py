@@ -1,4 +1,4 @@
-"""Everything that the robot of a scenario meets: the world, what stands in it and what moves in it."""
+"""The environment of a scenario's robot: the world, its obstacles and its actors."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def build_environment(scenario: Scenario, folder: Path, seed: int) -> tuple[Scen
     -------
     world : ScenarioWorld
     obstacles : Surface or None
-        What stands in the world and is on no map, to look at.
+        The things in the world that are on no map, for pictures.
     """
     keep_clear = coordinates((scenario.start, *scenario.goals))
     rng, is_kinematic = np.random.default_rng([seed, WORLD_STREAM]), scenario.physics == "kinematic"

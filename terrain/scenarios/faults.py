@@ -20,7 +20,7 @@ from terrain.sensors.proprioception import Localization
 from terrain.sensors.sensor import Sensor
 
 LOCALIZATION, ODOMETRY, IMU = "localization", "odometry", "imu"
-"""Names among the sensors of a fault, of those that look at the robot itself."""
+"""Names of the proprioceptive sensors and of the localisation, for faults."""
 
 
 class TimedFault(ParameterModel):
@@ -54,7 +54,7 @@ Fault = Annotated[SensorFault | LocalizationJump, Field(discriminator="type")]
 
 
 class FaultSchedule:
-    """Switches the faults of a scenario on and off as the world's time goes on.
+    """Switches the faults of a scenario on and off as the world's time passes.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class FaultSchedule:
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of what a sensor fault can befall."""
+        """Names that a sensor fault can have."""
         return tuple(self._sensors)
 
     def add(self, fault: SensorFault | LocalizationJump) -> None:
@@ -107,7 +107,7 @@ class FaultSchedule:
 
 
 def seen_from(scan: RangeScan, true_pose: Pose, believed_pose: Pose) -> RangeScan:
-    """Return a scan as a robot puts it into the map that believes to be at ``believed_pose``."""
+    """Return a scan as it appears in the map of a robot whose localisation gives ``believed_pose``."""
 
     def believed(points: NDArray[np.float64]) -> NDArray[np.float64]:
         in_base = rotated_back(true_pose.rotation, points - true_pose.position)

@@ -1,6 +1,6 @@
-"""How far what the navigation believes is from the truth in a scenario: noise of its pose, and faults of its map.
+"""Errors of what the navigation gets in a scenario: noise of its pose, and errors of its map.
 
-Bullet and the judge of a run keep to the truth; only the server gets the noisy pose and the noisy map.
+Only the server gets the noisy pose and the noisy map; the physics and the verdict on a run use the true ones.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class LocalizationNoise(ParameterModel):
 
 
 class MapNoise(ParameterModel):
-    """What is wrong with the map that the navigation gets; the world is as it is."""
+    """Errors of the map that the navigation gets; the world itself does not change."""
 
     height_noise: float = parameter(0.0, "Standard deviation of each vertex's height.", unit="m", ge=0.0)
     spacing: float | None = parameter(

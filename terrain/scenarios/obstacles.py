@@ -53,7 +53,7 @@ class Forest(ParameterModel):
 def add_obstacles(
     world: AnyWorld, obstacles: Iterable[Obstacle], height_at: Callable[[float, float], float]
 ) -> Surface | None:
-    """Stand the obstacles on the ground; return them as one surface to look at."""
+    """Put the obstacles on the ground and return them as one surface, for pictures."""
     parts = []
     for obstacle in obstacles:
         length, _, height = obstacle.size

@@ -24,7 +24,7 @@ NEAR_ZERO = 1000.0  # m; farther away single precision is coarser than a tenth o
 def on_map(scenario: Scenario, file: Path) -> Scenario:
     """Return the scenario in the building of ``file``, from one end of its largest free region to the other.
 
-    A map far from zero is put at zero: the physics reckons in single precision.
+    A map far from zero is moved to zero, because the physics calculates in single precision.
 
     Raises
     ------

@@ -59,7 +59,7 @@ class Scenario(ParameterModel):
         "exact", "True velocity, or that of the turning wheels; then odom drifts and map -> odom corrects it."
     )
     imu: bool = parameter(False, "Whether it has an IMU, for scripts: simulation.latest['imu'] is the tilt.")
-    localization: LocalizationNoise = parameter(LocalizationNoise(), "Noise of the pose; none = it is exact.")
+    localization: LocalizationNoise = parameter(LocalizationNoise(), "Noise of the pose; none = exact.")
     map: MapNoise = parameter(MapNoise(), "What is wrong with the map; nothing = it is the world itself.")
     perturb: Perturbation = parameter(Perturbation(), "What each run may change, drawn from its seed.")
     obstacles: tuple[Obstacle, ...] = parameter((), "Things that are on no map.")
@@ -137,7 +137,7 @@ def _find_contradictions(scenario: Scenario, document: YamlDocument) -> list[Fin
 
 
 def proprioceptive_sensors(scenario: Scenario) -> list[str]:
-    """Names of the sensors that look at the robot itself."""
+    """Names of the proprioceptive sensors."""
     return [ODOMETRY] * (scenario.odometry == "wheels") + [IMU] * scenario.imu
 
 

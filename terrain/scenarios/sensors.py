@@ -1,4 +1,4 @@
-"""The sensors of a scenario: lidars and cameras that see the world, and those that look at the robot itself."""
+"""The sensors of a scenario: lidars and cameras, proprioceptive sensors, and the localisation."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def make_sensors(
 
 
 def make_proprioceptive_sensors(scenario: model.Scenario, robot: AnyRobot, seed: int) -> dict[str, Sensor[Any]]:
-    """Make the sensors of a scenario that look at the robot itself, by name."""
+    """Make the proprioceptive sensors of a scenario, by name."""
     makers = {ODOMETRY: WheelOdometry, IMU: Imu}
     return {name: makers[name](robot, _generator(seed, name)) for name in model.proprioceptive_sensors(scenario)}
 
@@ -50,7 +50,7 @@ def make_localization(noise: LocalizationNoise, robot: AnyRobot, seed: int) -> L
 
 
 def _generator(seed: int, name: str) -> np.random.Generator:
-    """A generator of a sensor's own, so that sensors do not shift each other's noise."""
+    """A generator for one sensor, so that sensors do not shift each other's noise."""
     return np.random.default_rng([seed, zlib.crc32(name.encode())])
 
 

@@ -5,11 +5,10 @@ Every server gets the map it can read from ``terrain.worlds.map_files``, and a c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -28,7 +27,6 @@ from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.slope_map import slope_grid
 from terrain.worlds.surface import Surface
 
-Physics = TypeVar("Physics", BulletWorld, AnyWorld)
 HeightAt = Callable[[float, float], float]
 
 
@@ -103,25 +101,28 @@ def build_world(
     kinematic : bool
         Whether robots follow commands exactly; impossible on several levels.
     """
-
-    def physics(terrain: Heightfield | None = None, building: OccupancyGrid | None = None) -> AnyWorld:
-        return KinematicWorld(terrain, building) if kinematic else BulletWorld(time_step)
-
+    physics: AnyWorld
     if isinstance(world, TerrainWorld):
         terrain = world.heightfield(rng, keep_clear)
-        return _built(physics(terrain), partial(_build_terrain, terrain, world.lethal_slope, files))
+        physics = KinematicWorld(terrain) if kinematic else BulletWorld(time_step)
+        with _closed_if_that_fails(physics):
+            return _build_terrain(terrain, world.lethal_slope, files, physics)
     if isinstance(world, BuildingWorld):
         grid = world.grid()
-        return _built(physics(building=grid), partial(_build_building, world, grid, files))
+        physics = KinematicWorld(building=grid) if kinematic else BulletWorld(time_step)
+        with _closed_if_that_fails(physics):
+            return _build_building(world, grid, files, physics)
     if kinematic:
         raise ValueError("a robot without physics needs a world with one level")
-    return _built(BulletWorld(time_step), partial(_build_levels, world, files))
+    physics = BulletWorld(time_step)
+    with _closed_if_that_fails(physics):
+        return _build_levels(world, files, physics)
 
 
-def _built(physics: Physics, build: Callable[[Physics], ScenarioWorld]) -> ScenarioWorld:
-    """Build into ``physics``, which is closed if that fails."""
+@contextmanager
+def _closed_if_that_fails(physics: AnyWorld) -> Iterator[None]:
     try:
-        return build(physics)
+        yield
     except BaseException:
         physics.close()
         raise

@@ -7,16 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Vector3
+from mbf_abstract.geometry import FloatArray, Vector3
 from mbf_abstract.geometry.arithmetic import norm, rotated
 from mbf_abstract.maps.sensing import RangeScan
 from terrain.physics.protocols import SimulatedRobot
 from terrain.sensors.rays import RayCaster
 from terrain.sensors.sensor import Sensor
-
-FloatArray = NDArray[np.float64]
 
 RINGS, MAX_ELEVATION = 16, np.radians(15.0)
 WRONG_RANGE_FACTOR = 0.5  # a lidar gone wrong sees everything at half its distance

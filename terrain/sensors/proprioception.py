@@ -1,4 +1,4 @@
-"""Sensors that look at the robot itself: tilt (IMU), wheel odometry that drifts, and a localisation that can jump."""
+"""Proprioceptive sensors: tilt (IMU), wheel odometry that drifts, and a localisation that can jump."""
 
 from __future__ import annotations
 

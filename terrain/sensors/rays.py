@@ -12,12 +12,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import norm
 from terrain.kernels.ray_casting import first_distances
 from terrain.kernels.ray_tree import build_tree
 from terrain.physics.world import MOVING, BulletWorld
-
-FloatArray = NDArray[np.float64]
 
 
 class RayCaster(Protocol):

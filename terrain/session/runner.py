@@ -42,7 +42,7 @@ WriteViews = Callable[[Path, Recording, Metrics], Sequence[str]]
 
 @dataclass(frozen=True)
 class Progress:
-    """State of a run while it goes on; times in seconds, distance in metres, tilt in radians."""
+    """State of a run in progress; times in seconds, distance in metres, tilt in radians."""
 
     time: float
     wall_time: float
@@ -79,9 +79,9 @@ class RunOptions(SessionOptions):
     stay : bool
         Wait for further goals after those of the scenario, see ``GoalSequence.go_to``.
     watch : callable
-        Returns a context manager for a session and its goals; the run goes on inside, e.g. while a page is served.
+        Returns a context manager for a session and its goals, in which the run takes place, e.g. to serve a page.
     write_views : callable
-        Writes what is looked at (pictures, pages) from the folder, the recording and the metrics; returns problems.
+        Writes views (pictures, pages) from the folder, the recording and the metrics; returns problems.
     on_progress : callable
         Called about ten times a simulated second.
     on_note : callable

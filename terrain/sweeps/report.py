@@ -68,7 +68,7 @@ def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
         ratios = [row["path_over_geodesic"] for row in arrived if row.get("path_over_geodesic")]
         lines.append(
             {
-                "variant": variant or "as it is",
+                "variant": variant or "as written",
                 "runs": len(runs),
                 "success_percent": round(100.0 * len(arrived) / len(runs), 1),
                 "median_time_s": round(median(row["time_s"] for row in arrived), 1) if arrived else "",

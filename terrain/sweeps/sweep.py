@@ -1,7 +1,7 @@
 """Many runs of one scenario: every seed with every variant, each run exactly once.
 
-Finished runs are kept in ``runs.jsonl`` of the sweep's folder, so a sweep that was killed goes on where it was. Each
-run is as deterministic as ``mbf run`` with the same seed and settings.
+Finished runs are kept in ``runs.jsonl`` of the sweep's folder, so a killed sweep continues where it stopped. Each run
+is as deterministic as ``mbf run`` with the same seed and settings.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ def run_in_workers(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Ite
     Raises
     ------
     BrokenProcessPool
-        Workers died again and again.
+        Workers died more than ``MAX_POOLS`` times.
     """
     left = list(jobs)
     for attempt in range(MAX_POOLS):
@@ -67,7 +67,7 @@ def _run_in_pool(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Itera
 
 
 def _end_with_the_parent(parent: int) -> None:
-    """Let a worker end soon after its parent was killed; it would wait for work for ever.
+    """Let a worker end soon after its parent was killed; it would wait for work without end.
 
     It also ends at once on a signal, so that its job is given to another one: what a navigation server would do
     first, stop its robot, is of no use to a simulated one.

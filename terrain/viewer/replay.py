@@ -1,6 +1,6 @@
-"""A run to play again in any browser: one HTML file that needs no network and no Python to be opened.
+"""A replay of a run for any browser: one HTML file that can be opened without network and without Python.
 
-The scene is put up once in a viser server that listens at loopback only; its messages, with the times between them, are
+The scene is built once in a viser server that listens at loopback only; its messages, with the times between them, are
 the recording, which viser packs into one page with its own viewer, a time bar and speeds. Files stay small because a
 frame is only the robot's pose: about 3 MB for a terrain of a quarter of a million triangles.
 
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry import FloatArray
 from terrain.recording.recording import Recording
 from terrain.viewer.replay_panel import legend_of, with_panel
 from terrain.viewer.scene import (
@@ -28,8 +29,6 @@ from terrain.viewer.scene import (
     wheel_angles,
 )
 from terrain.viewer.server.page_server import page_server
-
-FloatArray = NDArray[np.float64]
 
 FRAME_RATE = 10.0  # Hz of recorded time
 MAX_FRAMES = 3000  # longer runs get fewer frames a second, so that the file stays small
@@ -134,7 +133,7 @@ def _thinned(items: list[tuple[float, FloatArray]], limit: int) -> list[tuple[fl
 
 
 def _corners(points: FloatArray) -> NDArray[np.bool_]:
-    """Which points of a track to keep: the ends, and those a hand's breadth from the last one kept."""
+    """Which points of a track to keep: the ends, and those more than 0.1 m from the last one kept."""
     keep = np.zeros(len(points), dtype=bool)
     keep[[0, -1]] = True
     last = points[0]

@@ -1,7 +1,7 @@
 """The text panel of a replay: events along the time bar, the state of the behaviour tree, and a legend of colours.
 
-The page of a replay is made by viser and knows scenes only. The panel is HTML and a few lines of script that read the
-time from the time bar; what it shows lies in the page as JSON, so it works from disk and without network.
+The page of a replay is made by viser and shows the scene only. The panel is HTML and a few lines of script that read
+the time from the time bar; its data is in the page as JSON, so it works from disk and without network.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The three-dimensional scene of a run in viser: ground, walls, goals, and a robot that can be placed.
 
 Shared by the replay and the live view. Lines have a width in pixels, so they can be seen from any distance; walls are
-cut low, as in a doll's house, so that one can look into rooms.
+cut low, so that rooms can be seen from above.
 """
 
 from __future__ import annotations
@@ -10,9 +10,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recording import Recording, RobotShape
 from terrain.viewer.pictures.colours import (
@@ -30,7 +29,6 @@ from terrain.viewer.pictures.shading import LIGHT, Colours, vertex_colours
 from terrain.viewer.pictures.shapes import marks, prism, robot_body, standing_things
 from terrain.worlds.surface import Surface
 
-FloatArray = NDArray[np.float64]
 Scene = Any  # viser.SceneApi; viser is imported only where a server is started
 
 PIN_HEIGHT = 0.03  # of the length of the route
@@ -106,7 +104,7 @@ def add_path(scene: Scene, name: str, points: FloatArray, colour: Colour = PLANN
 
 
 def add_track_piece(scene: Scene, name: str, points: FloatArray) -> Any:
-    """Add a piece of the driven track, a hand above plans so that it covers them."""
+    """Add a piece of the driven track, a little above plans, so that it covers them."""
     return add_path(scene, name, points + np.array([0.0, 0.0, LINE_LIFT]), DRIVEN)
 
 

@@ -2,7 +2,7 @@
 
 All readers turn the raster so that y grows northwards (row 0 of every one of these formats is the northern edge),
 put sample [0, 0] at the origin, and give degrees their length in metres at the raster's latitude. For a world to drive
-in, ``read_dem`` fills voids from the nearest valid sample: physics must not meet a hole where the survey had none. For
+in, ``read_dem`` fills voids from the nearest valid sample, because physics needs ground everywhere. For
 a map, ``read_elevation`` leaves them: the mesh server takes it by the entry point ``mbf.elevation_readers``.
 """
 

@@ -1,6 +1,6 @@
 """Draw a map from a short floor plan: rooms as rectangles of walls, doors as gaps, furniture.
 
-``office_map`` is the floor that ships with the package; ``write_office_map`` makes its map_server files anew after a
+``OFFICE_MAP`` is the floor that ships with the package; ``write_office_map`` makes its map_server files anew after a
 change of ``data/office.plan.yaml``. For real buildings read their map with ``terrain.worlds.occupancy.read_occupancy``.
 """
 

@@ -1,9 +1,9 @@
 """Make terrain: fractal ground of a wanted steepness, and features to put on it.
 
-Each function takes a ``Heightfield`` and returns another; what is random comes from a ``numpy`` Generator, so the
-same seed gives the same ground. Fractal ground is filtered noise with a power spectrum that falls with the wave number
-(M. Ebert et al., Texturing and Modeling, spectral synthesis); then its heights are scaled so that the
-median slope is exactly the wanted one, which works because the tangent of every slope is proportional to the heights.
+Each function takes a ``Heightfield`` and returns another; random numbers come from a ``numpy`` Generator, so the same
+seed gives the same ground. Fractal ground is filtered noise with a power spectrum that falls with the wave number (M.
+Ebert et al., Texturing and Modeling, spectral synthesis); then its heights are scaled so that the median slope is
+exactly the wanted one, which works because the tangent of every slope is proportional to the heights.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import exp, power, tan
 from terrain.worlds.heightfield import Heightfield
-
-FloatArray = NDArray[np.float64]
 
 CLEAR_RADIUS = 2.0  # m around start and goals without boulders
 

@@ -17,11 +17,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from trimesh.triangles import closest_point
 
+from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import norm
 from terrain.worlds.occupancy import OccupancyGrid
 from terrain.worlds.surface import Surface, height_grid
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 POINTS_PER_EDGE = 3

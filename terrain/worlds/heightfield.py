@@ -14,12 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RectBivariateSpline
 
-from mbf_abstract.geometry import Pose, quaternion_from_yaw, quaternion_multiply
+from mbf_abstract.geometry import FloatArray, Pose, quaternion_from_yaw, quaternion_multiply
 from mbf_abstract.geometry.arithmetic import arctan
 from terrain.worlds.smoothing import smoothed
 from terrain.worlds.surface import Surface, height_grid
-
-FloatArray = NDArray[np.float64]
 
 SMOOTHING_WIDTH = 0.5  # m; four sigma of the Gaussian that parts hills from bumps, about a wheelbase
 EDGE_TOLERANCE = 1e-9  # cells; a query on the far border must not fall off by a rounding error
@@ -114,11 +112,6 @@ class Heightfield:
     def size(self) -> tuple[float, float]:
         """Extent along x and y [m]."""
         return self.x_max - self.x0, self.y_max - self.y0
-
-    def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
-        """Whether positions [m] lie on the terrain, borders included."""
-        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        return np.asarray((x >= self.x0) & (x <= self.x_max) & (y >= self.y0) & (y <= self.y_max))
 
     def _locate(self, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray, FloatArray]:
         """Cell indices and the position inside the cell, each 0..1; nan positions outside the terrain."""

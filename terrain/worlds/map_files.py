@@ -1,7 +1,7 @@
-"""The map files that a run writes of its world, for every server the one it can read.
+"""The map files that a run writes of its world, one for each kind of map server.
 
-``world.ply`` holds the very triangles Bullet collides with and, where a 2D map can describe the world, ``world.yaml`` +
-``world.png`` are a map_server map; both exact unless the scenario's ``map:`` adds errors.
+``world.ply`` holds the triangles of Bullet's collision shapes and, where a 2D map can describe the world,
+``world.yaml`` + ``world.png`` are a map_server map; both exact unless the scenario's ``map:`` adds errors.
 """
 
 from __future__ import annotations

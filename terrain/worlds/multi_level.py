@@ -1,4 +1,4 @@
-"""Worlds of several levels, of our own making: a parking garage with ramps, and a bridge over a road.
+"""Generated worlds of several levels: a parking garage with ramps, and a bridge over a road.
 
 Only a planner on a mesh finds paths in them: a 2D map shows floor and roof, deck and road at the same place. The
 ``ground`` is what wheels may roll on and what a mesh server plans on; ``walls`` block wheels and sensors.
@@ -12,11 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from terrain.physics.world import BulletWorld
 from terrain.worlds.surface import Surface, box_between, height_grid, joined, merged
-
-FloatArray = NDArray[np.float64]
 
 CELL = 0.5  # m; edge length of all cells
 WALL = 0.1  # m; thickness of parapets

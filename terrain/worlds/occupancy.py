@@ -1,4 +1,4 @@
-"""Occupancy grids as worlds need them: read from map files by the server that knows them, turned into walls.
+"""Occupancy grids of worlds: read from map files by the server that knows the format, and extruded into walls.
 
 Cells are indexed ``[iy, ix]`` from the lower left corner, as on a map with y up.
 """
@@ -16,7 +16,6 @@ from mbf_abstract.maps.view import OCCUPIED, UNKNOWN_OCCUPANCY
 from mbf_abstract.server.factory import read_floor
 from terrain.worlds.surface import BOX_CORNERS, BOX_FACES, Surface
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
 

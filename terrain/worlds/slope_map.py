@@ -12,12 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import arctan
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid, write_map_files
 from terrain.worlds.smoothing import smoothed
-
-FloatArray = NDArray[np.float64]
 
 LETHAL_SLOPE = 30.0  # degrees; where a skid-steered robot of the kind of a Husky begins to slide sideways
 FREE_SLOPE = 5.0  # degrees; gentler ground costs nothing

@@ -7,12 +7,10 @@ with AVX-512.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import exp
-
-FloatArray = NDArray[np.float64]
 
 REACH = 4.0  # standard deviations at which the weights end
 

@@ -1,7 +1,7 @@
-"""Triangle meshes of worlds and things: boxes, cylinders, height grids, and how they are put together.
+"""Triangle meshes of worlds and things: boxes, cylinders, height grids, and functions to join them.
 
-The order of vertices and faces decides how rays round and how wheels touch, so these are not trimesh's solids, whose
-order differs: a drive would be another one.
+The order of vertices and faces decides how rays round and how wheels touch, so trimesh's solids are not used: their
+order differs, which would change every drive.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import rotated
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
 MERGE_DISTANCE = 1e-6  # m; corners nearer than this are one

@@ -1,6 +1,6 @@
-"""Boxes and cylinders that stand upright, as plain geometry: how far away, and where rays meet them.
+"""Upright boxes and cylinders as geometry: distances, penetration depths and ray distances.
 
-The kinematic world is made of these where Bullet would have bodies; each may be put elsewhere at any time.
+The kinematic world is made of these where Bullet would have bodies; each can be moved at any time.
 """
 
 from __future__ import annotations
@@ -12,11 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from terrain.physics.contact_depth import depth_in_circle, depth_in_polygon, placed
 from terrain.worlds.surface import Surface, box, cylinder
-
-FloatArray = NDArray[np.float64]
 
 TINY = 1e-12  # stands for a direction of exactly zero, which would divide nothing by nothing
 
@@ -32,7 +30,7 @@ class UprightSolid:
     size : (2,) or (3,) float
         Radius and height of a cylinder, or length, width and height of a box [m].
     moving : bool
-        Whether it will be put elsewhere, so that it is no part of the static world.
+        Whether it will be moved, so that it is no part of the static world.
     """
 
     pose: Pose

@@ -1,7 +1,7 @@
 """The planner thread of the classic ``move_base``, as a slot of ``get_path`` goals that is switched on and off.
 
 While it is switched on it asks for one plan after the other: at once after a failure, or at its frequency. The rules
-are those of the ``planThread`` of ROS 1's move_base; no thread of its own is needed for them here.
+are those of the ``planThread`` of ROS 1's move_base; they need no separate thread here.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class ClassicPlanner:
         return self._next_start if self.running and self._handle is None else math.inf
 
     def wake(self) -> None:
-        """Switch on; a call under way goes on."""
+        """Switch on; a call under way continues."""
         self.running = True
 
     def restart_patience(self) -> None:

@@ -1,7 +1,7 @@
-"""All runs of the experiment: which there are, in worker processes, each done once and kept.
+"""All runs of the experiment, in worker processes; each is done once and its result is kept.
 
-Finished runs stand in ``runs.jsonl`` of the campaign's folder under a key that holds the hash of all parameters, so an
-interrupted campaign continues where it stopped, and a change of any parameter repeats all runs.
+Finished runs are kept in ``runs.jsonl`` of the campaign's folder, under a key that holds the hash of all parameters. An
+interrupted campaign continues where it stopped; a change of any parameter repeats all runs.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""From the event log of a run to the numbers of the table. Nothing is counted anywhere else.
+"""Computes the numbers of the table from the event log of a run; nothing is counted anywhere else.
 
 Planner calls and recoveries come from the framework's events around every plugin call, hand-overs and control cycles
-from ``CountedController``, motion and contacts from the environment. Every moment of a leg is the first of four things
-that holds: *recovering* (a behaviour runs), *driving* (the robot moves), *planning* (the main planner works while the
-robot stands), *waiting* (the rest).
+from ``CountedController``, motion and contacts from the environment. Each moment of a leg counts as the first of four
+activities that applies: *recovering* (a behaviour runs), *driving* (the robot moves), *planning* (the main planner
+works while the robot stands), *waiting* (the rest).
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ class _Deadline:
         self._stamp = float("inf")
 
     def watch(self, time: float, pose: Pose, velocity: Twist) -> None:
-        """Look at the clock; called with each sample of the robot."""
+        """Check the time; called with each sample of the robot."""
         if not self.passed and self._clock.now() >= self._stamp:
             self.passed = True
             self._executive.cancel("time limit of the leg")

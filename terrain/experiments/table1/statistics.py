@@ -11,12 +11,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from mbf_abstract.geometry import FloatArray
 from terrain.experiments.table1.counting import ACTIVITIES, Tally
-
-FloatArray = NDArray[np.float64]
 
 RESAMPLES = 10_000
 BOOTSTRAP_SEED = 20180101

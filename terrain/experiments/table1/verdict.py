@@ -1,6 +1,6 @@
 """Whether the paper's result is reproduced, by six rules that were fixed before any run of the main seeds.
 
-The rules are those of section 6.5 of the benchmark notes; this file is part of what is hashed into the result file.
+The rules are those of section 6.5 of the benchmark notes.
 """
 
 from __future__ import annotations

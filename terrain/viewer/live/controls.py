@@ -54,15 +54,15 @@ class LiveControls:
         self._waiting.append(command)
 
     def work_off(self) -> None:
-        """Do what was asked for; on the simulator's thread."""
+        """Carry out the commands that have come; on the simulator's thread."""
         while self._waiting:
             command = self._waiting.popleft()
             try:
                 command()
-            except Exception as error:  # whatever a page has asked for, the world goes on
+            except Exception as error:  # a wrong request of a page must not end the run
                 self._log("refused", message=f"{type(error).__name__}: {error}")
         if self.holding:
-            self._server.pause_all()  # again and again, for goals that an executive has sent meanwhile
+            self._server.pause_all()  # in every step, for goals that an executive has sent since the last one
 
     # ------------------------------------------------------------------------------- commands, to be posted
     def go_to(self, origin: FloatArray, direction: FloatArray) -> None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mbf_abstract.geometry import FloatArray
 
 FIRST_DISTANCE = 9.0  # m from the robot when the camera begins to follow
 LOWEST = 0.5  # least height of the first view over its distance

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry import FloatArray
 from mbf_abstract.maps.view import GridView, MapView, MeshView
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from terrain.viewer.live.overlay import Overlay
@@ -19,8 +20,6 @@ from terrain.viewer.pictures.plan_picture import COSTLY, cost_colours
 from terrain.viewer.pictures.shading import FLAT_GROUND, vertex_colours
 from terrain.viewer.scene import add_ground
 from terrain.worlds.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 OWN_LOOK = "the ground itself"
 LETHAL = (200, 20, 40)
@@ -58,7 +57,7 @@ class Ground:
         self._lethal = None if self._is_grid else Overlay(gui, "forbidden places")
 
     def show(self) -> None:
-        """Draw what has changed; looks at the map now and then only."""
+        """Draw what has changed; looks at the map every ``REFRESH`` frames only."""
         chosen = self._choice.value
         if self._frame % REFRESH == 0 or self._drawn is None or chosen != self._drawn[0]:
             self._show_base(chosen)

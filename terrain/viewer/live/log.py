@@ -1,6 +1,6 @@
 """Text for the page: goals that have ended, notable events, and the running tree.
 
-An event sink: it keeps little, so that an unwatched run pays almost nothing for it.
+An event sink: it keeps little, so that it costs an unwatched run almost nothing.
 """
 
 from __future__ import annotations

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Command, Path, Pose, Twist
+from mbf_abstract.geometry import Command, FloatArray, Path, Pose, Twist
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.view import FieldView
@@ -25,8 +24,6 @@ from terrain.viewer.scene import (
     add_track_piece,
     wheel_angles,
 )
-
-FloatArray = NDArray[np.float64]
 
 AHEAD = 2.0  # s over which the present command is extrapolated
 AHEAD_STEPS = 20

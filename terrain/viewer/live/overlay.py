@@ -13,13 +13,11 @@ class Overlay:
     ----------
     gui : viser.GuiApi
     label : str
-        What stands beside the box.
-    shown : bool
-        Whether it is on at first.
+        Label of the box.
     """
 
-    def __init__(self, gui: Any, label: str, shown: bool = True) -> None:
-        self._box = gui.add_checkbox(label, shown)
+    def __init__(self, gui: Any, label: str) -> None:
+        self._box = gui.add_checkbox(label, True)
         self._key: Hashable = None
         self._handle: Any = None
 
@@ -37,7 +35,7 @@ class Overlay:
                 before.remove()
 
     def clear(self) -> None:
-        """Let nothing be there."""
+        """Remove what was drawn."""
         self._key = None
         if self._handle is not None:
             self._handle.remove()

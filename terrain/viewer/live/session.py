@@ -1,7 +1,7 @@
 """Watches and steers one run: serves the page, handles its requests, and limits the speed of the run.
 
 All of it happens on the simulator's thread after a step of the world (``DriveLoop.on_tick``). Nothing is drawn
-without visitors. If the page fails, the run goes on without it.
+without visitors. If the page fails, the run continues without it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from terrain.viewer.server.page_access import LOOPBACK, PageAccess, Role, is_loo
 from terrain.viewer.server.page_server import page_server
 
 FRAME_PERIOD = 0.1  # s of wall time between two drawings
-MAX_LAG = 0.5  # s; who is further behind does not catch up
+MAX_LAG = 0.5  # s behind the wall clock that are caught up at most
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class ViewOptions:
     speed : float
         Simulated seconds per second at most; 0 = as fast as possible.
     token : bool
-        Put a token into the address, so that only those who know it have access; without it, all who can reach it have.
+        Put a token into the address, so that only those who know it have access.
     read_only : bool
         Watching only; else there are two addresses, one to steer and one to watch.
 
@@ -64,7 +64,7 @@ class ViewOptions:
             raise ValueError(f"without a token a page is served at loopback only, not at {self.host!r}")
 
     def access(self) -> PageAccess:
-        """Decide who gets in, with new tokens each time."""
+        """Return the access control of the page, with new tokens each time."""
         make = PageAccess.by_token if self.token else PageAccess.open
         return make(self.host, self.read_only)
 
@@ -91,7 +91,7 @@ class Pace:
 
 
 class LiveSession:
-    """Serves the page of one run; a context manager in which the run goes on.
+    """Serves the page of one run; a context manager in which the run takes place.
 
     Parameters
     ----------
@@ -102,13 +102,12 @@ class LiveSession:
     on_page : callable
         Called with the page's address.
     on_note : callable
-        Called with what the user must know about who can reach it.
+        Called with warnings about access to the page.
 
     Attributes
     ----------
     address, watching_address : str
-        Where the page is for who steers it, and for who only watches, once the context has been entered; empty where
-        there is none.
+        Addresses of the page to steer and to watch, once the context has been entered; empty where there is none.
     controls : LiveControls
         What the page may ask for.
 
@@ -185,7 +184,7 @@ class LiveSession:
             self._session.events.emit(EventKind.FAULT, "live_view", type=type(error).__name__, message=str(error))
 
     def _speed(self) -> float:
-        """Simulated seconds per second; who waits for a goal waits in real time. A wall clock keeps its own pace."""
+        """Simulated seconds per second; in real time while the run waits for a goal. A wall clock needs no pacing."""
         if isinstance(self._session.clock, WallClock):
             return 0.0
         return self._options.speed or (1.0 if self._sequence.is_waiting else 0.0)

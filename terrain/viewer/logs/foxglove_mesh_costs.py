@@ -1,7 +1,7 @@
 """A mesh map in the colours of its costs, as Foxglove scene entities.
 
 The whole surface is drawn once; when costs change, only the triangles that differ from that first picture are drawn
-again, over it, so that a run in which an obstacle layer is at work stays small.
+again, over it, so that the file of a run with an obstacle layer stays small.
 """
 
 from __future__ import annotations

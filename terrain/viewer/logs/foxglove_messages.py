@@ -22,11 +22,10 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry import FloatArray
 from terrain.recording.recorded_maps import RecordedGrid
 from terrain.viewer.pictures.colours import Colour
 from terrain.viewer.pictures.plan_picture import cost_colours
-
-FloatArray = NDArray[np.float64]
 
 MAP_LIFT = 0.02  # m that the map floats above the ground, so that both can be seen
 MICROMETRES = 6  # decimals of scene coordinates [m]; rounded ones compress to a third

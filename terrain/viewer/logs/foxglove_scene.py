@@ -1,4 +1,4 @@
-"""What stands in the world of a run and what the robot looks like, as Foxglove scene entities."""
+"""The world of a run, its robot and its actors as Foxglove scene entities."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from foxglove_schemas_protobuf.TextPrimitive_pb2 import TextPrimitive
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recording import Recording, RobotShape
 from terrain.viewer.logs.foxglove_messages import colour, points, pose, timestamp, triangles
@@ -22,8 +22,6 @@ from terrain.viewer.pictures.colours import ACTORS, BODY, DRIVEN, WHEEL, Colour
 from terrain.viewer.pictures.shading import vertex_colours
 from terrain.viewer.pictures.shapes import marks, robot_body, standing_things
 from terrain.worlds.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 ALONG_Y = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])  # a quarter turn about x: a cylinder's axis along y

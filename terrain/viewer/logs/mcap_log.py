@@ -1,7 +1,7 @@
 """A run as an MCAP file, for Foxglove, Lichtblick, PlotJuggler and everything else that reads MCAP.
 
-Topics and schemas: ``terrain.viewer.logs.run_messages``. Schemas are inside the file, so a reader needs nothing of
-ours. Use ``terrain.viewer.replay`` to look at a run without installing anything.
+Topics and schemas: ``terrain.viewer.logs.run_messages``. The file contains its schemas, so a reader needs no part of
+this package. Use ``terrain.viewer.replay`` to look at a run without installing anything.
 """
 
 from __future__ import annotations

@@ -30,6 +30,7 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
 from mbf_abstract.events import Event, EventKind
+from mbf_abstract.geometry import FloatArray
 from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.recording.metrics import cross_track_errors
 from terrain.recording.recording import Recording
@@ -128,7 +129,7 @@ def _transforms(recording: Recording) -> Iterator[Stamped]:
         yield time, "/tf", FrameTransforms(transforms=[body, *wheels, *actors])
 
 
-def _about_y(angle: float) -> message.FloatArray:
+def _about_y(angle: float) -> FloatArray:
     return np.array([0.0, math.sin(angle / 2.0), 0.0, math.cos(angle / 2.0)])
 
 

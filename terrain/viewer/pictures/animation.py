@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 from trimesh.remesh import subdivide_to_size
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from terrain.recording.recording import Recording
 from terrain.recording.whole_files import replacing
 from terrain.viewer.pictures.colours import BODY, DRIVEN, GOAL, PLANNED, SCAN, START, Colour
@@ -24,8 +24,6 @@ from terrain.viewer.pictures.shapes import marks, prism, standing_things
 from terrain.viewer.replay import status_text
 from terrain.viewer.scene import look_at_route
 from terrain.worlds.surface import NO_SURFACE, Surface, joined
-
-FloatArray = NDArray[np.float64]
 
 SIZE = (800, 450)  # pixels
 FRAMES = 72

@@ -11,9 +11,8 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from terrain.recording.recording import Recording, StampedPoints
 from terrain.viewer.pictures.colours import ACTORS, DRIVEN, GOAL, PLANNED, START, slope_legend
 from terrain.viewer.pictures.shading import shaded_triangles
@@ -22,8 +21,6 @@ from terrain.viewer.pictures.shapes import standing_things
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-FloatArray = NDArray[np.float64]
 
 LONG_SIDE = 9.0  # inches
 DOTS_PER_INCH = 130

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.geometry import FloatArray
 from terrain.viewer.pictures.colours import FLOOR, Colour, slope_colours
 from terrain.worlds.surface import Surface
 
-FloatArray = NDArray[np.float64]
 Colours = NDArray[np.uint8]
 
 LIGHT = np.array([-1.0, 1.0, 1.4]) / np.linalg.norm([-1.0, 1.0, 1.4])

@@ -1,22 +1,19 @@
-"""What all views of a run draw alike: what stands in the world, start and goals, and a robot's body."""
+"""What all views of a run draw alike: walls and obstacles, start and goals, and a robot's body."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from terrain.recording.recording import Recording, RobotShape
 from terrain.viewer.pictures.colours import GOAL, OBSTACLE, START, WALL, Colour
 from terrain.worlds.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 WALL_CUT = 0.9  # m above the lowest point of the walls
 
 
 def standing_things(recording: Recording) -> list[tuple[str, Surface, Colour]]:
-    """Names, surfaces and colours of what stands in the world, as far as there is any; walls are cut low."""
+    """Names, surfaces and colours of walls, cut low, and obstacles, where there are any."""
     walls = None if recording.walls is None else cut_walls(recording.walls)
     things = [("walls", walls, WALL), ("obstacles", recording.obstacles, OBSTACLE)]
     return [(name, surface, colour) for name, surface, colour in things if surface is not None]
@@ -35,7 +32,7 @@ def robot_body(shape: RobotShape) -> Surface:
 
 
 def cut_walls(walls: Surface) -> Surface:
-    """Cut walls low, as in a doll's house, so that one can look into rooms."""
+    """Cut walls low, so that rooms can be seen from above."""
     vertices = walls.vertices.copy()
     vertices[:, 2] = np.minimum(vertices[:, 2], vertices[:, 2].min(initial=0.0) + WALL_CUT)
     return Surface(vertices, walls.faces)

@@ -1,6 +1,6 @@
 """The report of a run: one HTML file with outcome, picture, plots over time, a timeline, events, and metrics.
 
-Made for reading on any machine and for attaching to an issue: no script, no network, nothing beside the file. For
+Made for reading on any machine and for attaching to an issue: no script, no network, no other file. For
 motion see ``terrain.viewer.replay``.
 """
 
@@ -13,9 +13,9 @@ from html import escape
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import FloatArray
 from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.recording.metrics import cross_track_errors
 from terrain.recording.recording import Recording
@@ -23,8 +23,6 @@ from terrain.viewer.pictures.picture import ViewerMissing, picture_png
 from terrain.viewer.reports.event_lines import NOTABLE, event_text
 from terrain.viewer.reports.page import page, table
 from terrain.viewer.reports.timeline import timeline_svg
-
-FloatArray = NDArray[np.float64]
 
 
 def report_html(recording: Recording, metrics: Mapping[str, Any]) -> str:

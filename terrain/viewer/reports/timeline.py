@@ -1,4 +1,4 @@
-"""A timeline as SVG: a row for each action and plugin with a bar for each goal and call, and a row of what went wrong.
+"""A timeline as SVG: a row for each action and plugin with a bar for each goal and call, and a row of stops and faults.
 
 A goal's bar reaches from its acceptance to its end, a planner's from call to answer; a controller is called too often
 for that, so its bar is the whole control loop, with the number of its cycles. Colours show outcomes.

@@ -1,1 +1,1 @@
-"""The server behind a live page, and who may use it."""
+"""The server of a page, and its access control."""

@@ -1,9 +1,9 @@
-"""Who may see the page of a run, and who may steer it, by the address, the ``Host`` and the ``Origin`` of a request.
+"""Access to the page of a run, to watch or to steer, by the address, the ``Host`` and the ``Origin`` of a request.
 
 A browser lets any web page open a WebSocket to this machine, so it is not enough to listen at loopback. Three things
-must be right before viser hears of a visitor:
+are checked before a request reaches viser:
 
-- the path of the address begins with a token, which only who was given the address knows, and which allows a ``Role``;
+- the path of the address begins with a token, known only to those who were given the address, and allows a ``Role``;
 - ``Host`` names this machine; another name is a foreign domain that was made to point here (DNS rebinding);
 - ``Origin`` of a WebSocket is the page itself, not one that another site served.
 """

@@ -1,4 +1,4 @@
-"""Stands between the network and viser: refuses visitors without access, and messages that are not allowed.
+"""Access control between the network and viser: refuses visitors without access, and messages that are not allowed.
 
 viser has no hook for that, so its server is started with a request handler and a connection handler of ours around its
 own. Whether that has worked is checked, see ``PageGuard.is_installed``.
@@ -20,7 +20,7 @@ from terrain.viewer.server.page_messages import is_allowed
 
 MAX_MESSAGE = 64 * 1024  # bytes; messages of a browser are far shorter
 MAX_VISITORS = 32
-MAX_REFUSED = 100  # messages; who sends more than these that are wrong is disconnected
+MAX_REFUSED = 100  # wrong messages after which a visitor is disconnected
 TRY_AGAIN_LATER, POLICY_VIOLATION = 1013, 1008  # WebSocket close codes (RFC 6455, 7.4.1)
 HEADERS = {
     "Referrer-Policy": "no-referrer",  # the token is in the address
@@ -30,7 +30,7 @@ HEADERS = {
 }
 
 _logger = logging.getLogger(__name__)
-_logger.addHandler(logging.NullHandler())  # what strangers send must not fill the terminal
+_logger.addHandler(logging.NullHandler())  # wrong requests must not fill the terminal
 _starting = threading.Lock()  # one server is started at a time, see ``installed``
 
 

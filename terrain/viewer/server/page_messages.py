@@ -1,7 +1,7 @@
 """What a visitor's browser may send to a page: three kinds of messages, every value checked, and nothing else.
 
 viser takes whatever a client sends: it sets any property of a control to any value, takes uploads, and asks for a
-public tunnel. So messages are checked before viser sees them. What is left out here never arrives.
+public tunnel. So messages are checked before they reach viser, and all others are dropped.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from terrain.viewer.server.page_access import Role
 
 MAX_NUMBER = 1e9
 MAX_PIXELS = 100_000
-MODIFIERS = (None, "cmd/ctrl", "alt", "shift")
 
 CAMERA: dict[str, Callable[[Any], bool]] = {
     "wxyz": lambda value: _is_vector(value, 4),
@@ -44,7 +43,7 @@ def is_allowed(message: bytes | str, role: Role, controls: Mapping[str, Any]) ->
     message : bytes or str
         As it came through the WebSocket: msgpack, or text, which is never right.
     role : Role
-        Who only watches sends nothing but where the camera is.
+        Of the sender; a visitor who only watches may send the position of the camera and nothing else.
     controls : mapping of str to viser.GuiInputHandle
         The page's controls by their identifiers.
     """

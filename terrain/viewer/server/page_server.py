@@ -15,7 +15,7 @@ from terrain.viewer.server.page_guard import PageGuard
 
 @contextmanager
 def page_server(port: int, access: PageAccess = NOBODY, label: str | None = None) -> Iterator[Any]:
-    """Start a viser server that only those see whom ``access`` lets in, and stop it afterwards.
+    """Start a viser server that is open only to visitors whom ``access`` admits, and stop it afterwards.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def page_server(port: int, access: PageAccess = NOBODY, label: str | None = None
         raise ViewerMissing(f"viser cannot start a server on this machine: {error}") from error
     try:
         if not guard.is_installed:
-            raise ViewerMissing(f"viser {viser.__version__} cannot be guarded against strangers, so it is not used")
+            raise ViewerMissing(f"viser {viser.__version__} cannot be run behind access control, so it is not used")
         guard.controls = server.gui._gui_input_handle_from_uuid
         yield server
     finally:
@@ -44,7 +44,7 @@ def page_server(port: int, access: PageAccess = NOBODY, label: str | None = None
 
 
 def _check_interface(host: str) -> None:
-    """Find out whether anything can listen there: viser would try port after port for ever."""
+    """Raise where nothing can listen on an interface; viser would try one port after the other without end."""
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         with socket.create_server((host, 0), family=family):

@@ -46,7 +46,7 @@ class OutdoorEnvironment(Session):
         wrap_plugins(self.navigator.server, seed, surroundings.planner_latency)
 
     def _report(self, time: float, pose: Pose, velocity: Twist) -> None:
-        """Look at the robot, ten times a second."""
+        """Log motion and contacts; called ten times a second."""
         self.distance += 0.0 if self._last is None else pose.distance_to(self._last)
         self._last = pose
         if (velocity.speed > STANDS_BELOW) != self._moves:

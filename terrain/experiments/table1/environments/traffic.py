@@ -1,9 +1,9 @@
-"""The robot model of Table I, and the other robots.
+"""The robot model of Table I, and the other robots: shuttles on fixed routes that never replan.
 
-Each shuttles on a fixed route, stops for what is near ahead of it, and never replans.
+A shuttle stops for whatever is near ahead of it.
 
 A shuttle's motion is a function of its route, its speed and its phase; the executive that is measured acts on it only
-by standing on its route. ``polite=False`` removes even that.
+by standing on its route. ``polite=False`` removes even this influence.
 """
 
 from __future__ import annotations
@@ -13,13 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mbf_abstract.geometry import normalize_angle
+from mbf_abstract.geometry import FloatArray, normalize_angle
 from mbf_abstract.geometry.arithmetic import arctan2, plane_rotation, rotated_back
 from terrain.physics.robot_models import Drive, RobotSpec, rectangle
-
-FloatArray = NDArray[np.float64]
 
 HALF_LENGTH, HALF_WIDTH = 0.35, 0.25  # m
 

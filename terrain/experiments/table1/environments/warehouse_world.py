@@ -1,4 +1,4 @@
-"""Our robot and the shuttles in one warehouse, without physics: who moves where, and who touches whom.
+"""Our robot and the shuttles in one warehouse, without physics: their motions and contacts.
 
 A motion that would make outlines overlap does not take place and counts as a contact of the one that moved. A contact
 that lasts, or comes again within a second, counts once.
