@@ -1,4 +1,4 @@
-"""A map backend that learns its map while it drives: an octree, fed by range sensors.
+"""A map backend that builds its map while the robot drives: an octree, fed by range sensors.
 
 When to use: as the pattern of a backend with a memory of its own, or where the height of things matters: the robot
 drives under a table that a flat map would call an obstacle. When not: ramps and storeys, its ground is flat.
@@ -64,7 +64,7 @@ class OctreeMap(GraphMap):
         return nodes[nodes >= 0]
 
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:
-        """Begin with nothing known."""
+        """Forget everything."""
         with self._lock:
             if cleared := super().clear(layer_names):
                 self.tree = Octree(self.resolution)
@@ -79,12 +79,12 @@ class OctreeMap(GraphMap):
 
 
 class OctreeServer(GraphMapServer):
-    """The server: it begins with an empty map, the rest is inherited."""
+    """The server; it starts with an empty map."""
 
     backend: ClassVar[str] = "occupancy_octree"
     config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {"occupancy_octree": OctreeParameters}
 
     def make_map(self, config: Config) -> OctreeMap:
-        """Begin with nothing known."""
+        """Make an empty map."""
         parameters = cast(OctreeParameters, config.sections["occupancy_octree"].parameters)
         return OctreeMap(parameters, config.parameters.global_frame)
