@@ -34,11 +34,11 @@ class LayeredMap(NavigationMap):
     @property
     def source_names(self) -> tuple[str, ...]:
         """Names of all observation sources that layers ask for, sorted."""
-        return self.layers.source_names
+        return tuple(sorted({name for layer in self.layers.values() for name in layer.source_names}))
 
     def listens_to(self, source: str) -> bool:
         """Whether any layer takes scans of a source."""
-        return self.layers.listens_to(source)
+        return any(layer.listens_to(source) for layer in self.layers.values())
 
     def insert_scan(self, scan: RangeScan) -> None:
         """Hand a scan to the layers that listen to its source; the next update takes it into the map.
@@ -54,7 +54,7 @@ class LayeredMap(NavigationMap):
             raise ValueError(f"the scan is in the frame {scan.frame_id!r}, the map in {self.frame_id!r}")
         listening = [layer for layer in self.layers.values() if layer.listens_to(scan.source)]
         if not listening:
-            known = list(self.layers.source_names)
+            known = list(self.source_names)
             raise ValueError(f"no layer listens to the source {scan.source!r}, known are {known}")
         seen = scan.checked()
         if len(seen.ends) or not len(scan.ends):

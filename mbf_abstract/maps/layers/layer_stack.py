@@ -58,15 +58,6 @@ class LayerStack(Mapping[str, Layer_co], Generic[Layer_co]):
         """All layers, or those of some names; KeyError names the known ones."""
         return list(self.values()) if names is None else [self[name] for name in names]
 
-    @property
-    def source_names(self) -> tuple[str, ...]:
-        """Names of all observation sources that layers ask for, sorted."""
-        return tuple(sorted({name for layer in self.values() for name in layer.source_names}))
-
-    def listens_to(self, source: str) -> bool:
-        """Whether any layer takes scans of a source."""
-        return any(layer.listens_to(source) for layer in self.values())
-
     @contextmanager
     def computing(self, layer: MapLayer) -> Iterator[None]:
         """Keep as ``problem`` what a layer raises in the ``with`` block, also a ``sys.exit()``, and raise it on."""

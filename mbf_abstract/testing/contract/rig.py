@@ -13,6 +13,7 @@ from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.geometry import Pose
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import Plugin, PluginContext
+from mbf_abstract.testing.contract.report import Report
 from mbf_abstract.testing.loopback import LoopbackRobot, LoopbackSession
 from mbf_abstract.time.cancel import CancelToken
 from mbf_abstract.time.clock import Clock, WallClock, wall_seconds
@@ -87,8 +88,8 @@ def canceled_token() -> CancelToken:
     return token
 
 
-def expect_idle_cancel_is_harmless(plugin: Plugin) -> str:
-    """Call ``cancel`` often, from two threads, while nothing runs; return what is wrong, or an empty text."""
+def expect_idle_cancel_is_harmless(report: Report, plugin: Plugin) -> None:
+    """Call ``cancel`` often, from two threads, while nothing runs; record what is wrong."""
     answers: list[Any] = []
 
     def cancel_often() -> None:
@@ -100,5 +101,5 @@ def expect_idle_cancel_is_harmless(plugin: Plugin) -> str:
     thread = WallClock().spawn(cancel_often, "contract cancel")
     cancel_often()
     thread.join()
-    wrong = [answer for answer in answers if not isinstance(answer, bool)]
-    return f"cancel() while idle gave {wrong[0]!r}, not a bool" if wrong else ""
+    for answer in answers:
+        report.expect(isinstance(answer, bool), f"cancel() while idle gave {answer!r}, not a bool")

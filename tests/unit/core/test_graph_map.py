@@ -41,6 +41,13 @@ def plan(grid, start, goal, **request):
         return made.plugin.make_plan(PlanRequest(start, goal, **request))
 
 
+def test_a_map_knows_the_sources_of_its_layers():
+    grid = Grid(obstacles={"sources": ("right", "left")})
+
+    assert grid.source_names == ("left", "right")
+    assert grid.listens_to("left") and not grid.listens_to("up")
+
+
 @given(LETHAL, PLACES)
 def test_clearances_and_the_nearest_obstacle_are_those_of_a_loop_over_all_pairs(lethal, place):
     grid = Grid(lethal)

@@ -63,9 +63,8 @@ def test_disabled_layers_are_neither_stale_nor_warned_of():
     assert stack(a=False, b=True).configuration_warnings() == ["layer 'b': one eye would do"]
 
 
-def test_a_stack_knows_its_sources_and_names_the_known_layers():
+def test_a_stack_names_the_known_layers():
     layers = stack(a=True, b=True)
-    assert layers.source_names == ("left", "right") and layers.listens_to("left") and not layers.listens_to("up")
     assert [layer.name for layer in layers.chosen(None)] == ["a", "b"]
     with pytest.raises(KeyError, match=r"no layer 'c', only \['a', 'b'\]"):
         layers.chosen(["a", "c"])

@@ -20,7 +20,7 @@ ORIGIN = (5.5, 4.5, 0.5)
 def looked_at(costmap, times=6):
     """The cells after the same few scans."""
     for stamp in range(times):
-        if costmap.layers.source_names:
+        if costmap.source_names:
             costmap.insert_points("laser", SEEN, ORIGIN, float(stamp))
         costmap.update(Pose.planar(5.0, 5.0), float(stamp))
     return costmap.snapshot().cells
