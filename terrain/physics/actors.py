@@ -9,12 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import ndimage
 
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
@@ -24,15 +21,12 @@ from terrain.physics.protocols import SimulatedRobot
 from terrain.physics.robot_models import RobotSpec
 from terrain.physics.world import BulletWorld
 from terrain.recording.recording import RobotShape
-from terrain.worlds.occupancy import OccupancyGrid
 from terrain.worlds.surface import Surface, box, cylinder, joined
 
 AnyWorld = BulletWorld | KinematicWorld
 
 PERSON_RADIUS: float = 0.25  # m
 PERSON_HEIGHT: float = 1.7  # m
-MAX_ROUTE_DRAWS = 10_000
-LONGEST_LEG = 12.0  # m; short legs of a drawn route are found sooner
 COURTESY = 0.3  # m; an actor that gives way stops this far from the robot
 
 
@@ -214,40 +208,3 @@ def _robot_looks(spec: RobotSpec, size: tuple[float, float, float]) -> Surface:
     wheels = RobotShape.of(spec).wheels - np.array([*middle, 0.5 * height])
     raised = Surface(body + np.array([0.0, 0.0, 0.5 * radius]), body_faces)
     return joined([raised, *(Surface(drum + wheel, drum_faces) for wheel in wheels)])
-
-
-def random_route(grid: OccupancyGrid, rng: np.random.Generator, corners: int = 4, clearance: float = 0.4) -> FloatArray:
-    """Draw a closed route (corners, 2) [m] through free cells, each leg straight and clear of walls.
-
-    Parameters
-    ----------
-    clearance : float
-        Distance kept to walls [m].
-
-    Raises
-    ------
-    ValueError
-        No such route was found: the map is too narrow for the clearance.
-    """
-    open_cells = grid.free & (ndimage.distance_transform_edt(~grid.occupied) * grid.resolution > clearance)
-    cells = np.argwhere(open_cells)
-    route: list[NDArray[np.intp]] = []
-    for _ in range(MAX_ROUTE_DRAWS if len(cells) else 0):
-        cell = cells[rng.integers(len(cells))]
-        ends = [*route[-1:], cell]
-        if len(route) == corners - 1:
-            ends.append(route[0])
-        if all(_leg_is_open(open_cells, a, b, LONGEST_LEG / grid.resolution) for a, b in pairwise(ends)):
-            route.append(cell)
-        if len(route) == corners:
-            centres = (np.array(route, dtype=float)[:, ::-1] + 0.5) * grid.resolution
-            return np.asarray(centres + np.array([grid.origin_x, grid.origin_y]))
-    raise ValueError(f"found no route of {corners} corners with {clearance} m to the walls")
-
-
-def _leg_is_open(open_cells: NDArray[np.bool_], a: NDArray[np.intp], b: NDArray[np.intp], longest: float) -> bool:
-    length = float(norm(b - a))
-    if length > longest:
-        return False
-    points = np.rint(a + np.linspace(0.0, 1.0, 2 * math.ceil(length) + 2)[:, None] * (b - a)).astype(np.intp)
-    return bool(open_cells[points[:, 0], points[:, 1]].all())

@@ -14,7 +14,7 @@ from terrain.physics.contact_depth import depth_in_cells, placed
 from terrain.physics.incidents import Thing
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid, wall_surface
-from terrain.worlds.surface import Surface, joined
+from terrain.worlds.surface import Surface, joined, level_rectangle
 from terrain.worlds.upright_solids import UprightSolid
 
 TIME_STEP = 1.0 / 60.0
@@ -167,6 +167,5 @@ class KinematicWorld:
         """The ground, and the walls of the building."""
         if self.terrain is not None:
             return [self.terrain.surface()]
-        corners = FLOOR * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)
-        floor = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32))
+        floor = level_rectangle(-FLOOR, FLOOR, -FLOOR, FLOOR)
         return [floor] if self.building is None else [floor, wall_surface(self.building)]

@@ -25,7 +25,7 @@ from terrain.physics.bullet import connect, quiet_native_output
 from terrain.physics.incidents import Thing
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid, wall_surface
-from terrain.worlds.surface import Surface, box, cylinder, joined
+from terrain.worlds.surface import Surface, box, cylinder, joined, level_rectangle
 
 TIME_STEP = 1.0 / 240.0
 GRAVITY = 9.81
@@ -175,9 +175,8 @@ class BulletWorld:
 
     def add_ground_plane(self, x_min: float, x_max: float, y_min: float, y_max: float) -> int:
         """Put a level floor in at z = 0; it is endless for wheels and as large as given [m] for lidar rays."""
-        corners = np.array([[x_min, y_min, 0], [x_max, y_min, 0], [x_max, y_max, 0], [x_min, y_max, 0]], dtype=float)
         shape = self.bullet.createCollisionShape(self.bullet.GEOM_PLANE, planeNormal=[0, 0, 1])
-        return self._add_ground(shape, Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)))
+        return self._add_ground(shape, level_rectangle(x_min, x_max, y_min, y_max))
 
     def add_box(self, pose: Pose, size: Sequence[float], moving: bool = False) -> int:
         """Put a box of ``size`` (3,) [m] in, centred at ``pose``.

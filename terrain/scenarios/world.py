@@ -25,7 +25,7 @@ from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.map_files import MapFiles
 from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.slope_map import slope_grid
-from terrain.worlds.surface import Surface
+from terrain.worlds.surface import Surface, level_rectangle
 
 HeightAt = Callable[[float, float], float]
 
@@ -142,7 +142,7 @@ def _build_building(world: BuildingWorld, grid: OccupancyGrid, files: MapFiles, 
         physics.add_building(grid)
     walls = wall_surface(grid) if grid.occupied.any() else None
     return ScenarioWorld(
-        physics, files.of_building(grid), lambda x, y: 0.0, _floor_surface(grid), walls, grid, world.places()
+        physics, files.of_building(grid), lambda x, y: 0.0, level_rectangle(*grid.bounds), walls, grid, world.places()
     )
 
 
@@ -156,9 +156,3 @@ def _build_levels(world: LevelsWorld, files: MapFiles, physics: BulletWorld) -> 
 
     files_of_map = files.of_levels(levels.ground)
     return ScenarioWorld(physics, files_of_map, height_at, levels.ground, walls, places=levels.places)
-
-
-def _floor_surface(grid: OccupancyGrid) -> Surface:
-    x_min, x_max, y_min, y_max = grid.bounds
-    corners = np.array([[x_min, y_min, 0.0], [x_max, y_min, 0.0], [x_max, y_max, 0.0], [x_min, y_max, 0.0]])
-    return Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32))

@@ -13,6 +13,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +144,7 @@ def _drive(session: Session, options: RunOptions) -> tuple[GoalSequence, float]:
     sequence = GoalSequence(session, make_executive(options.executive, session.navigator), options.stay)
     with options.watch(session, sequence):
         started = wall_seconds()
-        session.loop.on_sample.append(_ProgressReporter(session, options.on_progress, started).report)
+        session.loop.on_sample.append(partial(_report_progress, session, options.on_progress, started))
         session.run()
         sequence.visit_goals()
         if session.loop.failure is not None:
@@ -151,30 +152,24 @@ def _drive(session: Session, options: RunOptions) -> tuple[GoalSequence, float]:
         return sequence, wall_seconds() - started
 
 
-class _ProgressReporter:
-    """Reports progress at each sample of the robot."""
-
-    def __init__(self, session: Session, on_progress: Callable[[Progress], None], started: float) -> None:
-        self._server = session.navigator.server
-        self._on_progress = on_progress
-        self._started = started
-
-    def report(self, time: float, pose: Pose, velocity: Twist) -> None:
-        """Report how far the running action is; an action that drives comes before one that only plans."""
-        server = self._server
-        at_work = [action.name for action in (server.exe_path, server.recovery, server.get_path) if action.busy]
-        driving = server.exe_path.unfinished
-        feedback = driving[0].feedback if driving else None
-        self._on_progress(
-            Progress(
-                time=time,
-                wall_time=wall_seconds() - self._started,
-                distance_left=feedback.distance_along_path if feedback else float("nan"),
-                speed=velocity.speed,
-                tilt=tilt_of(pose),
-                state=at_work[0] if at_work else "waiting",
-            )
+def _report_progress(
+    session: Session, on_progress: Callable[[Progress], None], started: float, time: float, pose: Pose, velocity: Twist
+) -> None:
+    """Report how far the running action is; an action that drives comes before one that only plans."""
+    server = session.navigator.server
+    at_work = [action.name for action in (server.exe_path, server.recovery, server.get_path) if action.busy]
+    driving = server.exe_path.unfinished
+    feedback = driving[0].feedback if driving else None
+    on_progress(
+        Progress(
+            time=time,
+            wall_time=wall_seconds() - started,
+            distance_left=feedback.distance_along_path if feedback else float("nan"),
+            speed=velocity.speed,
+            tilt=tilt_of(pose),
+            state=at_work[0] if at_work else "waiting",
         )
+    )
 
 
 def _measure(recording: Recording, session: Session, sequence: GoalSequence) -> Metrics:

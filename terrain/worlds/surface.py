@@ -59,6 +59,12 @@ def box_between(low: Sequence[float], high: Sequence[float]) -> Surface:
     return Surface(vertices + corners.mean(axis=0), faces)
 
 
+def level_rectangle(x_min: float, x_max: float, y_min: float, y_max: float) -> Surface:
+    """Level rectangle at z = 0 between these coordinates [m]."""
+    corners = np.array([[x_min, y_min, 0], [x_max, y_min, 0], [x_max, y_max, 0], [x_min, y_max, 0]], dtype=float)
+    return Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32))
+
+
 def cylinder(radius: float, height: float, sides: int = 24) -> Surface:
     """Upright cylinder about the origin as a prism: 2 * sides + 2 vertices, 4 * sides faces."""
     angle = 2.0 * np.pi * np.arange(sides) / sides

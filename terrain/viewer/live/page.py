@@ -5,11 +5,12 @@ It is made before the run begins and drawn by ``show``; nothing here reads time 
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
-from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.tilt import tilt_of
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session
 from terrain.viewer.live.controls import LiveControls
@@ -125,9 +126,4 @@ class LivePage:
     def _status(self, time: float) -> str:
         """Text above the robot."""
         robot = self._session.simulation.robot
-        return f"{time:.0f} s   {robot.velocity().speed:.1f} m/s   tilt {tilt_of(robot.pose()):.0f}°"
-
-
-def tilt_of(pose: Pose) -> float:
-    """Angle [degrees] between the robot's z axis and the vertical."""
-    return float(np.degrees(np.arccos(np.clip(pose.rotation[2, 2], -1.0, 1.0))))
+        return f"{time:.0f} s   {robot.velocity().speed:.1f} m/s   tilt {math.degrees(tilt_of(robot.pose())):.0f}°"

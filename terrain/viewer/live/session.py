@@ -6,6 +6,7 @@ without visitors. If the page fails, the run continues without it.
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -14,12 +15,13 @@ from dataclasses import dataclass
 from types import FrameType
 
 from mbf_abstract.events import EventKind
+from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.time.clock import Clock, WallClock
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session
 from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
-from terrain.viewer.live.page import LivePage, tilt_of
+from terrain.viewer.live.page import LivePage
 from terrain.viewer.live.plots import PERIOD, UNWATCHED_PERIOD, History
 from terrain.viewer.server.page_access import LOOPBACK, PageAccess, Role, is_loopback
 from terrain.viewer.server.page_server import page_server
@@ -193,7 +195,7 @@ class LiveSession:
         if self._history.is_due(time, period):
             robot, queries = self._session.simulation.robot, self._session.navigator.server.queries
             pose = robot.pose()
-            self._history.add(time, robot.velocity().speed, tilt_of(pose), queries.check_point(pose).cost)
+            self._history.add(time, robot.velocity().speed, math.degrees(tilt_of(pose)), queries.check_point(pose).cost)
 
     def _show(self, page: LivePage, time: float) -> None:
         if page.is_watched and self._wall.now() >= self._next_frame:

@@ -7,7 +7,7 @@ import pytest
 
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.maps.sensing import RangeScan
-from terrain.physics.actors import RouteWalker, SlidingDoor, other_robot, random_route
+from terrain.physics.actors import RouteWalker, SlidingDoor, other_robot
 from terrain.physics.incidents import IncidentKind, Thing
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import KinematicWorld
@@ -16,6 +16,7 @@ from terrain.physics.robots import WheeledRobot
 from terrain.physics.simulation import Simulation
 from terrain.physics.world import BulletWorld
 from terrain.recording.recording import RobotShape
+from terrain.scenarios.actors import random_route
 from terrain.sensors.lidar import Lidar, LidarModel, planar_directions
 from terrain.sensors.proprioception import Imu, WheelOdometry
 from terrain.sensors.rays import MovingRays, StaticRays
