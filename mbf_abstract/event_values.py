@@ -27,7 +27,7 @@ MAX_INTEGER_BITS = 63
 
 
 def error_text(error: BaseException) -> str:
-    """Return the text of an exception, cut to ``MAX_TEXT``; its ``__str__`` may do what it likes."""
+    """Return the text of an exception, cut to ``MAX_TEXT``; its ``__str__`` may raise or be endless."""
     return well_formed(shortened(_text_of(error)))
 
 

@@ -1,4 +1,4 @@
-"""``mbf check``: everything that is wrong with a configuration, without driving."""
+"""``mbf check``: list all mistakes of a configuration, without driving."""
 
 from __future__ import annotations
 

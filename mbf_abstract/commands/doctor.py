@@ -1,4 +1,4 @@
-"""``mbf doctor``: is everything here that the commands need, and how to install what is missing."""
+"""``mbf doctor``: check that what the commands need is installed, and print how to install the rest."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ OLDEST_PYTHON = (3, 10)
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: ``cure`` is empty where all is well."""
+    """One check: ``cure`` is empty where it passed."""
 
     what: str
     state: str
@@ -60,7 +60,7 @@ def doctor() -> None:
 
 
 def examine() -> Iterator[Finding]:
-    """Look at everything, in order."""
+    """Make all checks, in order."""
     enough = sys.version_info >= OLDEST_PYTHON
     yield Finding(
         "python", f"{platform.python_version()}, {os.cpu_count()} cores", "" if enough else "use 3.10 or newer"

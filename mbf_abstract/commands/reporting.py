@@ -1,4 +1,4 @@
-"""How commands end badly: one readable text on stderr and an exit code, never a traceback."""
+"""How commands end with an error: one readable text on stderr and an exit code, never a traceback."""
 
 from __future__ import annotations
 

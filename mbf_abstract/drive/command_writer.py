@@ -57,7 +57,7 @@ class CommandWriter:
         return stands_still(self.last_command)
 
     def wait_until_free(self, limit: float) -> bool:
-        """Wait at most ``limit`` [s] for the end of the running call; whether there is none any more."""
+        """Wait at most ``limit`` [s] for the end of the running call; returns whether it has ended."""
         deadline = self._clock.now() + limit
         self._waiting += 1
         try:

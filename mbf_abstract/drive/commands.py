@@ -1,4 +1,4 @@
-"""Commands as the velocity gate sees them: what is one, what stands still, and what an event records of them."""
+"""Checks of commands for the velocity gate: legal, standing still; and the numbers that an event records."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from mbf_abstract.geometry import AckermannCommand, Command, Twist
 def command_problem(command: object) -> str:
     """Why this must not reach a robot; empty if it may.
 
-    A type of the user's own, a subclass too, is refused: it may answer otherwise each time it is asked. The numbers
-    are looked at again although the constructors refuse what is not finite, because a frozen value can be written to.
+    A type of the user's own, a subclass too, is refused: its numbers may change with each access. The numbers are
+    checked again although the constructors refuse what is not finite, because a frozen value can be overwritten.
     """
     numbers: tuple[float, ...]
     if type(command) is Twist:

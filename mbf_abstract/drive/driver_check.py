@@ -1,4 +1,4 @@
-"""A robot's driver is looked at before the first goal, not when the robot drives already."""
+"""Checks a robot's driver before the first goal, so that a wrong one is refused before the robot moves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When has the robot arrived? By the plugin's answer, by the server's tolerances, or by either."""
+"""Decides whether the robot has arrived: by the plugin's answer, by the server's tolerances, or by either."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class ArrivalCheck:
         return plugin_agrees or (self.check == "either" and self.within(pose, tracker))
 
     def within(self, pose: Pose, tracker: PathTracker) -> bool:
-        """Whether ``pose`` is inside both tolerances, at the end of the path and not where it comes by earlier."""
+        """Whether ``pose`` is inside both tolerances, at the end of the path and not where the path passes earlier."""
         close = pose.distance_to(self.goal) < self.dist_tolerance
         driven = tracker.has_arrived(self.dist_tolerance + STRAYING * tracker.deviation)
         return close and driven and pose.angle_to(self.goal) < self.angle_tolerance

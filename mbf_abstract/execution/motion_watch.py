@@ -43,7 +43,7 @@ class MotionWatch:
             self._ignored.restart()
 
     def problem(self, pose: Pose, measured: Twist | None, tracker: PathTracker) -> tuple[ExePathOutcome, str] | None:
-        """Take in a cycle, with the measured velocity of a robot that has odometry; why the loop shall end, if so."""
+        """Check one cycle; ``measured`` is None without odometry. Returns why the loop must end, or None."""
         parameters = self._runtime.parameters
         tilt = tilt_of(pose)
         if parameters.max_tilt is not None and tilt > parameters.max_tilt:

@@ -35,7 +35,7 @@ ARM, GAINED = 0.2, 0.2
 That is a turn of 120 degrees; on a smooth bend, one of a radius below 0.11 m.
 """
 CHUNK = 32
-"""So many segments are looked at in one go."""
+"""Number of segments that are checked in one step."""
 _POSITION_NOISE = 1e-9  # [m]
 
 

@@ -17,14 +17,12 @@ from mbf_abstract.plugins import PlanRequest, PlanResult
 
 def in_global_frame(pose: Pose, runtime: Runtime) -> Pose:
     """Return ``pose`` in the global frame; raises TransformError where that frame is not known."""
-    frame = runtime.robot.global_frame
-    return pose if pose.frame_id == frame else runtime.transforms.transform_pose(pose, frame)
+    return runtime.transforms.transform_pose(pose, runtime.robot.global_frame)
 
 
 def path_in_global_frame(path: Path, runtime: Runtime) -> Path:
     """Return ``path`` in the global frame; raises TransformError where that frame is not known."""
-    frame = runtime.robot.global_frame
-    return path if path.frame_id == frame else runtime.transforms.transform_path(path, frame)
+    return runtime.transforms.transform_path(path, runtime.robot.global_frame)
 
 
 def area_problem(area: GoalArea | None, runtime: Runtime) -> str:

@@ -32,7 +32,7 @@ class GatedMotion:
         return self._runtime.robot.velocity()
 
     def send(self, command: Command) -> bool:
-        """Send one command; False if another owner drives, the goal is paused or shall end."""
+        """Send one command; False if another owner drives, the goal is paused or is to end."""
         if self._run.handle.paused:
             return False
         with self._condition:
@@ -42,7 +42,7 @@ class GatedMotion:
         return lease is not None and lease.send(command)
 
     def sleep(self, seconds: float) -> bool:
-        """Wait; False as soon as the behaviour shall end. Paused time does not count."""
+        """Wait; False as soon as the behaviour is to end. Paused time does not count."""
         watch = Stopwatch(self._runtime.clock)
         token = self._run.handle.cancel_token
         with self._condition:
@@ -53,20 +53,19 @@ class GatedMotion:
         return not token.cancelled
 
     def close(self, reason: str) -> None:
-        """Stop the robot if this behaviour moved it, and let it drive no more."""
-        with self._condition:
-            self._over = True
-            lease = self._lease
-        if lease is not None:
+        """Stop the robot if this behaviour moved it, and refuse further commands."""
+        if (lease := self._end()) is not None:
             lease.release(reason=reason)
 
     def revoke(self, reason: str) -> None:
         """Do the same from another thread than the behaviour's, which hangs; never waits."""
+        if (lease := self._end()) is not None:
+            lease.revoke(reason)
+
+    def _end(self) -> Lease | None:
         with self._condition:
             self._over = True
-            lease = self._lease
-        if lease is not None:
-            lease.revoke(reason)
+            return self._lease
 
     def _wake(self) -> None:
         if self._run.handle.paused and self._lease is not None:

@@ -128,7 +128,7 @@ class TreeExecutive:
                 self._condition.wait(stamp - clock.now())
 
     def _report_tip(self) -> None:
-        """Log which node is at work, so that a tree can be followed in the event log, live and in a replay."""
+        """Log which node is running, so that a tree can be followed in the event log, live and in a replay."""
         tip = self.tree.tip()
         name = "" if tip is None else tip.name
         if name != self._tip:

@@ -10,6 +10,7 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import reduce
 
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import (
@@ -309,10 +310,7 @@ def _compose(target_steps: list[Transform], source_steps: list[Transform], time:
 
 def _product(steps: list[Transform]) -> Transform | None:
     """``T_top_bottom`` of steps that lead up from the bottom; None for no steps."""
-    product: Transform | None = None
-    for T_parent_child in steps:
-        product = T_parent_child if product is None else T_parent_child @ product
-    return product
+    return reduce(lambda product, T_parent_child: T_parent_child @ product, steps) if steps else None
 
 
 def _describe_cache(child: str, cache: TransformCache, now: float | None) -> str:

@@ -2,7 +2,7 @@
 
 The end of a goal is never lost: what is submitted runs, also after ``close``, once each and in the order of
 submission. Feedback is: of several that one callback has not taken yet only the newest stays, so a slow callback can
-not fill the queue. A callback that blocks longer than ``patience`` is left alone with its thread, gets no more
+not fill the queue. A callback that blocks longer than ``patience`` keeps its thread to itself, gets no
 feedback until it returns, and the others are served by a new thread. With more than ``max_blocked`` such threads the
 queue waits until one of them comes back.
 """
@@ -82,7 +82,7 @@ class CallbackThread:
                 self._running = call = self._queue.popitem(last=False)
             self._run(call)
             with self._condition:
-                if self._running is not call:  # it had been left alone
+                if self._running is not call:  # another thread serves the queue
                     self._blocked.discard(call[0])
                     self._serve()
                     return

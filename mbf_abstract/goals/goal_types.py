@@ -289,7 +289,7 @@ class FollowWaypointsFeedback:
     results : tuple of MoveBaseResult
         The visits that have ended.
     driving : ExePathFeedback, optional
-        How the present visit gets on; None when it has just ended.
+        Feedback of the present visit; None when it has just ended.
     """
 
     visit: int

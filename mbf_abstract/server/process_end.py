@@ -50,7 +50,7 @@ class ProcessEndWatch:
             gate.close(reason)
 
     def end(self) -> None:
-        """Watch no more: the gate is closed. The last watch gives the signals back."""
+        """End the watch: the gate is closed. The last watch restores the signal handlers."""
         atexit.unregister(self.stop_robot)
         _watches.discard(self)
         if not _watches:

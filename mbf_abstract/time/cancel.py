@@ -34,7 +34,7 @@ class CancelToken:
 
     @property
     def cancelled(self) -> bool:
-        """Whether the goal shall end."""
+        """Whether the goal is to end."""
         return bool(self.flag[0])
 
     def on_cancel(self, callback: Callable[[], None]) -> None:

@@ -1,4 +1,4 @@
-"""The wall-clock guard of a simulated run: it gives up on a thread that keeps the baton for too long.
+"""The wall-clock guard of a simulated run: it detaches a thread that keeps the baton for too long.
 
 The only place where a simulated run may depend on the wall clock.
 """

@@ -1,4 +1,4 @@
-"""A thread as the lockstep scheduler knows it."""
+"""The state of one thread in the lockstep scheduler."""
 
 from __future__ import annotations
 
