@@ -12,7 +12,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_abstract.geometry.arithmetic import plane_rotation, rotated
 from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
@@ -47,12 +46,6 @@ class FootprintCheck:
     def collides(self, costmap: Costmap, x: float, y: float, yaw: float) -> bool:
         """Whether a lethal cell lies under the footprint."""
         return self.cost(costmap, x, y, yaw) == LETHAL
-
-    def touched(self, costmap: Costmap, x: float, y: float, yaw: float) -> int:
-        """Number of footprint samples on lethal cells or off the map: how deep the robot is in a collision."""
-        cells, inside = costmap.world_to_cells(rotated(plane_rotation(yaw), self.samples) + np.array([x, y]))
-        lethal = costmap.cells[cells[inside, 1], cells[inside, 0]] == LETHAL
-        return int(np.count_nonzero(lethal)) + int(np.count_nonzero(~inside))
 
     def first_collision(self, costmap: Costmap, poses: FloatArray) -> int:
         """Index of the first colliding pose of (n, 3) poses (x, y, yaw), or -1."""

@@ -15,7 +15,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.kernels.map.footprint_samples import blocked_under
 
 
 def obstacle_ahead(
@@ -38,17 +38,27 @@ def obstacle_ahead(
     leaves_collisions : bool
         Whether the motion was chosen to lead out of a collision, however deep it is.
     """
-    check = FootprintCheck(footprint, costmap.resolution)
-    allowed = check.touched(costmap, pose.x, pose.y, pose.yaw)
-    if not leaves_collisions:
-        allowed = min(allowed, len(check.samples) - 1)
+    allowed, _ = blocked_cells(costmap, footprint, pose.x, pose.y, pose.yaw)
     outline_speed = command.speed + abs(command.wz) * footprint.circumscribed_radius
     step = float(np.clip(0.5 * costmap.resolution / max(outline_speed, 1e-6), duration / 100.0, duration))
     ahead = arc_poses((pose.x, pose.y, pose.yaw), command.vx, command.vy, command.wz, duration, step)
     for x, y, yaw in ahead.tolist():
-        if check.touched(costmap, x, y, yaw) > allowed:
+        blocked, covered = blocked_cells(costmap, footprint, x, y, yaw)
+        if blocked > allowed or (blocked == covered and not leaves_collisions):
             return f"an obstacle is in the way: the footprint would touch it at ({x:.2f}, {y:.2f}, {yaw:.2f} rad)"
     return ""
+
+
+def blocked_cells(costmap: Costmap, footprint: Footprint, x: float, y: float, yaw: float) -> tuple[int, int]:
+    """How many of the cells under the footprint are lethal or off the map, and how many there are in all.
+
+    Each cell counts once, whatever part of it is covered. So a robot that backs out of a collision touches less and
+    less; counted by samples, an obstacle weighs more under the outline, where they are denser.
+    """
+    corners = footprint.at(x, y, yaw) if len(footprint.vertices) > 2 else np.array([[x, y]])
+    origin = np.array([costmap.origin_x, costmap.origin_y])
+    blocked, covered = blocked_under(costmap.cells, (corners - origin) / costmap.resolution)
+    return int(blocked), int(covered)
 
 
 def nearest_lethal(costmap: Costmap, pose: Pose, within: float) -> tuple[float, float, float] | None:

@@ -4,8 +4,8 @@ When to use: the planner answers BLOCKED_START or a controller COLLISION because
 lethal or inscribed. When not: the marks are ghosts; clear the costmap first. It stops (IMPASSABLE) where neither
 direction is better than staying.
 
-Rule: among forward, back and both turns, each tried over ``probe_distance``, take the one with the fewest footprint
-samples on lethal cells or off the map, and then the lowest cost at the centre; repeat until the centre
+Rule: among forward, back and both turns, each tried over ``probe_distance``, take the one with the fewest cells under
+the footprint that are lethal or off the map, and then the lowest cost at the centre; repeat until the centre
 is below ``free_cost``. An unknown cell there counts as free; outside the map does not.
 """
 
@@ -20,8 +20,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_costmap_nav.grid.costmap import UNKNOWN
-from mbf_costmap_nav.grid.footprint_check import FootprintCheck
-from mbf_costmap_nav.grid.motion_check import obstacle_ahead
+from mbf_costmap_nav.grid.motion_check import blocked_cells, obstacle_ahead
 from mbf_costmap_nav.plugins import CostmapRecovery
 
 OFF_MAP = 256
@@ -62,7 +61,7 @@ class EscapeRecovery(CostmapRecovery, GuardedRecovery):
         moved = start.distance_to(request.motion.pose())
         if stuck:
             touched, cost = self._badness(request.motion.pose(), Twist())
-            state = f"{touched} points of the footprint touch obstacles or lie off the map"
+            state = f"{touched} cells under the footprint are obstacles or off the map"
             centre = "lies off the map" if cost == OFF_MAP else f"costs {cost}"
             text = f"no motion leads out of the collision, moved {moved:.2f} m: {state}, the centre {centre}"
             return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
@@ -82,12 +81,11 @@ class EscapeRecovery(CostmapRecovery, GuardedRecovery):
         return motions
 
     def _badness(self, pose: Pose, motion: Twist) -> tuple[int, int]:
-        """Points in collision and cost of the centre after the probe distance; staying is judged where it is."""
+        """Cells in collision and cost of the centre after the probe distance; staying is judged where it is."""
         costmap, pose = self.costmap.snapshot(), self.on_map(pose)
-        check = FootprintCheck(self.costmap.footprint, costmap.resolution)
         duration = self.parameters.probe_distance / self.parameters.speed if motion != Twist() else 1e-3
         x, y, yaw = arc_poses((pose.x, pose.y, pose.yaw), motion.vx, 0.0, motion.wz, duration, duration)[-1].tolist()
-        touched = check.touched(costmap, x, y, yaw)
+        touched, _ = blocked_cells(costmap, self.costmap.footprint, x, y, yaw)
         cost = costmap.cost_at(x, y)
         if cost == UNKNOWN:
             return touched, self.parameters.free_cost - 1

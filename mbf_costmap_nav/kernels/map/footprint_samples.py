@@ -126,6 +126,23 @@ def polygon_costs(cells: NDArray[np.uint8], corners: FloatArray) -> tuple[int, i
 
 
 @kernel
+def blocked_under(cells: NDArray[np.uint8], corners: FloatArray) -> tuple[int, int]:
+    """How many of the cells a polygon covers are lethal (254) or off the grid, and how many it covers at all."""
+    height, width = cells.shape
+    x0, y0, mask = rasterise_polygon(corners, (-(1 << 40), -(1 << 40), 1 << 40, 1 << 40))
+    blocked, covered = 0, 0
+    for row in range(mask.shape[0]):
+        for column in range(mask.shape[1]):
+            if mask[row, column] == 0:
+                continue
+            ix, iy = x0 + column, y0 + row
+            covered += 1
+            if ix < 0 or iy < 0 or ix >= width or iy >= height or cells[iy, ix] == 254:
+                blocked += 1
+    return blocked, covered
+
+
+@kernel
 def fill_polygon(cells: NDArray[Any], corners: FloatArray, value: int) -> tuple[int, int, int, int]:
     """Write ``value`` into all covered cells on the grid; return the half-open box (x0, y0, x1, y1) around them."""
     height, width = cells.shape

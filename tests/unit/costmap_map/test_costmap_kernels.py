@@ -8,13 +8,14 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from mbf_costmap_nav.grid.costmap import GridGeometry
-from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon, polygon_costs, rasterise_polygon
+from mbf_costmap_nav.kernels.map.footprint_samples import blocked_under, fill_polygon, polygon_costs, rasterise_polygon
 from mbf_costmap_nav.kernels.map.inflation import inflate
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays, mark_points
 from mbf_costmap_nav.kernels.map.voxel import clear_voxel_rays, count_bits, project_columns
 from mbf_costmap_nav.layers.denoise import small_groups
 from mbf_costmap_nav.layers.inflation import cost_table
 
+SIXTEENTHS = st.integers(-32, 144).map(lambda value: value / 16)
 CELL_VALUES = st.sampled_from([0, 0, 0, 0, 0, 0, 100, 253, 254, 255])
 GRIDS = st.tuples(st.integers(1, 14), st.integers(1, 14)).flatmap(
     lambda shape: hnp.arrays(np.uint8, shape, elements=CELL_VALUES)
@@ -114,6 +115,16 @@ def test_a_polygon_far_larger_than_the_grid_costs_no_more_than_the_grid():
     huge = np.array([(-1e6, -1e6), (1e6, -1e6), (1e6, 1e6), (-1e6, 1e6)])
     assert fill_polygon(cells, huge, 7) == (0, 0, 5, 4)
     assert (cells == 7).all()
+
+
+@given(hnp.arrays(np.uint8, (6, 7), elements=st.sampled_from([0, 253, 254, 255])), SIXTEENTHS, SIXTEENTHS)
+@settings(max_examples=50, deadline=None)
+def test_blocked_cells_are_the_lethal_ones_of_a_map_in_a_lethal_frame(cells, x, y):
+    framed = np.full((26, 27), 254, dtype=np.uint8)
+    framed[10:16, 10:17] = cells
+    polygon = np.array([(x - 1.25, y - 1.0), (x + 1.875, y), (x, y + 1.75)])
+    covered, lethal, *_ = polygon_costs(framed, polygon + 10.0)
+    assert blocked_under(cells, polygon) == (lethal, covered)
 
 
 def test_the_summary_of_a_polygon_off_the_map_is_outside():

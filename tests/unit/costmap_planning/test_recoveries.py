@@ -16,7 +16,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import Costmap
-from mbf_costmap_nav.grid.footprint_check import FootprintCheck
+from mbf_costmap_nav.grid.motion_check import blocked_cells
 from mbf_costmap_nav.recoveries.escape import EscapeRecovery
 
 MOVING = [RotateRecovery, BackUpRecovery, DriveOnHeadingRecovery, EscapeRecovery, MoveAwayRecovery]
@@ -132,9 +132,9 @@ def test_cancel_while_moving_stops_the_robot(run, recovery):
 def test_no_recovery_drives_into_what_stands_in_its_way(run, closed_loop, recovery, boxes):
     world = around(*boxes)
     _, robot, plugin = run(recovery, world)
-    touched = FootprintCheck(plugin.navigation_map.footprint, world.resolution).touched
-    deepest = max(touched(world, *state) for state in robot.trace)
-    assert deepest <= touched(world, 0.0, 0.0, 0.0)
+    footprint = plugin.navigation_map.footprint
+    deepest = max(blocked_cells(world, footprint, *state)[0] for state in robot.trace)
+    assert deepest <= blocked_cells(world, footprint, 0.0, 0.0, 0.0)[0]
 
 
 def test_a_robot_that_does_not_move_runs_into_the_time_limit(run, make_plugin, closed_loop):
