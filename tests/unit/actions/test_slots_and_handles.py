@@ -165,7 +165,7 @@ def test_f246_a_canceled_goal_keeps_the_last_words_of_its_plugin(make_session):
     handle.cancel()
     result = handle.wait()
     assert (handle.status, result.outcome) == (GoalStatus.CANCELED, Outcome.CANCELED)
-    assert result.plugin_message == "as ordered"
+    assert (result.plugin_outcome, result.plugin_message) == (Outcome.CANCELED, "as ordered")  # F288
 
 
 def test_f247_a_plugin_that_raises_aborts_its_goal(make_session):
@@ -204,6 +204,25 @@ def test_f251_to_f257_a_goal_goes_from_pending_over_active_and_canceling_to_its_
     handle.wait()
     seen.append(handle.status)
     assert [status.value for status in seen] == ["pending", "active", "canceling", "canceled"]
+
+
+@pytest.mark.parametrize(
+    ("canceled", "answer", "end"),
+    [
+        pytest.param(False, straight_plan, GoalStatus.SUCCEEDED, id="F254"),
+        pytest.param(False, RuntimeError("no"), GoalStatus.ABORTED, id="F255"),
+        pytest.param(True, RuntimeError("no"), GoalStatus.ABORTED, id="F257"),
+    ],
+)
+def test_the_end_of_a_goal_that_ran(make_session, canceled, answer, end):
+    session = make_session()
+    session.planner.play(slow(session.clock, 0.5, answer))
+    handle = send(session)
+    session.clock.sleep(0.1)
+    if canceled:
+        handle.cancel()
+    handle.wait()
+    assert handle.status is end
 
 
 def test_f258_a_pending_goal_can_only_be_canceled_before_it_runs(make_session):

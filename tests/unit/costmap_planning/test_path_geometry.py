@@ -49,8 +49,17 @@ def test_f120_look_ahead_between_poses(distance):
     assert look_ahead_point(X_AXIS, distance) == pytest.approx((distance, 0.0))
 
 
-def test_look_ahead_inside_the_circle_ends_at_the_last_pose():
-    assert look_ahead_point(X_AXIS[:3], 10.0) == pytest.approx((2.0, 0.0))
+@pytest.mark.parametrize(
+    "points",
+    [
+        pytest.param([(0, 0), (1, 0), (2, 0), (3, 0)], id="F121"),
+        pytest.param([(2, 0), (3, 0)], id="F122"),
+        pytest.param([(2, 2), (3, 3)], id="F123"),
+    ],
+)
+def test_look_ahead_beyond_the_path_ends_at_its_last_pose(points):
+    # Nav2 can go straight on from there. Ours slows down before the end instead, so a shorter carrot does no harm.
+    assert look_ahead_point(np.array(points, dtype=float), 10.0) == pytest.approx(points[-1])
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,4 @@
-"""MemRec, the recovery node (F183 to F192), round robin (F193 to F196), guards and the recovery filter (F206 to F208).
-
-Nav2's "skipped" (F188, F189, F195) does not exist in py_trees; a closed guard fails instead.
-"""
+"""MemRec, recovery node (F183 to F192), round robin (F193 to F196), guards and the recovery filter (F206 to F208)."""
 
 from types import SimpleNamespace
 
@@ -165,6 +162,33 @@ def test_turns_are_remembered_across_picks_of_other_codes(scripted, tick):
     for code in (110, 104, 110):
         tick(bind(tree, code))
     assert ran == ["first", "other", "second"]
+
+
+@pytest.mark.parametrize(
+    ("nodes", "seen"),
+    [
+        pytest.param("-S", "S", id="F195-one-succeeds"),
+        pytest.param("--F", "F", id="F195-the-last-fails"),
+        pytest.param("--", "F", id="F195-all-closed"),
+    ],
+)
+def test_turns_pass_over_closed_guards(scripted, tick, nodes, seen):
+    # Nav2 skips a child; all skipped is a status of its own there. py_trees has none: a closed guard fails.
+    children = [OutcomeGuard(str(i), scripted("S"), [1]) if n == "-" else scripted(n) for i, n in enumerate(nodes)]
+    assert tick(bind(RoundRobin("turns", children), 2)) == seen
+
+
+@pytest.mark.parametrize(
+    ("task_is_closed", "ran"), [pytest.param(True, [0, 1], id="F188"), pytest.param(False, [1, 0], id="F189")]
+)
+def test_a_recovery_node_takes_a_closed_guard_for_a_failure(scripted, tick, task_is_closed, ran):
+    # Nav2 passes on that its task was skipped. Ours tries the recovery, and fails where the task stays closed.
+    children = [scripted("F"), scripted("S")]
+    guarded = children.copy()
+    closed = 0 if task_is_closed else 1
+    guarded[closed] = OutcomeGuard("closed", children[closed], [1])
+    assert tick(bind(RecoveryNode("node", guarded), 2)) == "F"
+    assert [child.ticks for child in children] == ran
 
 
 # ------------------------------------------------------------------------------------------------ recovery filter

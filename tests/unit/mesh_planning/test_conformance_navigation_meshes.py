@@ -1,6 +1,8 @@
 """Facts about shortest paths on navigation meshes that other packages' tests publish; the number is in the name."""
 
 import csv
+import json
+import math
 
 import numpy as np
 import pytest
@@ -60,6 +62,28 @@ def test_f356_the_arena_has_its_published_lengths(make_plugin, arena, planner_cl
     ratios = [plan(planner, pair[:2], pair[2:4]).path.length / pair[4] for pair in pairs]
     assert min(ratios) > 1.0 - PRINTED and max(ratios) < 1.001
     assert np.median(ratios) < 1.0 + PRINTED
+
+
+@pytest.fixture(scope="module")
+def nav2_maps(shared_data):
+    """Nav2's six test maps of 10 x 10 cells as flat meshes, a vertex in the middle of each cell."""
+    rows = json.loads((shared_data / "maps" / "nav2_test_costmaps.json").read_text())["maps"]
+    return {name: np.isin(np.array([list(row) for row in cells]), ["x", "i", "n"]) for name, cells in rows.items()}
+
+
+@pytest.mark.parametrize("planner_class", ALL)
+def test_f171_a_path_on_each_of_nav2s_test_maps(make_plugin, paint, nav2_maps, planner_class):
+    assert len(nav2_maps) == 6
+    for name, blocked in nav2_maps.items():
+        mesh_map = MeshMap.from_heights(np.zeros(blocked.shape), 1.0, 1.0)
+        paint(mesh_map, lambda v, b=blocked: np.where(b[v[:, 1].astype(int), v[:, 0].astype(int)], np.inf, 0.0))
+        result = plan(make_plugin(planner_class, mesh_map), (1, 1), (8, 8))
+        assert result.success, f"{name}: {result.message}"
+        # Along edges only every other diagonal is there, so the octile bound becomes that of four neighbours.
+        assert math.hypot(7, 7) - 1e-6 <= result.path.length <= 14.0 + 1e-6, name
+        at = np.rint(result.path.positions[:, :2]).astype(int)
+        near = np.hypot(*(result.path.positions[:, :2] - at).T) < 1e-6
+        assert not blocked[at[near, 1], at[near, 0]].any(), f"{name}: over a blocked vertex"
 
 
 @pytest.mark.parametrize("planner_class", ALL)
