@@ -116,7 +116,7 @@ _RANGES: tuple[tuple[range, type[IntEnum], range], ...] = (
 
 
 def is_success(outcome: int) -> bool:
-    """Tell whether ``outcome`` (any action's) means success: 0, or a plugin's own variant 1..9."""
+    """Whether ``outcome`` (any action's) means success: 0, or a plugin's own variant 1..9."""
     return 0 <= outcome < SUCCESS_LIMIT
 
 

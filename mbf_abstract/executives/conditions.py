@@ -39,7 +39,7 @@ BEYOND_RECOVERY = frozenset(
 
 
 def recovery_would_help(outcome: int) -> bool:
-    """Tell whether a recovery behaviour may help after this outcome of planning or driving."""
+    """Whether a recovery behaviour may help after this outcome of planning or driving."""
     return not is_success(outcome) and outcome not in BEYOND_RECOVERY
 
 

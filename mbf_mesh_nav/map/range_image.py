@@ -1,4 +1,4 @@
-"""A coarse picture of how far a sensor saw in every direction, to tell which remembered points are gone."""
+"""A coarse image of how far a sensor saw in every direction, to find remembered points that are gone."""
 
 from __future__ import annotations
 

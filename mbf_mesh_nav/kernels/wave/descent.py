@@ -1,9 +1,9 @@
 """Exact descent of a distance field: the path is traced from edge to edge, never stepped and searched for.
 
 At a point of a face the wave's own rule is applied once more (``cvp.propagate_wave``): two corners that one front has
-passed tell where its centre lies, a virtual source; the way leads straight there, if that line crosses the side between
+passed determine its centre, a virtual source; the path leads straight there, if that line crosses the side between
 the two, else to the corner over which it is shortest. A field taken as linear within a face would be wrong by a tenth
-some edges away from the source, where the fronts are round. A virtual source of two fronts is a fiction and may lead
+some edges away from the source, where the fronts are round. A virtual source of two fronts has no meaning and may lead
 in circles: no face is passed through twice, and from corner to corner the distance falls. Thus the trace ends, and
 every reached point gets a path.
 """
@@ -260,7 +260,7 @@ def _way_from_vertex(
     for record in records:
         face = Count(surface.vertex_faces[record])
         corners = surface.faces[face]
-        # A side of a free face is told of as that, it may have a blocked face on the other side.
+        # A side belongs to its free face here; the face on its other side may be blocked.
         if _has_corner(corners, best_vertex) and (best_face < 0 or _is_reached(corners, distances)):
             best_face = face
     if to_predecessor:

@@ -1,10 +1,10 @@
-"""Straight wave fronts over triangles laid down in the plane: what the known corners foretell of the next one.
+"""Straight wave fronts over triangles unfolded into the plane: the distance of the next corner from the known ones.
 
-A front is known by its centre, the source or the corner round which its way bends last, and by the distances from
-there. Two corners that one front has passed tell where its centre lies, a virtual source; the next corner is as far
-as the straight line from there, if that line crosses the side between the two. Where the two were passed by different
-fronts, the virtual source of both is a fiction. Then the corner behind their side helps: with the one of the two that
-was passed by the same front it tells where that front comes from, and whether it goes on through the side.
+A front is given by its centre, the source or the corner round which its path bends last, and by the distances from
+there. Two corners that one front has passed determine its centre, a virtual source; the distance of the next corner is
+that of the straight line from there, if that line crosses the side between the two. Where the two were passed by
+different fronts, they have no common virtual source. Then the corner behind their side helps: with the one of the two
+that was passed by the same front it gives the centre of that front, and whether it goes on through the side.
 
 Sides and distances are weighted lengths; where costs stretch them so that they form no triangle, no straight line has
 a meaning. All is float32: a plain number in a formula would turn it into float64.
@@ -98,7 +98,7 @@ def corner_behind(
 
 @inner_kernel
 def predicted_behind(u1: float, u2: float, c: float, b: float, a: float) -> float:
-    """Distance the virtual source of corners 1 and 2 foretells of the corner on its own side of side 12."""
+    """Distance of the corner on its own side of side 12, predicted from the virtual source of corners 1 and 2."""
     source_x, source_depth, corner_x, corner_depth = _unfolded(u1, u2, c, b, a)
     deeper, along = source_depth - corner_depth, source_x - corner_x
     return math.sqrt(deeper * deeper + along * along)
@@ -189,7 +189,7 @@ def distance_where_fronts_meet(
     behind, c, b, a = corner_behind(offsets, corner_ends, corner_weights, vertex, known, free)
     if behind == NOBODY or distances[behind] == _INFINITE:
         return best, side, last_bend
-    # 2. One front has reached the corner behind about when its virtual source foretells.
+    # 2. One front has reached the corner behind at about the distance that its virtual source predicts.
     if bend == own_bend:
         to_bend = distances[bend] if bend != NO_BEND else _ZERO
         predicted = predicted_behind(distances[vertex] - to_bend, distances[known] - to_bend, c, b, a)
@@ -211,7 +211,7 @@ def distance_where_fronts_meet(
         if distance < best:
             best, side, last_bend = distance, 0, front
     # 4. Beside a bend the fronts before and behind it differ little, so their virtual source is a fair guess; but not
-    #    alone if another one is known, or if it foretells the corner before an end of the side that it comes through.
+    #    alone if another one is known, or if it predicts the corner before an end of the side that it comes through.
     if bend == own_bend or best <= virtual:
         return best, side, last_bend
     if side != 0 and virtual >= max(distances[vertex], distances[known]):
