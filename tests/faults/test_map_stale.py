@@ -1,4 +1,4 @@
-"""Fault table, row 13, the core's half: the map's server says that it must not be driven on."""
+"""Fault table, row 13, the core's half: the map is stale and must not be driven on."""
 
 from mbf_abstract.goals.goal_types import ExePathGoal
 from mbf_abstract.outcomes import ExePathOutcome
