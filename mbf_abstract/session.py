@@ -71,8 +71,15 @@ class NavigationSession:
         transforms: TransformBuffer | None = None,
         seed: int = 0,
     ) -> Server:
-        """Make the server of a configuration; the parameters, and what is raised, are those of its class."""
-        server = server_class(config, robot, self.clock, transforms, self.events, seed)
+        """Make the server of a configuration; the parameters, and what is raised, are those of its class.
+
+        Where it raises, the session is closed.
+        """
+        try:
+            server = server_class(config, robot, self.clock, transforms, self.events, seed)
+        except BaseException:
+            self.close()
+            raise
         self.on_close(server.close)
         self.navigator = Navigator(server)
         return server

@@ -7,6 +7,7 @@ import pytest
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.plugins import RefineResult
+from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.loopback import LoopbackRobot
 from mbf_abstract.testing.promises import assert_stops
 from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner
@@ -72,6 +73,18 @@ def test_a_plugin_of_the_session_is_found_by_name_and_class():
         assert session.plugin("planner", ScriptedPlanner) is session.planner
         with pytest.raises(KeyError, match="no ScriptedController named 'planner'"):
             session.plugin("planner", ScriptedController)
+
+
+def test_a_session_whose_server_cannot_be_made_leaves_no_thread():
+    class Broken(ScriptedPlanner):
+        def __init__(self, context):
+            raise ValueError("no planner today")
+
+    clock = SimClock()
+    with pytest.raises(ServerError, match="no planner today"):
+        ScriptedSession({"broken": Broken}, clock=clock)
+
+    assert list(clock.thread_names) == ["main"]
 
 
 def test_the_stop_promise_is_checked_in_earnest():
