@@ -93,7 +93,7 @@ def commanded_twist(spec: RobotSpec, command: Command) -> Twist:
 
 
 def twist_from_wheels(spec: RobotSpec, left: float, right: float, steering: float = 0.0) -> Twist:
-    """Motion of the base if wheels turning at ``left`` and ``right`` [rad/s] do not slip, as odometry believes."""
+    """Motion of the base if wheels turning at ``left`` and ``right`` [rad/s] do not slip, as odometry assumes."""
     speed = 0.5 * (left + right) * spec.wheel_radius
     if spec.drive is Drive.ACKERMANN:
         return Twist.planar(speed, 0.0, speed * math.tan(steering) / spec.wheelbase)

@@ -106,11 +106,11 @@ class FaultSchedule:
         self._localization.offset = (dx, dy, dyaw)
 
 
-def seen_from(scan: RangeScan, true_pose: Pose, believed_pose: Pose) -> RangeScan:
-    """Return a scan as it appears in the map of a robot whose localisation gives ``believed_pose``."""
+def seen_from(scan: RangeScan, true_pose: Pose, estimated_pose: Pose) -> RangeScan:
+    """Return a scan as it appears in the map of a robot whose localisation gives ``estimated_pose``."""
 
-    def believed(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def estimated(points: NDArray[np.float64]) -> NDArray[np.float64]:
         in_base = rotated_back(true_pose.rotation, points - true_pose.position)
-        return rotated(believed_pose.rotation, in_base) + believed_pose.position
+        return rotated(estimated_pose.rotation, in_base) + estimated_pose.position
 
-    return replace(scan, origin=believed(scan.origin), ends=believed(scan.ends))
+    return replace(scan, origin=estimated(scan.origin), ends=estimated(scan.ends))

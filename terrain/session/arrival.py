@@ -17,7 +17,7 @@ from mbf_abstract.goals.goal_types import MoveBaseResult
 from terrain.scenarios.limits import Limits
 from terrain.scenarios.noise import LocalizationNoise
 
-DEVIATIONS = 3.0  # standard deviations of its pose; what a robot cannot know to be off by less
+DEVIATIONS = 3.0  # standard deviations of the estimated pose that a robot may be off
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,14 @@ class Arrival:
     ----------
     distance_m, angle_deg : float
         From the goal in truth; the angle is that between the headings.
-    believed_distance_m, believed_angle_deg : float
-        The same as navigation saw it.
+    estimated_distance_m, estimated_angle_deg : float
+        The same by the pose that the localisation estimated.
     """
 
     distance_m: float
     angle_deg: float
-    believed_distance_m: float
-    believed_angle_deg: float
+    estimated_distance_m: float
+    estimated_angle_deg: float
 
     @classmethod
     def at(cls, goal: Pose, truth: Pose, result: MoveBaseResult) -> Arrival:
@@ -75,15 +75,15 @@ def missed_goals(metrics: Mapping[str, Any]) -> list[str]:
         if arrival["distance_m"] > distance:
             missed.append(
                 f"goal {number} was missed by {arrival['distance_m']:.2f} m in truth, "
-                f"allowed are {distance:.2f} m{_belief(arrival['believed_distance_m'], 'm')}"
+                f"allowed are {distance:.2f} m{_estimate(arrival['estimated_distance_m'], 'm')}"
             )
         elif arrival["angle_deg"] > angle:
             missed.append(
                 f"goal {number} was missed by {arrival['angle_deg']:.0f} degrees in truth, "
-                f"allowed are {angle:.0f}{_belief(arrival['believed_angle_deg'], 'degrees')}"
+                f"allowed are {angle:.0f}{_estimate(arrival['estimated_angle_deg'], 'degrees')}"
             )
     return missed
 
 
-def _belief(value: float | None, unit: str) -> str:
-    return "" if value is None else f" (believed {value:.2f} {unit})"
+def _estimate(value: float | None, unit: str) -> str:
+    return "" if value is None else f" (estimated {value:.2f} {unit})"

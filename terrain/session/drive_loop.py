@@ -158,10 +158,10 @@ class DriveLoop:
         stamp, robot = self._origin + reading.pose.stamp, self._runtime.robot
         T_odom_base = Transform.from_pose(reading.pose.stamped(stamp), robot.robot_frame)
         self._runtime.transforms.set(T_odom_base)
-        believed = self._localization.measure(stamp)
-        if believed is not None:
+        estimated = self._localization.measure(stamp)
+        if estimated is not None:
             T_map_base = Transform(
-                believed.position, believed.orientation, robot.global_frame, robot.robot_frame, stamp
+                estimated.position, estimated.orientation, robot.global_frame, robot.robot_frame, stamp
             )
             self._runtime.transforms.set(T_map_base @ T_odom_base.inverse())
 
@@ -200,9 +200,9 @@ class DriveLoop:
         if not isinstance(measurement, RangeScan):
             return
         scan = replace(measurement, stamp=self._origin + measurement.stamp)
-        pose, believed = self._simulation.robot.pose(), self._localization.measure(scan.stamp)
-        if believed is not None and (believed.position, believed.orientation) != (pose.position, pose.orientation):
-            scan = seen_from(scan, pose, believed)
+        pose, estimated = self._simulation.robot.pose(), self._localization.measure(scan.stamp)
+        if estimated is not None and (estimated.position, estimated.orientation) != (pose.position, pose.orientation):
+            scan = seen_from(scan, pose, estimated)
         try:
             self._server.take_scan(scan)
         except Exception as error:  # a map that refuses a scan must not stop the physics

@@ -20,13 +20,13 @@ from terrain.session.runner import RunOptions, run_scenario
 def test_an_arrival_compares_truth_and_belief_with_the_goal():
     result = MoveBaseResult(MoveBaseOutcome.SUCCESS, "", None, 0.1, 0.2)
     arrival = Arrival.at(Pose.planar(1.0, 0.0, math.pi - 0.05), Pose.planar(1.0, 0.5, 0.05 - math.pi), result)
-    assert (arrival.distance_m, arrival.believed_distance_m) == (0.5, 0.1)
+    assert (arrival.distance_m, arrival.estimated_distance_m) == (0.5, 0.1)
     assert arrival.angle_deg == pytest.approx(math.degrees(0.1))
 
 
 def test_what_an_executive_does_not_report_is_written_as_unknown():
     result = MoveBaseResult(MoveBaseOutcome.SUCCESS, "")
-    assert Arrival.at(Pose.planar(0.0, 0.0), Pose.planar(0.3, 0.0), result).to_json()["believed_distance_m"] is None
+    assert Arrival.at(Pose.planar(0.0, 0.0), Pose.planar(0.3, 0.0), result).to_json()["estimated_distance_m"] is None
 
 
 def test_a_robot_need_not_know_better_than_its_localisation_where_it_is():
@@ -56,7 +56,7 @@ def test_truth_and_belief_are_one_where_the_pose_is_exact(short_drive, tmp_path)
     (arrival,) = result.metrics["arrivals"]
     assert result.success, result.verdict
     assert arrival["distance_m"] <= 0.15
-    assert arrival["distance_m"] == pytest.approx(arrival["believed_distance_m"], abs=0.01)
+    assert arrival["distance_m"] == pytest.approx(arrival["estimated_distance_m"], abs=0.01)
 
 
 def test_a_run_whose_pose_has_jumped_fails_although_navigation_says_that_it_arrived(short_drive, tmp_path):
@@ -65,5 +65,5 @@ def test_a_run_whose_pose_has_jumped_fails_although_navigation_says_that_it_arri
     metrics = json.loads((tmp_path / "metrics.json").read_text())
     (arrival,) = metrics["arrivals"]
     assert metrics["outcome"] == "SUCCESS" and not result.success
-    assert arrival["believed_distance_m"] < 0.2 and arrival["distance_m"] > 0.6
-    assert "missed" in str(result.verdict) and "believed" in str(result.verdict)
+    assert arrival["estimated_distance_m"] < 0.2 and arrival["distance_m"] > 0.6
+    assert "missed" in str(result.verdict) and "estimated" in str(result.verdict)

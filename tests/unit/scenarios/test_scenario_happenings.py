@@ -92,7 +92,7 @@ def test_a_fault_of_a_sensor_that_does_not_exist_is_refused_with_the_names_of_th
         schedule.add(SensorFault(type="silent", sensor="nose", start=1.0))
 
 
-def test_a_scan_turns_and_moves_with_the_believed_pose():
+def test_a_scan_turns_and_moves_with_the_estimated_pose():
     scan = RangeScan("lidar", "map", np.array([1.0, 2.0, 0.3]), np.array([[2.0, 2.0, 0.3]]), np.array([True]), 0.0)
     seen = seen_from(scan, Pose.planar(1.0, 2.0), Pose.planar(3.0, 0.0, math.pi / 2))
     assert seen.origin == pytest.approx([3.0, 0.0, 0.3])

@@ -48,10 +48,10 @@ def place(session, target, source):
 def test_wheel_odometry_drifts_in_odom_and_the_localisation_corrects_it(sensing):
     with Session(sensing(), SessionOptions(backend="mesh", seed=4)) as session:
         drive(session, 4.0)
-        believed, truth = place(session, "map", "base_link"), session.robot.pose()
+        estimated, truth = place(session, "map", "base_link"), session.robot.pose()
         travelled = place(session, "odom", "base_link")
         reported, true = session.navigator.server.runtime.robot.velocity(), session.robot.velocity()
-    assert believed.translation == pytest.approx(truth.position, abs=0.03)  # one period of odometry old
+    assert estimated.translation == pytest.approx(truth.position, abs=0.03)  # one period of odometry old
     assert travelled.translation[0] == pytest.approx(truth.distance_to(session.recorder.start), rel=0.1)
     assert travelled.translation[1] == pytest.approx(0.0, abs=0.2)  # odom lies along the robot's first heading
     assert reported.vx != true.vx

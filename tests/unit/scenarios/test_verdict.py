@@ -10,7 +10,7 @@ from terrain.scenarios.limits import Limits
 
 ARRIVED = MoveBaseResult(MoveBaseOutcome.SUCCESS, "goal reached")
 BLOCKED = MoveBaseResult(ExePathOutcome.BLOCKED_PATH, "a box")
-NEAR = {"distance_m": 0.1, "angle_deg": 5.0, "believed_distance_m": 0.1, "believed_angle_deg": 5.0}
+NEAR = {"distance_m": 0.1, "angle_deg": 5.0, "estimated_distance_m": 0.1, "estimated_angle_deg": 5.0}
 CALM = {
     "max_tilt_deg": 5.0,
     "path_length_m": 10.0,
@@ -40,7 +40,7 @@ PUSHED = CALM | {"incidents": ["collision", "collision_with_person"], "collision
             Limits(),
             FAR,
             False,
-            "FAILED: goal 2 was missed by 2.17 m in truth, allowed are 0.40 m (believed 0.10 m) "
+            "FAILED: goal 2 was missed by 2.17 m in truth, allowed are 0.40 m (estimated 0.10 m) "
             "(navigation: SUCCESS, goal reached)",
         ),
         (
@@ -48,7 +48,7 @@ PUSHED = CALM | {"incidents": ["collision", "collision_with_person"], "collision
             Limits(),
             TURNED,
             False,
-            "FAILED: goal 1 was missed by 40 degrees in truth, allowed are 20 (believed 5.00 degrees) "
+            "FAILED: goal 1 was missed by 40 degrees in truth, allowed are 20 (estimated 5.00 degrees) "
             "(navigation: SUCCESS, goal reached)",
         ),
         (BLOCKED, Limits(), CALM, False, "BLOCKED_PATH: a box"),
