@@ -16,6 +16,7 @@ from typing import ClassVar
 
 from mbf_abstract.geometry import Path, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.room_to_turn import RoomToTurn, curves_ahead, wider_curves
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
@@ -78,6 +79,13 @@ class RegulatedPurePursuitParameters(PluginParameters):
     collision_check_padding: float | None = parameter(
         None, "Padding of the footprint in that simulation; absent = the costmap's.", unit="m", ge=0.0, le=1.0
     )
+    make_room_dist: float = parameter(
+        0.5,
+        "How far it may drive on in a wider curve where turning would swing the outline into something; 0 = it stops.",
+        unit="m",
+        ge=0.0,
+        le=10.0,
+    )
     control_period: float = parameter(0.05, "Time between two calls, for accelerations.", unit="s", gt=0.0, le=1.0)
 
 
@@ -88,12 +96,13 @@ class RegulatedPurePursuitController(PathFollower):
     parameters: RegulatedPurePursuitParameters
 
     _at_goal = False
+    _room_to_turn = RoomToTurn()
     _outline: tuple[Footprint, Footprint] | None = None
     """The costmap's outline without padding, and the one used by the collision check."""
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path; that the robot stood at the end of the last one no longer counts."""
-        self._at_goal = False
+        self._at_goal, self._room_to_turn = False, RoomToTurn()
         return super().set_plan(path)
 
     def parameters_changed(self) -> None:
@@ -144,19 +153,20 @@ class RegulatedPurePursuitController(PathFollower):
         if tracker.deviation > furthest:
             text = f"{tracker.deviation:.2f} m off the path, limit {furthest:.2f} m"
             return ControlResult(ExePathOutcome.MISSED_PATH, text)
-        turn = self._turn_at_goal(cycle)
-        if turn is None:
-            carrot = self._carrot(cycle)
-            backward = self.parameters.allow_reversing and tracker.driving_backward
-            bearing = math.atan2(carrot[1], carrot[0])
-            error = normalize_angle(bearing + math.pi) if backward else bearing
-            if self.rotates and abs(error) > self.parameters.rotate_to_heading_min_angle:
-                turn = error
-        if turn is not None:
-            command = Twist.planar(wz=self.rotation_speed(turn, request.velocity.wz))
-        else:
-            command = self._drive(cycle, carrot, backward)
-        return self._checked(cycle, command)
+        return self._checked(cycle, self._motions(cycle))
+
+    def _motions(self, cycle: ControlCycle) -> list[Twist]:
+        """The motion that is wanted, then those that make room for it."""
+        yaw_rate, tracker = cycle.request.velocity.wz, cycle.tracker
+        if (turn := self._turn_at_goal(cycle)) is not None:
+            return [Twist.planar(wz=self.rotation_speed(turn, yaw_rate))]
+        carrot = self._carrot(cycle)
+        backward = self.parameters.allow_reversing and tracker.driving_backward
+        bearing = math.atan2(carrot[1], carrot[0])
+        error = normalize_angle(bearing + math.pi) if backward else bearing
+        if self.rotates and abs(error) > self.parameters.rotate_to_heading_min_angle:
+            return curves_ahead(Twist.planar(wz=self.rotation_speed(error, yaw_rate)), error, backward)
+        return wider_curves(self._drive(cycle, carrot, backward))
 
     # ------------------------------------------------------------------------------------------------ steering
     def look_ahead_distance(self, speed: float) -> float:
@@ -227,22 +237,32 @@ class RegulatedPurePursuitController(PathFollower):
         return Twist.planar(vx=speed, wz=speed * curvature)
 
     # ----------------------------------------------------------------------------------------------- collisions
-    def _checked(self, cycle: ControlCycle, command: Twist) -> ControlResult:
-        """Refuse a command that leads into an obstacle within the check time, but not beyond the path's end."""
+    def _checked(self, cycle: ControlCycle, motions: list[Twist]) -> ControlResult:
+        """Take the first motion that is free within the distance for making room, else refuse."""
         if not self.parameters.collision_check:
-            return ControlResult(ExePathOutcome.SUCCESS, "", command)
+            return ControlResult(ExePathOutcome.SUCCESS, "", motions[0])
+        pose, progress, distance = cycle.request.pose, cycle.tracker.progress, self.parameters.make_room_dist
+        command, reason = self._room_to_turn.choose(
+            pose, progress, motions, distance, lambda motion: self._blocked(cycle, motion)
+        )
+        return ControlResult(ExePathOutcome.BLOCKED_PATH if reason else ExePathOutcome.SUCCESS, reason, command)
+
+    def _blocked(self, cycle: ControlCycle, command: Twist) -> str:
+        """Where a command leads into an obstacle in the check time, not beyond the path's end; empty if free."""
         duration, shortest = self.parameters.collision_check_time, self.parameters.min_distance_to_obstacle
         if command.vx != 0.0:  # a robot that may creep as far as the check time allows ends up at the obstacle
             duration = max(duration, shortest / max(abs(command.vx), SLOWEST))
         duration /= cycle.limit_factor
         if command.vx != 0.0:
             duration = min(duration, max(cycle.tracker.remaining, 0.0) / abs(command.vx))
-        step = min(cycle.costmap.resolution / max(abs(command.vx), 1e-3), 0.1, max(duration, 1e-3))
+        outline_speed = abs(command.vx) + abs(command.wz) * cycle.footprint.footprint.circumscribed_radius
+        # Half a cell of the outline from pose to pose, and among them those of the next cycles.
+        period = self.parameters.control_period
+        step = period / math.ceil(period * outline_speed / (0.5 * cycle.costmap.resolution) + 1e-9)
         pose = cycle.request.pose
-        poses = arc_poses((pose.x, pose.y, pose.yaw), command.vx, 0.0, command.wz, max(duration, 1e-3), step)
+        poses = arc_poses((pose.x, pose.y, pose.yaw), command.vx, 0.0, command.wz, max(duration, step), step)
         hit = cycle.footprint.first_collision(cycle.costmap, poses)
         if hit < 0:
-            return ControlResult(ExePathOutcome.SUCCESS, "", command)
+            return ""
         x, y = poses[hit, 0], poses[hit, 1]
-        text = f"obstacle ahead: the footprint would collide at ({x:.2f}, {y:.2f}) in {(hit + 1) * step:.2f} s"
-        return ControlResult(ExePathOutcome.BLOCKED_PATH, text)
+        return f"obstacle ahead: the footprint would collide at ({x:.2f}, {y:.2f}) in {(hit + 1) * step:.2f} s"

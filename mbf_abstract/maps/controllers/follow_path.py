@@ -18,6 +18,7 @@ from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.navigation_map import MapPlugin
+from mbf_abstract.maps.room_to_turn import RoomToTurn, curves_ahead, wider_curves
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
@@ -37,6 +38,13 @@ class FollowPathParameters(PluginParameters):
     )
     turn_gain: float = parameter(2.0, "Yaw rate per heading error when turning on the spot.", unit="1/s", gt=0.0)
     check_ahead_time: float = parameter(1.0, "How far ahead the motion must be free.", unit="s", gt=0.0, le=10.0)
+    make_room_dist: float = parameter(
+        0.5,
+        "How far it may drive on in a wider curve where turning would touch something; 0 = it stops.",
+        unit="m",
+        ge=0.0,
+        le=10.0,
+    )
     max_path_distance: float = parameter(
         1.0, "Farther from the path than this the path is missed.", unit="m", gt=0.0, le=100.0
     )
@@ -52,6 +60,7 @@ class FollowPath(MapPlugin, AbstractController):
     parameters: FollowPathParameters
 
     _tracker: PathTracker | None = None
+    _room_to_turn = RoomToTurn()
 
     @property
     def turns_on_the_spot(self) -> bool:
@@ -60,7 +69,7 @@ class FollowPath(MapPlugin, AbstractController):
 
     def set_plan(self, path: Path) -> bool:
         """Take over a path that has poses."""
-        self._tracker = PathTracker(path, dimensions=2) if len(path) else None
+        self._tracker, self._room_to_turn = PathTracker(path, dimensions=2) if len(path) else None, RoomToTurn()
         return self._tracker is not None
 
     def compute_velocity_commands(self, request: ControlRequest) -> ControlResult:
@@ -73,14 +82,18 @@ class FollowPath(MapPlugin, AbstractController):
         if tracker.deviation > farthest:
             text = f"{tracker.deviation:.2f} m off the path, limit {farthest:.2f} m"
             return ControlResult(ExePathOutcome.MISSED_PATH, text)
-        command = self._steer(pose, tracker)
         try:
-            obstacle = self.navigation_map.obstacle_ahead(self.on_map(pose), command, p.check_ahead_time)
+            there = self.on_map(pose)
+            command, obstacle = self._room_to_turn.choose(
+                pose,
+                tracker.progress,
+                self._motions(pose, tracker),
+                p.make_room_dist,
+                lambda motion: self.navigation_map.obstacle_ahead(there, motion, p.check_ahead_time),
+            )
         except TransformError as error:
             return ControlResult(ExePathOutcome.TF_ERROR, str(error))
-        if obstacle:
-            return ControlResult(ExePathOutcome.BLOCKED_PATH, obstacle)
-        return ControlResult(ExePathOutcome.SUCCESS, "", command)
+        return ControlResult(ExePathOutcome.BLOCKED_PATH if obstacle else ExePathOutcome.SUCCESS, obstacle, command)
 
     def is_goal_reached(self, pose: Pose, dist_tolerance: float, angle_tolerance: float) -> bool:
         """Whether the path has been driven to its end, and the pose is within both tolerances of it."""
@@ -91,20 +104,24 @@ class FollowPath(MapPlugin, AbstractController):
         gap, turn = self._from_goal(pose, tracker)
         return tracker.has_arrived(dist_tolerance) and gap <= dist_tolerance and abs(turn) <= angle_tolerance
 
-    def _steer(self, pose: Pose, tracker: PathTracker) -> Twist:
-        """Turn on the spot at a large heading error, or at the goal to its heading; else drive along the arc."""
+    def _motions(self, pose: Pose, tracker: PathTracker) -> list[Twist]:
+        """A turn on the spot at a large heading error, or at the goal to its heading; else a drive along the arc.
+
+        After the wanted motion come those that make room for it.
+        """
         p = self.parameters
         gap, turn = self._from_goal(pose, tracker)
         if tracker.on_last_section and tracker.remaining < 0.5 * MIN_SPEED and gap < MIN_SPEED:
-            return self._turn(turn)
+            return [self._turn(turn)]
         x, y = tracker.point_at(min(tracker.progress + p.look_ahead_dist, tracker.next_cusp)).tolist()
         bearing, curvature = arc_to(pose, np.array([x, y, pose.z]))
         if abs(bearing) > p.turn_in_place_angle:
-            return self._turn(bearing)
+            return curves_ahead(self._turn(bearing), bearing)
         left = max(tracker.to_cusp, gap if tracker.on_last_section else 0.0)
         speed = min(p.max_vel_x, p.max_vel_theta / max(abs(curvature), 1e-6), math.sqrt(2.0 * p.decel_lim_x * left))
         speed = max(speed, min(MIN_SPEED, p.max_vel_x))
-        return Twist.planar(vx=speed, wz=max(-p.max_vel_theta, min(speed * curvature, p.max_vel_theta)))
+        turn = max(-p.max_vel_theta, min(speed * curvature, p.max_vel_theta))
+        return wider_curves(Twist.planar(vx=speed, wz=turn))
 
     def _turn(self, angle: float) -> Twist:
         limit = self.parameters.max_vel_theta
