@@ -25,7 +25,8 @@ import numpy as np
 
 from mbf_costmap_nav.kernels.search.grid_line import line_cost, pull_string
 from mbf_costmap_nav.kernels.search.grid_path import trace_cells
-from mbf_costmap_nav.kernels.search.grid_search import FOUND, pad_cells, search
+from mbf_costmap_nav.kernels.search.grid_search import FOUND, search
+from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid, pad_cells
 from mbf_costmap_nav.kernels.search.short_lines import trace_lines
 from mbf_costmap_nav.kernels.search.theta_star import theta_search
 from mbf_costmap_nav.planning.search_grid import traversal_table
@@ -44,13 +45,13 @@ def read_map(path: FilePath) -> np.ndarray:
     return np.array([[0 if c in ".G" else 254 for c in row] for row in rows if row], dtype=np.uint8)
 
 
-def octile_steps(grid: tuple[np.ndarray, int], start: int, goal: int) -> tuple[float, int]:
+def octile_steps(grid: PaddedGrid, start: int, goal: int) -> tuple[float, int]:
     """Straight and diagonal steps of our A* path; inf straight ones without a path."""
-    cells, stride = grid
-    status, g = search(cells, stride, TABLE, start, goal, 1.0, False, False, NO_CANCEL)
+    stride = grid.stride
+    status, g = search(grid, start, goal, 1.0, False, False, NO_CANCEL)
     if status != FOUND:
         return math.inf, 0
-    path = trace_cells(cells, stride, TABLE, g, goal, False)
+    path = trace_cells(grid, g, goal, False)
     diagonal = int(np.count_nonzero(np.diff(path // stride) * np.diff(path % stride)))
     return len(path) - 1 - diagonal, diagonal
 
@@ -70,7 +71,7 @@ def scenario_results(data: FilePath, every: int, pattern: str) -> tuple[int, int
     for scenario in sorted(data.glob(f"movingai/{pattern}.scen")):
         cells = read_map(scenario.with_name(scenario.name.removesuffix(".scen")))
         stride = cells.shape[1] + 2
-        grid = (pad_cells(cells, 254), stride)
+        grid = PaddedGrid(pad_cells(cells, 254), stride, TABLE)
         queries = [line.split() for line in scenario.read_text().splitlines()[1:] if line.strip()][::every]
         good = 0
         for query in queries:
@@ -93,12 +94,12 @@ def fine_corner(cells: np.ndarray, x: int, y: int) -> int:
     raise ValueError(f"corner ({x}, {y}) touches no free cell")
 
 
-def theta_length(grid: tuple[np.ndarray, int], start: int, goal: int) -> float:
+def theta_length(grid: PaddedGrid, start: int, goal: int) -> float:
     """Length [small cells] of the any-angle path between two small cells."""
-    cells, stride = grid
-    _, _, origin = theta_search(cells, stride, TABLE, start, goal, NO_CANCEL)
-    corners = pull_string(cells, stride, TABLE, trace_lines(origin, stride, start, goal))
-    return sum(float(line_cost(cells, stride, TABLE, int(a), int(b))) for a, b in pairwise(corners))
+    stride = grid.stride
+    _, _, origin = theta_search(grid, start, goal, NO_CANCEL)
+    corners = pull_string(grid, trace_lines(origin, stride, start, goal))
+    return sum(float(line_cost(grid, int(a), int(b))) for a, b in pairwise(corners))
 
 
 def any_angle_results(data: FilePath, every: int) -> tuple[np.ndarray, int]:
@@ -108,7 +109,7 @@ def any_angle_results(data: FilePath, every: int) -> tuple[np.ndarray, int]:
         numbers = np.array((folder / "maze.txt").read_text().split(), dtype=int)
         coarse = numbers[2:].reshape(numbers[1], numbers[0]).astype(np.uint8) * np.uint8(254)
         cells = np.repeat(np.repeat(coarse, FINE, axis=0), FINE, axis=1)
-        grid = (pad_cells(cells, 254), cells.shape[1] + 2)
+        grid = PaddedGrid(pad_cells(cells, 254), cells.shape[1] + 2, TABLE)
         for row in list(csv.reader((folder / "problems.csv").open()))[1::every]:
             start, goal = fine_corner(cells, int(row[0]), int(row[1])), fine_corner(cells, int(row[2]), int(row[3]))
             theta = theta_length(grid, start, goal)

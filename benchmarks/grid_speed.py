@@ -26,7 +26,8 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import CellBox
 from mbf_costmap_nav.kernels.map.inflation import inflate
-from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND, pad_cells, search
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND, search
+from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid, pad_cells
 from mbf_costmap_nav.kernels.search.search_cells import new_records
 from mbf_costmap_nav.kernels.search.theta_star import theta_search
 from mbf_costmap_nav.layers.inflation import cost_table
@@ -107,8 +108,9 @@ class Suite:
         self.lethal = rooms(size)
         self.cells = inflated(self.lethal)
         self.table = traversal_table(2.0, 253, False)
-        self.padded, self.stride = pad_cells(self.cells, 254), size + 2
-        self.records = new_records(self.padded.size)  # kept from search to search, as planners do
+        self.stride = size + 2
+        self.padded = PaddedGrid(pad_cells(self.cells, 254), self.stride, self.table)
+        self.records = new_records(self.padded.cells.size)  # kept from search to search, as planners do
         self.start = (20 + 1) * self.stride + 20 + 1
         field = self.field()[1]
         self.goal = int(np.flatnonzero(np.isfinite(field))[-1])  # the reached cell nearest to the far corner
@@ -130,23 +132,19 @@ class Suite:
 
     def astar(self) -> tuple[int, np.ndarray]:
         """Run our A*."""
-        return search(
-            self.padded, self.stride, self.table, self.start, self.goal, 1.0, False, False, NO_CANCEL, self.records
-        )
+        return search(self.padded, self.start, self.goal, 1.0, False, False, NO_CANCEL, self.records)
 
     def field(self) -> tuple[int, np.ndarray]:
         """Run our full field."""
-        return search(self.padded, self.stride, self.table, self.start, -1, 0.0, False, False, NO_CANCEL, self.records)
+        return search(self.padded, self.start, -1, 0.0, False, False, NO_CANCEL, self.records)
 
     def interpolated(self) -> tuple[int, np.ndarray]:
         """Run navfn's potential up to the goal."""
-        return search(
-            self.padded, self.stride, self.table, self.start, self.goal, 0.0, False, True, NO_CANCEL, self.records
-        )
+        return search(self.padded, self.start, self.goal, 0.0, False, True, NO_CANCEL, self.records)
 
     def theta(self) -> tuple[int, np.ndarray, np.ndarray]:
         """Run our Theta*."""
-        return theta_search(self.padded, self.stride, self.table, self.start, self.goal, NO_CANCEL)
+        return theta_search(self.padded, self.start, self.goal, NO_CANCEL)
 
     def run(self) -> None:
         """All pairs whose peer is there."""
@@ -229,7 +227,7 @@ def cancel_delay(suite: Suite, after: float) -> float:
 
     def field() -> int:
         padded = pad_cells(suite.cells, 254, flag)
-        return search(padded, suite.stride, suite.table, suite.start, -1, 0.0, False, False, flag)[0]
+        return search(PaddedGrid(padded, suite.stride, suite.table), suite.start, -1, 0.0, False, False, flag)[0]
 
     with ThreadPoolExecutor(1) as pool:
         running = pool.submit(field)

@@ -126,8 +126,8 @@ class CostmapNavigationServer(MapServer):
         """Take every image format this package reads, and map_server's YAML."""
         if file.suffix.lower() not in MAP_SUFFIXES:
             return None
-        words = {"allow_unknown": json.dumps(unknown_is_free), "track_unknown": json.dumps(not unknown_is_free)}
-        return BARE_MAP.format(file=json.dumps(str(file)), **words)
+        keys = {"allow_unknown": json.dumps(unknown_is_free), "track_unknown": json.dumps(not unknown_is_free)}
+        return BARE_MAP.format(file=json.dumps(str(file)), **keys)
 
     @classmethod
     def read_floor(cls, file: Path) -> FloorMap | None:

@@ -3,7 +3,7 @@
 >>> def test_my_layer_keeps_the_contract():
 ...     check_layer(MyLayer)
 
-It raises one ``ContractBroken`` with everything it found. Whether the costs are the right ones it cannot know.
+It raises one ``ContractBroken`` with everything it found. It does not check whether the costs are the right ones.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def check_layer(
     parameters : LayerParameters, optional
         The class's defaults if not given.
     background : Costmap, optional
-        What the layers before it have written, and the map of a static layer; a room of 6 m x 4 m if not given.
+        What the layers before it have written, and the map of a static layer; a hall of 6 m x 4 m if not given.
     scans : sequence of RangeScan
         What the sources of a sensor layer see, in the frame of the map, with stamps around 1 s.
     base_folder : path
@@ -65,17 +65,17 @@ def check_layer(
     ContractBroken
         With everything that is wrong.
     """
-    room = _room() if background is None else background
+    hall = _hall() if background is None else background
     seen = [array for scan in scans for array in (scan.ends, scan.hits)]
-    report = Report(layer_class, [room.cells, *seen])
+    report = Report(layer_class, [hall.cells, *seen])
     chosen = layer_class.Parameters() if parameters is None else parameters
     for track_unknown_space in (False, True):
 
         def make(rolling: bool = False, unknown: bool = track_unknown_space) -> _Site:
             context = LayerContext(
-                "dut", chosen, room.frame_id, rolling, unknown, base_folder=Path(base_folder), static_map=room
+                "dut", chosen, hall.frame_id, rolling, unknown, base_folder=Path(base_folder), static_map=hall
             )
-            return _Site(layer_class(context), room, report)
+            return _Site(layer_class(context), hall, report)
 
         with report.no_exception("construction"):
             site, twin = make(), make()
@@ -161,15 +161,15 @@ def _check_clear_area(make: Callable[[], _Site], scans: Scans, report: Report) -
 class _Site:
     """The part of a layered costmap that one layer sees: cells, a box, and what was written before it."""
 
-    def __init__(self, layer: CostmapLayer, room: Costmap, report: Report) -> None:
+    def __init__(self, layer: CostmapLayer, hall: Costmap, report: Report) -> None:
         self.layer = layer
         self.report = report
-        self.pose = Pose.planar(*room.cell_to_world(room.width // 2, room.height // 2), frame_id=room.frame_id)
-        self.background = room.cells.copy()
+        self.pose = Pose.planar(*hall.cell_to_world(hall.width // 2, hall.height // 2), frame_id=hall.frame_id)
+        self.background = hall.cells.copy()
         if not layer.track_unknown_space:
             self.background[self.background == UNKNOWN] = FREE
         self.cells = self.background.copy()
-        layer.match_geometry(room.geometry)
+        layer.match_geometry(hall.geometry)
         layer.set_footprint(Footprint.circle(0.2))
 
     def see(self, scans: Scans) -> CellArray:
@@ -213,8 +213,8 @@ class _Site:
         return self.cells.copy()
 
 
-def _room() -> Costmap:
-    """Free space with a wall, a grey area, a lone cell and a corner nobody has seen.
+def _hall() -> Costmap:
+    """Free space with a wall, a grey area, a lone cell and an unknown corner.
 
     The resolution is a power of two, so that a moved window rounds no point into another cell.
     """

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mbf_abstract.maps.queries import CellState
 from mbf_costmap_nav.grid.costmap import INSCRIBED, LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.kernels.map.footprint_samples import polygon_costs
+from mbf_costmap_nav.kernels.map.rasterisation import polygon_costs
 
 
 class FootprintCosts(NamedTuple):

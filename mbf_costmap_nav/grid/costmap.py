@@ -150,7 +150,7 @@ class Costmap(GridGeometry):
     Parameters
     ----------
     cells : (height, width) uint8
-        Costs; not copied. C-contiguous, so that kernels take it as it is.
+        Costs; not copied. C-contiguous, so that kernels take it without a copy.
     resolution : float
         Side of a cell [m].
     origin_x, origin_y : float

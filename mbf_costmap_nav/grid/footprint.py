@@ -1,6 +1,6 @@
 """The robot's outline in the plane: parsing, radii, padding and true offset.
 
-There are two ways to enlarge an outline, because callers need different ones:
+There are two kinds of enlarged outlines:
 
 - ``padded`` is costmap_2d's ``footprint_padding``: every vertex moves by the padding along x and along y, away from
   the base's axes. It keeps the number of vertices and is what users' configurations mean. It is not an offset: the

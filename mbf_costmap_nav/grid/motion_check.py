@@ -15,7 +15,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.arcs import arc_poses
 from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.kernels.map.footprint_samples import blocked_under
+from mbf_costmap_nav.kernels.map.rasterisation import blocked_under
 
 
 def obstacle_ahead(

@@ -1,4 +1,4 @@
-"""The one way kernels of this package are compiled; it keeps their annotations visible to mypy.
+"""The decorator with which all kernels of this package are compiled; it keeps their annotations visible to mypy.
 
 Nothing is compiled at import: numba specialises a kernel at its first call and keeps the machine code on disk, until a
 file of this folder changes. Kernels run without the interpreter lock and in strict IEEE arithmetic, so NaN and inf keep

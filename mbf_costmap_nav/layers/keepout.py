@@ -17,7 +17,7 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, FREE, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
 from mbf_costmap_nav.grid.resampling import sample_costmap
-from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon
+from mbf_costmap_nav.kernels.map.rasterisation import fill_polygon
 from mbf_costmap_nav.map.area_layer import AreaLayer, AreaLayerParameters
 from mbf_costmap_nav.map.layer import CombinationMethod, LayerContext, combine
 

@@ -22,7 +22,7 @@ from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import FREE, LETHAL, CellArray, CellBox
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon
+from mbf_costmap_nav.kernels.map.rasterisation import fill_polygon
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays, mark_points
 from mbf_costmap_nav.map.layer import CombinationMethod, GridLayer, LayerContext, combine
 from mbf_costmap_nav.map.sensor_data import ObservationBuffer, SourceParameters

@@ -16,7 +16,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.grid.costmap import EMPTY_BOX, CellBox, GridGeometry
-from mbf_costmap_nav.kernels.map.footprint_samples import fill_polygon
+from mbf_costmap_nav.kernels.map.rasterisation import fill_polygon
 from mbf_costmap_nav.kernels.map.voxel import clear_voxel_rays, mark_voxels, project_columns
 from mbf_costmap_nav.layers.obstacle import ObstacleLayer, ObstacleLayerParameters
 from mbf_costmap_nav.map.layer import clear_cells, shifted

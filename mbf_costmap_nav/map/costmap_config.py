@@ -1,7 +1,7 @@
 """Building a ``LayeredCostmap`` from configuration.
 
 A costmap's block has the keys of ``CostmapParameters``; each layer's own parameters stand in a block of the layer's
-name, the way MBF writes its plugin lists::
+name, as in the plugin lists of MBF::
 
     global_costmap:
       resolution: 0.05

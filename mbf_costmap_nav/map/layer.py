@@ -2,7 +2,7 @@
 
 One update of a ``LayeredCostmap`` runs in two passes over its layers, in the configured order:
 
-1. ``update_bounds``: a layer takes in what it learnt and returns the box of cells that may change, grown from the box
+1. ``update_bounds``: a layer takes in new data and returns the box of cells that may change, grown from the box
    of the layers before it.
 2. ``update_costs``: the box is reset and every layer writes its part into the shared cells.
 
@@ -82,7 +82,7 @@ class CostmapLayer(MapLayer):
 
     contract_check: ClassVar[str] = "mbf_costmap_nav.testing:check_layer"
     clearable: ClassVar[bool] = True
-    """Whether clearing an area means this layer although nobody named it; false for what no sensor brings back."""
+    """Whether it is cleared with an area if no layers are named; false for what no sensor brings back."""
     geometry: GridGeometry
 
     def __init__(self, context: LayerContext) -> None:
@@ -193,7 +193,7 @@ def clear_cells(cells: NDArray[CellType], box: CellBox, inside: bool, value: flo
 
 
 def combine(cells: CellArray, layer_cells: CellArray, box: CellBox, method: CombinationMethod) -> None:
-    """Write a layer's cells of ``box`` into the costmap's; unknown layer cells change nothing under a maximum."""
+    """Write a layer's cells of ``box`` into the costmap's; unknown ones change nothing under a maximum."""
     old, new = cells[box.slices], layer_cells[box.slices]
     if method is CombinationMethod.OVERWRITE:
         np.copyto(old, new, where=new != UNKNOWN)

@@ -1,7 +1,7 @@
 """The four questions a client may ask a costmap without planning: cost of a point, a pose, a path; nearest valid pose.
 
 Semantics are those of MBF's costmap services (check_point_cost, check_pose_cost, check_path_cost, find_valid_pose),
-with these deviations, each the cure of a known fault:
+with these deviations, each of which avoids a known fault:
 
 - no cell is counted twice (there the outline was), and the safety distance is a true offset of the footprint;
 - a search that finds nothing returns no pose (there it returned the one it was asked about).
@@ -109,7 +109,7 @@ def find_valid_pose(
 
 
 def _turned(pose: Pose, place: NDArray[np.float64], turn: float) -> Pose:
-    """``pose`` moved to ``place`` (2,) [m] and turned by ``turn`` [rad]; without a turn its orientation as it is."""
+    """``pose`` moved to ``place`` (2,) [m] and turned by ``turn`` [rad]; without a turn it keeps its orientation."""
     x, y = place.tolist()
     orientation = pose.orientation if turn == 0.0 else Pose.planar(0.0, 0.0, pose.yaw + turn).orientation
     return Pose((x, y, pose.z), orientation, pose.frame_id, pose.stamp)

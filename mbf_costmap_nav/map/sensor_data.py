@@ -14,7 +14,7 @@ MAX_OBSERVATIONS = 256
 
 
 class SourceTiming(ParameterModel):
-    """How often a sensor must speak."""
+    """How often a sensor must send."""
 
     expected_update_rate: float = parameter(
         1.0, "Longest allowed time between two observations; 0 switches the check off.", unit="s", ge=0.0
@@ -25,7 +25,7 @@ class SourceParameters(SourceTiming):
     """One observation source of a layer."""
 
     marking: bool = parameter(True, "Whether hits of this source put obstacles on the map.")
-    clearing: bool = parameter(True, "Whether rays of this source remove obstacles along their way.")
+    clearing: bool = parameter(True, "Whether rays of this source remove obstacles along them.")
     obstacle_max_range: float = parameter(2.5, "Hits farther than this are not marked.", unit="m", gt=0.0)
     obstacle_min_range: float = parameter(0.0, "Hits nearer than this are not marked.", unit="m", ge=0.0)
     raytrace_max_range: float = parameter(3.0, "Rays clear up to this distance.", unit="m", gt=0.0)

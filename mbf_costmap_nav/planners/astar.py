@@ -46,12 +46,12 @@ class AStarPlanner(GridPlanner):
             return plan_down_potential(grid, start, goal, tolerance, interpolated=True)
         cut, goal_cell = self.parameters.cut_corners, grid.cell_of(goal)
         first, last, flag = grid.index(grid.cell_of(start)), grid.index(goal_cell), grid.token.flag
-        status, g = search(grid.cells, grid.stride, grid.table, first, last, 1.0, cut, False, flag, grid.records())
+        status, g = search(grid.padded, first, last, 1.0, cut, False, flag, grid.records())
         if status == CANCELED:
             return NO_LEG
         end = goal_cell if g[last] < float("inf") else grid.nearest_reached(g, goal, tolerance)
         if end is None:
             return NO_LEG
-        trace = trace_cells(grid.cells, grid.stride, grid.table, g, grid.index(end), cut)
+        trace = trace_cells(grid.padded, g, grid.index(end), cut)
         cost = float(g[grid.index(end)]) * grid.costmap.resolution
         return Leg(grid.points(trace[::-1]), cost, end == goal_cell)

@@ -92,12 +92,12 @@ class _World:
     def field(self, source: Pose) -> NDArray[np.float32]:
         """(n,) cost [cells] of the padded grid's cells from a pose's cell around what blocks the centre."""
         grid, first = self.grid, self.grid.index(self.grid.cell_of(source))
-        _, g = search(grid.cells, grid.stride, grid.table, first, -1, 0.0, True, False, grid.token.flag)
+        _, g = search(grid.padded, first, -1, 0.0, True, False, grid.token.flag)
         return g
 
     def rows(self, field: NDArray[np.float32]) -> NDArray[np.float32]:
         """(height, width) of a field, without the padding."""
-        return field.reshape(-1, self.grid.stride)[1:-1, 1:-1]
+        return field.reshape(-1, self.grid.padded.stride)[1:-1, 1:-1]
 
 
 @dataclass(frozen=True)

@@ -61,5 +61,5 @@ def _weighted_length(grid: SearchGrid, ends: NDArray[np.float64]) -> float:
     """Cost [m, weighted] of the free line between two points (2, 2) [m]."""
     samples = resample(ends, grid.costmap.resolution / SAMPLES_PER_CELL)
     cells, _ = grid.costmap.world_to_cells(0.5 * (samples[1:] + samples[:-1]))
-    traversal = grid.table[grid.costmap.cells[cells[:, 1], cells[:, 0]]]
+    traversal = grid.padded.table[grid.costmap.cells[cells[:, 1], cells[:, 0]]]
     return float(np.mean(traversal, dtype=np.float64)) * math.dist(ends[0], ends[1])

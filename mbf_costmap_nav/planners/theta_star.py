@@ -50,19 +50,19 @@ class ThetaStarPlanner(GridPlanner):
         """Search, then shorten by string pulling."""
         goal_cell, source = grid.cell_of(goal), grid.index(grid.cell_of(start))
         last, flag = grid.index(goal_cell), grid.token.flag
-        status, g, origin = theta_search(grid.cells, grid.stride, grid.table, source, last, flag)
+        status, g, origin = theta_search(grid.padded, source, last, flag)
         if status == CANCELED:
             return NO_LEG
         end = goal_cell if status == FOUND else grid.nearest_reached(g, goal, tolerance)
         if end is None:
             return NO_LEG
-        lines = trace_lines(origin, grid.stride, source, grid.index(end))
-        corners = pull_string(grid.cells, grid.stride, grid.table, lines)
+        lines = trace_lines(origin, grid.padded.stride, source, grid.index(end))
+        corners = pull_string(grid.padded, lines)
         return Leg(grid.points(corners), path_cost(grid, corners), end == goal_cell)
 
 
 def path_cost(grid: SearchGrid, corners: NDArray[np.int32]) -> float:
     """Cost [m, weighted] of straight lines between flat padded indices."""
     pieces = zip(corners[:-1].tolist(), corners[1:].tolist(), strict=True)
-    total = sum(float(line_cost(grid.cells, grid.stride, grid.table, a, b)) for a, b in pieces)
+    total = sum(float(line_cost(grid.padded, a, b)) for a, b in pieces)
     return total * grid.costmap.resolution

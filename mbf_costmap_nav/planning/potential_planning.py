@@ -39,9 +39,9 @@ def plan_down_potential(
         return NO_LEG
     cost = float(g[source]) * grid.costmap.resolution
     if not gradient_path:
-        cells = trace_cells(grid.cells, grid.stride, grid.table, g, source, False)
+        cells = trace_cells(grid.padded, g, source, False)
         return Leg(grid.points(cells), cost, reached_goal)
-    points = trace_gradient(grid.cells, grid.stride, grid.table, g, source) - 1.0
+    points = trace_gradient(grid.padded, g, source) - 1.0
     return Leg(grid.costmap.cells_to_world(points), cost, reached_goal)
 
 
@@ -57,7 +57,5 @@ def _from_nearest_end(
 def _propagate(grid: SearchGrid, source: Cell, until: int, interpolated: bool) -> NDArray[np.float32] | None:
     """Field from ``source`` up to the padded index ``until``, or everywhere for -1; None when cancelled."""
     first, flag = grid.index(source), grid.token.flag
-    status, g = search(
-        grid.cells, grid.stride, grid.table, first, until, 0.0, False, interpolated, flag, grid.records()
-    )
+    status, g = search(grid.padded, first, until, 0.0, False, interpolated, flag, grid.records())
     return None if status == CANCELED else g

@@ -16,8 +16,8 @@ from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.grid.costmap import LETHAL, UNKNOWN, Costmap
 from mbf_costmap_nav.kernels.map.line_cells import cost_along
-from mbf_costmap_nav.kernels.search.grid_search import pad_cells
 from mbf_costmap_nav.kernels.search.nearest_cell import nearest_reached
+from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid, pad_cells
 from mbf_costmap_nav.kernels.search.search_cells import Records, new_records
 
 Cell = tuple[int, int]
@@ -61,12 +61,8 @@ class SearchGrid:
     Attributes
     ----------
     costmap : Costmap
-    cells : (n,) uint8
-        Flat padded costs.
-    stride : int
-        Row length of the padded grid.
-    table : (256,) float32
-        Traversal of each cost, 1 for free, inf for blocked.
+    padded : PaddedGrid
+        Its costs and their traversal, 1 for free, inf for blocked.
     token : CancelToken
         Ends long searches early; their results are then invalid.
     workspace : SearchWorkspace
@@ -74,9 +70,7 @@ class SearchGrid:
     """
 
     costmap: Costmap
-    cells: NDArray[np.uint8]
-    stride: int
-    table: NDArray[np.float32]
+    padded: PaddedGrid
     token: CancelToken
     workspace: SearchWorkspace
 
@@ -90,18 +84,12 @@ class SearchGrid:
     ) -> SearchGrid:
         """Prepare a snapshot with the costs of a planner."""
         table = traversal_table(parameters.cost_factor, parameters.lethal_cost, parameters.allow_unknown)
-        return cls(
-            costmap,
-            pad_cells(costmap.cells, LETHAL, token.flag),
-            costmap.width + 2,
-            table,
-            token,
-            workspace or SearchWorkspace(),
-        )
+        padded = PaddedGrid(pad_cells(costmap.cells, LETHAL, token.flag), costmap.width + 2, table)
+        return cls(costmap, padded, token, workspace or SearchWorkspace())
 
     def records(self) -> Records:
         """Return memory for a search on this grid; it holds the records of the last one."""
-        return self.workspace.records(self.cells.size)
+        return self.workspace.records(self.padded.cells.size)
 
     @property
     def geometry(self) -> NDArray[np.float64]:
@@ -110,7 +98,7 @@ class SearchGrid:
 
     def index(self, cell: Cell) -> int:
         """Flat padded index of a cell (ix, iy)."""
-        return (cell[1] + 1) * self.stride + cell[0] + 1
+        return (cell[1] + 1) * self.padded.stride + cell[0] + 1
 
     def cell_of(self, pose: Pose) -> Cell:
         """Cell that holds a pose, or the nearest one of the map."""
@@ -118,17 +106,18 @@ class SearchGrid:
 
     def points(self, indices: NDArray[np.int32]) -> NDArray[np.float64]:
         """Centres (n, 2) [m] of flat padded indices (n,)."""
-        return self.costmap.cells_to_world(np.column_stack([indices % self.stride - 1, indices // self.stride - 1]))
+        rows, columns = np.divmod(indices, self.padded.stride)
+        return self.costmap.cells_to_world(np.column_stack([columns - 1, rows - 1]))
 
     def is_blocked(self, cell: Cell) -> bool:
         """Whether the planner may not enter a cell."""
-        return math.isinf(self.table[self.costmap.cost(*cell)])
+        return math.isinf(self.padded.table[self.costmap.cost(*cell)])
 
     def is_free_line(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether the line between two points (x, y) [m] runs through no blocked cell and does not leave the map."""
         (x0, y0), (x1, y1) = ((np.asarray(p) - self.geometry[1:]) / self.costmap.resolution for p in (a, b))
-        unknown = LETHAL if math.isinf(self.table[UNKNOWN]) else 0
-        first_blocked = int(np.argmax(np.isinf(self.table[:UNKNOWN])))
+        unknown = LETHAL if math.isinf(self.padded.table[UNKNOWN]) else 0
+        first_blocked = int(np.argmax(np.isinf(self.padded.table[:UNKNOWN])))
         return int(cost_along(self.costmap.cells, unknown, x0, y0, x1, y1)) < first_blocked
 
     def nearest_reached(
@@ -139,7 +128,7 @@ class SearchGrid:
         Of equally near cells the one of lower ``g`` counts. With footprint ``samples`` (n, 2) [m] the robot must fit
         there at the goal's heading.
         """
-        unknown = LETHAL if math.isinf(self.table[UNKNOWN]) else LETHAL - 2
+        unknown = LETHAL if math.isinf(self.padded.table[UNKNOWN]) else LETHAL - 2
         wanted = np.array([goal.x, goal.y, goal.yaw])
         ix, iy = nearest_reached(
             g, self.costmap.cells, unknown, self.geometry, samples, wanted, tolerance, self.token.flag

@@ -3,8 +3,8 @@
 When to use: thousands of poses of one footprint on one snapshot (``hybrid_astar``). When not: one pose or a few, for
 which ``pose_cost`` alone is enough.
 
-Most poses are far from obstacles, and one look at each of a few cells proves it: the ``discs`` cover the footprint, and
-no lethal cell is near the centre of any. Only where one of the cells is ``tight`` are the covering points looked at.
+Most poses are far from obstacles, which a look-up of a few cells proves: the ``discs`` cover the footprint, and no
+lethal cell is near the centre of any. The footprint samples are looked at only where one of these cells is ``tight``.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Ground(NamedTuple):
     geometry : (resolution, origin_x, origin_y)
         [m].
     samples : (n, 2) float64
-        Covering points of the footprint in the base frame [m], neighbours far apart so that a collision shows early.
+        Footprint samples in the base frame [m], neighbours far apart so that a collision shows early.
     discs : (k, 2) float64
         Centres [m] of the discs that cover the samples.
     tight : (height, width) uint8
@@ -55,14 +55,14 @@ class Ground(NamedTuple):
 
 
 def ground_of(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, samples: FloatArray) -> Ground:
-    """Prepare a snapshot for a footprint's covering points (n, 2) [m]; the arguments are those of ``Ground``."""
+    """Prepare a snapshot for footprint samples (n, 2) [m]; the arguments are those of ``Ground``."""
     order = np.argsort((np.arange(len(samples)) * GOLDEN_RATIO) % 1.0, kind="stable")
     discs = _disc_centres(samples)
     gaps = np.hypot(samples[:, None, 0] - discs[None, :, 0], samples[:, None, 1] - discs[None, :, 1])
     radius = min(LARGEST_RADIUS, math.ceil(gaps.min(axis=1).max() / geometry[0] + CELL_DIAGONAL))
     tight = np.zeros_like(cells)
     if radius == LARGEST_RADIUS:
-        tight[:] = 1  # a robot of hundreds of cells: all its points are looked at
+        tight[:] = 1  # a robot of hundreds of cells: all its samples are looked at
     height, width = cells.shape
     seeds = (cells == LETHAL).astype(np.uint8)
     inflate(tight, seeds, (0, 0, width, height), np.ones(radius * radius + 1, dtype=np.uint8), radius, 1)
@@ -109,7 +109,7 @@ def _centre_cost(cells: NDArray[np.uint8], unknown: int, geometry: FloatArray, p
 
 @kernel
 def fitting_cost(ground: Ground, pose: FloatArray) -> int:
-    """What ``pose_cost`` says of the ground, sooner where no obstacle is near."""
+    """``pose_cost`` on the ground, faster where no obstacle is near."""
     geometry = ground.geometry
     cost = _centre_cost(ground.cells, ground.unknown, geometry, pose)
     if cost < 0:
@@ -129,7 +129,7 @@ def fitting_cost(ground: Ground, pose: FloatArray) -> int:
 def driven_cost(ground: Ground, start: FloatArray, poses: FloatArray) -> float:
     """Mean cost of the centre over poses (n, 3) that are driven one after the other from ``start``, or -1.
 
-    -1: the robot does not fit at one of them, or its centre crosses a blocked cell on the way to it. 0 without poses.
+    -1: the robot does not fit at one of them, or its centre crosses a blocked cell before it. 0 without poses.
     """
     total, geometry = 0.0, ground.geometry
     x, y = (start[0] - geometry[1]) / geometry[0], (start[1] - geometry[2]) / geometry[0]

@@ -60,7 +60,7 @@ ANCESTORS = (1, 2, 4, 8, 16)
 """How many arcs before and behind a meeting of the trees a curve is tried to join them."""
 MEETINGS_PER_TRY = 8
 SPARE_STATES = 500
-"""With a way known, the search for a better one goes on for half of the states so far, and these."""
+"""With a path known, the search for a better one goes on for half of the states so far, and these."""
 
 
 class Target(NamedTuple):
@@ -71,7 +71,7 @@ class Target(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """The best way so far: its ``cost`` (1,) [m], its ``states`` (2,) of both trees, the ``word`` (5, 2) between."""
+    """The best path so far: its ``cost`` (1,) [m], its ``states`` (2,) of both trees, the ``word`` (5, 2) between."""
 
     cost: FloatArray
     states: NDArray[np.int64]
@@ -104,7 +104,7 @@ def _bin_of(ground: Ground, car: Car, pose: FloatArray) -> int:
 def _join(
     ground: Ground, car: Car, side: float, tree: StateTree, other: StateTree, states: tuple[int, int], joint: Joint
 ) -> None:
-    """Try the free curve between a state of a tree and one of the other; keep it if it is the best way so far."""
+    """Try the free curve between a state of a tree and one of the other; keep it if it is the best path so far."""
     first, second = (tree, other) if side == FORWARD_SIDE else (other, tree)
     a, b = states if side == FORWARD_SIDE else (states[1], states[0])
     limit = joint.cost[0] - first.g[a] - second.g[b]
@@ -165,7 +165,7 @@ def _grow(
 ) -> StateTree:
     """Add what six arcs (three if the car may not reverse) reach; what no free ground would improve is not looked at.
 
-    ``arc`` (pieces, 3) is room to work in. The tree it returns may stand in other memory.
+    ``arc`` (pieces, 3) is working memory. The tree it returns may stand in other memory.
     """
     pose = tree.poses[state]
     for motion in range(MOTIONS if car.reversing else FORWARD_MOTIONS):
@@ -212,7 +212,7 @@ def hybrid_search(
     max_states: int,
     cancel_flag: NDArray[np.uint8],
 ) -> tuple[int, FloatArray, float, int]:
-    """Search a way from the start to the goal.
+    """Search a path from the start to the goal.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def hybrid_search(
     car : Car
     from_start, from_goal : Target
         What the trees from the start and from the goal grow to: the goal with the cost-to-go to it, and the start with
-        the cost from there, in cells; inf where there is no way.
+        the cost from there, in cells; inf where there is no path.
     wanted : (3,) float64
     tolerance : float
         If the goal is not reached, the state nearest to ``wanted`` that can be, at most so far [m] away and of its
@@ -235,7 +235,7 @@ def hybrid_search(
     poses : (m, 3) float64
         From the start to the end, at most the resolution apart.
     cost : float
-        Of the way [m], weighted.
+        Of the path [m], weighted.
     states : int
         How many were made.
     """
@@ -251,7 +251,7 @@ def hybrid_search(
         count = tree.made[0] + other.made[0]
         if cancel_flag[0] != 0:
             return CANCELED, nothing, 0.0, count
-        # 1. With a way at hand, stop when none of the open states promises a better one, or it took long enough.
+        # 1. With a path at hand, stop when none of the open states promises a better one, or it took long enough.
         if joint.cost[0] < np.inf:
             last_count = min(last_count, count + count // 2 + SPARE_STATES)
             most_promising = max(heap[0][0], other_heap[0][0]) if len(other_heap) > 0 else heap[0][0]
@@ -272,7 +272,7 @@ def hybrid_search(
                 _try_joints(ground, car, BACKWARD_SIDE, (other, tree), from_goal, state, other_waits, joint)
                 other = _grow(ground, car, BACKWARD_SIDE, other, from_goal, state, other_heap, arc)
 
-    # 3. The arcs from the start, the curve, the arcs to the goal; without a way the state that will do.
+    # 3. The arcs from the start, the curve, the arcs to the goal; without a path the state within the tolerance.
     count = tree.made[0] + other.made[0]
     if joint.cost[0] < np.inf:
         a, b = joint.states

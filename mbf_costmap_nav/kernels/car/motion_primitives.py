@@ -32,7 +32,7 @@ FORWARD_SIDE, BACKWARD_SIDE = 1.0, -1.0
 
 
 class Car(NamedTuple):
-    """How a car drives, and the costs that a search for its way weighs.
+    """How a car drives, and the costs that a search for its path weighs.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 """Replace pieces of a drivable path by free curves that cost less.
 
 When to use: behind ``hybrid_astar``, whose headings are binned and whose heuristic is weighted, so its paths wind a
-little and where its trees met they may change direction for a hand's breadth. When not: paths that are not made of a
+little and where its trees met they may change direction for a few centimetres. When not: paths that are not made of a
 car's curves; ``smoothing`` moves the points of those.
 
 Windows of the path, first long ones, then ever shorter ones, are each compared with the shortest curve between their

@@ -33,7 +33,7 @@ class StateTree(NamedTuple):
     parents : (n,) int32
         NO_STATE for the root.
     motions : (n,) int8
-        Arc that joins a state with its parent, see ``driven_arcs``.
+        Arc that joins a state with its parent, see ``motion_primitives``.
     slots : (4 n,) int32
         Hash table: the best state of a bin, or NO_STATE.
     made : (1,) int64
@@ -91,7 +91,7 @@ def with_state(
     """Append a state that is the best of its bin from now on; the tree it returns may stand in other memory."""
     state = tree.made[0]
     if state == tree.g.size:
-        tree = _with_twice_the_room(tree)
+        tree = _doubled(tree)
     tree.poses[state], tree.g[state], tree.bins[state] = pose, g, bin_of_pose
     tree.parents[state], tree.motions[state] = parent, motion
     tree.slots[_slot_of(tree, bin_of_pose)] = state
@@ -100,7 +100,7 @@ def with_state(
 
 
 @kernel
-def _with_twice_the_room(tree: StateTree) -> StateTree:
+def _doubled(tree: StateTree) -> StateTree:
     count = tree.made[0]
     larger = _empty_tree(2 * count)
     larger.poses[:count], larger.g[:count], larger.bins[:count] = tree.poses, tree.g, tree.bins

@@ -43,7 +43,7 @@ def map_costs(
     Returns
     -------
     total : (samples,) float32
-        Sum over the steps of the dearest disc's value.
+        Sum over the steps of the most expensive disc's value.
     """
     height, width = cells.shape
     flat = cells.reshape(-1)

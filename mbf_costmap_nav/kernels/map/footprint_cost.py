@@ -1,7 +1,7 @@
-"""Cost of a footprint at many poses, for rollouts: the largest cell value under points that cover the outline.
+"""Cost of a footprint at many poses, for rollouts: the largest cell value under footprint samples.
 
 When to use: thousands of poses a cycle (controllers, recoveries, hybrid A*). When not: one exact answer with every
-cell counted once, which is the job of the pose queries. The covering points are at most half a cell apart on the
+cell counted once, which is the job of the pose queries. The samples are at most half a cell apart on the
 outline and a cell apart inside, so only a corner of a cell that the outline clips by less than a quarter of its side
 can be missed.
 """
@@ -36,7 +36,7 @@ def footprint_cost(
     resolution, origin_x, origin_y : float
         Grid geometry [m].
     samples : (n, 2) float64
-        Points that cover the footprint in the base frame [m].
+        Footprint samples in the base frame [m].
     x, y, yaw : float
         Pose of the base [m, rad].
 

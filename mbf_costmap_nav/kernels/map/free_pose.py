@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
-from mbf_costmap_nav.kernels.map.footprint_samples import polygon_costs
+from mbf_costmap_nav.kernels.map.rasterisation import polygon_costs
 
 FREE, INSCRIBED, LETHAL, UNKNOWN, OUTSIDE = 0, 1, 2, 3, 4
 FloatArray = NDArray[np.float64]

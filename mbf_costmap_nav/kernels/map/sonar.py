@@ -91,9 +91,9 @@ def update_cone(
                 if distance <= reach and beside <= 0.71 * resolution:
                     probability[iy, ix] = LEAST_PROBABILITY
                 continue
-            sensor_says = occupied_given_reading(distance, angle, reading, half_angle, resolution)
+            measured = occupied_given_reading(distance, angle, reading, half_angle, resolution)
             prior = probability[iy, ix]
-            occupied, free = sensor_says * prior, (1.0 - sensor_says) * (1.0 - prior)
+            occupied, free = measured * prior, (1.0 - measured) * (1.0 - prior)
             posterior = occupied / (occupied + free)
             probability[iy, ix] = min(1.0 - LEAST_PROBABILITY, max(LEAST_PROBABILITY, posterior))
     return x0, y0, max(x0, x1), max(y0, y1)

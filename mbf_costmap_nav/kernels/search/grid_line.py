@@ -11,14 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid
 
 
 @kernel
-def line_cost(cells: NDArray[np.uint8], stride: int, table: NDArray[np.float32], a: int, b: int) -> np.float32:
+def line_cost(grid: PaddedGrid, a: int, b: int) -> np.float32:
     """Cost of the straight line between the centres of two cells (flat padded indices); inf if it is blocked.
 
     Cell by cell as in Amanatides and Woo 1987, the order of the crossings decided in integers.
     """
+    cells, stride, table = grid
     ax, ay, bx, by = a % stride, a // stride, b % stride, b // stride
     dx, dy = abs(bx - ax), abs(by - ay)
     step_x = 1 if bx > ax else -1
@@ -31,7 +33,7 @@ def line_cost(cells: NDArray[np.uint8], stride: int, table: NDArray[np.float32],
     cell, total, done = a, 0.0, 0.0
     crossed_x, crossed_y = 0, 0
     while cell != b:
-        # The next border lies at (crossed + 0.5) / d of the way, on either axis; compare by cross-multiplication.
+        # The next border lies at (crossed + 0.5) / d of the line, on either axis; compare by cross-multiplication.
         order = (2 * crossed_x + 1) * dy - (2 * crossed_y + 1) * dx
         here = table[cells[cell]]
         if order <= 0 and crossed_x < dx:
@@ -54,9 +56,7 @@ def line_cost(cells: NDArray[np.uint8], stride: int, table: NDArray[np.float32],
 
 
 @kernel
-def pull_string(
-    cells: NDArray[np.uint8], stride: int, table: NDArray[np.float32], path: NDArray[np.int32]
-) -> NDArray[np.int32]:
+def pull_string(grid: PaddedGrid, path: NDArray[np.int32]) -> NDArray[np.int32]:
     """Drop every point of a path (n,) of flat padded indices whose neighbours see each other at no higher cost.
 
     Repeats until nothing changes; the ends stay, and the cost never grows.
@@ -70,8 +70,8 @@ def pull_string(
         count = 1
         for i in range(1, current.size - 1):
             before, here, after = kept[count - 1], current[i], current[i + 1]
-            direct = line_cost(cells, stride, table, before, after)
-            around = line_cost(cells, stride, table, before, here) + line_cost(cells, stride, table, here, after)
+            direct = line_cost(grid, before, after)
+            around = line_cost(grid, before, here) + line_cost(grid, here, after)
             if direct <= around:
                 changed = True
             else:

@@ -2,7 +2,7 @@
 
 Both walk from a reached cell down to the source of the field that ``grid_search.search`` filled. The cell path is the
 exact shortest 8-connected one; the gradient path (navfn's idea) leaves the eight directions and looks smoother, but
-may be a little longer or shorter than the field says and needs a field around the path, not only on it.
+may be a little longer or shorter than in the field, and needs a field around the path, not only on it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
-from mbf_costmap_nav.kernels.search.open_list import SQRT2
+from mbf_costmap_nav.kernels.search.padded_grid import SQRT2, PaddedGrid
 
 GRADIENT_STEP = 0.5
 """Length of a step down the gradient [cells]."""
@@ -20,15 +20,9 @@ STEPS_PER_CELL = 4
 
 
 @kernel
-def best_predecessor(
-    cells: NDArray[np.uint8],
-    stride: int,
-    table: NDArray[np.float32],
-    g: NDArray[np.float32],
-    cell: int,
-    cut_corners: bool,
-) -> int:
+def best_predecessor(grid: PaddedGrid, g: NDArray[np.float32], cell: int, cut_corners: bool) -> int:
     """Neighbour over which the search reached ``cell``: the one with the least ``g + step`` (not stored, refound)."""
+    cells, stride, table = grid
     best, best_g = cell, np.float32(np.inf)
     here = np.float32(0.5) * table[cells[cell]]
     for dy in range(-1, 2):
@@ -47,14 +41,7 @@ def best_predecessor(
 
 
 @kernel
-def trace_cells(
-    cells: NDArray[np.uint8],
-    stride: int,
-    table: NDArray[np.float32],
-    g: NDArray[np.float32],
-    end: int,
-    cut_corners: bool,
-) -> NDArray[np.int32]:
+def trace_cells(grid: PaddedGrid, g: NDArray[np.float32], end: int, cut_corners: bool) -> NDArray[np.int32]:
     """Follow the best predecessors from ``end``, a reached cell, to the source of ``g``.
 
     Returns
@@ -67,7 +54,7 @@ def trace_cells(
     length = 1
     cell = end
     while g[cell] > 0.0:
-        cell = best_predecessor(cells, stride, table, g, cell, cut_corners)
+        cell = best_predecessor(grid, g, cell, cut_corners)
         if length == path.size:
             path = np.concatenate((path, np.empty_like(path)))
         path[length] = cell
@@ -100,9 +87,7 @@ def _interpolated_gradient(g: NDArray[np.float32], stride: int, x: float, y: flo
 
 
 @kernel
-def trace_gradient(
-    cells: NDArray[np.uint8], stride: int, table: NDArray[np.float32], g: NDArray[np.float32], end: int
-) -> NDArray[np.float64]:
+def trace_gradient(grid: PaddedGrid, g: NDArray[np.float32], end: int) -> NDArray[np.float64]:
     """Descend the interpolated gradient of ``g`` from the centre of ``end`` to the source of the field.
 
     Where the descent would enter an unreached cell, go up or turn on the spot it moves to the best predecessor, so it
@@ -113,7 +98,7 @@ def trace_gradient(
     points : (m, 2) float64
         Points (x, y) in padded cell units (a cell's centre has whole numbers), from ``end`` to the source.
     """
-    points = np.empty((1024, 2))
+    points, stride = np.empty((1024, 2)), grid.stride
     x, y = float(end % stride), float(end // stride)
     points[0, 0], points[0, 1] = x, y
     count, steps_inside = 1, 0
@@ -131,7 +116,7 @@ def trace_gradient(
         if step_down:
             x, y = x_new, y_new
         else:
-            after = best_predecessor(cells, stride, table, g, cell, False)
+            after = best_predecessor(grid, g, cell, False)
             x, y = float(after % stride), float(after // stride)
         steps_inside = steps_inside + 1 if after == cell else 0
         cell = after

@@ -1,11 +1,7 @@
 """Shortest paths on an 8-connected grid: A* with a bucketed open list, or Dijkstra's field of all cells.
 
-When to use: the way from one cell to one goal, or the cost of all cells (``goal`` = -1): potentials (navfn's job, the
+When to use: the path from one cell to one goal, or the cost of all cells (``goal`` = -1): potentials (navfn's job, the
 heuristic of ``hybrid_astar``). When not: any-angle paths (``theta_star``), turning circles (``hybrid_astar``).
-
-The grid is handed over flat and padded by one blocked cell on every side, so the inner loop needs no border test.
-Entering or leaving a cell costs half its *traversal* ``table[cost]`` per cell of length, so a step between cells a
-and b of length L weighs ``L * (table[a] + table[b]) / 2``: symmetric, and infinite where one of them is blocked.
 
 The result is the exact optimum as soon as the current bucket's lower end reaches g(goal); see ``open_list``.
 """
@@ -16,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
-from mbf_costmap_nav.kernels.search.open_list import INF, RING, SQRT2, Integer, bucket_width, with_room
+from mbf_costmap_nav.kernels.search.open_list import RING, bucket_width, enlarged_if_full
+from mbf_costmap_nav.kernels.search.padded_grid import INF, PaddedGrid, octile_distance
 from mbf_costmap_nav.kernels.search.relaxing import relax_bucket, relax_interpolated
 from mbf_costmap_nav.kernels.search.search_cells import (
     CAME_SHIFT,
@@ -31,46 +28,13 @@ from mbf_costmap_nav.kernels.search.search_cells import (
 FOUND, EXHAUSTED, CANCELED = 0, 1, 2
 """States of a finished search: goal settled; everything reachable settled; the cancel flag was seen."""
 
-FIRST_ROOM, CELLS_PER_ROOM = 4096, 512
-"""Entries each bucket has room for at first, and on large grids one for so many cells."""
-CELLS_PER_POLL = 1 << 20
-"""How many cells are copied between two looks at the cancel flag; at most a millisecond."""
-NEVER_CANCELED = np.zeros(1, dtype=np.uint8)
+FIRST_CAPACITY, CELLS_PER_ENTRY = 4096, 512
+"""Entries of a bucket at first, and on large grids one for so many cells."""
 LARGEST_FLOAT = np.float32(np.finfo(np.float32).max)
 
 
-def pad_cells(
-    cells: NDArray[np.uint8], border: int, cancel_flag: NDArray[np.uint8] = NEVER_CANCELED
-) -> NDArray[np.uint8]:
-    """Copy (height, width) cells into a flat ((height + 2) * (width + 2),) array framed by ``border``.
-
-    With the flag set it ends early, and what is not copied yet holds anything; ``search`` then starts nowhere.
-    """
-    height, width = cells.shape
-    padded = np.empty((height + 2, width + 2), dtype=np.uint8)
-    padded[[0, -1]] = border
-    rows = max(1, CELLS_PER_POLL // max(1, width))
-    for begin in range(0, height, rows):
-        if cancel_flag[0] != 0:
-            break
-        end = min(begin + rows, height)
-        block = padded[1 + begin : 1 + end]  # the frame too, as the first touch of a page is what takes the time
-        block[:, [0, -1]], block[:, 1:-1] = border, cells[begin:end]
-    return padded.reshape(-1)
-
-
-@kernel
-def octile_distance(dx: Integer, dy: Integer) -> np.float32:
-    """Length of the shortest 8-connected way over ``dx``, ``dy`` >= 0 free cells."""
-    if dx < dy:
-        dx, dy = dy, dx
-    return np.float32(dx) + (SQRT2 - np.float32(1.0)) * np.float32(dy)
-
-
 def search(
-    cells: NDArray[np.uint8],
-    stride: int,
-    table: NDArray[np.float32],
+    grid: PaddedGrid,
     start: int,
     goal: int,
     heuristic_scale: float,
@@ -83,12 +47,7 @@ def search(
 
     Parameters
     ----------
-    cells : (n,) uint8
-        Flat padded costs, see ``pad_cells``.
-    stride : int
-        Row length of the padded grid.
-    table : (256,) float32
-        Traversal of each cost, at least 1; inf = blocked.
+    grid : PaddedGrid
     start, goal : int
         Flat padded indices; ``goal`` = -1 settles everything reachable.
     heuristic_scale : float
@@ -110,11 +69,12 @@ def search(
         FOUND, EXHAUSTED or CANCELED.
     g : (n,) float32
         Cost from the start in traversal times cells, inf where not reached. Exact for settled cells, an upper bound
-        at the rim of the search. A view into the search's records, so not contiguous.
+        at the boundary of the search. A view into the search's records, so not contiguous.
     """
-    records = new_records(cells.size) if records is None else records
-    write_records(cells, stride, cancel_flag, records)
-    buckets = np.empty((RING, max(FIRST_ROOM, cells.size // CELLS_PER_ROOM)), dtype=np.int32)
+    records = new_records(grid.cells.size) if records is None else records
+    write_records(grid.cells, grid.stride, cancel_flag, records)
+    buckets = np.empty((RING, max(FIRST_CAPACITY, grid.cells.size // CELLS_PER_ENTRY)), dtype=np.int32)
+    stride, table = grid.stride, grid.table
     status = _search(
         records, stride, table, start, goal, heuristic_scale, cut_corners, interpolated, cancel_flag, buckets
     )
@@ -145,7 +105,7 @@ def _search(
     width = bucket_width(table, 2.0)
     inverse_width = np.float32(1.0) / width
     counts = np.zeros(RING, dtype=np.int64)
-    fresh, came = np.empty(8 * FIRST_ROOM, dtype=np.int32), np.empty(8 * FIRST_ROOM, dtype=np.uint8)
+    fresh, came = np.empty(8 * FIRST_CAPACITY, dtype=np.int32), np.empty(8 * FIRST_CAPACITY, dtype=np.uint8)
     records[start].g = 0.0
     bucket = int(scale * octile_distance(abs(start % stride - goal_x), abs(start // stride - goal_y)) * inverse_width)
     slot = bucket & (RING - 1)
@@ -177,7 +137,7 @@ def _search(
 
         # 4. Sort the improved cells into buckets by g + h; a cell that already waits there is not added again. The last
         #    improvement of a cell is its best one, so the last step to it stands.
-        buckets = with_room(buckets, counts, improved)
+        buckets = enlarged_if_full(buckets, counts, improved)
         for i in range(improved):
             cell = np.uint32(fresh[i])
             key = records[cell].g

@@ -15,7 +15,7 @@ from mbf_costmap_nav.kernels.car.ground import pose_cost
 from mbf_costmap_nav.kernels.compiled import kernel
 
 SAME_DISTANCE = 1e-6
-"""Cells whose distances [m] differ by less are told apart by their cost."""
+"""Of cells whose distances [m] differ by less the one of lower cost is taken."""
 
 
 @kernel
@@ -37,7 +37,7 @@ def nearest_reached(
         Costs from the start on the grid padded by one cell on every side.
     cells : (height, width) uint8
     unknown, geometry, samples
-        As for ``car_ground.pose_cost``; without samples no robot has to fit anywhere.
+        As for ``ground.pose_cost``; without samples no robot has to fit anywhere.
     goal : (3,) float64
         x, y [m], and the heading [rad] at which the robot has to fit.
     tolerance : float

@@ -12,21 +12,16 @@ counter only moves on if it improved, and blocked cells simply cost inf.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
+from mbf_costmap_nav.kernels.search.padded_grid import INF, SQRT2, Integer
 
 RING = 128
 """Buckets of the ring; a power of two."""
 IDLE = np.uint8(255)
 """State of a cell that waits in no bucket; any other value is the bucket's place in the ring."""
-SQRT2 = np.float32(np.sqrt(2.0))
-INF = np.float32(np.inf)
-
-Integer = int | np.integer[Any]
 
 
 @kernel
@@ -41,8 +36,8 @@ def bucket_width(table: NDArray[np.float32], steps: float) -> np.float32:
 
 
 @kernel
-def with_room(buckets: NDArray[np.int32], counts: NDArray[np.int64], added: Integer) -> NDArray[np.int32]:
-    """Buckets (RING, capacity) in which each has room for ``added`` more; the given array if they have."""
+def enlarged_if_full(buckets: NDArray[np.int32], counts: NDArray[np.int64], added: Integer) -> NDArray[np.int32]:
+    """Buckets (RING, capacity) that hold ``added`` more each; the given array where that does already."""
     needed = counts.max() + added
     if needed <= buckets.shape[1]:
         return buckets

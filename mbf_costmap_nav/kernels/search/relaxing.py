@@ -1,6 +1,6 @@
 """Relaxing what one bucket of the grid search holds: the cost of eight-connected steps, or navfn's potential.
 
-Both write down every neighbour they look at and count only those that improved; ``open_list`` says why.
+Both write down every neighbour they look at and count only those that improved; ``open_list`` explains why.
 """
 
 from __future__ import annotations
@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_costmap_nav.kernels.compiled import kernel
-from mbf_costmap_nav.kernels.search.open_list import IDLE, INF, SQRT2, Integer
+from mbf_costmap_nav.kernels.search.open_list import IDLE
+from mbf_costmap_nav.kernels.search.padded_grid import INF, SQRT2, Integer
 from mbf_costmap_nav.kernels.search.search_cells import (
     CAME_BITS,
     CAME_SHIFT,
@@ -62,9 +63,9 @@ def relax_bucket(
 
     All eight, but of a *plain* cell, whose neighbours all have its own cost, only its natural ones: straight on, and
     after a diagonal step also along its two axes. Every other neighbour is reached from the cell before over another
-    cell of the nine for the same cost or less; where it is the same, the way with the diagonal first is kept, so no two
-    cells leave a third to each other (canonical orderings, Sturtevant and Rabin 2016, after the jump point search of
-    Harabor and Grastien 2011).
+    cell of the nine for the same cost or less; where it is the same, the path with the diagonal first is kept, so no
+    two cells leave a third to each other (canonical orderings, Sturtevant and Rabin 2016, after the jump point search
+    of Harabor and Grastien 2011).
 
     Parameters
     ----------
@@ -139,7 +140,7 @@ def relax_interpolated(
 
     A cell's potential is interpolated between its lower neighbour along x and its lower one along y, as if a straight
     front came in between: with d = their difference by the cell's traversal, lower + traversal * v(d), where v is
-    navfn's parabola through the wave's travel times. It exceeds 1, the way straight from the lower neighbour, by half
+    navfn's parabola through the wave's travel times. It exceeds 1, the straight step from the lower neighbour, by half
     a per cent as d comes near 1; cut off there it never falls with a neighbour's potential, so the order of updates
     does not matter. Parameters are those of ``relax_bucket``; ``table`` is the traversal itself, and ``came`` is
     filled with NOWHERE, as a value comes from two neighbours.

@@ -11,7 +11,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.polygon import inside_polygon
 from mbf_costmap_nav.grid.costmap import GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.kernels.map.footprint_samples import rasterise_polygon
+from mbf_costmap_nav.kernels.map.rasterisation import rasterise_polygon
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays
 from mbf_costmap_nav.map.layer import shifted
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap

@@ -11,7 +11,7 @@ from mbf_abstract.maps.queries import CellState
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.zones import Zone
-from mbf_costmap_nav.kernels.map.footprint_samples import rasterise_polygon
+from mbf_costmap_nav.kernels.map.rasterisation import rasterise_polygon
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays
 from mbf_costmap_nav.map.pose_checks import pose_check
 

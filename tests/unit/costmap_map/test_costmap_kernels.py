@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from mbf_costmap_nav.grid.costmap import GridGeometry
-from mbf_costmap_nav.kernels.map.footprint_samples import blocked_under, fill_polygon, polygon_costs, rasterise_polygon
 from mbf_costmap_nav.kernels.map.inflation import inflate
+from mbf_costmap_nav.kernels.map.rasterisation import blocked_under, fill_polygon, polygon_costs, rasterise_polygon
 from mbf_costmap_nav.kernels.map.raytrace import clear_rays, mark_points
 from mbf_costmap_nav.kernels.map.voxel import clear_voxel_rays, count_bits, project_columns
 from mbf_costmap_nav.layers.denoise import small_groups

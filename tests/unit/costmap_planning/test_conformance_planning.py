@@ -23,7 +23,7 @@ from mbf_costmap_nav.files.map_io import load_image
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
-from mbf_costmap_nav.kernels.map.footprint_samples import rasterise_polygon
+from mbf_costmap_nav.kernels.map.rasterisation import rasterise_polygon
 from mbf_costmap_nav.layers.speed_limit import SpeedLimitLayer
 from mbf_costmap_nav.map.layer import LayerContext
 from mbf_costmap_nav.map.pose_checks import pose_check

@@ -12,7 +12,8 @@ from hypothesis.extra import numpy as hnp
 
 from mbf_costmap_nav.kernels.search.grid_line import line_cost
 from mbf_costmap_nav.kernels.search.grid_path import trace_cells, trace_gradient
-from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FOUND, pad_cells, search
+from mbf_costmap_nav.kernels.search.grid_search import CANCELED, EXHAUSTED, FOUND, search
+from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid, pad_cells
 from mbf_costmap_nav.kernels.search.search_cells import new_records
 from mbf_costmap_nav.kernels.search.short_lines import TOUCHED, crossed_cells, trace_lines
 from mbf_costmap_nav.kernels.search.theta_star import theta_search
@@ -62,19 +63,18 @@ def run(cells, start, goal, *, cost_factor=3.0, allow_unknown=False, cut_corners
     """Search on a grid; start and goal are (iy, ix), goal None = field. Returns status, g, and what tracing needs."""
     table = traversal_table(cost_factor, 253, allow_unknown)
     stride = cells.shape[1] + 2
-    padded = pad_cells(cells, 254)
+    grid = PaddedGrid(pad_cells(cells, 254), stride, table)
 
     def index(cell):
         return (cell[0] + 1) * stride + cell[1] + 1
 
     if goal is None:
-        status, g = search(padded, stride, table, index(start), -1, 0.0, cut_corners, False, flag)
+        status, g = search(grid, index(start), -1, 0.0, cut_corners, False, flag)
     else:
-        status, g = search(padded, stride, table, index(start), index(goal), 1.0, cut_corners, False, flag)
-    return status, g.reshape(-1, stride)[1:-1, 1:-1], (padded, stride, table, g), index
+        status, g = search(grid, index(start), index(goal), 1.0, cut_corners, False, flag)
+    return status, g.reshape(-1, stride)[1:-1, 1:-1], (grid, g), index
 
 
-@settings(max_examples=60, deadline=None)
 @given(cells=small_maps, cut_corners=st.booleans(), allow_unknown=st.booleans())
 def test_field_equals_the_naive_dijkstra(cells, cut_corners, allow_unknown):
     cells[0, 0] = 0
@@ -106,17 +106,19 @@ def test_memory_that_has_been_searched_in_changes_no_later_search(first, second)
     table, memory = traversal_table(3.0, 253, False), new_records(14 * 14)
     for cells in (first, second, first):
         cells[0, 0] = 0
-        padded, stride = pad_cells(cells, 254), cells.shape[1] + 2
-        status, g = search(padded, stride, table, stride + 1, -1, 0.0, False, False, NO_CANCEL, memory[: padded.size])
-        alone = search(padded, stride, table, stride + 1, -1, 0.0, False, False, NO_CANCEL)
+        stride = cells.shape[1] + 2
+        grid = PaddedGrid(pad_cells(cells, 254), stride, table)
+        records = memory[: grid.cells.size]
+        status, g = search(grid, stride + 1, -1, 0.0, False, False, NO_CANCEL, records)
+        alone = search(grid, stride + 1, -1, 0.0, False, False, NO_CANCEL)
         assert status == alone[0]
         np.testing.assert_array_equal(g, alone[1])
 
 
 def test_a_field_may_end_at_a_cell_that_has_its_final_value():
     cells = np.zeros((80, 80), dtype=np.uint8)
-    _, _, (padded, stride, table, whole), index = run(cells, (5, 5), None)
-    status, g = search(padded, stride, table, index((5, 5)), index((9, 12)), 0.0, False, False, NO_CANCEL)
+    _, _, (padded, whole), index = run(cells, (5, 5), None)
+    status, g = search(padded, index((5, 5)), index((9, 12)), 0.0, False, False, NO_CANCEL)
     assert status == FOUND and g[index((9, 12))] == whole[index((9, 12))]
     assert np.isinf(g[index((79, 79))])
 
@@ -140,7 +142,7 @@ def test_traced_cell_path_sums_up_to_its_cost(cells, cut_corners):
     reached = np.argwhere(np.isfinite(field))
     end = tuple(reached[-1])
     path = trace_cells(*grid, index(end), cut_corners)
-    padded, stride, table, _ = grid
+    padded, stride, table = grid[0]
     weights = table[padded[path]].astype(float)
     lengths = np.hypot(np.diff(path % stride), np.diff(path // stride))
     assert path[0] == index(end) and path[-1] == index((0, 0))
@@ -156,7 +158,7 @@ def test_gradient_path_arrives_through_reached_cells(cells):
     end = tuple(np.argwhere(np.isfinite(field))[-1])
     points = trace_gradient(*grid, index(end))
     visited = np.floor(points + 0.5).astype(int)
-    assert np.isfinite(grid[3][visited[:, 1] * grid[1] + visited[:, 0]]).all()
+    assert np.isfinite(grid[1][visited[:, 1] * grid[0].stride + visited[:, 0]]).all()
     assert visited[-1].tolist() == [1, 1]
 
 
@@ -211,7 +213,7 @@ def test_line_cost_is_the_integral_of_the_traversal(cells, data):
     cells[a], cells[b] = 0, 0
     table, stride = traversal_table(3.0, 253, False), cells.shape[1] + 2
     flat = [(p[0] + 1) * stride + p[1] + 1 for p in (a, b)]
-    cost = line_cost(pad_cells(cells, 254), stride, table, *flat)
+    cost = line_cost(PaddedGrid(pad_cells(cells, 254), stride, table), *flat)
     expected = naive_line_cost(cells, table, a, b)
     if np.isfinite(cost):
         assert cost == pytest.approx(expected, rel=2e-3)
@@ -225,7 +227,8 @@ def test_line_of_sight_past_the_block(end, free):
     cells = np.zeros((50, 50), dtype=np.uint8)
     cells[7:15, 7:15] = 253
     index = [(y + 1) * 52 + x + 1 for y, x in ((2, 2), end)]
-    assert np.isfinite(line_cost(pad_cells(cells, 254), 52, traversal_table(0.0, 253, False), *index)) == free
+    grid = PaddedGrid(pad_cells(cells, 254), 52, traversal_table(0.0, 253, False))
+    assert np.isfinite(line_cost(grid, *index)) == free
 
 
 @pytest.mark.parametrize("dx", range(-2, 3))
@@ -245,11 +248,11 @@ def test_tabulated_lines_have_the_length_that_dense_samples_find_in_each_cell(dx
 def test_theta_star_is_nowhere_dearer_than_the_naive_dijkstra_and_its_lines_are_free(cells, cost_factor):
     cells[0, 0] = 0
     table, stride = traversal_table(cost_factor, 253, False), cells.shape[1] + 2
-    padded, start = pad_cells(cells, 254), stride + 1
+    grid, start = PaddedGrid(pad_cells(cells, 254), stride, table), stride + 1
     for (y, x), octile in list(naive_field(cells, table, (0, 0), False).items())[::7]:
         goal = (y + 1) * stride + x + 1
-        status, g, origin = theta_search(padded, stride, table, start, goal, NO_CANCEL)
-        lines = [line_cost(padded, stride, table, a, b) for a, b in pairwise(trace_lines(origin, stride, start, goal))]
+        status, g, origin = theta_search(grid, start, goal, NO_CANCEL)
+        lines = [line_cost(grid, a, b) for a, b in pairwise(trace_lines(origin, stride, start, goal))]
         assert status == FOUND and g[goal] <= octile * (1.0 + 1e-5)
         assert sum(lines) <= g[goal] * (1.0 + 1e-5)
 
@@ -260,7 +263,7 @@ def test_theta_star_without_a_way_settles_exactly_what_can_be_reached(cells):
     cells[0, 0], cells[-1, -1] = 0, 254
     table, stride = traversal_table(3.0, 253, False), cells.shape[1] + 2
     status, g, _ = theta_search(
-        pad_cells(cells, 254), stride, table, stride + 1, stride * (len(cells) + 1) - 2, NO_CANCEL
+        PaddedGrid(pad_cells(cells, 254), stride, table), stride + 1, stride * (len(cells) + 1) - 2, NO_CANCEL
     )
     reached = {(int(y), int(x)) for y, x in np.argwhere(np.isfinite(g.reshape(-1, stride)[1:-1, 1:-1]))}
     assert cells.size == 1 or (status == EXHAUSTED and reached == set(naive_field(cells, table, (0, 0), False)))
@@ -292,22 +295,21 @@ def naive_potential(cells, table, start):
 def test_the_interpolated_potential_equals_navfns_update_repeated_until_nothing_changes(cells, cost_factor):
     cells[0, 0] = 0
     table, stride = traversal_table(cost_factor, 253, False), cells.shape[1] + 2
-    padded, start = pad_cells(cells, 254), stride + 1
-    _, g = search(padded, stride, table, start, -1, 0.0, False, True, NO_CANCEL)
+    grid, start = PaddedGrid(pad_cells(cells, 254), stride, table), stride + 1
+    _, g = search(grid, start, -1, 0.0, False, True, NO_CANCEL)
     expected = naive_potential(cells, table, (0, 0))
     np.testing.assert_allclose(g.reshape(-1, stride)[1:-1, 1:-1], expected, rtol=1e-5)
     y, x = np.argwhere(np.isfinite(expected))[-1]
     goal = (y + 1) * stride + x + 1
-    status, partial = search(padded, stride, table, start, goal, 0.0, False, True, NO_CANCEL)
+    status, partial = search(grid, start, goal, 0.0, False, True, NO_CANCEL)
     assert status == FOUND and partial[goal] == pytest.approx(expected[y, x], rel=1e-5)
 
 
 def test_the_interpolated_potential_in_the_open_is_nearly_the_euclidean_distance():
     table, stride = traversal_table(3.0, 253, False), 102
-    padded = pad_cells(np.zeros((100, 100), dtype=np.uint8), 254)
-    g = search(padded, stride, table, 11 * stride + 11, -1, 0.0, False, True, NO_CANCEL)[1].reshape(102, 102)[
-        1:-1, 1:-1
-    ]
+    grid = PaddedGrid(pad_cells(np.zeros((100, 100), dtype=np.uint8), 254), stride, table)
+    _, g = search(grid, 11 * stride + 11, -1, 0.0, False, True, NO_CANCEL)
+    g = g.reshape(102, 102)[1:-1, 1:-1]
     y, x = np.mgrid[:100, :100] - 10
     far = np.hypot(x, y) > 20
     assert np.abs(g[far] / np.hypot(x, y)[far] - 1.0).max() < 0.05

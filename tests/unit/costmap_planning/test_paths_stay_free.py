@@ -12,7 +12,7 @@ from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.grid.footprint import Footprint
-from mbf_costmap_nav.kernels.search.grid_search import pad_cells
+from mbf_costmap_nav.kernels.search.padded_grid import pad_cells
 from mbf_costmap_nav.kernels.search.search_cells import _fill
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner

@@ -1,4 +1,4 @@
-"""Exactly which cells a polygon touches, each once.
+"""Rasterisation of polygons: exactly the cells a polygon touches, each once.
 
 A cell is the half-open unit square [ix, ix + 1) x [iy, iy + 1), the same rule by which a point has its cell. A polygon
 covers a cell if the closed polygon and that square share a point: so a corner that lies on the border of two cells
