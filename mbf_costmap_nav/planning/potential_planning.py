@@ -1,7 +1,7 @@
 """Planning down a potential (navfn's job): propagate costs from the goal to the start, then descend.
 
 When to use: by planners whose path follows a field instead of a chain of predecessors. When not: the exact cell path
-to one goal, which ``kernels.grid_search.search`` and ``trace_cells`` give with one search from the start.
+to one goal, which ``kernels.search.grid_search.search`` and ``trace_cells`` give with one search from the start.
 """
 
 from __future__ import annotations

@@ -13,7 +13,8 @@ from mbf_costmap_nav.controllers.regulated_pure_pursuit import RegulatedPurePurs
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.motion_check import obstacle_ahead
-from mbf_costmap_nav.kernels.search.grid_search import pad_cells, search
+from mbf_costmap_nav.kernels.search.grid_search import search
+from mbf_costmap_nav.kernels.search.padded_grid import PaddedGrid, pad_cells
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
 from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
@@ -102,7 +103,8 @@ def distances(lethal, start):
         cells[y, x] = 254
     origin = (start[1] + 1) * 12 + start[0] + 1
     table = traversal_table(0.0, 254, True)
-    _, g = search(pad_cells(cells, 254), 12, table, origin, -1, 0.0, False, False, np.zeros(1, dtype=np.uint8))
+    grid = PaddedGrid(pad_cells(cells, 254), 12, table)
+    _, g = search(grid, origin, -1, 0.0, False, False, np.zeros(1, dtype=np.uint8))
     return np.asarray(g).reshape(12, 12)[1:-1, 1:-1]
 
 
