@@ -7,6 +7,7 @@ the copies are counted, not made. Numbers by the COLLADA 1.4.1 specification (Kh
 from __future__ import annotations
 
 from collections.abc import Iterable
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -43,18 +44,15 @@ def check_collada(path: Path) -> None:
 
 
 def _count_uses(nodes: dict[str, Any], path: Path) -> dict[str, int]:
-    """Uses of geometries in each node of a name: those below it, and those of the nodes it instances.
-
-    Nodes are counted after those they use; where none can be next, the rest goes round.
-    """
-    waits = {name: {used for used in _used_nodes(node) if used in nodes} for name, node in nodes.items()}
+    """Uses of geometries in each named node: those below it, and those of the nodes it instances."""
+    used = {name: [other for other in _used_nodes(node) if other in nodes] for name, node in nodes.items()}
     counts: dict[str, int] = {}
-    while ready := [name for name, used in waits.items() if used <= counts.keys()]:
-        for name in ready:
+    try:
+        for name in TopologicalSorter(used).static_order():
             counts[name] = _uses(nodes[name], counts)
-            del waits[name]
-    if waits:
-        raise MeshError(str(path), [f"its nodes instance each other in a cycle, e.g. '{min(waits):.40}'"])
+    except CycleError as error:
+        text = f"its nodes instance each other in a cycle, e.g. '{error.args[1][0]:.40}'"
+        raise MeshError(str(path), [text]) from error
     return counts
 
 

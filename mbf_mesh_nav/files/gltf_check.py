@@ -1,15 +1,15 @@
 """What has to hold in a glTF file before a reader may follow its references.
 
-A reader that trusts them answers with whatever its own code stumbles over, leaves a part of the map out, goes round a
-cycle of nodes for ever, or takes the memory that a count asks for. Here every reference that leads to a triangle is
-followed once, and what is wrong comes out with its place in the file. Numbers by the glTF 2.0 specification (Khronos
-Group), sections 3.5, 3.6 and 4.
+A reader that trusts them fails with an error of its own code, leaves a part of the map out, follows a cycle of nodes
+for ever, or allocates the memory that a count asks for. Here every reference that leads to a triangle is followed once,
+and errors name their place in the file. Numbers by the glTF 2.0 specification (Khronos Group), sections 3.5, 3.6 and 4.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -111,25 +111,10 @@ def _wrong_nodes(tables: dict[str, Table]) -> list[str]:
         for root in scene.get("nodes", []):
             if not isinstance(root, int) or not 0 <= root < len(nodes):
                 reasons.append(f"scenes[{number}]: names nodes[{root}], there are {len(nodes)}")
-    return reasons + _cycles(parent)
-
-
-def _cycles(parent: dict[int, int]) -> list[str]:
-    """One reason for each cycle among nodes that have at most one parent each."""
-    reasons: list[str] = []
-    done: set[int] = set()
-    for start in parent:
-        way: list[int] = []
-        seen: set[int] = set()
-        node: int | None = start
-        while node is not None and node not in done and node not in seen:
-            seen.add(node)
-            way.append(node)
-            node = parent.get(node)
-        if node in seen:
-            circle = [*way[way.index(node) :], node][::-1]
-            reasons.append("the nodes are no tree: " + " -> ".join(f"nodes[{one}]" for one in circle))
-        done |= seen
+    try:
+        TopologicalSorter({child: (above,) for child, above in parent.items()}).prepare()
+    except CycleError as error:
+        reasons.append("the nodes are no tree: " + " -> ".join(f"nodes[{one}]" for one in error.args[1]))
     return reasons
 
 

@@ -9,17 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.layers.combination import CombinationLayer
+from mbf_mesh_nav.layers.weighted_sum import WeightedSumLayer
 from mbf_mesh_nav.map.layer import CostArray
 
 
-class MeanLayer(CombinationLayer):
+class MeanLayer(WeightedSumLayer):
     """Vertex by vertex the mean cost of the inputs, weighted by ``combination_weight``."""
 
     def combine(self, costs: list[CostArray], weights: list[float]) -> NDArray[np.floating]:
         """Weighted mean; an input of weight 0 plays no part. All weights 0 give 0."""
-        total = np.zeros(len(costs[0]))
-        for cost, weight in zip(costs, weights, strict=True):
-            if weight > 0.0:
-                total += weight * cost
-        return total / max(sum(weights), 1e-12)
+        return super().combine(costs, weights) / max(sum(weights), 1e-12)

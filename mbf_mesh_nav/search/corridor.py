@@ -6,7 +6,7 @@ import numpy as np
 
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
 from mbf_mesh_nav.kernels.wave.corridor_detours import pass_vertices
-from mbf_mesh_nav.kernels.wave.corridors import link_faces, straighten
+from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, link_faces, straighten
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.search.path_cost import cost_along
@@ -29,7 +29,7 @@ class Corridor:
     def __init__(self, mesh_map: MeshMap, snapshot: MeshSnapshot, blocked: BoolArray) -> None:
         self._mesh_map = mesh_map
         self._snapshot = snapshot
-        self._blocked = blocked
+        self._free = FreeFaces(mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, blocked)
 
     def shorten(self, positions: FloatArray, point_faces: IntArray) -> Piece:
         """Shorten a traced path by string pulling; a piece keeps its old course where the shorter one costs more.
@@ -48,8 +48,7 @@ class Corridor:
         positions, point_faces
             The shortened path in the same form.
         """
-        mesh_map = self._mesh_map
-        corridor, pieces = link_faces(mesh_map.faces, mesh_map.face_neighbours, self._blocked, point_faces)
+        corridor, pieces = link_faces(self._free, point_faces)
         points, faces, has_costs = [positions[:1]], [point_faces[:1]], self.has_costs(point_faces)
         for first, last, begin, end in pieces.tolist():
             old = positions[first : last + 1], point_faces[first : last + 1]
@@ -60,11 +59,8 @@ class Corridor:
 
     def _shorten_piece(self, positions: FloatArray, point_faces: IntArray, corridor: IntArray, turn: bool) -> Piece:
         """Take the geodesic near the corridor if it is not more expensive, else try its halves."""
-        mesh_map = self._mesh_map
         ends = tuple(positions[0].tolist()), tuple(positions[-1].tolist())
-        shortened, faces = straighten(
-            mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, self._blocked, corridor, *ends, turn
-        )
+        shortened, faces = straighten(self._free, corridor, *ends, turn)
         pulled_faces = np.concatenate([point_faces[:1], faces])
         if self.cost(shortened, pulled_faces) <= self.cost(positions, point_faces):
             return shortened, pulled_faces
@@ -81,13 +77,11 @@ class Corridor:
 
         A path that leads along edges between blocked faces stays as it is.
         """
-        mesh_map = self._mesh_map
-        corridor, pieces = link_faces(mesh_map.faces, mesh_map.face_neighbours, self._blocked, point_faces)
+        corridor, pieces = link_faces(self._free, point_faces)
         if len(pieces) != 1 or len(corridor) == 0:
             return positions, point_faces
         ends = tuple(positions[0].tolist()), tuple(positions[-1].tolist())
-        mesh = mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, self._blocked
-        points, faces = pass_vertices(*mesh, corridor, *ends)
+        points, faces = pass_vertices(self._free, corridor, *ends)
         return points, np.concatenate([point_faces[:1], faces])
 
     def has_costs(self, faces: IntArray) -> bool:

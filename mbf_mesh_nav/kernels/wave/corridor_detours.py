@@ -7,13 +7,13 @@ straight, one vertex at a time, and the geodesic on the other side is taken wher
 
 from __future__ import annotations
 
-from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
+from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, kernel
 from mbf_mesh_nav.kernels.mesh.vectors import Vector
 from mbf_mesh_nav.kernels.wave.corridors import (
+    FreeFaces,
     corner_of,
-    fan_length,
-    next_round,
+    other_side,
     path_length,
     straighten,
     turned_corridor,
@@ -26,36 +26,31 @@ _MAX_TRIES_A_FACE = 50
 
 @kernel
 def pass_vertices(
-    vertices: FloatArray,
-    faces: IntArray,
-    face_neighbours: IntArray,
-    blocked: BoolArray,
+    mesh: FreeFaces,
     corridor: IntArray,
     start: Vector,
     goal: Vector,
 ) -> tuple[FloatArray, IntArray]:
     """Shortest geodesic that vertices passed on their other side lead to; arguments and result of ``straighten``."""
-    points, corridor = straighten(vertices, faces, face_neighbours, blocked, corridor, start, goal, True)
+    points, corridor = straighten(mesh, corridor, start, goal, True)
     length, index, tries = path_length(points), Count(0), _MAX_TRIES_A_FACE * len(corridor)
     while index < len(corridor) - 1 and tries > 0:
         is_shorter = False
         for corner in range(3):
             # Every vertex once: at the first face of the corridor that has it, if the next one has it, too.
-            vertex = Count(faces[corridor[index], corner])
-            begins = index == 0 or corner_of(faces[corridor[index - 1]], vertex) < 0
-            if not begins or corner_of(faces[corridor[index + 1]], vertex) < 0:
+            vertex = Count(mesh.faces[corridor[index], corner])
+            begins = index == 0 or corner_of(mesh.faces[corridor[index - 1]], vertex) < 0
+            if not begins or corner_of(mesh.faces[corridor[index + 1]], vertex) < 0:
                 continue
             last = index + 1
-            while last < len(corridor) - 1 and corner_of(faces[corridor[last + 1]], vertex) >= 0:
+            while last < len(corridor) - 1 and corner_of(mesh.faces[corridor[last + 1]], vertex) >= 0:
                 last += 1
-            begin, end = Count(corridor[index]), Count(corridor[last])
-            inner = Count(corridor[index + 1])
-            side = Count(2) if next_round(faces, face_neighbours, vertex, begin, Count(0)) == inner else Count(0)
-            if begin == end or fan_length(faces, face_neighbours, blocked, vertex, begin, end, side) < 0:
+            side = other_side(mesh, corridor, vertex, index, last)
+            if side < 0:
                 continue
             tries -= 1
-            other = turned_corridor(faces, face_neighbours, corridor, vertex, index, last, side)
-            found, found_corridor = straighten(vertices, faces, face_neighbours, blocked, other, start, goal, True)
+            other = turned_corridor(mesh, corridor, vertex, index, last, side)
+            found, found_corridor = straighten(mesh, other, start, goal, True)
             if path_length(found) < _SHORTER * length:
                 points, corridor, length, is_shorter = found, found_corridor, path_length(found), True
                 break

@@ -9,6 +9,7 @@ Sharp and Crane 2020 turn edges instead of faces).
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,18 +23,23 @@ _LESS_THAN_HALF_A_TURN = math.pi - 1e-6
 _MAX_TURNS_A_FACE = 50  # tries; a bound, a traced corridor needs a turn for few of its faces
 
 
+class FreeFaces(NamedTuple):
+    """Arrays of a mesh as in ``MeshTopology``, and its blocked vertices (V,); no corridor has a face at one of them."""
+
+    vertices: FloatArray
+    faces: IntArray
+    face_neighbours: IntArray
+    blocked: BoolArray
+
+
 @kernel
-def link_faces(
-    faces: IntArray, face_neighbours: IntArray, blocked: BoolArray, point_faces: IntArray
-) -> tuple[IntArray, IntArray]:
+def link_faces(mesh: FreeFaces, point_faces: IntArray) -> tuple[IntArray, IntArray]:
     """Join the faces of a path to corridors in which each shares an edge with the next.
 
     Parameters
     ----------
-    faces, face_neighbours, blocked : (F, 3) int32, (F, 3) int32, (V,) bool
-        The mesh; a face with a blocked corner is in no corridor.
     point_faces : (n,) int32
-        The face in which the way to each point lies.
+        The face in which the segment to each point lies.
 
     Returns
     -------
@@ -48,11 +54,11 @@ def link_faces(
     count, begin, piece_count, first = Count(0), Count(0), Count(0), Count(0)
     for index in range(1, len(point_faces)):
         following = Count(point_faces[index])
-        is_free = not _is_blocked(faces[following], blocked)
+        is_free = not _is_blocked(mesh, following)
         if index > 1:
             linked = Count(-1)
             if is_free and count > begin:
-                corridor, linked = _linked(faces, face_neighbours, blocked, corridor, begin, count, following)
+                corridor, linked = _linked(mesh, corridor, begin, count, following)
             if linked >= 0:
                 count = linked
                 continue
@@ -83,8 +89,9 @@ def _grown(corridor: IntArray) -> IntArray:
 
 
 @inner_kernel
-def _is_blocked(corners: IntArray, blocked: BoolArray) -> bool:
-    return bool(blocked[corners[0]] or blocked[corners[1]] or blocked[corners[2]])
+def _is_blocked(mesh: FreeFaces, face: int) -> bool:
+    a, b, c = mesh.faces[face, 0], mesh.faces[face, 1], mesh.faces[face, 2]
+    return bool(mesh.blocked[a] or mesh.blocked[b] or mesh.blocked[c])
 
 
 @inner_kernel
@@ -98,9 +105,7 @@ def corner_of(corners: IntArray, vertex: int) -> int:
 
 @inner_kernel
 def _linked(
-    faces: IntArray,
-    face_neighbours: IntArray,
-    blocked: BoolArray,
+    mesh: FreeFaces,
     corridor: IntArray,
     begin: int,
     count: int,
@@ -111,20 +116,20 @@ def _linked(
     if last == following:
         return corridor, count
     for side in range(3):
-        if face_neighbours[last, side] == following:
+        if mesh.face_neighbours[last, side] == following:
             return _appended(corridor, begin, count, following)
     for corner in range(3):
-        vertex = Count(faces[last, corner])
-        if corner_of(faces[following], vertex) < 0:
+        vertex = Count(mesh.faces[last, corner])
+        if corner_of(mesh.faces[following], vertex) < 0:
             continue
-        left = fan_length(faces, face_neighbours, blocked, vertex, last, following, Count(0))
-        right = fan_length(faces, face_neighbours, blocked, vertex, last, following, Count(2))
+        left = fan_length(mesh, vertex, last, following, Count(0))
+        right = fan_length(mesh, vertex, last, following, Count(2))
         if left < 0 and right < 0:
             return corridor, Count(-1)
         side = Count(0) if right < 0 or 0 <= left < right else Count(2)
         face = last
         while face != following:
-            face = next_round(faces, face_neighbours, vertex, face, side)
+            face = next_round(mesh, vertex, face, side)
             corridor, count = _appended(corridor, begin, count, face)
         return corridor, count
     return corridor, Count(-1)
@@ -142,16 +147,14 @@ def _appended(corridor: IntArray, begin: int, count: int, face: int) -> tuple[In
 
 
 @inner_kernel
-def next_round(faces: IntArray, face_neighbours: IntArray, vertex: int, face: int, side: int) -> int:
+def next_round(mesh: FreeFaces, vertex: int, face: int, side: int) -> int:
     """Next face round a vertex over its outgoing (0) or incoming (2) edge; -1 at a border."""
-    return Count(face_neighbours[face, (corner_of(faces[face], vertex) + side) % 3])  # type: ignore[no-any-return]
+    return Count(mesh.face_neighbours[face, (corner_of(mesh.faces[face], vertex) + side) % 3])  # type: ignore[no-any-return]
 
 
 @inner_kernel
 def fan_length(
-    faces: IntArray,
-    face_neighbours: IntArray,
-    blocked: BoolArray,
+    mesh: FreeFaces,
     vertex: int,
     face: int,
     following: int,
@@ -163,30 +166,38 @@ def fan_length(
     """
     steps, begin = Count(0), face
     while face != following:
-        face = next_round(faces, face_neighbours, vertex, face, side)
+        face = next_round(mesh, vertex, face, side)
         steps += 1
-        if face < 0 or face == begin or (face != following and _is_blocked(faces[face], blocked)):
+        if face < 0 or face == begin or (face != following and _is_blocked(mesh, face)):
             return Count(-1)  # type: ignore[no-any-return]
     return steps  # type: ignore[no-any-return]
 
 
+@inner_kernel
+def other_side(mesh: FreeFaces, corridor: IntArray, vertex: int, first: int, last: int) -> int:
+    """Edge (0, 2) over which the free fan on the other side of a vertex begins that leads from one face to another.
+
+    ``first`` and ``last`` number faces of the corridor; -1 if that fan is not free.
+    """
+    begin, end = Count(corridor[first]), Count(corridor[last])
+    side = Count(2) if next_round(mesh, vertex, begin, Count(0)) == Count(corridor[first + 1]) else Count(0)
+    if begin == end or fan_length(mesh, vertex, begin, end, side) < 0:
+        return Count(-1)  # type: ignore[no-any-return]
+    return side  # type: ignore[no-any-return]
+
+
 @kernel
 def straighten(
-    vertices: FloatArray,
-    faces: IntArray,
-    face_neighbours: IntArray,
-    blocked: BoolArray,
+    mesh: FreeFaces,
     corridor: IntArray,
     start: Vector,
     goal: Vector,
     turn: bool,
 ) -> tuple[FloatArray, IntArray]:
-    """Pull a path taut through a corridor and turn the corridor round the vertices where that makes the path shorter.
+    """Pull the string through a corridor and turn the corridor round the vertices where that makes the path shorter.
 
     Parameters
     ----------
-    vertices, faces, face_neighbours, blocked
-        The mesh, as in ``link_faces``.
     corridor : (s,) int32
         Faces, each sharing an edge with the next.
     start, goal : (float, float, float)
@@ -201,7 +212,7 @@ def straighten(
     corridor : (n,) int32
         The faces the path goes through.
     """
-    points = pull_string(vertices, faces, corridor, start, goal)
+    points = pull_string(mesh.vertices, mesh.faces, corridor, start, goal)
     length = path_length(points)
     index, tries, is_changed = Count(0), _MAX_TURNS_A_FACE * len(corridor) if turn else Count(0), False
     while tries > 0 and len(corridor) > 1:
@@ -209,22 +220,22 @@ def straighten(
             if not is_changed:
                 break
             index, is_changed = Count(0), False  # a turn may have made the path bend before it
-        vertex = _bend_at(vertices, faces, corridor, points, index)
+        vertex = _bend_at(mesh, corridor, points, index)
         if vertex < 0:
             index += 1
             continue
         first, last = index, index + 1
-        while first > 0 and corner_of(faces[corridor[first - 1]], vertex) >= 0:
+        while first > 0 and corner_of(mesh.faces[corridor[first - 1]], vertex) >= 0:
             first -= 1
-        while last < len(corridor) - 1 and corner_of(faces[corridor[last + 1]], vertex) >= 0:
+        while last < len(corridor) - 1 and corner_of(mesh.faces[corridor[last + 1]], vertex) >= 0:
             last += 1
-        side = _free_side(vertices, faces, face_neighbours, blocked, corridor, points, vertex, first, last)
-        turned = corridor if side < 0 else turned_corridor(faces, face_neighbours, corridor, vertex, first, last, side)
+        side = _free_side(mesh, corridor, points, vertex, first, last)
+        turned = corridor if side < 0 else turned_corridor(mesh, corridor, vertex, first, last, side)
         index = last
         if side < 0:
             continue
         tries -= 1
-        shorter = pull_string(vertices, faces, turned, start, goal)
+        shorter = pull_string(mesh.vertices, mesh.faces, turned, start, goal)
         new_length = path_length(shorter)
         if new_length < length:
             points, corridor, length, is_changed = shorter, turned, new_length, True
@@ -242,12 +253,12 @@ def path_length(points: FloatArray) -> float:
 
 
 @inner_kernel
-def _bend_at(vertices: FloatArray, faces: IntArray, corridor: IntArray, points: FloatArray, portal: int) -> int:
+def _bend_at(mesh: FreeFaces, corridor: IntArray, points: FloatArray, portal: int) -> int:
     """Vertex at an end of a portal through which the path goes, else -1."""
-    following, crossing = faces[corridor[portal + 1]], row(points, Count(portal + 1))
+    following, crossing = mesh.faces[corridor[portal + 1]], row(points, Count(portal + 1))
     for corner in range(3):
-        vertex = Count(faces[corridor[portal], corner])
-        if corner_of(following, vertex) >= 0 and norm(difference(row(vertices, vertex), crossing)) < _AT_VERTEX:
+        vertex = Count(mesh.faces[corridor[portal], corner])
+        if corner_of(following, vertex) >= 0 and norm(difference(row(mesh.vertices, vertex), crossing)) < _AT_VERTEX:
             return vertex  # type: ignore[no-any-return]
     return Count(-1)  # type: ignore[no-any-return]
 
@@ -260,65 +271,52 @@ def _angle(at: Vector, first: Vector, second: Vector) -> float:
 
 @inner_kernel
 def _free_side(
-    vertices: FloatArray,
-    faces: IntArray,
-    face_neighbours: IntArray,
-    blocked: BoolArray,
+    mesh: FreeFaces,
     corridor: IntArray,
     points: FloatArray,
     vertex: int,
     first: int,
     last: int,
 ) -> int:
-    """Which way round a vertex (0, 2) leads from face ``first`` of a corridor to ``last`` on the other side; -1: none.
-
-    None if it is not free, or if the path leaves an angle of half a turn or more there.
-    """
-    inner = Count(corridor[first + 1])
-    side = (
-        Count(2) if next_round(faces, face_neighbours, vertex, Count(corridor[first]), Count(0)) == inner else Count(0)
-    )
+    """As ``other_side``; -1 also if the path leaves an angle of half a turn or more there."""
+    side = other_side(mesh, corridor, vertex, first, last)
+    if side < 0:
+        return side
     begin, end = Count(corridor[first]), Count(corridor[last])
-    if begin == end or fan_length(faces, face_neighbours, blocked, vertex, begin, end, side) < 0:
-        return Count(-1)  # type: ignore[no-any-return]
     # The path comes to the vertex from the point before face ``first`` and leaves it to the one behind ``last``.
-    at = row(vertices, vertex)
-    corner = corner_of(faces[begin], vertex)
-    # Over the outgoing edge the face is left between the vertex and the next corner, else and the one before.
-    edge = row(vertices, Count(faces[begin, (corner + 1) % 3 if side == 0 else (corner + 2) % 3]))
+    at = row(mesh.vertices, vertex)
+    corner = corner_of(mesh.faces[begin], vertex)
+    # Over the outgoing edge the face is left between the vertex and the next corner, else the one before.
+    edge = row(mesh.vertices, Count(mesh.faces[begin, (corner + 1) % 3 if side == 0 else (corner + 2) % 3]))
     total = _angle(at, row(points, first), edge)
-    face = next_round(faces, face_neighbours, vertex, begin, side)
+    face = next_round(mesh, vertex, begin, side)
     while face != end and total < _LESS_THAN_HALF_A_TURN:
-        corner = corner_of(faces[face], vertex)
+        corner = corner_of(mesh.faces[face], vertex)
         total += _angle(
-            at, row(vertices, Count(faces[face, (corner + 1) % 3])), row(vertices, Count(faces[face, (corner + 2) % 3]))
+            at,
+            row(mesh.vertices, Count(mesh.faces[face, (corner + 1) % 3])),
+            row(mesh.vertices, Count(mesh.faces[face, (corner + 2) % 3])),
         )
-        face = next_round(faces, face_neighbours, vertex, face, side)
-    corner = corner_of(faces[end], vertex)
-    edge = row(vertices, Count(faces[end, (corner + 2) % 3 if side == 0 else (corner + 1) % 3]))
+        face = next_round(mesh, vertex, face, side)
+    corner = corner_of(mesh.faces[end], vertex)
+    edge = row(mesh.vertices, Count(mesh.faces[end, (corner + 2) % 3 if side == 0 else (corner + 1) % 3]))
     total += _angle(at, edge, row(points, Count(last + 1)))
-    return side if total < _LESS_THAN_HALF_A_TURN else Count(-1)  # type: ignore[no-any-return]
+    return side if total < _LESS_THAN_HALF_A_TURN else Count(-1)
 
 
 @inner_kernel
-def turned_corridor(
-    faces: IntArray, face_neighbours: IntArray, corridor: IntArray, vertex: int, first: int, last: int, side: int
-) -> IntArray:
+def turned_corridor(mesh: FreeFaces, corridor: IntArray, vertex: int, first: int, last: int, side: int) -> IntArray:
     """The corridor led round the other side of a vertex between two of its faces."""
-    between, face, end = (
-        Count(0),
-        next_round(faces, face_neighbours, vertex, Count(corridor[first]), side),
-        corridor[last],
-    )
+    between, face, end = Count(0), next_round(mesh, vertex, Count(corridor[first]), side), corridor[last]
     while face != end:
-        face = next_round(faces, face_neighbours, vertex, face, side)
+        face = next_round(mesh, vertex, face, side)
         between += 1
     turned = np.empty(first + 1 + between + len(corridor) - last, dtype=np.int32)
     for index in range(first + 1):
         turned[index] = corridor[index]
     face = Count(corridor[first])
     for index in range(between):
-        face = next_round(faces, face_neighbours, vertex, face, side)
+        face = next_round(mesh, vertex, face, side)
         turned[first + 1 + index] = face
     for index in range(last, len(corridor)):
         turned[first + 1 + between + index - last] = corridor[index]

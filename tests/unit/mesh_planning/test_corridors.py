@@ -9,7 +9,7 @@ from pygeodesic import geodesic
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.kernels.wave.corridors import link_faces, straighten
+from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, link_faces, straighten
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
@@ -27,13 +27,12 @@ def test_on_flat_free_ground_a_winding_corridor_becomes_the_straight_line(seed):
     mesh_map = MeshMap.from_heights(np.zeros((21, 31)), 0.2, 0.3)
     waves, phase = np.random.default_rng(seed).uniform(0.5, 2.5, 2)
     x = np.linspace(0.7, 5.3, 2000)
-    free = np.zeros(len(mesh_map.vertices), np.bool_)
+    none = np.zeros(len(mesh_map.vertices), np.bool_)
+    mesh = FreeFaces(mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, none)
     winding = faces_along(mesh_map, np.column_stack([x, 3.0 + 1.2 * np.sin(waves * x + phase)]))
-    corridor, _ = link_faces(mesh_map.faces, mesh_map.face_neighbours, free, winding)
+    corridor, _ = link_faces(mesh, winding)
     start, goal = mesh_map.vertices[mesh_map.faces[corridor[[0, -1]]]].mean(axis=1)
-    points, faces = straighten(
-        mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, free, corridor, tuple(start), tuple(goal), True
-    )
+    points, faces = straighten(mesh, corridor, tuple(start), tuple(goal), True)
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(np.linalg.norm(goal - start))
     assert len(points) == len(faces) + 1
     neighbours = [following in mesh_map.face_neighbours[face] for face, following in itertools.pairwise(faces)]
@@ -45,19 +44,11 @@ def test_a_corridor_is_not_turned_over_blocked_faces():
     blocked = np.linalg.norm(mesh_map.vertices - [2.0, 2.0, 0.0], axis=1) < 0.1
     angles = np.linspace(np.pi, 0.0, 500)
     arc = 2.0 + 1.1 * np.column_stack([np.cos(angles), np.sin(angles)])
-    linked, pieces = link_faces(mesh_map.faces, mesh_map.face_neighbours, blocked, faces_along(mesh_map, arc))
+    mesh = FreeFaces(mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, blocked)
+    linked, pieces = link_faces(mesh, faces_along(mesh_map, arc))
     assert len(pieces) == 1
     ends = tuple(mesh_map.vertices[mesh_map.faces[linked[[0, -1]]]].mean(axis=1).tolist())
-    points, faces = straighten(
-        mesh_map.vertices,
-        mesh_map.faces,
-        mesh_map.face_neighbours,
-        blocked,
-        linked,
-        tuple(ends[0]),
-        tuple(ends[1]),
-        True,
-    )
+    points, faces = straighten(mesh, linked, tuple(ends[0]), tuple(ends[1]), True)
     assert not blocked[mesh_map.faces[faces]].any()
     assert np.linalg.norm(points[:, :2] - 2.0, axis=1).min() > 0.3  # round the faces of the blocked vertex
 
@@ -68,7 +59,8 @@ def test_faces_that_touch_in_a_vertex_of_two_fans_are_not_linked():
     faces = np.array([*upper, *((0, b + 4, a + 4) for _, a, b in upper)], np.int32)
     neighbours = np.array([[(f - 1) % 4, -1, (f + 1) % 4] for f in range(4)], np.int32)
     neighbours = np.vstack([neighbours, np.where(neighbours < 0, -1, neighbours + 4)[:, ::-1]])
-    _, pieces = link_faces(faces, neighbours, np.zeros(9, np.bool_), np.array([0, 0, 5, 5], np.int32))
+    mesh = FreeFaces(np.zeros((9, 3)), faces, neighbours, np.zeros(9, np.bool_))
+    _, pieces = link_faces(mesh, np.array([0, 0, 5, 5], np.int32))
     assert len(pieces) == 2
 
 

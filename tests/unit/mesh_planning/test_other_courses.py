@@ -11,7 +11,7 @@ from pygeodesic import geodesic
 from mbf_abstract.geometry import Pose
 from mbf_abstract.plugins import PlanRequest
 from mbf_mesh_nav.kernels.wave.corridor_detours import pass_vertices
-from mbf_mesh_nav.kernels.wave.corridors import link_faces, straighten
+from mbf_mesh_nav.kernels.wave.corridors import FreeFaces, link_faces, straighten
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.any_angle import AnyAnglePlanner
 from mbf_mesh_nav.planners.cvp import CVPPlanner
@@ -64,24 +64,24 @@ def other_sides(mesh_map, blocked, corridor):
 @settings(max_examples=20, deadline=None)
 def test_no_single_vertex_passed_on_its_other_side_makes_a_path_shorter(seed):
     mesh_map, rng = coarse_map(seed), np.random.default_rng(seed)
-    mesh = mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours
     blocked = rng.random(len(mesh_map.vertices)) < 0.05
+    mesh = FreeFaces(mesh_map.vertices, mesh_map.faces, mesh_map.face_neighbours, blocked)
     free = np.flatnonzero(~blocked[mesh_map.faces].any(axis=1))
     walk = [int(rng.choice(free))]
     for _ in range(60):  # a random walk over free faces is a poor corridor
         around = [f for f in mesh_map.face_neighbours[walk[-1]] if f >= 0 and f in free]
         walk += [int(rng.choice(around))] if around else []
-    corridor, pieces = link_faces(mesh_map.faces, mesh_map.face_neighbours, blocked, np.array(walk, np.int32))
+    corridor, pieces = link_faces(mesh, np.array(walk, np.int32))
     if len(pieces) != 1 or len(corridor) < 2:
         return
     ends = [tuple(mesh_map.vertices[mesh_map.faces[face]].mean(axis=0).tolist()) for face in corridor[[0, -1]]]
-    before, _ = straighten(*mesh, blocked, corridor, *ends, True)
-    points, found = pass_vertices(*mesh, blocked, corridor, *ends)
+    before, _ = straighten(mesh, corridor, *ends, True)
+    points, found = pass_vertices(mesh, corridor, *ends)
     assert length_of(points) <= length_of(before)
     assert not blocked[mesh_map.faces[found]].any()
     assert all(following in mesh_map.face_neighbours[face] for face, following in itertools.pairwise(found))
     for other in other_sides(mesh_map, blocked, found):
-        assert length_of(straighten(*mesh, blocked, other, *ends, True)[0]) > (1.0 - 2e-6) * length_of(points)
+        assert length_of(straighten(mesh, other, *ends, True)[0]) > (1.0 - 2e-6) * length_of(points)
 
 
 @pytest.mark.parametrize("planner_class", [CVPPlanner, AnyAnglePlanner])
