@@ -129,7 +129,7 @@ class MeshNavigationServer(MapServer):
             for plugin in held:
                 plugin.release(self)
         for plugin in held:
-            plugin.retire()  # goals that waited for the old instance end
+            plugin.retire()  # goals that waited for the old instance end: it is gone
 
     def save_map(self, file: Path | str, layout: str = "mesh_io") -> None:
         """Write the mesh with the present costs of all layers, as an HDF5 file that mesh_navigation reads.

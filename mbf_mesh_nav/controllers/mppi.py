@@ -4,8 +4,8 @@ Strengths: reads the map of *now*, so it drives round obstacles seen after plann
 motion model (differential or Ackermann). Known failure: a local method with a horizon of ``time_steps * model_dt``;
 a deeper pocket needs a new plan. An Ackermann robot cannot correct its heading on the spot; it
 arrives on a curve along the goal's heading, if free space allows one. It drives a path whose poses require reversing
-as it is, cusp after cusp, where ``min_vel_x`` allows that, and refuses otherwise.
-Cost: about 3 ms a cycle with 400 samples of 30 steps; so many times more as a step is longer than half
+cusp after cusp where ``min_vel_x`` allows reversing, and refuses it otherwise.
+Cost: about 3 ms a cycle with 400 samples of 30 steps; that many times more as a step is longer than half
 the shortest edge of the mesh, or than 0.05 m if that is more.
 
 Method: Williams et al., "Information theoretic MPC for model-based reinforcement learning", ICRA 2017, algorithm 2,
@@ -49,7 +49,7 @@ _PATH_SPACING = 0.1  # [m] between the samples of the path ahead
 _COLLISION_SCORE = 1e6
 _ROOM_TO_STEER = 1.2  # radius of the approach to the goal, in least turning radii
 _STRICT_RADII = 8.0  # before the goal at which a bent approach begins to be followed ...
-_STRICTNESS = 10.0  # ... so many times more closely: who cuts it arrives with the wrong heading
+_STRICTNESS = 10.0  # ... so many times more closely: a car that cuts it arrives with the wrong heading
 _STANDSTILL = 0.2  # [m] and [rad] gained over the horizon: less than this is no motion
 _IDLE_CYCLES = 20  # without motion, after which there is none that gets on
 _RUN_OUT = np.array([[0.1], [0.2], [0.3]])  # [m] beyond the end of a section that a car drives

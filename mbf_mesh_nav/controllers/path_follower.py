@@ -116,7 +116,7 @@ class PathFollower(MeshController):
         return self._approach.is_reached(pose, self._tracker, dist_tolerance, angle_tolerance)
 
     def _distance_to_obstacle(self, here: FloatArray) -> float | None:
-        """Distance [m] along the path to where the current map forbids to go on; None if that is not in sight.
+        """Distance [m] along the path to the first place that the map forbids now; None without one in reach.
 
         A robot that stands on forbidden surface may leave it, see ``kernels.search.forbidden_surface``. Where the path
         leads off the surface it is blocked too.

@@ -42,14 +42,14 @@ class FileFrame(NamedTuple):
 
 
 def file_frame(path: Path, up_axis: str = "", unit: float = 0.0) -> FileFrame:
-    """Axes and unit of a mesh file: the given ones, else what the file or its format says.
+    """Axes and unit of a mesh file: the given ones, else those of the file or its format.
 
     Parameters
     ----------
     up_axis : str
-        "x", "y" or "z"; "" = what the file says.
+        "x", "y" or "z"; "" = as the file states.
     unit : float
-        [m]; 0 = what the file says.
+        [m]; 0 = as the file states.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def on_the_map(points: FloatArray, frame: FileFrame) -> FloatArray:
 
 
 def _collada_frame(path: Path) -> FileFrame:
-    """What the first ``asset`` of a COLLADA file says; only the file's beginning is read."""
+    """Axis and unit in the first ``asset`` of a COLLADA file; only the file's beginning is read."""
     from lxml import etree
 
     up_axis, meter = "Y_UP", "1"

@@ -65,7 +65,7 @@ def _check_off(path: Path, file: BinaryIO) -> None:
 
 
 def _count_lines(lines: Iterator[bytes], faces_last: bool) -> int:
-    """Count lines; if the last ones are faces, the very last only if it has all the corners its first number says."""
+    """Count lines; if the last ones are faces, the very last only if it has as many corners as its first number."""
     count, last = 0, b""
     for number, line in enumerate(lines, start=1):
         count, last = number, line

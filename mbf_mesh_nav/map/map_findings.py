@@ -1,4 +1,4 @@
-"""What somebody should know of a map that can be used: turned files, coarse edges, ground all lethal, wider robots."""
+"""Warnings about a usable map: rotated files, coarse edges, all ground lethal, a robot wider than its inflation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import Finding
 
 LETHAL_SHARE = 0.95
-"""A map with a greater share of lethal vertices is hardly what anybody wanted."""
+"""A map with a greater share of lethal vertices is hardly intended."""
 AXES = ("x", "y", "z")
 NOWHERE = np.zeros(0, dtype=np.int64)
 
@@ -60,7 +60,7 @@ def _narrow(mesh_map: MeshMap) -> Iterator[Finding]:
 
 
 def _lethal(mesh_map: MeshMap) -> Iterator[Finding]:
-    """One finding if nearly every vertex of the default layer is lethal, with the layers that say so themselves."""
+    """One finding if nearly every vertex of the default layer is lethal, with the layers that are as lethal."""
     used = np.diff(mesh_map.neighbour_offsets) > 0
     shares = {name: float(layer.lethal[used].mean()) for name, layer in mesh_map.layers.items()}
     default = mesh_map.default_layer

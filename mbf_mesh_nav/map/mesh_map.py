@@ -1,6 +1,6 @@
 """The map of the mesh server: a surface, the layers on it, and frozen snapshots for planners and controllers.
 
-Everything a plugin needs is an attribute here, as flat read-only arrays (``topology.MeshTopology`` says what is in
+Everything a plugin needs is an attribute here, as flat read-only arrays (``topology.MeshTopology`` describes
 them), in internal numbering. The surface never changes; costs do. A plugin takes one ``snapshot()`` at the start of a
 call and works on that.
 """

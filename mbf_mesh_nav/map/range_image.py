@@ -1,4 +1,4 @@
-"""A coarse image of how far a sensor saw in every direction, to find remembered points that are gone."""
+"""A coarse picture of how far a sensor saw in every direction, to find which remembered points are gone."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class RangeImage:
     Parameters
     ----------
     points : (n, 3) float64
-        Where the rays of one cloud ended [m]; those at the sensor itself have no direction and say nothing.
+        Where the rays of one cloud ended [m]; those at the sensor itself have no direction and are left out.
     sensor_origin : (3,) float64
     """
 

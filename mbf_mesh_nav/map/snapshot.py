@@ -1,8 +1,8 @@
 """The state of a mesh map at one version, and how the next one is made at the price of what changed.
 
 A snapshot never changes, so the next one needs arrays of its own. On a large map copying them costs more than a local
-change does; so the arrays of the snapshot before the last one are brought up to date instead, if nobody holds them any
-more.
+change does; so the arrays of the snapshot before the last one are brought up to date instead, if nothing refers to
+them any more.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class MeshSnapshot:
     def traversability_rank(self, cost_limit: float, vertices: IntArray | None = None) -> CostArray:
         """How forbidden vertices are, all or the given (k,): 0 where free, 1 to 2 by cost, LETHAL_RANK if lethal.
 
-        What is free is as in ``blocked``; infinite cost is lethal. See ``kernels.forbidden_ground`` for its use.
+        What is free is as in ``blocked``; infinite cost is lethal. Used by ``kernels.search.forbidden_surface``.
         """
         costs, lethal = (self.costs, self.lethal) if vertices is None else (self.costs[vertices], self.lethal[vertices])
         beyond = np.nan_to_num(costs - np.float32(min(cost_limit, 1e6)), nan=0.0, posinf=1.0)
@@ -68,7 +68,7 @@ class MeshSnapshot:
 
 
 class _Loan:
-    """Lives as long as anybody holds a view of the arrays of one snapshot."""
+    """Lives as long as anything refers to a view of the arrays of one snapshot."""
 
 
 class _Lent:
@@ -90,7 +90,7 @@ class _Arrays:
         return _Arrays(self.costs.copy(), self.lethal.copy(), self.edge_weights.copy())
 
     def is_held(self) -> bool:
-        """Whether anybody still has the last snapshot of these arrays, or any part of it."""
+        """Whether anything still refers to the last snapshot of these arrays, or any part of it."""
         return self._loan() is not None
 
     def show(self, version: int, edge_cost_factor: float) -> MeshSnapshot:

@@ -1,7 +1,7 @@
 """What is wrong with a mesh, and the repairs a configuration may allow.
 
 A mesh with a defect is refused unless its name stands in the configuration's ``repair`` list; only faces wound against
-their neighbours are flipped without being listed, if all can agree. The report says what was found and done, with
+their neighbours are flipped without being listed, if all can agree. The report lists what was found and done, with
 counts and indices in the caller's numbering. The caller's arrays and files are never changed.
 
 ``REPAIRS`` maps each defect that can be repaired to what the repair does. Harmless findings (unreferenced vertices,
@@ -161,7 +161,7 @@ class _Check:
         broken = np.asarray(~np.isfinite(points).all(axis=1))
         if not broken.any():
             return mesh
-        # A grid with voids has a vertex without a height for each of them; what no face names, harms nobody.
+        # A grid with voids has a vertex without a height for each of them; vertices that no face names do no harm.
         used = mesh.used
         self.found("non_finite", "{count} vertices have a NaN or inf coordinate", np.flatnonzero(broken & used))
         text = "{count} vertices without a position belong to no face and are left out"

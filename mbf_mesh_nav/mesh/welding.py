@@ -1,8 +1,8 @@
 """Finding vertices that stand for one point: at the same position, or nearly so at the boundaries of parts that meet.
 
 Parts of a scene are moved into place by matrices, and files hold four bytes a coordinate: two tiles laid edge to edge
-then miss each other by a rounding error. Only vertices at a boundary are compared with a tolerance, so however fine the
-inside of a surface is, it stays as it is.
+then miss each other by a rounding error. Only vertices at a boundary are compared with a tolerance, so the
+inside of a surface never changes, however fine it is.
 """
 
 from __future__ import annotations
@@ -62,6 +62,6 @@ def first_of_group(pairs: NDArray[np.integer], count: int) -> IntArray:
 
 
 def rounding_distance(vertices: FloatArray) -> float:
-    """Distance [m] within which boundaries are taken for one unless the user says otherwise."""
+    """Distance [m] within which boundaries are joined unless the user gives another."""
     extent = np.ptp(vertices, axis=0) if len(vertices) else np.zeros(3)
     return ROUNDING_SHARE * float(norm(extent))

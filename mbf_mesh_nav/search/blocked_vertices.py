@@ -1,6 +1,6 @@
 """Which vertices a planner may not touch, brought up to date from plan to plan at the price of what changed.
 
-When to use: by whoever plans again and again on a changing map. When not: for a single question;
+When to use: by planners that plan again and again on a changing map. When not: for a single question;
 ``MeshSnapshot.blocked`` answers that, in several passes over the whole map.
 """
 

@@ -32,7 +32,7 @@ COURSE_LOST = 0.005
 """A path so much costlier than its field, as a share, is looked for once more. Fields are right to 0.3 %."""
 
 AS_PREDICTED = 5e-4
-"""A path that differs by no more from what its field says, as a share, is the one that the wave meant."""
+"""A path that differs by no more from the distance of its field, as a share, is the one along which the wave came."""
 
 
 @dataclass(frozen=True, eq=False)

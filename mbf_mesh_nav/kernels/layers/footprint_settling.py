@@ -146,7 +146,7 @@ def settle_footprints(
     wheel_angles, wheel_order : (4 heading_count,)
         Where the wheels of all headings stand, see ``wheel_directions``.
     rigid : bool
-        Whether the body stands on three wheels; then roll and pitch are the steeper of the two ways to stand.
+        Whether the body stands on three wheels; then roll and pitch are the steeper of the two stances.
 
     Returns
     -------

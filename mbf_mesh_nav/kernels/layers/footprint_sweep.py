@@ -35,7 +35,7 @@ class Chassis(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Memory of one search: who saw a vertex last (V,), members (V,), the last mark (1,), wheels and their faces."""
+    """Memory of one search: last mark of each vertex (V,), members (V,), last mark (1,), wheels and their faces."""
 
     seen: IntArray
     members: IntArray

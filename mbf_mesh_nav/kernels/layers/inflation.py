@@ -131,7 +131,7 @@ def repair_distances(
         touched[size] = vertex
         size += ONE
     flips = size
-    # 2. Forget every distance that came, directly or not, from a former one.
+    # 2. Invalidate every distance that came, directly or not, from a former one.
     reader = Index(0)
     while reader < size:
         vertex = Index(touched[reader])
@@ -146,7 +146,7 @@ def repair_distances(
                 state[other] = _TOUCHED
                 touched[size] = other
                 size += ONE
-    # 3. Offers come from the boundary of new lethal regions, and from what is known beside the forgotten.
+    # 3. Offers come from the boundary of new lethal regions, and from what is known beside the invalidated.
     for index in range(size):
         vertex = Index(touched[index])
         for slot in range(Index(neighbour_offsets[vertex]), Index(neighbour_offsets[vertex + ONE])):
@@ -157,7 +157,7 @@ def repair_distances(
                 state[offering] |= _WAITING
                 queue[tail] = offering
                 tail = after(tail, queue)
-    # 4. Whoever was lowered offers to the faces around it, first come first served, until nothing is lowered.
+    # 4. Vertices that were lowered offer to the faces around it, first come first served, until nothing is lowered.
     while head != tail:
         vertex = Index(queue[head])
         head = after(head, queue)
@@ -169,7 +169,7 @@ def repair_distances(
                 other = Index(faces[face, corner])
                 if distances[other] <= reached:
                     continue
-                # Corners in the order of the winding, so that rounding does not depend on who came first.
+                # Corners in the order of the winding, so that rounding does not depend on the order of arrival.
                 v1, v2 = Index(faces[face, (corner + 1) % 3]), Index(faces[face, (corner + 2) % 3])
                 exact, first, second = face_offer(vertices, other, v1, distances[v1], v2, distances[v2])
                 offer = np.float32(exact)

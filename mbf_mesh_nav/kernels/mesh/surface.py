@@ -8,7 +8,7 @@ from mbf_mesh_nav.arrays import FloatArray, IntArray
 
 
 class Surface(NamedTuple):
-    """Arrays of a ``MeshTopology``, which says what they hold."""
+    """Arrays of a ``MeshTopology``, described there."""
 
     vertices: FloatArray
     faces: IntArray

@@ -48,8 +48,8 @@ def score_rollouts(
     vertices, faces, face_neighbours, face_normals
         The mesh.
     costs, ranks : (V,) float32
-        The current map; how ground is forbidden, and where a rollout that starts there may go, says
-        ``forbidden_ground.py``.
+        The current map; ``forbidden_surface.py`` defines the rank of forbidden surface and where a rollout
+        that starts there may go.
     start_face, start, heading
         The robot: face, point [m], unit direction in the face.
     controls : (n, t, 2) float64

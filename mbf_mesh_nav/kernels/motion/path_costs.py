@@ -1,4 +1,4 @@
-"""Length and collected cost of a way through faces."""
+"""Length and collected cost of a path through faces."""
 
 from __future__ import annotations
 

@@ -17,8 +17,8 @@ def poses_along(positions: FloatArray, normals: FloatArray, tolerance: float) ->
     """Positions (m, 3) and quaternions (m, 4), x y z w: each pose stands on its normal and looks to the next one.
 
     Both ends are kept, and of the points between what is farther than ``tolerance`` from the last one kept before;
-    what comes that near to the end just before it is dropped, too. A way that passes the place where it ends keeps its
-    course there. The last pose looks any way.
+    what comes that near to the end just before it is dropped, too. A path that passes the place where it ends keeps its
+    course there. The heading of the last pose has no meaning.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ def search_with_heading(
     state : int
         The best target state, -1 if there is none, -2 if cancelled.
     total : float
-        What the way there costs [m], the rest to the goal and the last turn included.
+        Cost of the path there [m], the rest to the goal and the last turn included.
     """
     vertices, neighbour_offsets, neighbours = surface.vertices, surface.neighbour_offsets, surface.neighbours
     state_count = len(distances)

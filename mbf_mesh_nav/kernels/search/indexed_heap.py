@@ -4,8 +4,8 @@ Four children per node halve the depth of a binary heap and share a cache line; 
 key" into a constant-time look-up, so no vertex is ever queued twice. Use it where the order of settling matters (A*,
 fast marching); a plain shortest-path field is faster with the near/far lists of ``dijkstra.py``.
 
-The heap is two arrays owned by the caller: ``heap`` (n,) uint64 and ``positions`` (n,) int32, the place of each
-item (negative: not queued). Items are of type ``Index``. An entry is key and item in one number, see
+The heap is two arrays owned by the caller: ``heap`` (n,) uint64 and ``positions`` (n,) int32, the place of each item
+(negative: not queued). Items are of type ``Index``. An entry is key and item in one number, see
 ``bucket_queue.entry_of``: one comparison orders by key and, among equal keys, by item, which makes the order of
 settling the same everywhere. Functions return the new size.
 """

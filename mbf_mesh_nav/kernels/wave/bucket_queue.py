@@ -2,8 +2,8 @@
 
 Most vertices are queued well ahead of the front and wait in a bucket, where adding one costs a few writes; only the
 handful whose turn is next is kept in order. Entries leave strictly by (key, item), as from a heap, so the width of a
-bucket changes nothing but the speed. A key that drops is queued again: whoever takes an entry compares its key with
-the item's and drops the older one.
+bucket changes nothing but the speed. A key that drops is queued again: the caller compares the key of an entry with
+that of its item and drops the older one.
 
 When to use: where the order of settling matters and keys grow by steps of about one size. When not: a plain
 shortest-path field, which is faster with ``near_far.py``; keys without bound below the current one.

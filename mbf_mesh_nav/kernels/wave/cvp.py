@@ -3,14 +3,14 @@
 The update rule is that of mesh_navigation's continuous vector planner: the triangle is unfolded into the plane, the
 two known distances define a virtual source on the far side of their edge, and the third corner's distance is the
 straight line to it if that line crosses the edge, else a walk along a side. The original compares the angles at the
-third corner for that; where the line crosses the edge's own line says the same without an arc cosine.
+third corner for that; where the line crosses the edge's own line gives the same answer without an arc cosine.
 
 Deviations, each for accuracy:
 
 - The original looks at a face once, when two of its corners are settled. At an obtuse corner the front may come
   through the side opposite to it, whose far end is settled last (Kimmel and Sethian 1998 split such corners). So an
   obtuse corner is looked at again once all three are settled.
-- Where the way bends round a corner, the front behind it spreads from there, not from the source. So each vertex
+- Where the path bends round a corner, the front behind it spreads from there, not from the source. So each vertex
   remembers its last bend, and the virtual source is found from the distances after it.
 - Where two fronts meet, no virtual source describes both (``fronts.py``). Near the source, where an error is a large
   share, at obtuse corners and beside bends the corner behind the side is asked which of them goes on.
@@ -69,7 +69,7 @@ def propagate_wave(
     cancel_flag: FlagArray,
     along_edges: bool = False,
 ) -> int:
-    """Spread a wave from ``seeds`` over the faces whose corners are all free.
+    """Propagate a wave from ``seeds`` over the faces whose corners are all free.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def propagate_wave(
     cut_records : (V,) int32
         Out: the predecessor's corner record whose face the ray crosses, ``ALONG_EDGE`` where it follows an edge.
     bends : (V,) int32
-        In: ``NO_BEND``. Out: the vertex at which the way to a vertex bends last, the centre of the front it came with.
+        In: ``NO_BEND``. Out: the vertex at which the path to a vertex bends last, the centre of the front it came with.
     seeds : (s,) int32
         Start vertices; they keep their distances.
     targets : (t,) int32
@@ -134,7 +134,7 @@ def propagate_wave(
             targets_settled += 1
             if targets_settled == len(targets):
                 limit = np.float32(distances[vertex] + overshoot)
-        # 3. Faces around it with one free corner hand the wave on; so do those with an obtuse corner, once more.
+        # 3. Faces around it with one free corner propagate the wave; so do those with an obtuse corner, once more.
         u1, own_bend = key, bends[vertex]
         to_own_bend = distances[own_bend] if own_bend != NO_BEND else _ZERO
         for record in range(Index(vertex_face_offsets[vertex]), Index(vertex_face_offsets[vertex + ONE])):
@@ -162,7 +162,7 @@ def propagate_wave(
                 to_known, to_free = to_free, to_known
             u2, bend = distances[known], bends[known]
             if u2 + to_known < u1 and predecessors[vertex] >= 0:
-                # No face had two known corners to bring the way along this side: the vertex is taken once more.
+                # No face had two known corners to bring the path along this side: the vertex is taken once more.
                 distances[vertex] = u2 + to_known
                 predecessors[vertex], cut_records[vertex], bends[vertex] = known, ALONG_EDGE, known
                 entry = entry_of(distances[vertex], vertex)

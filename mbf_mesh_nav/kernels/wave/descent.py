@@ -1,9 +1,9 @@
 """Exact descent of a distance field: the path is traced from edge to edge, never stepped and searched for.
 
 At a point of a face the wave's own rule is applied once more (``cvp.propagate_wave``): two corners that one front has
-passed determine its centre, a virtual source; the path leads straight there, if that line crosses the side between
-the two, else to the corner over which it is shortest. A field taken as linear within a face would be wrong by a tenth
-some edges away from the source, where the fronts are round. A virtual source of two fronts has no meaning and may lead
+passed give its centre, a virtual source; the path leads straight there, if that line crosses the side between the
+two, else to the corner over which it is shortest. A field taken as linear within a face would be wrong by a tenth
+some edges away from the source, where the fronts are round. A virtual source of two fronts is a fiction and may lead
 in circles: no face is passed through twice, and from corner to corner the distance falls. Thus the trace ends, and
 every reached point gets a path.
 """
@@ -45,7 +45,7 @@ def trace_descent(
     goal: Vector,
     along_edges: bool,
 ) -> tuple[FloatArray, IntArray]:
-    """Trace the way down from ``start`` to the source of the field at ``goal``.
+    """Trace the path down from ``start`` to the source of the field at ``goal``.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ def trace_descent(
     start, goal : (float, float, float)
         Points in them [m].
     along_edges : bool
-        Follow the predecessors only: a longer way, but surely the one along which the wave came.
+        Follow the predecessors only: a longer path, but surely the one along which the wave came.
 
     Returns
     -------
     points : (n, 3) float64
         From start to goal, one point per crossed edge or visited vertex [m].
     point_faces : (n,) int32
-        The face the way to each point lies in (or on an edge of); the start's own face first.
+        The face the segment to each point lies in (or on an edge of); the start's own face first.
     """
     capacity = Count(256)
     points = np.empty((capacity, 3), dtype=np.float64)
@@ -86,12 +86,12 @@ def trace_descent(
         if count + 2 > capacity:
             capacity *= 2
             points, point_faces = _grown(points, point_faces, capacity)
-        # 2. Which way on is the shortest: through one of the sides to a face not passed yet, or over a corner?
+        # 2. Which continuation is the shortest: through one of the sides to a face not passed yet, or over a corner?
         if vertex >= 0:
             face, side, share, vertex = _way_from_vertex(surface, field, goal_face, passed, vertex, along_edges)
         else:
             _, side, share, vertex = _way_through(surface, field, goal_face, passed, face, place, along_edges)
-        # 3. Note where it leads, and go on there.
+        # 3. Store where it leads, and continue there.
         if vertex < 0:
             left, right = Count(faces[face, side]), Count(faces[face, (side + 1) % 3])
             passed[face] = True
@@ -185,7 +185,7 @@ def _way_through(
     place: Vector,
     over_corner: bool,
 ) -> tuple[float, int, float, int]:
-    """Find the shortest way on from a point of a face: its length, the side, the share of it, or the corner (else -1).
+    """Find the shortest continuation from a point of a face: length, side, the share of it, or the corner (else -1).
 
     It goes to no face that has been ``passed`` (F,), or to a corner in any case (``over_corner``). Where one is not
     reached, only the others count.
@@ -227,10 +227,10 @@ def _leads_on(faces: IntArray, following: int, distances: Float32Array, goal_fac
 
 @inner_kernel
 def _over_side(field: Field, left: int, right: int, c: float, b: float, a: float) -> tuple[float, float]:
-    """Length of the straight way through a side to the centre of the front, and where it crosses the side.
+    """Length of the straight line through a side to the centre of the front, and where it crosses the side.
 
     ``c``, ``b``, ``a`` are the side and the lengths from the point to its left and right end. The length is inf where
-    the way would not cross the side; the crossing is a share of the side from its left end.
+    the line would not cross the side; the crossing is a share of the side from its left end.
     """
     distances, bend = field.distances, field.bends[left]
     to_bend = float(distances[bend]) if bend == field.bends[right] and bend != NO_BEND else 0.0
@@ -253,14 +253,14 @@ def _over_side(field: Field, left: int, right: int, c: float, b: float, a: float
 def _way_from_vertex(
     surface: Surface, field: Field, goal_face: int, passed: BoolArray, vertex: int, to_predecessor: bool
 ) -> tuple[int, int, float, int]:
-    """Choose the way on from a vertex: (face, side, share, -1) through a face, or (face, -1, 0, next vertex)."""
+    """Choose the continuation from a vertex: (face, side, share, -1) through a face, or (face, -1, 0, next vertex)."""
     best, best_face, best_side, best_share = np.inf, Count(-1), Count(_NO_SIDE), 0.0
     best_vertex, distances = Count(field.predecessors[vertex]), field.distances
     records = range(surface.vertex_face_offsets[vertex], surface.vertex_face_offsets[vertex + 1])
     for record in records:
         face = Count(surface.vertex_faces[record])
         corners = surface.faces[face]
-        # A side belongs to its free face here; the face on its other side may be blocked.
+        # A free face is preferred: its side may have a blocked face on the other side.
         if _has_corner(corners, best_vertex) and (best_face < 0 or _is_reached(corners, distances)):
             best_face = face
     if to_predecessor:

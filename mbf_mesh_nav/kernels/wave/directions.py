@@ -1,4 +1,4 @@
-"""The direction field of a wave: at every vertex the way along which the wave came, seen backwards.
+"""The direction field of a wave: at every vertex the direction from which the wave came.
 
 Where the ray to a vertex crossed a face, the crossing point on the opposite edge is found in the unfolded (weighted)
 triangle and carried over to the real edge as a fraction of its length; so costs bend the wave but the direction
@@ -65,7 +65,7 @@ def wave_directions(
 
 @inner_kernel
 def _crossing_share(u: float, u_end: float, c: float, b: float, a: float) -> float:
-    """Where the way from a corner to the front's centre crosses the opposite side, as a share of it from one end.
+    """Where the line from a corner to the front's centre crosses the opposite side, as a share of it from one end.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""Straight wave fronts over triangles unfolded into the plane: the distance of the next corner from the known ones.
+"""Straight wave fronts over triangles laid down in the plane: predicting the distance of a corner from the known ones.
 
-A front is given by its centre, the source or the corner round which its path bends last, and by the distances from
-there. Two corners that one front has passed determine its centre, a virtual source; the distance of the next corner is
-that of the straight line from there, if that line crosses the side between the two. Where the two were passed by
-different fronts, they have no common virtual source. Then the corner behind their side helps: with the one of the two
-that was passed by the same front it gives the centre of that front, and whether it goes on through the side.
+A front is known by its centre, the source or the corner round which its path bends last, and by the distances from
+there. Two corners that one front has passed give its centre, a virtual source; the next corner is as far
+as the straight line from there, if that line crosses the side between the two. Where the two were passed by different
+fronts, the virtual source of both is a fiction. Then the corner behind their side helps: with the one of the two that
+was passed by the same front it gives the centre of that front, and whether the front passes through the side.
 
 Sides and distances are weighted lengths; where costs stretch them so that they form no triangle, no straight line has
 a meaning. All is float32: a plain number in a formula would turn it into float64.
@@ -21,13 +21,13 @@ from mbf_mesh_nav.arrays import Float32Array, IntArray
 from mbf_mesh_nav.kernels.compiled import ONE, Count, Index, inner_kernel, kernel
 
 NO_BEND = -1
-"""The way comes straight from the source."""
+"""The path comes straight from the source."""
 NOBODY = -1
 OBTUSE: Any = np.float32(1.2)  # least ratio of the longest side squared to the others squared: 102 degrees if equal
 MISMATCH: Any = np.float32(0.1)  # of a side: by how much later than predicted a front may reach the corner behind
 SLACK: Any = np.float32(1.001)
 PASSING: Any = np.float32(0.3)  # of a side: how far past the corner behind it a front may go that reached that corner
-GRAZING: Any = np.float32(0.001)  # of a side: the same if the other way bends round that corner, so that it is an end
+GRAZING: Any = np.float32(0.001)  # of a side: the same if the other path bends round that corner, so that it is an end
 _ZERO: Any = np.float32(0)
 _HALF: Any = np.float32(0.5)
 _INFINITE: Any = np.float32(np.inf)
@@ -69,7 +69,7 @@ def unfolded_distance(u1: float, u2: float, c: float, b: float, a: float) -> tup
     distance : float32
         The candidate.
     side : int
-        0 if the way crosses side 12, else the corner (1 or 2) from which it runs along a side.
+        0 if the path crosses side 12, else the corner (1 or 2) from which it runs along a side.
     """
     source_x, source_depth, corner_x, corner_height = _unfolded(u1, u2, c, b, a)
     no_triangle = abs(source_x) > SLACK * u1 or abs(corner_x) > SLACK * b
@@ -98,7 +98,7 @@ def corner_behind(
 
 @inner_kernel
 def predicted_behind(u1: float, u2: float, c: float, b: float, a: float) -> float:
-    """Distance of the corner on its own side of side 12, predicted from the virtual source of corners 1 and 2."""
+    """Distance that the virtual source of corners 1 and 2 predicts for the corner on its own side of side 12."""
     source_x, source_depth, corner_x, corner_depth = _unfolded(u1, u2, c, b, a)
     deeper, along = source_depth - corner_depth, source_x - corner_x
     return math.sqrt(deeper * deeper + along * along)
@@ -180,7 +180,7 @@ def distance_where_fronts_meet(
     Returns
     -------
     distance, side, bend
-        Side as of ``unfolded_distance``; the last bend of a way through the side.
+        Side as of ``unfolded_distance``; the last bend of a path through the side.
     """
     own_bend, bend = Count(bends[vertex]), Count(bends[known])
     along_vertex, along_known = distances[vertex] + to_free, distances[known] + between
@@ -189,7 +189,7 @@ def distance_where_fronts_meet(
     behind, c, b, a = corner_behind(offsets, corner_ends, corner_weights, vertex, known, free)
     if behind == NOBODY or distances[behind] == _INFINITE:
         return best, side, last_bend
-    # 2. One front has reached the corner behind at about the distance that its virtual source predicts.
+    # 2. One front has reached the corner behind about when its virtual source predicts it.
     if bend == own_bend:
         to_bend = distances[bend] if bend != NO_BEND else _ZERO
         predicted = predicted_behind(distances[vertex] - to_bend, distances[known] - to_bend, c, b, a)

@@ -1,4 +1,4 @@
-"""The shortest path within a corridor of faces: unfold the corridor into the plane and pull the string.
+"""The shortest path within a corridor of faces: string pulling by the funnel algorithm.
 
 Funnel algorithm of Lee and Preparata (1984) in the form of Mononen's "simple stupid funnel": left and right side of the
 funnel are narrowed portal by portal; where they cross, the string bends round a corner and a new funnel begins there.
@@ -169,7 +169,7 @@ def _cross_portals(
     last_bend: int,
     points: FloatArray,
 ) -> None:
-    """Write the surface points where the string, straight between bends, crosses the portals; portal i to row i + 1."""
+    """Write the points where the string, straight between its bends, crosses the portals; portal i to row i + 1."""
     segment = 0
     for i in range(len(portals)):
         while segment + 1 < last_bend and bend_portals[segment + 1] < i:
