@@ -1,8 +1,8 @@
-"""The priority queue of the wave kernels: an indexed 4-ary heap over flat arrays.
+"""The priority queue of A* over (vertex, heading): an indexed 4-ary heap over flat arrays.
 
 Four children per node halve the depth of a binary heap and share a cache line; the position array turns "decrease
-key" into a constant-time look-up, so no vertex is ever queued twice. Use it where the order of settling matters (A*,
-fast marching); a plain shortest-path field is faster with the near/far lists of ``dijkstra.py``.
+key" into a constant-time look-up, so no vertex is ever queued twice. Use it where the order of settling matters and
+keys drop often; a plain shortest-path field is faster with the near/far lists of ``dijkstra.py``.
 
 The heap is two arrays owned by the caller: ``heap`` (n,) uint64 and ``positions`` (n,) int32, the place of each item
 (negative: not queued). Items are of type ``Index``. An entry is key and item in one number, see
