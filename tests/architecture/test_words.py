@@ -1,7 +1,9 @@
-"""Identifiers and documentation use the field's terms (docs/glossary.md); each test names all offenders of one rule."""
+"""Identifiers, prose and documentation use the field's terms (docs/glossary.md); each test names all offenders."""
 
 import ast
+import io
 import re
+import tokenize
 from pathlib import Path
 
 import pytest
@@ -9,19 +11,23 @@ import pytest
 REPOSITORY = Path(__file__).resolve().parents[2]
 PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")
 FILES = [file for package in PACKAGES for file in sorted((REPOSITORY / package).rglob("*.py"))]
-PAGES = [file for file in sorted((REPOSITORY / "docs").glob("*.md")) if file.name != "results.md"]  # a dated record
-PAGES += [REPOSITORY / "README.md"]
+PAGES = [file for file in sorted((REPOSITORY / "docs").rglob("*.md")) if "results" not in file.as_posix()]  # dated
+PAGES += [REPOSITORY / "README.md", REPOSITORY / "CONTRIBUTING.md"]
 STANDARD = {  # banned word: the field's term
     "mishap": "incident",
     "doubt": "configuration warning",
+    "doubtful": "uncertain, or what exactly is wrong",
     "tell": "report",
     "tells": "reports",
     "telling": "reporting",
     "told": "reported",
     "heed": "respect",
+    "heeded": "respected",
     "mend": "repair",
+    "mended": "repaired",
     "foretell": "predict",
     "foretold": "predicted",
+    "taut": "string pulling",
     "hardness": "traversability rank",
     "sheet": "surface patch",
     "strip": "corridor",
@@ -43,6 +49,10 @@ ALLOWED_NAMES = {
     "LineStrips3D": "an archetype of rerun",
     "rim": "of a crater, a key of scenario files",
     "lever_arms": "of a force about an axis",
+}
+ALLOWED_PROSE = {
+    ("terrain/scenarios/features.py", "rim"): "of a crater",
+    ("terrain/worlds/generate.py", "rim"): "of a crater",
 }
 
 
@@ -78,6 +88,20 @@ def prose(page):
             yield number, re.sub(r"`[^`]*`|\]\([^)]*\)", " ", line)
 
 
+def prose_of(file):
+    """Lines of docstrings, messages and comments of a module, without inline code."""
+    source = file.read_text("utf-8")
+    texts = [
+        (node.lineno + offset, line)
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        for offset, line in enumerate(node.value.splitlines())
+    ]
+    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
+    texts += [(token.start[0], token.string) for token in tokens if token.type == tokenize.COMMENT]
+    return [(line, re.sub(r"`[^`]*`", " ", text).lower()) for line, text in texts]
+
+
 def where(file, line):
     return f"{file.relative_to(REPOSITORY).as_posix()}:{line}"
 
@@ -88,6 +112,28 @@ def test_identifiers_use_the_fields_terms():
         for file in FILES
         for name, line in identifiers(file)
         if name not in ALLOWED_NAMES and any(map(is_banned, words_of(name)))
+    }
+    assert sorted(offenders) == []
+
+
+def test_docstrings_messages_and_comments_use_the_fields_words():
+    offenders = {
+        f"{where(file, line)} {word}"
+        for file in FILES
+        for line, text in prose_of(file)
+        for word in re.findall(r"[a-z]+", text)
+        if is_banned(word) and (file.relative_to(REPOSITORY).as_posix(), word) not in ALLOWED_PROSE
+    }
+    assert sorted(offenders) == []
+
+
+def test_docstrings_messages_and_comments_use_the_fields_phrases():
+    offenders = {
+        f"{where(file, line)} {phrase}"
+        for file in FILES
+        for line, text in prose_of(file)
+        for phrase in PHRASES
+        if re.search(rf"\b{phrase}s?\b", text)
     }
     assert sorted(offenders) == []
 
