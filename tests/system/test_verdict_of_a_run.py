@@ -19,7 +19,7 @@ def mbf(*arguments):
 
 @pytest.fixture
 def rude(tmp_path):
-    """The crowded corridor, with people who do not look where they walk."""
+    """The crowded corridor, with people who do not look where they walk; with seed 1 the robot arrives nevertheless."""
     text = (SHIPPED / "crowded_corridor.yaml").read_text()
     text = text.replace(", gives_way: true", "").replace("config/", f"{SHIPPED}/config/")
     (tmp_path / "rude.yaml").write_text(text)
@@ -27,28 +27,28 @@ def rude(tmp_path):
 
 
 def test_a_contact_while_the_robot_moves_fails_the_run_everywhere(rude, tmp_path):
-    run = mbf("run", rude, "--out", tmp_path / "run", "--quiet")
+    run = mbf("run", rude, "--seed", "1", "--out", tmp_path / "run", "--quiet")
 
     metrics = json.loads((tmp_path / "run" / "metrics.json").read_text())
     count = metrics["collisions_while_moving"]
-    said = f"FAILED: contacts while the robot moved: {count} (person) (navigation: SUCCESS, goal reached)"
+    verdict = f"FAILED: contacts while the robot moved: {count} (person) (navigation: SUCCESS, goal reached)"
     assert run.exit_code == 1
-    assert said in run.stdout
-    assert (metrics["success"], metrics["verdict"], metrics["outcome"]) == (False, said, "SUCCESS")
+    assert verdict in run.stdout
+    assert (metrics["success"], metrics["verdict"], metrics["outcome"]) == (False, verdict, "SUCCESS")
     recording, _ = read_run(tmp_path / "run")
-    assert (recording.verdict.success, str(recording.verdict)) == (False, said)
+    assert (recording.verdict.success, str(recording.verdict)) == (False, verdict)
     report = (tmp_path / "run" / "report.html").read_text()
-    assert f'<p class="outcome bad">{said}</p>' in report
+    assert f'<p class="outcome bad">{verdict}</p>' in report
     compared = mbf("compare", tmp_path / "run", tmp_path / "run", "--out", tmp_path / "compare.html")
-    assert said in compared.stdout and said in (tmp_path / "compare.html").read_text()
+    assert verdict in compared.stdout and verdict in (tmp_path / "compare.html").read_text()
 
 
 def test_a_sweep_reports_the_verdict_and_counts_no_success(rude, tmp_path):
-    swept = mbf("sweep", rude, "--seeds", "0:1", "--out", tmp_path / "sweep")
+    swept = mbf("sweep", rude, "--seeds", "1:2", "--out", tmp_path / "sweep")
 
     with SweepLog(tmp_path / "sweep" / "runs.jsonl") as log:
         (row,) = log.rows.values()
     assert row["success"] is False and row["verdict"].startswith("FAILED: ")
-    assert f"seed 0 : {row['verdict']}" in swept.stdout
+    assert f"seed 1 : {row['verdict']}" in swept.stdout
     assert "FAILED: " in (tmp_path / "sweep" / "sweep.csv").read_text()
     assert 'class="failed"' in (tmp_path / "sweep" / "sweep.html").read_text()
