@@ -6,12 +6,14 @@ import pytest
 from pydantic import ValidationError
 
 from mbf_abstract.config.registry import PluginError
+from mbf_abstract.execution.loaded_plugin import PluginGone
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal
+from mbf_abstract.outcomes import GetPathOutcome as Outcome
 from mbf_abstract.plugins import PluginKind
 from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.faulty import slow
-from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
 
 TARGET = Pose.planar(1.0, 0.0)
 SOURCE = """
@@ -118,3 +120,31 @@ def test_a_plugin_that_refuses_its_new_parameters_keeps_the_old_ones(session, mo
     with pytest.raises(ValueError, match="read once only"):
         session.server.set_plugin_parameters(PluginKind.PLANNER, "refuser", code=80)
     assert answer(session) == (75, "one")
+
+
+def test_a_plugin_in_use_is_not_unloaded(make_session):
+    session = make_session()
+    session.plugin("planner", ScriptedPlanner).play(slow(session.clock, 1.0, straight_plan))
+    handle = session.navigator.send(GetPathGoal(TARGET))
+    session.clock.sleep(0.1)
+    with pytest.raises(ServerError, match="in use"):
+        session.server.unload_plugin(PluginKind.PLANNER, "planner")
+    with pytest.raises(ServerError, match="in use"):
+        session.server.set_plugin_parameters(PluginKind.PLANNER, "planner")
+    assert handle.wait().success
+    session.clock.sleep(0.1)
+    session.server.unload_plugin(PluginKind.PLANNER, "planner")
+    assert session.navigator.send(GetPathGoal(TARGET)).result.outcome == Outcome.INVALID_PLUGIN
+    with pytest.raises(ServerError, match="no planner named 'planner'"):
+        session.server.unload_plugin(PluginKind.PLANNER, "planner")
+
+
+def test_a_plugin_unloaded_between_acceptance_and_start_ends_the_goal_with_its_name(make_session):
+    session = make_session()
+    handle = session.navigator.send(GetPathGoal(TARGET, planner="planner"))
+    session.server.unload_plugin(PluginKind.PLANNER, "planner")
+    result = handle.wait()
+    assert result.outcome == Outcome.INVALID_PLUGIN
+    assert "'planner'" in result.message
+    with pytest.raises(PluginGone):
+        session.server.plugins.get(PluginKind.PLANNER, "planner")

@@ -6,13 +6,11 @@ from dataclasses import replace
 import pytest
 
 from mbf_abstract.events import EventKind
-from mbf_abstract.execution.loaded_plugin import PluginGone
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import GetPathGoal, MoveBaseGoal, RecoveryGoal
 from mbf_abstract.goals.handle import GoalStatus
 from mbf_abstract.outcomes import GetPathOutcome as Outcome
 from mbf_abstract.plugins import PlanResult, PluginKind
-from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.faulty import Hang, obedient, slow
 from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
 from mbf_abstract.testing.scripted_session import ScriptedSession
@@ -343,35 +341,6 @@ def test_all_three_styles_work_on_the_wall_clock():
 def test_a_goal_of_no_action_is_refused(make_session):
     with pytest.raises(TypeError, match="expected one of GetPathGoal"):
         make_session().navigator.send("home")
-
-
-# ------------------------------------------------------------------------------------- plugins at run time
-def test_a_plugin_in_use_is_not_unloaded(make_session):
-    session = make_session()
-    busy(session, 1.0)
-    handle = send(session)
-    session.clock.sleep(0.1)
-    with pytest.raises(ServerError, match="in use"):
-        session.server.unload_plugin(PluginKind.PLANNER, "planner")
-    with pytest.raises(ServerError, match="in use"):
-        session.server.set_plugin_parameters(PluginKind.PLANNER, "planner")
-    assert handle.wait().success
-    session.clock.sleep(0.1)
-    session.server.unload_plugin(PluginKind.PLANNER, "planner")
-    assert send(session).result.outcome == Outcome.INVALID_PLUGIN
-    with pytest.raises(ServerError, match="no planner named 'planner'"):
-        session.server.unload_plugin(PluginKind.PLANNER, "planner")
-
-
-def test_a_plugin_unloaded_between_acceptance_and_start_ends_the_goal_with_its_name(make_session):
-    session = make_session()
-    handle = send(session, "planner")
-    session.server.unload_plugin(PluginKind.PLANNER, "planner")
-    result = handle.wait()
-    assert result.outcome == Outcome.INVALID_PLUGIN
-    assert "'planner'" in result.message
-    with pytest.raises(PluginGone):
-        session.server.plugins.get(PluginKind.PLANNER, "planner")
 
 
 # --------------------------------------------------------------------------------------------------- closing
