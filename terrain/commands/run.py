@@ -53,10 +53,14 @@ def run(
         1.0, "--view-speed", min=0.0, help="With --view: at most so many times real time; 0 = no limit."
     ),
     stay: bool = typer.Option(True, "--stay/--no-stay", help="With --view: wait for goals from the page at the end."),
-    quiet: bool = typer.Option(False, "--quiet", help="Print only the outcome."),
-    as_json: bool = typer.Option(False, "--json", help="Print one JSON object with outcome and metrics."),
+    quiet: bool = typer.Option(False, "--quiet", help="Print the result without progress."),
+    as_json: bool = typer.Option(False, "--json", help="Print one JSON object with verdict and metrics."),
 ) -> None:
-    """Drive a scenario in the simulator; exit code 0 only if it arrived within all limits and touched nothing."""
+    """Drive a scenario in the simulator; exit code 0 only if the run is a success.
+
+    Success: it arrived, broke no limit, did not tip over and touched nothing while it moved. Else the code is 1, and 2
+    for a mistake in scenario, configuration or arguments.
+    """
     with readable_errors():
         from terrain.commands.live_line import LiveLine
         from terrain.scenarios.on_map import on_map
@@ -145,6 +149,7 @@ def compare(
         from rich.markup import escape
         from rich.table import Table
 
+        from terrain.commands.verdict_line import print_verdict
         from terrain.recording.run_folder import read_run
         from terrain.recording.whole_files import write_whole
         from terrain.viewer.reports.comparison import compare_digests, compare_metrics, comparison_html
@@ -152,6 +157,8 @@ def compare(
         runs = read_run(left), read_run(right)
         names = (left.name, right.name) if left.name != right.name else (str(left), str(right))
         table = Table("metric", *map(escape, names), "difference")
+        for name, (recording, _) in zip(names, runs, strict=True):
+            print_verdict(recording.verdict, f"{name}: ")
         for row in compare_metrics(runs[0][1], runs[1][1]):
             table.add_row(*map(escape, row))
         Console().print(table)
@@ -169,11 +176,13 @@ def new_run_folder(parent: Path, now: datetime) -> Path:
 
 
 def _print_result(result: RunResult, as_json: bool) -> None:
+    from terrain.commands.verdict_line import print_verdict
+
     metrics = result.metrics
     if as_json:
         typer.echo(json.dumps({**result.verdict.to_json(), "folder": str(result.folder), "metrics": metrics}))
         return
-    typer.echo(result.verdict)
+    print_verdict(result.verdict)
     typer.echo(
         f"{metrics['path_length_m']:.1f} m in {metrics['time_s']:.1f} s simulated, "
         f"{metrics['wall_time_s']:.1f} s of wall time: {metrics['real_time_factor']:.1f} x real time"

@@ -229,7 +229,7 @@ def _recording_from(arrays: dict[str, Any]) -> Recording:
         paths=_stamped("paths", arrays),
         scans=_stamped("scans", arrays),
         events=tuple(Event.from_json(line) for line in metadata["events"]),
-        verdict=Verdict(ending["outcome"], ending["message"], tuple(ending["failures"])),
+        verdict=Verdict(**ending | {"failures": tuple(ending["failures"])}),
         grids=grids_from(arrays),
         meshes=meshes_from(arrays),
         actors=tracks_from(arrays),

@@ -34,6 +34,8 @@ def sweep(
         from rich.table import Table
 
         from mbf_abstract.event_values import well_formed
+        from terrain.commands.verdict_line import TERMINAL_COLOURS
+        from terrain.recording.verdict import Level
         from terrain.scenarios.scenario import load_scenario
         from terrain.sweeps.cluster import run_on_cluster
         from terrain.sweeps.log import SweepLog
@@ -57,7 +59,8 @@ def sweep(
             ):
                 log.append(run.key(hashed), {**metrics, "seed": run.seed, "variant": run.variant})
                 text = well_formed(f"seed {run.seed} {run.variant}: {metrics['verdict']}")
-                console.print(text, markup=False, highlight=False, soft_wrap=True)
+                style = TERMINAL_COLOURS[Level(metrics["level"])]
+                console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
             rows = [log.rows[run.key(hashed)] for run in planned]
         files = write_tables(f"{loaded.name}: {loaded.proves}", rows, out)
         summary = summarise(rows)

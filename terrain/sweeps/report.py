@@ -11,12 +11,14 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from terrain.recording.verdict import Level
 from terrain.recording.whole_files import replacing, write_whole
 
 COLUMNS = (
     "variant",
     "seed",
     "success",
+    "level",
     "outcome",
     "outcome_code",
     "time_s",
@@ -39,7 +41,7 @@ COLUMNS = (
 STYLE = (
     "body{font:14px sans-serif;margin:2em}table{border-collapse:collapse;margin-bottom:2em}"
     "th,td{border:1px solid #bbb;padding:.2em .6em;text-align:right}td.text{text-align:left}"
-    "tr.failed{background:#fbe3e0}"
+    "tr.success{background:#e6f4e9}tr.arrived{background:#fdf3d3}tr.failed{background:#fbe3e0}"
 )
 
 Row = Mapping[str, Any]
@@ -71,6 +73,7 @@ def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
                 "variant": variant or "as written",
                 "runs": len(runs),
                 "success_percent": round(100.0 * len(arrived) / len(runs), 1),
+                "arrived_with_failures": sum(row["level"] == Level.ARRIVED.value for row in runs),
                 "median_time_s": round(median(row["time_s"] for row in arrived), 1) if arrived else "",
                 "median_length_m": round(median(row["path_length_m"] for row in arrived), 1) if arrived else "",
                 "median_path_over_geodesic": round(median(ratios), 3) if ratios else "",
@@ -109,10 +112,7 @@ def _html_table(rows: Sequence[Row]) -> str:
     if not rows:
         return "<p>No runs yet.</p>"
     head = "".join(f"<th>{html.escape(name)}</th>" for name in rows[0])
-    body = "".join(
-        f'<tr class="{"failed" if row.get("success") is False else ""}">{"".join(map(_html_cell, row.values()))}</tr>'
-        for row in rows
-    )
+    body = "".join(f'<tr class="{row.get("level", "")}">{"".join(map(_html_cell, row.values()))}</tr>' for row in rows)
     return f"<table><tr>{head}</tr>{body}</table>"
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from mbf_abstract.config.yaml_source import load_yaml
+from terrain.recording.verdict import Level
 from terrain.scenarios.scenario import Scenario
 
 MAX_NAME = 200  # bytes; a longer text is no file's name
@@ -93,5 +94,11 @@ def run_once(job: Job) -> dict[str, Any]:
             result = run_scenario(scenario, options)
         except Exception as error:  # one impossible variant must not end the sweep
             name, message = type(error).__name__, str(error)
-            return {"success": False, "verdict": f"{name}: {message}", "outcome": name, "message": message}
+            return {
+                "success": False,
+                "level": Level.FAILED.value,
+                "verdict": f"{name}: {message}",
+                "outcome": name,
+                "message": message,
+            }
     return result.metrics

@@ -50,7 +50,7 @@ def replay_html(recording: Recording) -> str:
         if len(recording.times):
             _Player(server, serializer, recording, robot, actors).play()
         page: str = serializer.as_html()
-    return with_panel(page, recording.events, legend_of(recording))
+    return with_panel(page, recording.verdict, recording.events, legend_of(recording))
 
 
 class _Player:

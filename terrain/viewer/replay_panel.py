@@ -1,4 +1,4 @@
-"""The text panel of a replay: events along the time bar, the state of the behaviour tree, and a legend of colours.
+"""The text panel of a replay: verdict, events along the time bar, state of the behaviour tree, legend of colours.
 
 The page of a replay is made by viser and shows the scene only. The panel is HTML and a few lines of script that read
 the time from the time bar; its data is in the page as JSON, so it works from disk and without network.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ import numpy as np
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import SYMBOLS
 from terrain.recording.recording import Recording
-from terrain.viewer.pictures.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, SCAN, Colour, slope_legend
+from terrain.recording.verdict import Verdict
+from terrain.viewer.pictures.colours import ACTORS, DRIVEN, LEVELS, OBSTACLE, PLANNED, SCAN, Colour, slope_legend
 from terrain.viewer.pictures.shading import FLAT_GROUND
 from terrain.viewer.reports.event_lines import is_shown, line_of
 from terrain.viewer.reports.tree_html import COLOURS, INDENT
@@ -32,6 +34,7 @@ STYLE = """
 #run { position: fixed; left: 10px; top: 10px; width: 300px; max-height: calc(100vh - 90px); overflow: auto;
   font: 12px/1.4 system-ui, sans-serif; background: rgba(255, 255, 255, 0.88); color: #444; padding: 6px 12px;
   border-radius: 6px; box-shadow: 0 1px 6px rgba(0, 0, 0, 0.2); z-index: 10; }
+#run p { font-weight: 600; margin: 4px 0; }
 #run summary { font-weight: 600; cursor: pointer; color: #222; margin: 4px 0; }
 """
 
@@ -75,14 +78,16 @@ setInterval(() => {
 """
 
 
-def with_panel(page: str, events: Iterable[Event], legend: Iterable[Entry] = ()) -> str:
+def with_panel(page: str, verdict: Verdict, events: Iterable[Event], legend: Iterable[Entry] = ()) -> str:
     """Put the panel into the text of a page, before the end of its body."""
     contents = _data(tuple(events))
     data = json.dumps(contents, separators=(",", ":")).replace("<", "\\u003c")
     tree = "<details open><summary>Behaviour tree</summary><div id='run-tree'></div></details>"
     tree = tree if contents["trees"] else ""
     panel = (
-        f"<style>{STYLE}</style><div id='run'><details open><summary>What happened</summary>"
+        f"<style>{STYLE}</style><div id='run'>"
+        f"<p style='color:{LEVELS[verdict.level]}'>{escape(str(verdict))}</p>"
+        "<details open><summary>What happened</summary>"
         f"<div id='run-lines'></div></details>{tree}"
         f"<details open><summary>Colours</summary><div>{legend_html(legend)}</div></details></div>"
         f"<script type='application/json' id='run-data'>{data}</script><script>{SCRIPT}</script>"

@@ -9,6 +9,7 @@ from mbf_abstract.cli import make_app
 from terrain.recording.run_folder import read_run
 from terrain.scenarios.scenario import SHIPPED
 from terrain.sweeps.log import SweepLog
+from terrain.viewer.pictures.colours import WARNING
 
 pytestmark = pytest.mark.timeout(300)
 
@@ -31,16 +32,21 @@ def test_a_contact_while_the_robot_moves_fails_the_run_everywhere(rude, tmp_path
 
     metrics = json.loads((tmp_path / "run" / "metrics.json").read_text())
     count = metrics["collisions_while_moving"]
-    verdict = f"FAILED: contacts while the robot moved: {count} (person) (navigation: SUCCESS, goal reached)"
+    verdict = (
+        f"ARRIVED WITH FAILURES: contacts while the robot moved: {count} (person) (navigation: SUCCESS, goal reached)"
+    )
     assert run.exit_code == 1
     assert verdict in run.stdout
-    assert (metrics["success"], metrics["verdict"], metrics["outcome"]) == (False, verdict, "SUCCESS")
+    assert (metrics["success"], metrics["level"], metrics["outcome"]) == (False, "arrived", "SUCCESS")
+    assert metrics["verdict"] == verdict
     recording, _ = read_run(tmp_path / "run")
     assert (recording.verdict.success, str(recording.verdict)) == (False, verdict)
     report = (tmp_path / "run" / "report.html").read_text()
-    assert f'<p class="outcome bad">{verdict}</p>' in report
+    assert f'<p class="outcome arrived">{verdict}</p>' in report
+    replay = (tmp_path / "run" / "replay.html").read_text()
+    assert f"<p style='color:{WARNING}'>{verdict}</p>" in replay
     compared = mbf("compare", tmp_path / "run", tmp_path / "run", "--out", tmp_path / "compare.html")
-    assert verdict in compared.stdout and verdict in (tmp_path / "compare.html").read_text()
+    assert f"run: {verdict}" in compared.stdout and verdict in (tmp_path / "compare.html").read_text()
 
 
 def test_a_sweep_reports_the_verdict_and_counts_no_success(rude, tmp_path):
@@ -48,7 +54,7 @@ def test_a_sweep_reports_the_verdict_and_counts_no_success(rude, tmp_path):
 
     with SweepLog(tmp_path / "sweep" / "runs.jsonl") as log:
         (row,) = log.rows.values()
-    assert row["success"] is False and row["verdict"].startswith("FAILED: ")
+    assert row["success"] is False and row["verdict"].startswith("ARRIVED WITH FAILURES: ")
     assert f"seed 1 : {row['verdict']}" in swept.stdout
-    assert "FAILED: " in (tmp_path / "sweep" / "sweep.csv").read_text()
-    assert 'class="failed"' in (tmp_path / "sweep" / "sweep.html").read_text()
+    assert "ARRIVED WITH FAILURES: " in (tmp_path / "sweep" / "sweep.csv").read_text()
+    assert 'class="arrived"' in (tmp_path / "sweep" / "sweep.html").read_text()

@@ -8,7 +8,8 @@ from html import escape
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from terrain.session.goal_sequence import GoalSequence
 from terrain.viewer.live.log import Snapshot
-from terrain.viewer.reports.event_lines import BAD, GOOD, NEITHER, Line
+from terrain.viewer.pictures.colours import BAD, GOOD, NEITHER
+from terrain.viewer.reports.event_lines import Line
 
 BUSY = "#1f6feb"
 SHOWN_LINES = 12

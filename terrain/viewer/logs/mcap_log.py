@@ -24,8 +24,9 @@ def write_mcap(file: str | Path, recording: Recording) -> None:
     with replacing(file) as part, part.open("wb") as stream:
         writer = Writer(stream)
         writer.start(library="mbf-flex")
-        facts = {"scenario": recording.scenario, "backend": recording.backend, "verdict": str(recording.verdict)}
-        writer.add_metadata("run", {**facts, "robot": recording.robot.name})
+        verdict = {"verdict": str(recording.verdict), "level": recording.verdict.level.value}
+        facts = {"scenario": recording.scenario, "backend": recording.backend, "robot": recording.robot.name}
+        writer.add_metadata("run", facts | verdict)
         channels: dict[str, int] = {}
         for time, topic, message in messages_of(recording):
             if topic not in channels:

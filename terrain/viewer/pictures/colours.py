@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terrain.recording.verdict import Level
+
 Colour = tuple[int, int, int]
 
 PLANNED: Colour = (25, 90, 220)
@@ -22,6 +24,9 @@ SCAN: Colour = (220, 30, 40)
 BODY: Colour = (245, 190, 40)
 WHEEL: Colour = (40, 40, 44)
 ACTORS: dict[str, Colour] = {"person": (150, 60, 190), "door": (120, 90, 60), "robot": (0, 140, 160)}
+
+GOOD, WARNING, BAD, NEITHER = "#1a7f37", "#9a6700", "#cf222e", "#6b7280"  # of texts, as CSS has them
+LEVELS = {Level.SUCCESS: GOOD, Level.ARRIVED: WARNING, Level.FAILED: BAD}
 
 SLOPE_STOPS = np.array([0.0, 10.0, 20.0, 30.0, 45.0])  # degrees
 SLOPE_COLOURS = np.array(

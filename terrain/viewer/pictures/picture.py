@@ -14,7 +14,7 @@ import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.recording.recording import Recording, StampedPoints
-from terrain.viewer.pictures.colours import ACTORS, DRIVEN, GOAL, PLANNED, START, slope_legend
+from terrain.viewer.pictures.colours import ACTORS, DRIVEN, GOAL, LEVELS, PLANNED, START, slope_legend
 from terrain.viewer.pictures.shading import shaded_triangles
 from terrain.viewer.pictures.shapes import standing_things
 
@@ -162,6 +162,7 @@ def _label(axes: Axes, recording: Recording) -> None:
     title = f"{recording.scenario[:MAX_NAME]} · {recording.backend[:MAX_NAME]} · {recording.verdict.title}"
     tilt = np.degrees(recording.tilt).max(initial=0.0)
     facts = f"{length:.1f} m driven in {recording.duration:.1f} s, tilt up to {tilt:.0f}°"
-    axes.set_title(f"{title}\n", loc="left", fontsize=12, fontweight="bold", parse_math=False)
+    colour = LEVELS[recording.verdict.level]
+    axes.set_title(f"{title}\n", loc="left", fontsize=12, fontweight="bold", color=colour, parse_math=False)
     axes.text(0.0, 1.015, facts, transform=axes.transAxes, fontsize=9, color="#444444")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=6, frameon=False, fontsize=9)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.outcomes import is_success, outcome_name
+from terrain.viewer.pictures.colours import BAD, GOOD, NEITHER
 
 NOTABLE = {
     EventKind.GOAL_REJECTED,
@@ -21,7 +22,6 @@ NOTABLE = {
 LEFT_OUT = ("traceback", "goal_id")
 SHOWN = NOTABLE | {EventKind.GOAL_FINISHED, EventKind.GOAL_PAUSED, EventKind.GOAL_RESUMED, EventKind.CUSTOM}
 REPLACED = "preempted by a new plan"  # message of exe_path's goal when the robot continues on a newer path
-GOOD, BAD, NEITHER = "#1a7f37", "#cf222e", "#6b7280"
 
 
 def event_text(event: Event) -> str:

@@ -7,18 +7,21 @@ from collections.abc import Iterable
 from html import escape
 from typing import Any
 
+from terrain.viewer.pictures.colours import LEVELS
+
 MAX_ROWS = 200
 FOLDED_FROM = 40
 
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #222; margin: 2em auto; padding: 0 1em; }
 h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.15em; margin-top: 2em; }
-.outcome { font-size: 1.15em; font-weight: 600; } .good { color: #1a7f37; } .bad { color: #b42318; }
+.outcome { font-size: 1.15em; font-weight: 600; }
 table { border-collapse: collapse; } td, th { text-align: left; padding: 2px 14px 2px 0; vertical-align: top; }
 th { color: #555; font-weight: 600; border-bottom: 1px solid #ccc; } td:first-child { white-space: nowrap; }
 img { max-width: 100%; height: auto; } svg { width: 100%; height: auto; } summary { color: #555; cursor: pointer; }
 .beside { display: grid; grid-template-columns: 1fr 1fr; gap: 0 2em; align-items: start; } .beside > * { min-width: 0; }
 """
+STYLE += "".join(f".{level.value} {{ color: {colour}; }}\n" for level, colour in LEVELS.items())
 
 
 def page(title: str, parts: Iterable[str], width: int = 1000) -> str:

@@ -46,10 +46,9 @@ def title_of(recording: Recording) -> str:
 
 def summary(recording: Recording) -> str:
     """Title, outcome, and what was asked."""
-    quality = "good" if recording.verdict.success else "bad"
     return (
         f"<h1>{escape(title_of(recording))}</h1>"
-        f'<p class="outcome {quality}">{escape(str(recording.verdict))}</p>'
+        f'<p class="outcome {recording.verdict.level.value}">{escape(str(recording.verdict))}</p>'
         f"<p>{escape(_asked(recording))}</p>"
     )
 

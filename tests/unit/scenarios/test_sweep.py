@@ -15,7 +15,16 @@ from terrain.sweeps.sweep import SweepRun, hash_of, plan_sweep
 
 def row(seed, variant="planner=cvp", success=True, **more):
     numbers = {"time_s": 10.0 + seed, "path_length_m": 20.0, "incidents": ["slipping"] if seed else []}
-    return {"seed": seed, "variant": variant, "success": success, "outcome": "SUCCESS", **numbers, **more}
+    level = "success" if success else "failed"
+    return {
+        "seed": seed,
+        "variant": variant,
+        "success": success,
+        "level": level,
+        "outcome": "SUCCESS",
+        **numbers,
+        **more,
+    }
 
 
 def test_every_seed_meets_every_combination_of_settings():
@@ -105,7 +114,7 @@ def test_a_line_that_was_cut_short_is_taken_away_and_written_again(tmp_path, len
 
 
 def test_the_csv_has_one_row_per_run_sorted_by_variant_and_seed(tmp_path):
-    rows = [row(1), row(0), row(0, "planner=astar", success=False)]
+    rows = [row(1, level="arrived", success=False), row(0), row(0, "planner=astar", success=False)]
     files = write_tables("Trial <1>", rows, tmp_path)
     with files[0].open() as file:
         table = list(csv.DictReader(file))
@@ -116,14 +125,19 @@ def test_the_csv_has_one_row_per_run_sorted_by_variant_and_seed(tmp_path):
     ]
     page = files[1].read_text()
     assert "Trial &lt;1&gt;" in page
-    assert page.count('class="failed"') == 1
+    assert [page.count(f'<tr class="{level}">') for level in ("success", "arrived", "failed")] == [1, 1, 1]
 
 
 def test_a_run_that_could_not_begin_has_a_row_too(tmp_path):
-    rows = [{"seed": 0, "variant": "planner=none", "success": False, "outcome": "ConfigError", "message": "unknown"}]
+    rows = [{"seed": 0, "variant": "planner=none", "success": False, "level": "failed", "outcome": "ConfigError"}]
     write_tables("Trial", rows, tmp_path)
     assert "ConfigError" in (tmp_path / "sweep.csv").read_text()
     assert summarise(rows)[0]["success_percent"] == 0.0
+
+
+def test_the_summary_counts_arrivals_with_failures_beside_successes():
+    (line,) = summarise([row(0), row(1, success=False, level="arrived"), row(2, success=False)])
+    assert (line["success_percent"], line["arrived_with_failures"]) == (33.3, 1)
 
 
 def test_the_summary_counts_per_variant_and_takes_medians_of_successes():

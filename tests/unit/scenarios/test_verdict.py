@@ -5,7 +5,7 @@ import pytest
 from mbf_abstract.goals.goal_types import MoveBaseResult
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 from terrain.physics.incidents import IncidentKind
-from terrain.recording.verdict import UNFINISHED, judge
+from terrain.recording.verdict import UNFINISHED, Level, judge
 from terrain.scenarios.limits import Limits
 
 ARRIVED = MoveBaseResult(MoveBaseOutcome.SUCCESS, "goal reached")
@@ -17,6 +17,7 @@ CALM = {
     "incidents": [],
     "collisions": 0,
     "collisions_while_moving": 0,
+    "tip_overs": 0,
     "arrivals": [NEAR],
     "arrival_tolerance": (0.4, 180.0),
 }
@@ -57,7 +58,8 @@ PUSHED = CALM | {"incidents": ["collision", "collision_with_person"], "collision
             Limits(),
             HIT,
             False,
-            "FAILED: contacts while the robot moved: 2 (person, wall) (navigation: SUCCESS, goal reached)",
+            "ARRIVED WITH FAILURES: contacts while the robot moved: 2 (person, wall) "
+            "(navigation: SUCCESS, goal reached)",
         ),
         (
             BLOCKED,
@@ -71,7 +73,22 @@ PUSHED = CALM | {"incidents": ["collision", "collision_with_person"], "collision
             Limits(max_tilt=4.0, forbidden=(IncidentKind.COLLISION,)),
             PUSHED,
             False,
-            "FAILED: max_tilt_deg 5.0 is above 4 degrees; collision happened (navigation: SUCCESS, goal reached)",
+            "ARRIVED WITH FAILURES: max_tilt_deg 5.0 is above 4 degrees; collision happened "
+            "(navigation: SUCCESS, goal reached)",
+        ),
+        (
+            ARRIVED,
+            Limits(),
+            CALM | {"tip_overs": 1},
+            False,
+            "ARRIVED WITH FAILURES: the robot tipped over (navigation: SUCCESS, goal reached)",
+        ),
+        (
+            ARRIVED,
+            Limits(forbidden=(IncidentKind.TIPPED_OVER,)),
+            CALM | {"tip_overs": 1, "incidents": ["tipped_over"]},
+            False,
+            "ARRIVED WITH FAILURES: tipped_over happened (navigation: SUCCESS, goal reached)",
         ),
     ],
 )
@@ -82,6 +99,25 @@ def test_a_run_succeeds_only_if_all_is_well(result, limits, metrics, success, te
     assert verdict.to_json()["outcome_code"] == int(result.outcome)
 
 
+@pytest.mark.parametrize(
+    ("result", "metrics", "level"),
+    [
+        (ARRIVED, CALM, Level.SUCCESS),
+        (ARRIVED, PUSHED, Level.SUCCESS),
+        (ARRIVED, HIT, Level.ARRIVED),
+        (ARRIVED, FAR, Level.FAILED),
+        (ARRIVED, HIT | {"arrivals": FAR["arrivals"]}, Level.FAILED),
+        (BLOCKED, CALM, Level.FAILED),
+        (BLOCKED, HIT, Level.FAILED),
+    ],
+)
+def test_a_robot_that_did_not_arrive_in_truth_is_worse_than_one_that_touched_something(result, metrics, level):
+    verdict = judge(result, Limits(), metrics)
+
+    assert verdict.level is level
+    assert verdict.to_json()["level"] == level.value
+
+
 def test_a_run_that_was_cut_short_is_no_success():
-    assert not UNFINISHED.success
+    assert not UNFINISHED.success and UNFINISHED.level is Level.FAILED
     assert str(UNFINISHED) == "UNFINISHED: the run was cut short"

@@ -36,6 +36,7 @@ CALM = {
     "path_length_m": 10.0,
     "incidents": [],
     "collisions_while_moving": 0,
+    "tip_overs": 0,
     "arrivals": [],
     "arrival_tolerance": (0.4, 180.0),
 }

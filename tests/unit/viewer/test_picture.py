@@ -13,7 +13,18 @@ from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
-from terrain.viewer.pictures.colours import ACTORS, DRIVEN, OBSTACLE, PLANNED, WALL, linear_for_viewer, slope_colours
+from terrain.viewer.pictures.colours import (
+    ACTORS,
+    BAD,
+    DRIVEN,
+    GOOD,
+    OBSTACLE,
+    PLANNED,
+    WALL,
+    WARNING,
+    linear_for_viewer,
+    slope_colours,
+)
 from terrain.viewer.pictures.picture import picture_png
 from terrain.viewer.pictures.shading import face_colours, face_normals, shaded_triangles, vertex_colours
 from terrain.worlds.surface import Surface
@@ -50,6 +61,18 @@ def test_the_picture_of_hills_is_written_to_the_file(hill_recording, tmp_path):
     pixels = pixels_of((tmp_path / "picture.png").read_bytes())
     assert min(pixels.shape[:2]) > 600
     assert count(pixels, DRIVEN) > 100
+
+
+@pytest.mark.parametrize(
+    ("failures", "at_goals", "colour"), [((), True, GOOD), (("contacts",), True, WARNING), (("missed",), False, BAD)]
+)
+def test_the_title_has_the_colour_of_the_verdict(hill_recording, failures, at_goals, colour):
+    verdict = Verdict(0, "goal reached", failures, at_goals)
+
+    pixels = pixels_of(picture_png(replace(hill_recording, verdict=verdict)))
+
+    shown = [count(pixels[:60], [int(c[i : i + 2], 16) for i in (1, 3, 5)]) > 100 for c in (GOOD, WARNING, BAD)]
+    assert shown == [c == colour for c in (GOOD, WARNING, BAD)]
 
 
 def test_a_run_that_never_began_has_a_picture_too():

@@ -3,15 +3,20 @@
 import json
 import re
 from dataclasses import replace
+from html import escape
 
 import numpy as np
+import pytest
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import NodeState
 from terrain.recording.actor_track import ActorTrack
+from terrain.recording.verdict import Verdict
+from terrain.viewer.pictures.colours import BAD, GOOD, WARNING
 from terrain.viewer.replay_panel import legend_of, with_panel
 from terrain.viewer.reports.tree_html import worth_showing
 
+WELL = Verdict(0, "goal reached")
 PAGE = "<html><body><p>scene</p></body></html>"
 NODES = [{"name": "root", "type": "Sequence", "depth": 0}, {"name": "leaf", "type": "GetPath", "depth": 1}]
 
@@ -32,7 +37,7 @@ def test_the_page_carries_each_run_of_a_tree_and_its_changes_with_their_times():
         tree(5.0, nodes=NODES),
     ]
 
-    first, second = contents(with_panel(PAGE, events))["trees"]
+    first, second = contents(with_panel(PAGE, WELL, events))["trees"]
 
     assert first["nodes"] == [["root", 0], ["leaf", 1]]
     assert first["changes"] == [
@@ -44,16 +49,31 @@ def test_the_page_carries_each_run_of_a_tree_and_its_changes_with_their_times():
 
 
 def test_the_panel_lies_inside_the_body_and_has_no_tree_where_none_ran():
-    page = with_panel(PAGE, [])
+    page = with_panel(PAGE, WELL, [])
 
     assert page.startswith("<html><body><p>scene</p><style>") and page.endswith("</script></body></html>")
     assert "Behaviour tree" not in page
-    assert "Behaviour tree" in with_panel(PAGE, [tree(0.0, nodes=NODES)])
+    assert "Behaviour tree" in with_panel(PAGE, WELL, [tree(0.0, nodes=NODES)])
+
+
+@pytest.mark.parametrize(
+    ("verdict", "colour"),
+    [
+        (WELL, GOOD),
+        (replace(WELL, failures=("contacts <b>",)), WARNING),
+        (replace(WELL, failures=("goal missed",), at_goals=False), BAD),
+        (Verdict(110, "<script>blocked"), BAD),
+    ],
+)
+def test_the_verdict_stands_above_everything_in_the_colour_of_its_level(verdict, colour):
+    page = with_panel(PAGE, verdict, [])
+
+    assert f"<p style='color:{colour}'>{escape(str(verdict))}</p><details" in page
 
 
 def test_words_of_an_event_cannot_end_the_script():
     said = "</script><script>alert(1)</script>"
-    page = with_panel(PAGE, [Event(0.0, EventKind.FAULT, "x", {"message": said})])
+    page = with_panel(PAGE, WELL, [Event(0.0, EventKind.FAULT, "x", {"message": said})])
 
     assert "alert(1)</script>" not in page
     assert said in contents(page)["lines"][0][1]
@@ -88,5 +108,5 @@ def test_the_legend_names_what_occurs_in_the_run_and_nothing_else(hill_recording
 
     assert hill == ["plan", "driven", "slope 0°", "slope 10°", "slope 20°", "slope 30°", "slope 45°"]
     assert office == ["plan", "driven", "seen by a sensor", "on no map", "person"]
-    page = with_panel(PAGE, [], legend_of(hill_recording))
+    page = with_panel(PAGE, WELL, [], legend_of(hill_recording))
     assert "rgb(25,90,220)" in page and ">plan<" in page
