@@ -12,6 +12,9 @@ from mbf_abstract.geometry.pose import Pose
 
 FloatArray = NDArray[np.float64]
 
+STRAIGHT = 1e-9
+"""A slower turn [rad/s] bends no arc that anybody drives."""
+
 
 def in_robot_frame(pose: Pose, point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Coordinates (3,) of a global point in the robot's frame: x ahead, y left, both in its tangent plane."""
@@ -33,10 +36,8 @@ def arc_poses(
     """
     x, y, yaw = pose
     times = np.append(np.arange(step, duration, step), duration)
-    angles = wz * times
-    # integral of the rotation over time: sin(a)/w and (1 - cos(a))/w, stable where w vanishes
-    sine = times * np.sinc(angles / np.pi)
-    versine = times * np.sinc(angles / (2.0 * np.pi)) * np.sin(angles / 2.0)
-    forward, left = vx * sine - vy * versine, vx * versine + vy * sine
-    c, s = math.cos(yaw), math.sin(yaw)
-    return np.column_stack([x + c * forward - s * left, y + s * forward + c * left, yaw + angles])
+    # Driven is an arc; its chord points half the turn away from the heading and is sin(half) / half times as long.
+    half_turns = (0.5 * wz) * times
+    chords = times * (np.sin(half_turns) / half_turns) if abs(wz) > STRAIGHT else times
+    c, s = np.cos(yaw + half_turns), np.sin(yaw + half_turns)
+    return np.column_stack([x + chords * (vx * c - vy * s), y + chords * (vx * s + vy * c), yaw + wz * times])

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from mbf_abstract.geometry.arithmetic import scalar_products
+from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
@@ -24,19 +23,19 @@ def resample(points: FloatArray, spacing: float) -> FloatArray:
     return np.concatenate([*pieces, points[-1:]])
 
 
-def circle_crossing(a: ArrayLike, b: ArrayLike, radius: float) -> FloatArray:
+def circle_crossing(a: Sequence[float] | FloatArray, b: Sequence[float] | FloatArray, radius: float) -> FloatArray:
     """Point where the segment from ``a`` to ``b`` crosses the circle of ``radius`` [m] around the origin.
 
     One end must lie inside (or on) the circle and the other outside (or on) it; the crossing is then unique, but for a
     segment that starts on the circle and runs through it: of two the one nearer to ``b`` is returned.
     """
-    start, side = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64) - np.asarray(a, dtype=np.float64)
-    quadratic = float(scalar_products(side, side))
-    linear = float(scalar_products(start, side))
-    constant = float(scalar_products(start, start)) - radius * radius
+    (x, y), (end_x, end_y) = (float(c) for c in a), (float(c) for c in b)  # plain numbers: once a control cycle
+    dx, dy = end_x - x, end_y - y
+    quadratic, linear, constant = dx * dx + dy * dy, x * dx + y * dy, x * x + y * y - radius * radius
     root = math.sqrt(max(0.0, linear * linear - quadratic * constant))
     far, near = (-linear + root) / quadratic, (-linear - root) / quadratic
-    return np.asarray(start + side * (far if -1e-12 <= far <= 1.0 + 1e-12 else near))
+    share = far if -1e-12 <= far <= 1.0 + 1e-12 else near
+    return np.array([x + dx * share, y + dy * share])
 
 
 def look_ahead_point(points: FloatArray, distance: float) -> FloatArray:
