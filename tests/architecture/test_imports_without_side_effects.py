@@ -10,7 +10,7 @@ import ast, gc, importlib, locale, logging, multiprocessing, os, pkgutil, random
 from pathlib import Path
 import numpy as np
 
-PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")
+PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "mbf_ros", "terrain")
 
 def state():
     return {

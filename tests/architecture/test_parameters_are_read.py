@@ -8,7 +8,7 @@ from pathlib import Path
 from mbf_abstract.parameters import ParameterModel
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")
+PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "mbf_ros", "terrain")
 READ_BY_NAME = {
     ("NavigationParameters", "restore_defaults"): "taken out of the changes before they are applied",
     ("CriticParameters", None): "one block for each critic, read in the order of the table of critics",

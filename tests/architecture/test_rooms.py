@@ -13,6 +13,7 @@ ALLOWED = {
     "mbf_abstract": {"mbf_abstract"},
     "mbf_costmap_nav": {"mbf_abstract", "mbf_costmap_nav"},
     "mbf_mesh_nav": {"mbf_abstract", "mbf_mesh_nav"},
+    "mbf_ros": {"mbf_abstract", "mbf_ros"},
     "terrain": {"mbf_abstract", "terrain"},
 }
 CLOCKS = "mbf_abstract/time/"

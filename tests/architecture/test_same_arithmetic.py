@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")
+PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "mbf_ros", "terrain")
 ONLY_LOOKS = ("terrain/viewer/", "terrain/experiments/table1/statistics.py", "mbf_abstract/testing/")
 ARITHMETIC = "mbf_abstract/geometry/arithmetic.py"
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")
+PACKAGES = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "mbf_ros", "terrain")
 FILES = [file for package in PACKAGES for file in sorted((REPOSITORY / package).rglob("*.py"))]
 PAGES = [file for file in sorted((REPOSITORY / "docs").rglob("*.md")) if "results" not in file.as_posix()]  # dated
 PAGES += [REPOSITORY / "README.md", REPOSITORY / "CONTRIBUTING.md"]

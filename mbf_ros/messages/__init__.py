@@ -1,0 +1,1 @@
+"""Goals, results, questions and sensor data as ROS messages: dictionaries by field name, made by pure functions."""

@@ -1,0 +1,158 @@
+"""The services of mbf_msgs that ask the map: requests to our questions, and answers to messages.
+
+A multiplier of 0 is left out of account, as upstream. The costmaps are numbered as there: 1 the local, 2 the global
+one; on a mesh both are the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.maps.map_queries import MapQueries
+from mbf_abstract.maps.queries import CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
+from mbf_ros.messages.geometry import InvalidValueError, MessageContext, path_of, pose_of, pose_stamped
+from mbf_ros.messages.interfaces import Message, MessageError
+
+LOCAL_COSTMAP, GLOBAL_COSTMAP = 1, 2
+MAX_COST = 2**32 - 1
+FACTORS = ("lethal_cost_mult", "inscrib_cost_mult", "unknown_cost_mult")
+
+
+@dataclass(frozen=True)
+class PathQuestion:
+    """The arguments of ``MapQueries.check_path``."""
+
+    path: Path
+    query: PlaceQuery
+    return_on: CellState | None
+    skip_poses: int
+    path_cells_only: bool
+
+
+@dataclass(frozen=True)
+class ValidPoseQuestion:
+    """The arguments of ``MapQueries.find_valid_pose``; distances [m], angles [rad]."""
+
+    pose: Pose | None
+    dist_tolerance: float
+    angle_tolerance: float
+    query: PlaceQuery
+
+
+def point_question(request: Message, context: MessageContext) -> tuple[Pose, bool]:
+    """Return the point of a CheckPoint_Request, and whether the local map is asked."""
+    header = request["point"]["header"]
+    orientation = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+    stamped = {"header": header, "pose": {"position": request["point"]["point"], "orientation": orientation}}
+    return pose_of(stamped, context, "point"), _is_local(request)
+
+
+def pose_question(request: Message, context: MessageContext) -> tuple[Pose | None, PlaceQuery]:
+    """Return pose (None = where the robot is) and query of a CheckPose_Request."""
+    return _pose(request, context), _place_query(request)
+
+
+def path_question(request: Message, context: MessageContext) -> PathQuestion:
+    """Return path and query of a CheckPath_Request."""
+    state = request["return_on"]
+    if state not in tuple(CellState):
+        raise MessageError(f"return_on must be a state from 0 to {max(CellState)}, got {state}")
+    path, skip = path_of(request["path"], context), request["skip_poses"]
+    return PathQuestion(path, _place_query(request), CellState(state) or None, skip, request["path_cells_only"])
+
+
+def valid_pose_question(request: Message, context: MessageContext) -> ValidPoseQuestion:
+    """Return pose, tolerances and query of a FindValidPose_Request."""
+    tolerances = request["dist_tolerance"], request["angle_tolerance"]
+    return ValidPoseQuestion(_pose(request, context), *tolerances, _place_query(request))
+
+
+def place_answer(answer: PlaceAnswer) -> Message:
+    """Return a CheckPoint_Response or a CheckPose_Response."""
+    return {"state": int(answer.state), "cost": _cost(answer.cost)}
+
+
+def path_answer(answer: PathAnswer) -> Message:
+    """Return a CheckPath_Response; ``last_checked`` of a path without poses is 0."""
+    return {"last_checked": max(answer.last_checked, 0), "state": int(answer.state), "cost": _cost(answer.cost)}
+
+
+def valid_pose_answer(answer: PoseAnswer, context: MessageContext) -> Message:
+    """Return a FindValidPose_Response; the pose is in no frame where none was found."""
+    return {
+        "state": int(answer.state),
+        "cost": _cost(answer.cost),
+        "pose": pose_stamped(answer.pose, context),
+    }
+
+
+def _is_local(request: Message) -> bool:
+    if request["costmap"] not in (LOCAL_COSTMAP, GLOBAL_COSTMAP):
+        raise MessageError(f"costmap must be 1 (local) or 2 (global), got {request['costmap']}")
+    return bool(request["costmap"] == LOCAL_COSTMAP)
+
+
+def _pose(request: Message, context: MessageContext) -> Pose | None:
+    return None if request["current_pose"] else pose_of(request["pose"], context)
+
+
+def _place_query(request: Message) -> PlaceQuery:
+    factors = {name: request.get(name) or 1.0 for name in FACTORS}
+    if bad := [name for name, factor in factors.items() if not math.isfinite(factor)]:
+        raise InvalidValueError(f"{bad[0]} must be finite")
+    try:
+        return PlaceQuery(
+            request["safety_dist"], local=_is_local(request), use_padded_footprint=request["use_padded_fp"], **factors
+        )
+    except MessageError:
+        raise
+    except ValueError as error:
+        raise InvalidValueError(str(error)) from error
+
+
+def _cost(cost: float) -> int:
+    """A cost as uint32: rounded, and cut where it does not fit."""
+    return round(cost) if 0.0 <= cost < MAX_COST else MAX_COST if cost > 0.0 else 0
+
+
+@dataclass(frozen=True)
+class MapQuestion:
+    """One service: its type, and what asks the map and makes the answer."""
+
+    type: str
+    ask: Callable[[MapQueries, Message, MessageContext], Message]
+
+
+def _ask_point(queries: MapQueries, request: Message, context: MessageContext) -> Message:
+    point, local = point_question(request, context)
+    return place_answer(queries.check_point(point, local))
+
+
+def _ask_pose(queries: MapQueries, request: Message, context: MessageContext) -> Message:
+    return place_answer(queries.check_pose(*pose_question(request, context)))
+
+
+def _ask_path(queries: MapQueries, request: Message, context: MessageContext) -> Message:
+    return path_answer(queries.check_path(**_arguments(path_question(request, context))))
+
+
+def _ask_valid_pose(queries: MapQueries, request: Message, context: MessageContext) -> Message:
+    answer = queries.find_valid_pose(**_arguments(valid_pose_question(request, context)))
+    return valid_pose_answer(answer, context)
+
+
+def _arguments(question: PathQuestion | ValidPoseQuestion) -> dict[str, Any]:
+    return dict(vars(question))
+
+
+MAP_QUESTIONS = {
+    "check_point_cost": MapQuestion("mbf_msgs/srv/CheckPoint", _ask_point),
+    "check_pose_cost": MapQuestion("mbf_msgs/srv/CheckPose", _ask_pose),
+    "check_path_cost": MapQuestion("mbf_msgs/srv/CheckPath", _ask_path),
+    "find_valid_pose": MapQuestion("mbf_msgs/srv/FindValidPose", _ask_valid_pose),
+}
+"""By the names of the services of ``mbf_costmap_nav`` upstream."""
