@@ -57,6 +57,9 @@ class EventKind(str, Enum):
     LEASE_REVOKED = "lease_revoked"  # holder, reason
     FAULT = "fault"  # where, type, message, traceback
     QUARANTINE = "quarantine"  # plugin, slot, reason
+    STUCK = (
+        "stuck"  # place, outcome, failures (count), tried: names, message; the same failure again and again at a place
+    )
     TREE = "tree"  # tree, then nodes where a run of it begins, or tick and changes: [index, status, message] of each
     MAP = "map"  # message: what a map server did or found, such as a defect of the mesh it has loaded
     PARAMETER_CHANGED = "parameter_changed"  # name, old, new

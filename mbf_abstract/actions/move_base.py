@@ -18,6 +18,10 @@ new goal                takes over: the old one ends CANCELED, the robot drives 
 cancel                  cancel the sub-goals, wait for their ends, end CANCELED
 ======================  =====================================================================================
 
+A robot that is stuck (``stuck_failures`` failures of one kind at one place) gets the behaviours of
+``escalation_behaviors`` instead of those of the list, and so does one whose list is used up; see
+``actions.stuck_monitor``. By default there are none, and the machine is that of Move Base Flex.
+
 Each behaviour of the list runs at most once until the list is reset: by a plan after trigger *plan*, by
 ``oscillation_distance`` of motion after the other two (upstream forgets that for *control*).
 """
@@ -69,7 +73,8 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
     def _check(self, goal: MoveBaseGoal) -> tuple[int, str] | None:
         """Accept only names that are loaded and tolerances that make sense."""
         wanted = [(PluginKind.PLANNER, goal.planner), (PluginKind.CONTROLLER, goal.controller)]
-        wanted += [(PluginKind.RECOVERY, name) for name in goal.recovery_behaviors or ()]
+        behaviors = (*(goal.recovery_behaviors or ()), *self.runtime.parameters.escalation_behaviors)
+        wanted += [(PluginKind.RECOVERY, name) for name in behaviors]
         for kind, name in wanted:
             problem = self._plugins.problem(kind, name)
             if problem:

@@ -10,6 +10,7 @@ from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.get_path import GetPathAction
 from mbf_abstract.actions.move_base_states import MoveBaseState, Trigger
 from mbf_abstract.actions.recovery import RecoveryAction
+from mbf_abstract.actions.stuck_monitor import StuckMonitor
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.motion_watch import OscillationDetector
@@ -65,6 +66,7 @@ class MoveBaseMachine:
         self._failure: End | None = None
         self._ending: End | None = None
         self._next_behavior = 0
+        self._monitor = StuckMonitor(self._runtime)
         self._oscillation = OscillationDetector(self._runtime.clock)
         self._recovered_at: Pose | None = None
         self._replan_watch = Stopwatch(self._runtime.clock)
@@ -85,6 +87,7 @@ class MoveBaseMachine:
     def run(self) -> End:
         """Work until the goal has its end."""
         self._job.handle.on_wake(self.wake)
+        self._monitor.restart(self._runtime.parameters.escalation_behaviors)
         self._ask_for_plan()
         try:
             end = None
@@ -117,7 +120,7 @@ class MoveBaseMachine:
             return self._on_followed(message.result)
         if message is self._recover:
             self._recover = None
-            return self._on_recovered()
+            return self._on_recovered(message.result)
         return None  # a sub-goal that another one has replaced
 
     def _next_message(self) -> AnyGoalHandle | None:
@@ -252,18 +255,26 @@ class MoveBaseMachine:
 
     # -------------------------------------------------------------------------------------- recovery
     def _recover_from(self, trigger: Trigger, failure: End) -> End | None:
-        """Run the next behaviour of the list; without one the failure is the goal's end."""
-        behaviors = self._behaviors()
+        """Run the behaviour that is due; without one the failure is the goal's end."""
         self._trigger = trigger
-        if not self._runtime.parameters.recovery_enabled or self._next_behavior >= len(behaviors):
-            return failure
-        behavior = behaviors[self._next_behavior]
-        self._next_behavior += 1
+        self._monitor.note_failure(failure[0])
+        behavior = self._due_behavior() if self._runtime.parameters.recovery_enabled else ""
+        if not behavior:
+            return failure[0], self._monitor.described(failure[1])
         self._enter(MoveBaseState.RECOVERY, behavior=behavior, trigger=trigger.value, failure=failure[1])
         self._recover = self._send(self._sub_actions.recovery, RecoveryGoal(behavior, concurrency_slot=SUB_GOAL_SLOT))
         return None
 
-    def _on_recovered(self) -> End | None:
+    def _due_behavior(self) -> str:
+        """Return the next one of the list; for a robot that is stuck, or after the list, that of the escalation."""
+        behaviors = self._behaviors()
+        if self._monitor.escalates or self._next_behavior >= len(behaviors):
+            return self._monitor.next_behavior()
+        self._next_behavior += 1
+        return behaviors[self._next_behavior - 1]
+
+    def _on_recovered(self, result: Any) -> End | None:
+        self._monitor.note_recovery(result.used_plugin, result.outcome)
         self._oscillation.reset()
         try:
             self._recovered_at = self._runtime.robot.pose()
@@ -274,7 +285,10 @@ class MoveBaseMachine:
 
     def _behaviors(self) -> list[str]:
         wanted = self._job.handle.goal.recovery_behaviors
-        return self._plugins.names(PluginKind.RECOVERY) if wanted is None else list(wanted)
+        if wanted is not None:
+            return list(wanted)
+        kept_back = self._runtime.parameters.escalation_behaviors
+        return [name for name in self._plugins.names(PluginKind.RECOVERY) if name not in kept_back]
 
     def _reset_recovery_after_motion(self, pose: Pose) -> None:
         if self._trigger in (Trigger.CONTROL, Trigger.OSCILLATION) and self._recovered_at is not None:
@@ -292,6 +306,7 @@ class MoveBaseMachine:
         if not self._job.take_over(lambda handle: handle.on_wake(self.wake), PREEMPTED):
             return
         self._reset_recovery()
+        self._monitor.restart(self._runtime.parameters.escalation_behaviors)
         self._failure = None
         self._oscillation.reset()
         try:

@@ -199,6 +199,7 @@ class _Validation:
         parameters = self._parameters()
         for key, kind in PLUGIN_LISTS.items():
             self._plugin_list(key, kind)
+        self._escalation_behaviors()
         validator = SectionValidator(self.document, self.registry, self.findings)
         sections = {key: validator.validate(model, key) for key, model in self.sections.items()}
         self._unknown_keys()
@@ -224,6 +225,16 @@ class _Validation:
             name = declared.name if declared else item.get("name") if isinstance(item, dict) else None
             if isinstance(name, str) and self._name_is_free(name, (key, index, "name")) and declared:
                 self._plugin(kind, declared, (key, index))
+
+    def _escalation_behaviors(self) -> None:
+        """Check that each behaviour for a robot that is stuck is one of the recovery behaviours of the file."""
+        names = self.data.get("escalation_behaviors")
+        items = self.data.get("recovery_behaviors")
+        listed = [item["name"] for item in items or () if isinstance(item, dict) and isinstance(item.get("name"), str)]
+        for index, name in enumerate(names if isinstance(names, list) else ()):
+            if isinstance(name, str) and name not in listed:
+                expected = "the name of one of the recovery_behaviors"
+                self._report(("escalation_behaviors", index), expected, repr(name), suggest(name, listed))
 
     def _name_is_free(self, name: str, path: KeyPath) -> bool:
         if name in self.lines_of_names:

@@ -104,6 +104,18 @@ class NavigationParameters(ParameterModel):
     )
     oscillation_angle: float = parameter(3.14, "Turning this far is progress.", unit="rad", ge=0.0, le=6.28)
 
+    # Robots that are stuck
+    stuck_failures: int = parameter(
+        3, "Failures of one kind at one place, for one goal, that count as stuck; 0 = never.", ge=0, le=1000
+    )
+    stuck_distance: float = parameter(0.5, "Failures this near to each other are at one place.", unit="m", ge=0.0)
+    escalation_behaviors: tuple[str, ...] = parameter(
+        (),
+        "Recovery behaviours for a robot that is stuck, each once at a place, in this order; then move_base and the "
+        "navigation tree give up. They are not among those that move_base runs by default. Empty = no escalation, as "
+        "in Move Base Flex.",
+    )
+
     # Robot, frames and odometry
     global_frame: str = parameter("map", "Frame of goals and paths.", dynamic=False)
     robot_frame: str = parameter("base_link", "Frame of the robot.", dynamic=False)

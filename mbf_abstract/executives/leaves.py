@@ -48,7 +48,7 @@ class ActionLeaf(Leaf):
     def take_result(self, result: ActionResult) -> None:
         """Write a result to the mission; this one keeps failures."""
         if not result.success:
-            self.mission.failure = result
+            self.mission.fail(result)
 
     def initialise(self) -> None:
         """Forget the goal of an earlier entry."""
@@ -199,7 +199,8 @@ class Recovery(ActionLeaf):
         return RecoveryGoal(self.behavior, concurrency_slot=self.slot)
 
     def take_result(self, result: ActionResult) -> None:
-        """Leave the mission as it is."""
+        """Leave the failure as it is, and note what was tried against it."""
+        self.mission.stuck.note_recovery(self.behavior, result.outcome)
 
 
 class MoveBase(ActionLeaf):

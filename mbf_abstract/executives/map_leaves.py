@@ -53,7 +53,7 @@ class MapCheck(Leaf):
 
     def _fail(self, outcome: int, message: str) -> Status:
         self.feedback_message = message
-        self.mission.failure = ActionResult(int(outcome), message)
+        self.mission.fail(ActionResult(int(outcome), message))
         return Status.FAILURE
 
 

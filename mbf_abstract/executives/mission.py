@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from mbf_abstract.actions.stuck_monitor import StuckMonitor
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.goals.goal_types import ActionResult, ExePathFeedback, ExePathResult, GetPathResult
 from mbf_abstract.goals.handle import AnyGoalHandle
@@ -39,6 +40,8 @@ class MissionContext:
         Newest feedback of driving along ``path``.
     failure : ActionResult, optional
         The last failure of planning, driving, a check or a watchdog; recoveries are picked by its code.
+    stuck : StuckMonitor
+        The trouble so far: whether the same failure comes again and again at one place.
     """
 
     navigator: Navigator
@@ -48,7 +51,11 @@ class MissionContext:
     drive: ExePathResult | None = None
     feedback: ExePathFeedback | None = None
     failure: ActionResult | None = None
+    stuck: StuckMonitor = field(init=False, repr=False)
     _handles: list[AnyGoalHandle] = field(default_factory=list, repr=False)
+
+    def __post_init__(self) -> None:
+        self.stuck = StuckMonitor(self.navigator.server.runtime)
 
     @property
     def clock(self) -> Clock:
@@ -64,6 +71,11 @@ class MissionContext:
         if self.failure.outcome in PATIENCE_CODES and own is not None and not is_success(own):
             return int(own)
         return self.failure.outcome
+
+    def fail(self, failure: ActionResult) -> None:
+        """Keep a failure of planning, driving, a check or a watchdog, and count it where the robot is."""
+        self.failure = failure
+        self.stuck.note_failure(self.failure_code)
 
     def robot_pose(self) -> Pose:
         """Fresh robot pose in the global frame; raises RobotStateError."""

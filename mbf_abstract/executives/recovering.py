@@ -21,6 +21,11 @@ class TaskWithRecoveries(Composite):
     """Run a task; while it fails, run the next recovery of a list and the task again, until the list is used up.
 
     ``MemRec`` and ``RecoveryNode`` differ in what a recovery that fails means.
+
+    Attributes
+    ----------
+    gives_up : callable
+        Asked after each failure of the task whether to fail without a further recovery; an ``Escalation`` sets it.
     """
 
     recovery_must_succeed = False
@@ -33,6 +38,7 @@ class TaskWithRecoveries(Composite):
         super().__init__(name, [task, *recoveries])
         self.turns = turns
         self.give_up_on = frozenset(give_up_on)
+        self.gives_up: Callable[[], bool] = lambda: False
         self._used = 0
         self._recovering = False
 
@@ -51,7 +57,7 @@ class TaskWithRecoveries(Composite):
                     return status
                 self._recovering = False
             status = yield from self.tick_child(task)
-            if status != Status.FAILURE or self._used == self.turns:
+            if status != Status.FAILURE or self._used == self.turns or self.gives_up():
                 return status
             if self.give_up_on and self.mission.failure_code in self.give_up_on:
                 return Status.FAILURE

@@ -3,7 +3,8 @@
 - *planning*: plan; where that fails, run the next recovery of a list and plan again.
 - *control*: follow the path while a second planner keeps updating it; where driving fails, run a recovery that fits the
   outcome code, then drive on along the **same** path. Only if that does not help does the tree fall back to planning.
-- *navigation*: free the robot and the goal if they are blocked, then plan and drive.
+- *navigation*: free the robot and the goal if they are blocked, then plan and drive. A robot that is stuck gets the
+  server's ``escalation_behaviors``, see ``executives.escalation``.
 
 Use them as they are, or as a pattern: a tree is an expression of nodes. They need the behaviours named in
 ``TreeOptions`` to be loaded; a name of "" leaves the behaviour out.
@@ -20,6 +21,7 @@ from py_trees.common import ParallelPolicy
 from py_trees.composites import Parallel, Sequence
 
 from mbf_abstract.executives.conditions import BEYOND_RECOVERY, recovery_would_help
+from mbf_abstract.executives.escalation import Escalation
 from mbf_abstract.executives.leaves import ExePath, GetPath, Recovery, UpdatePath
 from mbf_abstract.executives.map_leaves import CheckPose, PathBlocked
 from mbf_abstract.executives.pacing import Delay, InBackground
@@ -104,7 +106,7 @@ def navigation_tree(options: TreeOptions = TreeOptions()) -> Behaviour:
             MemRec("free the goal", CheckPose("goal is free?"), _recoveries(options.clear)),
             *steps,
         ]
-    return Sequence("navigation", memory=True, children=steps)
+    return Escalation("navigation", Sequence("unless stuck", memory=True, children=steps))
 
 
 def planning_tree(options: TreeOptions = TreeOptions(), name: str = "planning") -> Behaviour:

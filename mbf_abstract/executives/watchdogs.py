@@ -48,7 +48,7 @@ class Watchdog(Decorator):
         if not text:
             return Status.RUNNING
         self.feedback_message = text
-        self.mission.failure = ActionResult(int(self.outcome), text)
+        self.mission.fail(ActionResult(int(self.outcome), text))
         return Status.FAILURE
 
 

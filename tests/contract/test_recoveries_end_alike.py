@@ -198,6 +198,12 @@ def test_waiting_takes_its_time(world, run):
     assert result.outcome == RecoveryOutcome.SUCCESS and motion.seconds == pytest.approx(2.0, abs=0.1)
 
 
+def test_waiting_by_chance_stays_within_its_bounds_and_is_the_same_for_the_same_seed(world, run):
+    times = [run("wait", world.map_of(nothing), duration=1.0, random_extra=2.0)[1].seconds for _ in range(2)]
+    assert times[0] == times[1]
+    assert 1.3 < times[0] < 3.1, "drawn, not the shortest time"
+
+
 @pytest.mark.parametrize(
     ("options", "left"),
     [

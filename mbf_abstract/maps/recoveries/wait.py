@@ -1,5 +1,8 @@
 """Stand still for a while, e.g. until a person has passed.
 
+With ``random_extra`` the time is drawn anew for each run, so that two robots that wait for each other do not start
+again at the same moment for ever. The draws come from the plugin's generator: the same seed waits the same times.
+
 When to use: first in the list, before anything that moves or clears. When not: obstacles that stay; it only costs time.
 """
 
@@ -19,7 +22,8 @@ PERIOD = 0.05  # s
 class WaitParameters(PluginParameters):
     """Parameters of ``wait``."""
 
-    duration: float = parameter(3.0, "How long to stand.", unit="s", ge=0.0, le=600.0)
+    duration: float = parameter(3.0, "How long to stand, at least.", unit="s", ge=0.0, le=600.0)
+    random_extra: float = parameter(0.0, "Stand up to this much longer, by chance.", unit="s", ge=0.0, le=600.0)
 
 
 class WaitRecovery(AbstractRecovery):
@@ -30,7 +34,7 @@ class WaitRecovery(AbstractRecovery):
 
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
         """Wait; ends early when cancelled, or where something else drives the robot."""
-        motion, token, duration = request.motion, request.cancel_token, self.parameters.duration
+        motion, token, duration = request.motion, request.cancel_token, self._duration()
         if token.cancelled:
             return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
         # A goal that is paused is refused too: its sleep lasts until it is resumed, so the second refusal counts.
@@ -39,4 +43,9 @@ class WaitRecovery(AbstractRecovery):
             return RecoveryResult(RecoveryOutcome.STOPPED, GATE_REFUSED)
         if not motion.sleep(duration):
             return ended_by_others(token)
-        return RecoveryResult(RecoveryOutcome.SUCCESS, f"waited {duration:g} s")
+        return RecoveryResult(RecoveryOutcome.SUCCESS, f"waited {duration:.3g} s")
+
+    def _duration(self) -> float:
+        """Time of this run [s], between ``duration`` and ``random_extra`` more."""
+        extra = self.parameters.random_extra
+        return self.parameters.duration + (extra * float(self.rng.random()) if extra > 0.0 else 0.0)

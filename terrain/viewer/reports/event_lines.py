@@ -12,6 +12,7 @@ NOTABLE = {
     EventKind.GOAL_REJECTED,
     EventKind.GOAL_CANCEL,
     EventKind.RECOVERY,
+    EventKind.STUCK,
     EventKind.ROBOT_STOPPED,
     EventKind.COMMAND_DROPPED,
     EventKind.GATE_CLOSED,

@@ -295,3 +295,17 @@ def test_values_out_of_mbfs_range_are_refused(name, low, high):
 def test_a_watchdog_shorter_than_a_control_period_is_refused():
     with pytest.raises(ValueError, match="at least one control period"):
         NavigationParameters(command_timeout=0.5, controller_frequency=1.0)
+
+
+def test_a_behaviour_for_a_stuck_robot_must_be_one_of_the_recovery_behaviours(tmp_path):
+    text = GOOD.replace("second: {", "escalation_behaviors: [pause, pase, first]\nsecond: {")
+    assert refused(tmp_path, text) == [
+        "8: escalation_behaviors[1]: expected the name of one of the recovery_behaviors, got 'pase' "
+        "(did you mean 'pause'?)",
+        "8: escalation_behaviors[2]: expected the name of one of the recovery_behaviors, got 'first'",
+    ]
+
+
+def test_behaviours_for_a_stuck_robot_are_taken_over_in_their_order(tmp_path):
+    text = GOOD.replace("second: {", "escalation_behaviors: [pause]\nsecond: {")
+    assert check(tmp_path, text).parameters.escalation_behaviors == ("pause",)

@@ -107,7 +107,8 @@ def test_it_gives_up_after_its_replans_with_the_last_failure(make_session):
     session = make_session()
     session.controller.play(BLOCKED)
     result = run(session, navigation_tree(OPTIONS))
-    assert result.message == "BLOCKED_PATH: a chair"
+    stuck = "stuck at (0.00, 0.00): BLOCKED_PATH 20 times; tried clear, back_up"
+    assert result.message == f"BLOCKED_PATH: a chair; {stuck}"
     assert plans(session) == 1 + OPTIONS.replans
     assert session.robot.command.is_stopped()
 

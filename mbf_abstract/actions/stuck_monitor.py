@@ -1,0 +1,134 @@
+"""Finds a robot that gets nowhere: the same failure at the same place, again and again, whatever is tried against it.
+
+An executive notes every failure it recovers from and every behaviour it has run. Where failures of one kind have come
+``stuck_failures`` times within ``stuck_distance`` of a place, the robot is stuck there: the monitor emits an event, and
+the behaviours of ``escalation_behaviors`` are due, one after the other. Each runs once at a place; then there is
+nothing left to try, and ``described`` gives the text with which the executive gives up.
+
+When to use: one monitor for each goal of an executive of your own; ``move_base`` and the missions of behaviour trees
+have one. When not: a robot that moves without getting anywhere raises no failure; the oscillation and progress watches
+of ``exe_path`` make one of it.
+
+Places are kept until the goal ends, so a robot that is sent to and fro between two closed doors is found, too. What
+counts is where a failure was met, not what the robot did in between; a plan that succeeds is no progress.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.events import EventKind
+from mbf_abstract.execution.runtime import Runtime
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import is_success, outcome_name
+
+
+@dataclass
+class TroubleSpot:
+    """A place where something failed, for one goal.
+
+    Attributes
+    ----------
+    place : Pose
+        Where the robot was at the first failure.
+    failures : Counter of int
+        Failures by outcome code.
+    tried : dict of str to int
+        Behaviours that ran here, with their last outcome, in the order of their first run.
+    escalations : int
+        How many behaviours of the escalation are used up here.
+    """
+
+    place: Pose
+    failures: Counter[int] = field(default_factory=Counter)
+    tried: dict[str, int] = field(default_factory=dict)
+    escalations: int = 0
+
+    def __str__(self) -> str:
+        x, y, z = self.place.position
+        where = f"({x:.2f}, {y:.2f})" if z == 0.0 else f"({x:.2f}, {y:.2f}, {z:.2f})"
+        (outcome, count), *_ = self.failures.most_common(1)
+        ends = [name if is_success(end) else f"{name} ({outcome_name(end)})" for name, end in self.tried.items()]
+        return f"stuck at {where}: {outcome_name(outcome)} {count} times; tried {', '.join(ends) or 'nothing'}"
+
+
+class StuckMonitor:
+    """The trouble of one goal at a time; used by one thread."""
+
+    def __init__(self, runtime: Runtime) -> None:
+        self._runtime = runtime
+        self.restart()
+
+    def restart(self, escalation: Sequence[str] = ()) -> None:
+        """Forget everything for a new goal.
+
+        Parameters
+        ----------
+        escalation : sequence of str
+            Recovery behaviours for a robot that is stuck, in their order; without any the monitor only reports.
+        """
+        self._escalation = tuple(escalation)
+        self._spots: list[TroubleSpot] = []
+        self._present: TroubleSpot | None = None
+
+    # ------------------------------------------------------------------------------------------- what happened
+    def note_failure(self, outcome: int) -> None:
+        """Count a failure where the robot is now; one of a robot that does not know where it is belongs nowhere."""
+        try:
+            pose = self._runtime.robot.pose()
+        except RobotStateError:
+            self._present = None
+            return
+        self._present = spot = self._spot_at(pose)
+        spot.failures[outcome] += 1
+        if spot.failures[outcome] == self._runtime.parameters.stuck_failures:
+            self._runtime.events.emit(
+                EventKind.STUCK,
+                "stuck_monitor",
+                place=list(spot.place.position),
+                outcome=int(outcome),
+                failures=spot.failures[outcome],
+                tried=list(spot.tried),
+                message=str(spot),
+            )
+
+    def _spot_at(self, pose: Pose) -> TroubleSpot:
+        """Return the oldest place within the distance, else a new one."""
+        distance = self._runtime.parameters.stuck_distance
+        for spot in self._spots:
+            if spot.place.distance_to(pose) <= distance:
+                return spot
+        self._spots.append(TroubleSpot(pose))
+        return self._spots[-1]
+
+    def note_recovery(self, behavior: str, outcome: int) -> None:
+        """Note that a behaviour has run against the last failure, and how it ended."""
+        if self._present is not None:
+            self._present.tried[behavior] = outcome
+
+    # --------------------------------------------------------------------------------------------- what is due
+    @property
+    def stuck(self) -> bool:
+        """Whether the last failure was one too many at its place."""
+        limit = self._runtime.parameters.stuck_failures
+        return self._present is not None and 0 < limit <= max(self._present.failures.values())
+
+    @property
+    def escalates(self) -> bool:
+        """Whether the escalation decides what happens next, instead of the usual recoveries."""
+        return self.stuck and bool(self._escalation)
+
+    def next_behavior(self) -> str:
+        """Return the next behaviour of the escalation at the present place; empty if all have run here."""
+        spot = self._present
+        if spot is None or spot.escalations >= len(self._escalation):
+            return ""
+        spot.escalations += 1
+        return self._escalation[spot.escalations - 1]
+
+    def described(self, message: str) -> str:
+        """Return the message of a failure, with the place and what was tried if the robot is stuck."""
+        return f"{message}; {self._present}" if self.stuck else message

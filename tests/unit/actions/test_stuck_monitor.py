@@ -1,0 +1,157 @@
+"""The stuck monitor: the same failure at the same place is counted, whatever happens in between."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mbf_abstract.actions.stuck_monitor import StuckMonitor
+from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import Pose
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RecoveryOutcome
+from mbf_abstract.testing.scripted_session import ScriptedSession
+
+BLOCKED, COLLISION = ExePathOutcome.BLOCKED_PATH, ExePathOutcome.COLLISION
+LADDER = ("wait", "back_out")
+
+
+class Stand:
+    """A monitor and a robot that is put somewhere before each failure."""
+
+    def __init__(self, session, escalation=()):
+        self.session = session
+        self.monitor = StuckMonitor(session.server.runtime)
+        self.monitor.restart(escalation)
+
+    def fail(self, x=0.0, outcome=BLOCKED):
+        self.session.robot._x = x
+        self.session.clock.sleep(0.05)  # for its pose to be published
+        self.monitor.note_failure(outcome)
+        return self.monitor.stuck
+
+
+@pytest.fixture
+def stand():
+    """``stand(escalation, **parameters)``; its session is closed at the end."""
+    sessions = []
+
+    def make(escalation=(), **parameters):
+        sessions.append(ScriptedSession(**parameters))
+        return Stand(sessions[-1], escalation)
+
+    yield make
+    for session in sessions:
+        session.close()
+
+
+def test_the_third_failure_of_one_kind_at_one_place_is_one_too_many(stand):
+    made = stand()
+    assert [made.fail() for _ in range(4)] == [False, False, True, True]
+
+
+def test_failures_of_different_kinds_are_counted_apart(stand):
+    made = stand()
+    codes = (BLOCKED, COLLISION, BLOCKED, COLLISION, BLOCKED)
+    assert [made.fail(outcome=code) for code in codes] == [False, False, False, False, True]
+
+
+def test_what_the_robot_did_between_two_failures_does_not_matter(stand):
+    made = stand(stuck_distance=0.5)
+    places = [0.0, 3.0, 0.2, 3.1, 0.4, 2.9]
+    assert [made.fail(x) for x in places] == [False, False, False, False, True, True]
+
+
+def test_a_failure_beyond_the_distance_is_at_another_place(stand):
+    made = stand(stuck_distance=0.5)
+    assert [made.fail(x) for x in (0.0, 0.45, 0.6, 0.9, 0.1)] == [False, False, False, False, True]
+
+
+def test_a_limit_of_zero_switches_the_monitor_off(stand):
+    made = stand(LADDER, stuck_failures=0)
+    assert not any(made.fail() for _ in range(20))
+    assert not made.session.recorded(EventKind.STUCK)
+
+
+def test_a_new_goal_begins_with_nothing_counted(stand):
+    made = stand(LADDER)
+    for _ in range(3):
+        made.fail()
+    made.monitor.restart(LADDER)
+    assert not made.monitor.stuck
+    assert not made.fail()
+
+
+def test_a_robot_that_is_lost_is_stuck_nowhere(stand):
+    made = stand(stuck_failures=1, tf_timeout=0.5)
+    assert made.fail()
+    made.session.robot.publishes_pose = False
+    made.session.clock.sleep(1.0)
+    made.monitor.note_failure(BLOCKED)
+    assert not made.monitor.stuck
+    assert made.monitor.described("lost") == "lost"
+
+
+def test_it_is_reported_once_with_place_kind_and_what_was_tried(stand):
+    made = stand()
+    for name, end in (("clear", 0), ("back_up", RecoveryOutcome.IMPASSABLE), ("clear", 0), ("clear", 0)):
+        made.fail(10.7)
+        made.monitor.note_recovery(name, end)
+    (event,) = made.session.recorded(EventKind.STUCK)
+    assert event.data["place"] == [10.7, 0.0, 0.0]
+    assert (event.data["outcome"], event.data["failures"]) == (BLOCKED, 3)
+    assert event.data["tried"] == ["clear", "back_up"]
+    expected = "stuck at (10.70, 0.00): BLOCKED_PATH 3 times; tried clear, back_up (IMPASSABLE)"
+    assert event.data["message"] == expected
+    assert made.monitor.described("a chair") == f"a chair; {expected.replace('3', '4')}"
+
+
+def test_the_message_of_a_robot_that_is_not_stuck_stays(stand):
+    made = stand()
+    made.fail()
+    assert made.monitor.described("a chair") == "a chair"
+
+
+def test_a_place_above_the_ground_is_named_with_its_height(stand):
+    made = stand(start=Pose.planar(1.0, 2.0, 0.0, 3.5), stuck_failures=1)
+    made.monitor.note_failure(GetPathOutcome.NO_PATH_FOUND)
+    assert made.monitor.described("x") == "x; stuck at (1.00, 2.00, 3.50): NO_PATH_FOUND 1 times; tried nothing"
+
+
+def test_each_behaviour_of_the_escalation_is_due_once_at_each_place(stand):
+    made = stand(LADDER)
+    made.fail(0.0)
+    assert [made.monitor.next_behavior() for _ in range(3)] == ["wait", "back_out", ""]
+    made.fail(5.0)
+    assert made.monitor.next_behavior() == "wait"
+    made.fail(0.1)
+    assert made.monitor.next_behavior() == ""
+
+
+def test_without_escalation_the_usual_recoveries_go_on(stand):
+    made = stand(())
+    for _ in range(5):
+        made.fail()
+    assert made.monitor.stuck and not made.monitor.escalates
+    assert made.monitor.next_behavior() == ""
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 40), st.sampled_from([BLOCKED, COLLISION])), max_size=30),
+    st.integers(0, 4),
+    st.integers(0, 12),
+)
+def test_it_counts_as_a_naive_counter_does(failures, limit, tenths):
+    """The twin keeps the whole history: a failure belongs to the first place ever founded within the distance."""
+    with ScriptedSession(stuck_failures=limit, stuck_distance=tenths / 10.0) as session:
+        made = Stand(session)
+        founded, belongs = [], []
+        for tenth, outcome in failures:
+            x = tenth / 10.0
+            place = next((index for index, other in enumerate(founded) if abs(other - x) <= tenths / 10.0), None)
+            if place is None:
+                place = len(founded)
+                founded.append(x)
+            belongs.append((place, outcome))
+            counts = [belongs.count((place, code)) for code in (BLOCKED, COLLISION)]
+            assert made.fail(x, outcome) == (0 < limit <= max(counts))
+        expected = sum(0 < limit <= belongs.count(kind) for kind in set(belongs))
+        assert len(session.recorded(EventKind.STUCK)) == expected
