@@ -72,6 +72,12 @@ class MissionContext:
             return int(own)
         return self.failure.outcome
 
+    def begin(self, target: Pose) -> None:
+        """Forget everything about the old target and go to another one."""
+        self.target, self.path, self.plan, self.drive = target, None, None, None
+        self.feedback, self.failure = None, None
+        self.stuck.restart()
+
     def fail(self, failure: ActionResult) -> None:
         """Keep a failure of planning, driving, a check or a watchdog, and count it where the robot is."""
         self.failure = failure

@@ -1,8 +1,9 @@
 """Runs a behaviour tree (or a state machine) for one target after the other: ticks it on the server's clock.
 
 The tree is ticked on the caller's thread, every ``period`` seconds of the server's clock, so a simulated run
-repeats bit for bit. However a run ends - the tree is done, ``cancel`` from another thread, an exception, Ctrl-C - every
-goal it sent is ended and the robot stands when ``run`` returns.
+repeats bit for bit. ``change_target`` sends it elsewhere, whatever branch is running. However a run ends - the tree is
+done, ``cancel`` from another thread, an exception, Ctrl-C - every goal it sent is ended and the robot stands when
+``run`` returns.
 
 Example
 -------
@@ -67,6 +68,8 @@ class TreeExecutive:
         self._runtime = navigator.server.runtime
         self._condition = self._runtime.clock.condition()
         self._cancel_reason = ""
+        self._new_target: Pose | None = None
+        self._runs = False
         self._tip = ""
         self._ticks = 0
         self._reporter = TreeReporter(tree, self._runtime.events)
@@ -87,8 +90,10 @@ class TreeExecutive:
             node.setup(mission=mission)
         self._reporter.begin()
         try:
-            status = self._tick_until_done()
+            status = self._tick_until_done(mission)
         finally:
+            with self._condition:
+                self._runs = False
             self._stop_tree()
             mission.end_goals(self._cancel_reason or "the tree has ended")
         return TreeResult(status, self._message(status, mission), mission)
@@ -99,9 +104,40 @@ class TreeExecutive:
             self._cancel_reason = reason
             self._condition.notify_all()
 
-    def _tick_until_done(self) -> Status:
+    def change_target(self, target: Pose) -> bool:
+        """Let the present run go on to another target; may be called from any thread, never waits.
+
+        Before the next tick, whatever branch is running, every node becomes idle, the goals they sent are canceled and
+        the mission forgets the old target; then the tree begins anew. The robot stops meanwhile. Of several targets
+        between two ticks the last one counts. For trees that plan: one that follows a given path has none then.
+
+        Returns
+        -------
+        bool
+            Whether the run goes there; False where none is running.
+        """
+        with self._condition:
+            if self._runs and not self._cancel_reason:
+                self._new_target = target
+                return True
+            return False
+
+    def _take_new_target(self, mission: MissionContext) -> bool:
+        """Begin anew if there is another target; without one a run that is done takes no more of them."""
+        with self._condition:
+            target, self._new_target = self._new_target, None
+            self._runs = target is not None or self.tree.status == Status.RUNNING
+        if target is None:
+            return False
+        self._stop_tree()
+        mission.begin(target)
+        return True
+
+    def _tick_until_done(self, mission: MissionContext) -> Status:
         clock = self._runtime.clock
         start, self._ticks = clock.now(), 0
+        with self._condition:
+            self._new_target, self._runs = None, True
         while not self._cancel_reason:
             self.tree.tick_once()
             self._ticks += 1
@@ -109,7 +145,7 @@ class TreeExecutive:
             self._reporter.report(self._ticks)
             for listener in self.on_tick:
                 listener(self._ticks)
-            if self.tree.status != Status.RUNNING:
+            if not self._take_new_target(mission) and self.tree.status != Status.RUNNING:
                 return self.tree.status
             self._wait_until(start + self._ticks * self.period)
         return Status.INVALID
