@@ -27,6 +27,7 @@ from mbf_costmap_nav.files.map_io import load_map
 from mbf_costmap_nav.grid.costmap import INSCRIBED, UNKNOWN
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.map.static_maps import StaticMaps
 from mbf_costmap_nav.planning.nav_core import wrap_nav_core
 from mbf_costmap_nav.plugins import CostmapContext
 
@@ -81,8 +82,9 @@ class CostmapNavigationServer(MapServer):
 
     def serve_maps(self, config: Config) -> Iterator[ServedMap[Any]]:
         """Build the global costmap, then the local one."""
+        static_maps = StaticMaps(self.runtime.transforms)
         for key in ("global_costmap", "local_costmap"):
-            served = self._serve(config, key)
+            served = self._serve(config, key, static_maps)
             setattr(self, key, served.map)
             yield served
 
@@ -140,7 +142,7 @@ class CostmapNavigationServer(MapServer):
             raise ConfigError([Finding(str(error.file), 1, "", "a map", error.reason)]) from error
         return FloorMap(content.occupancy, content.resolution, *content.origin[:2])
 
-    def _serve(self, config: Config, key: str) -> ServedMap[LayeredCostmap]:
+    def _serve(self, config: Config, key: str, static_maps: StaticMaps) -> ServedMap[LayeredCostmap]:
         section = config.sections[key]
         parameters = cast(CostmapParameters, section.parameters)
         layer_classes: dict[str, Any] = {layer.type_name: layer.layer_class for layer in section.layers}
@@ -150,6 +152,7 @@ class CostmapNavigationServer(MapServer):
             load_layer=layer_classes.__getitem__,
             base_folder=config.path.parent,
             transforms=self.runtime.transforms,
+            static_maps=static_maps,
         )
         frequency, tolerance = parameters.update_frequency, parameters.transform_tolerance
         return ServedMap(costmap, self.runtime, key, parameters, frequency, tolerance)

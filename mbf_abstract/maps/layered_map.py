@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.tracking.objects import TrackedObject
 
 
 class LayeredMap(NavigationMap):
@@ -81,6 +82,11 @@ class LayeredMap(NavigationMap):
             As ``insert_scan``.
         """
         self.insert_scan(RangeScan.of_points(source, points, sensor_origin, stamp, self.frame_id))
+
+    def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
+        """The objects of all layers that follow some, at ``now`` [s]."""
+        with self._lock:
+            return tuple(known for layer in self.layers.enabled for known in layer.tracked_objects(now))
 
     def set_layer_parameters(self, name: str, parameters: Any, until: float = math.inf) -> None:
         """Replace the parameters of one layer, all or none.

@@ -18,6 +18,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.plugins import Plugin, PluginContext
 
 PlaceCheck = Callable[[Pose], PlaceAnswer]
@@ -73,6 +74,10 @@ class NavigationMap(ABC):
     def insert_scan(self, scan: RangeScan) -> None:
         """Keep a scan in the frame of the map for the next update; never waits for an update."""
         raise ValueError(f"the map listens to no source, got a scan of {scan.source!r}")
+
+    def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
+        """What moves, or has stopped, among what its sensors see, at ``now`` [s]; empty if no layer tracks objects."""
+        return ()
 
     # -------------------------------------------------------------------------------------------------- places
     @abstractmethod

@@ -21,7 +21,7 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.layers.layer import LayerParameters
 from mbf_abstract.parameters import parameter
 from mbf_costmap_nav.files.map_io import load_costmap
-from mbf_costmap_nav.grid.costmap import EMPTY_BOX, LETHAL, UNKNOWN, CellArray, CellBox, GridGeometry
+from mbf_costmap_nav.grid.costmap import EMPTY_BOX, LETHAL, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.placement import Placement
 from mbf_costmap_nav.grid.resampling import sample_costmap
 from mbf_costmap_nav.map.layer import CombinationMethod, GridLayer, LayerContext, combine
@@ -69,6 +69,11 @@ class StaticLayer(GridLayer):
     def permanent(self) -> bool:
         """Whether its map is in the costmap's frame."""
         return self._placement.in_costmap_frame
+
+    @property
+    def floor_plan(self) -> Costmap:
+        """The map as loaded."""
+        return self._map
 
     def configuration_warning(self) -> str:
         """Warn that nearly all of the map is occupied."""

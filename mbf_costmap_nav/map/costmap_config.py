@@ -28,6 +28,7 @@ from mbf_costmap_nav.grid.costmap import MAX_CELLS, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.map.layer import CostmapLayer, LayerContext
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.map.static_maps import StaticMaps
 
 
 class CostmapParameters(ParameterModel):
@@ -112,6 +113,7 @@ def build_layered_costmap(
     base_folder: Path | str = ".",
     static_map: Costmap | None = None,
     transforms: TransformBuffer | None = None,
+    static_maps: StaticMaps | None = None,
 ) -> LayeredCostmap:
     """Make a costmap with its layers.
 
@@ -129,6 +131,8 @@ def build_layered_costmap(
         Map of static layers that name no file.
     transforms : TransformBuffer, optional
         For layers whose data is in another frame than the costmap.
+    static_maps : StaticMaps, optional
+        Takes the floor plans of the layers, and shows them those of other costmaps.
 
     Raises
     ------
@@ -138,6 +142,7 @@ def build_layered_costmap(
         A layer's map file cannot be used.
     """
     plan = plan_layers(parameters.layers, layer_blocks or {}, load_layer or layer_loader("costmap", CostmapLayer))
+    static_maps = StaticMaps(transforms) if static_maps is None else static_maps
     layers = [
         planned.layer_class(
             LayerContext(
@@ -151,10 +156,14 @@ def build_layered_costmap(
                 static_map=static_map,
                 transforms=transforms,
                 max_cells=parameters.max_cells,
+                static_maps=static_maps,
             )
         )
         for planned in plan
     ]
+    for layer in layers:
+        if layer.floor_plan is not None:
+            static_maps.add(layer.floor_plan)
     return LayeredCostmap(
         parameters.geometry(),
         layers,

@@ -25,6 +25,7 @@ from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.layers.layer import LayerParameters, MapLayer
 from mbf_costmap_nav.grid.costmap import FREE, MAX_CELLS, UNKNOWN, CellArray, CellBox, Costmap, GridGeometry
 from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.static_maps import StaticMaps
 
 CellType = TypeVar("CellType", bound=np.generic)
 
@@ -63,6 +64,8 @@ class LayerContext:
         A map handed over by the program instead of a file.
     transforms : TransformBuffer, optional
         Where the frames of the layer's data are looked up; without it everything must be in the costmap's frame.
+    static_maps : StaticMaps
+        Floor plans that explain what sensors see of walls, also those of the server's other costmap.
     """
 
     name: str
@@ -75,6 +78,7 @@ class LayerContext:
     static_map: Costmap | None = None
     transforms: TransformBuffer | None = None
     max_cells: int = MAX_CELLS
+    static_maps: StaticMaps = field(default_factory=StaticMaps)
 
 
 class CostmapLayer(MapLayer):
@@ -92,6 +96,11 @@ class CostmapLayer(MapLayer):
 
     def preferred_geometry(self) -> GridGeometry | None:
         """Grid the costmap should have because of this layer (a static map); None = any."""
+        return None
+
+    @property
+    def floor_plan(self) -> Costmap | None:
+        """Map of what stands for ever, in its own frame, if the layer has one."""
         return None
 
     def match_geometry(self, geometry: GridGeometry) -> None:

@@ -46,6 +46,8 @@ class LayerContext:
         Validated instance of the layer class's ``Parameters``.
     inputs : tuple of MeshLayer
         The layers it reads, in the configured order.
+    frame_id : str
+        Frame of all coordinates.
     """
 
     name: str
@@ -53,6 +55,7 @@ class LayerContext:
     locator: SurfaceLocator
     parameters: LayerParameters
     inputs: tuple[MeshLayer, ...] = ()
+    frame_id: str = "map"
 
 
 class MeshLayer(map_layer.MapLayer):

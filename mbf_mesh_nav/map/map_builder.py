@@ -253,7 +253,8 @@ def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer[MeshLayer]], 
     for planned in plan:
         inputs = tuple(layers[name] for name in planned.entry.reads)
         name, settings = planned.entry.name, cast(LayerParameters, planned.parameters)
-        layer = planned.layer_class(LayerContext(name, mesh_map.topology, mesh_map.locator, settings, inputs))
+        context = LayerContext(name, mesh_map.topology, mesh_map.locator, settings, inputs, mesh_map.frame_id)
+        layer = planned.layer_class(context)
         stored = cache.load(layer) if cache and layer.cacheable else None
         if stored is not None:
             layer.replace(*stored)

@@ -12,8 +12,8 @@ from mbf_abstract.geometry import Pose
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 from mbf_costmap_nav.plugins import CostmapContext
+from mbf_mesh_nav.layers.combinations.max_combination import MaxCombinationLayer
 from mbf_mesh_nav.layers.inflation import InflationLayer
-from mbf_mesh_nav.layers.max_combination import MaxCombinationLayer
 from mbf_mesh_nav.layers.obstacle import ObstacleLayer
 from mbf_mesh_nav.map.layer import LayerContext, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph

@@ -21,12 +21,14 @@ COSTMAP_PARAMETERS = {
     "obstacle": SOURCES,
     "voxel": SOURCES,
     "range_sensor": {"sources": {"laser": {}}},
+    "moving_obstacles": {"sources": ["laser"]},
 }
 MESH_PARAMETERS = {
     "clearance": {"robot_height": 0.8},
     "keepout": {"regions": [{"polygon": CORNERS}]},
     "label": {"regions": [{"polygon": CORNERS, "label": "mud"}], "label_costs": {"mud": 0.4}},
     "obstacle": {"decay_time": 10.0},
+    "moving_obstacles": {"sources": ["sensor"]},
 }
 SCAN = RangeScan.of_rays("laser", (3.5, 2.0, 0.3), [(4.5, 2.0, 0.3), (3.5, 3.0, 0.5), (2.5, 2.4, 0.3)], [True] * 3, 0.9)
 CLOUD = np.array([(1.5, 1.5, 0.9), (1.6, 1.5, 0.9), (2.2, 0.7, 0.8)])

@@ -10,6 +10,7 @@ from abc import ABC
 from typing import Any, ClassVar
 
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.parameters import PluginParameters, parameter
 
 
@@ -58,6 +59,10 @@ class MapLayer(ABC):
     def stale_reason(self, now: float) -> str:
         """Why the layer's data are too old at ``now`` [s]; empty while they are fresh, or if it has none."""
         return ""
+
+    def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
+        """The objects that the layer follows, at ``now`` [s]; none if it follows none."""
+        return ()
 
     def configuration_warning(self) -> str:
         """A legal but suspicious parameter of the layer; empty if there is none."""

@@ -7,9 +7,9 @@ from mbf_abstract.maps.layers.layer_list import LayerListError, dependency_order
 from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.layers.border import BorderLayer
-from mbf_mesh_nav.layers.max_combination import MaxCombinationLayer
-from mbf_mesh_nav.layers.mean import MeanLayer
-from mbf_mesh_nav.layers.weighted_sum import WeightedSumLayer
+from mbf_mesh_nav.layers.combinations.max_combination import MaxCombinationLayer
+from mbf_mesh_nav.layers.combinations.mean import MeanLayer
+from mbf_mesh_nav.layers.combinations.weighted_sum import WeightedSumLayer
 from mbf_mesh_nav.map.layer import NOTHING_CHANGED, LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.layers.combination import CombinationLayer
+from mbf_mesh_nav.layers.combinations.combination import CombinationLayer
 from mbf_mesh_nav.map.layer import CostArray
 
 

@@ -1,0 +1,1 @@
+"""Compiled parts of the tracker: pure functions, arrays in, arrays out."""

@@ -1,0 +1,215 @@
+"""One step of the tracker: predict, assign clusters to objects, correct.
+
+The state of an object along x and along y is position and velocity; both axes share one covariance, as noise is the
+same in all directions. The model is constant velocity with white noise of acceleration (Bar-Shalom, Li, Kirubarajan
+2001, section 6.3.2); the arithmetic is written out, so it is the same on every CPU.
+
+A scan shows only the near side of an object. So its size is remembered, and its middle is measured from the side that
+faces the sensor: the middle stays where it is while more or less of the far side comes into view.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.maps.tracking.kernels.clustering import (
+    GREATEST_X,
+    GREATEST_Y,
+    LEAST_X,
+    LEAST_Y,
+    MEAN_Z,
+    POINTS,
+)
+from mbf_abstract.maps.tracking.kernels.compiled import kernel
+
+FloatArray = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+STATE_COLUMNS = 17
+X, Y, Z, VX, VY, VAR_POSITION, COVARIANCE, VAR_VELOCITY, HALF_X, HALF_Y = range(10)
+FIRST_SEEN, LAST_SEEN, SCANS, ANCHOR_X, ANCHOR_Y, ANCHOR_TIME, HAS_MOVED = range(10, STATE_COLUMNS)
+"""Columns of the state of an object. It stood at its anchor at ``ANCHOR_TIME`` [s]; ``HAS_MOVED`` is 0 or 1."""
+NOBODY = -1
+
+
+@kernel
+def predict(states: FloatArray, seconds: float, acceleration_deviation: float) -> None:
+    """Move the ``states`` (n, STATE_COLUMNS) on by some time [s]; the deviation [m/s^2] is that of the noise."""
+    square = seconds * seconds
+    q = acceleration_deviation * acceleration_deviation
+    for i in range(len(states)):
+        state = states[i]
+        state[X] += seconds * state[VX]
+        state[Y] += seconds * state[VY]
+        state[VAR_POSITION] += 2.0 * seconds * state[COVARIANCE] + square * state[VAR_VELOCITY] + 0.25 * q * square**2
+        state[COVARIANCE] += seconds * state[VAR_VELOCITY] + 0.5 * q * square * seconds
+        state[VAR_VELOCITY] += q * square
+
+
+@kernel
+def middle_of(least: float, greatest: float, half: float, sensor: float) -> float:
+    """Middle [m] along one axis of a thing of half size ``half`` seen from ``least`` to ``greatest`` by a sensor."""
+    if sensor < least:
+        return least + half
+    if sensor > greatest:
+        return greatest - half
+    return 0.5 * (least + greatest)
+
+
+@kernel
+def assign(states: FloatArray, boxes: FloatArray, sensor: FloatArray, max_size: float, distance: float) -> Indices:
+    """Number of the object that each cluster is, or NOBODY: the nearest pairs first, each object once.
+
+    Of equally near pairs the one with the lower object, then with the lower cluster, comes first.
+
+    Parameters
+    ----------
+    states : (n, STATE_COLUMNS) float64
+        Predicted to the time of the scan.
+    boxes : (m, BOX_COLUMNS) float64
+    sensor : (3,) float64
+        Where the scan was taken [m].
+    max_size : float
+        Clusters longer than this [m] are no objects.
+    distance : float
+        An object is at most this far [m] from where it was expected.
+
+    Returns
+    -------
+    (m,) int64
+    """
+    n, m = len(states), len(boxes)
+    squares = np.empty((n, m), dtype=np.float64)
+    for i in range(n):
+        for j in range(m):
+            box = boxes[j]
+            width, depth = box[GREATEST_X] - box[LEAST_X], box[GREATEST_Y] - box[LEAST_Y]
+            if max(width, depth) > max_size:
+                squares[i, j] = np.inf
+                continue
+            x = middle_of(box[LEAST_X], box[GREATEST_X], max(states[i, HALF_X], 0.5 * width), sensor[0])
+            y = middle_of(box[LEAST_Y], box[GREATEST_Y], max(states[i, HALF_Y], 0.5 * depth), sensor[1])
+            dx, dy, dz = x - states[i, X], y - states[i, Y], box[MEAN_Z] - states[i, Z]
+            squares[i, j] = dx * dx + dy * dy + dz * dz
+    owners = np.empty(m, dtype=np.int64)
+    for j in range(m):
+        owners[j] = NOBODY
+    while True:
+        best, object_, cluster = distance * distance, NOBODY, NOBODY
+        for i in range(n):
+            for j in range(m):
+                if squares[i, j] < best or (squares[i, j] == best and object_ == NOBODY):
+                    best, object_, cluster = squares[i, j], i, j
+        if object_ == NOBODY:
+            return owners
+        owners[cluster] = object_
+        for j in range(m):
+            squares[object_, j] = np.inf
+        for i in range(n):
+            squares[i, cluster] = np.inf
+
+
+@kernel
+def correct(
+    states: FloatArray,
+    boxes: FloatArray,
+    owners: Indices,
+    sensor: FloatArray,
+    stamp: float,
+    position_deviation: float,
+    shrink: float,
+) -> None:
+    """Correct the objects by their clusters.
+
+    Parameters
+    ----------
+    states, boxes, owners, sensor
+        As in ``assign``, and its result.
+    stamp : float
+        Of the scan [s].
+    position_deviation : float
+        Of the middle of a cluster [m].
+    shrink : float
+        How far [m] the remembered half size of an object may fall to what is seen.
+    """
+    noise = position_deviation * position_deviation
+    for j in range(len(boxes)):
+        if owners[j] == NOBODY:
+            continue
+        state, box = states[owners[j]], boxes[j]
+        _take_size(state, X, HALF_X, ANCHOR_X, box[LEAST_X], box[GREATEST_X], sensor[0], shrink)
+        _take_size(state, Y, HALF_Y, ANCHOR_Y, box[LEAST_Y], box[GREATEST_Y], sensor[1], shrink)
+        dx = middle_of(box[LEAST_X], box[GREATEST_X], state[HALF_X], sensor[0]) - state[X]
+        dy = middle_of(box[LEAST_Y], box[GREATEST_Y], state[HALF_Y], sensor[1]) - state[Y]
+        total = state[VAR_POSITION] + noise
+        gain, velocity_gain = state[VAR_POSITION] / total, state[COVARIANCE] / total
+        state[X] += gain * dx
+        state[Y] += gain * dy
+        state[VX] += velocity_gain * dx
+        state[VY] += velocity_gain * dy
+        state[VAR_VELOCITY] -= velocity_gain * state[COVARIANCE]
+        state[COVARIANCE] -= gain * state[COVARIANCE]
+        state[VAR_POSITION] -= gain * state[VAR_POSITION]
+        state[Z] = box[MEAN_Z]
+        state[LAST_SEEN] = stamp
+        state[SCANS] += 1.0
+
+
+@kernel
+def _take_size(
+    state: FloatArray,
+    position: int,
+    size: int,
+    anchor: int,
+    least: float,
+    greatest: float,
+    sensor: float,
+    shrink: float,
+) -> None:
+    """Remember the half size along one axis; the middle that moves with it is no motion."""
+    half = max(0.5 * (greatest - least), state[size] - shrink)
+    moved = middle_of(least, greatest, half, sensor) - middle_of(least, greatest, state[size], sensor)
+    state[size] = half
+    state[position] += moved
+    state[anchor] += moved
+
+
+@kernel
+def note_motion(states: FloatArray, stamp: float, distance: float) -> None:
+    """Move the anchors of ``states`` that are farther than ``distance`` [m] from them at ``stamp`` [s]."""
+    for i in range(len(states)):
+        state = states[i]
+        dx, dy = state[X] - state[ANCHOR_X], state[Y] - state[ANCHOR_Y]
+        if dx * dx + dy * dy > distance * distance:
+            state[ANCHOR_X], state[ANCHOR_Y], state[ANCHOR_TIME] = state[X], state[Y], stamp
+            state[HAS_MOVED] = 1.0
+
+
+@kernel
+def born(box: FloatArray, sensor: FloatArray, stamp: float, state: FloatArray, deviations: FloatArray) -> None:
+    """Begin a ``state`` from a box; ``deviations`` (2,) are those of position [m] and velocity [m/s]."""
+    half_x, half_y = 0.5 * (box[GREATEST_X] - box[LEAST_X]), 0.5 * (box[GREATEST_Y] - box[LEAST_Y])
+    for column in range(STATE_COLUMNS):
+        state[column] = 0.0
+    state[HALF_X], state[HALF_Y] = half_x, half_y
+    state[X] = state[ANCHOR_X] = middle_of(box[LEAST_X], box[GREATEST_X], half_x, sensor[0])
+    state[Y] = state[ANCHOR_Y] = middle_of(box[LEAST_Y], box[GREATEST_Y], half_y, sensor[1])
+    state[Z] = box[MEAN_Z]
+    state[VAR_POSITION], state[VAR_VELOCITY] = deviations[0] * deviations[0], deviations[1] * deviations[1]
+    state[FIRST_SEEN] = state[LAST_SEEN] = state[ANCHOR_TIME] = stamp
+    state[SCANS] = 1.0
+
+
+@kernel
+def may_begin(boxes: FloatArray, owners: Indices, min_points: int, max_size: float) -> Indices:
+    """Clusters of no known object that have enough points and are no longer than ``max_size`` [m], ascending."""
+    found = np.empty(len(boxes), dtype=np.int64)
+    count = 0
+    for j in range(len(boxes)):
+        box = boxes[j]
+        longest = max(box[GREATEST_X] - box[LEAST_X], box[GREATEST_Y] - box[LEAST_Y])
+        if owners[j] == NOBODY and box[POINTS] >= min_points and longest <= max_size:
+            found[count] = j
+            count += 1
+    return found[:count]

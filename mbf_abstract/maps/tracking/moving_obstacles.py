@@ -1,0 +1,153 @@
+"""What the layers ``moving_obstacles`` of all maps share: scans in, tracked objects out, and how predictions cost.
+
+A layer takes the points out of a scan that stand on its ground and are not part of its static map; the rest is here.
+Scans wait for the next update of the map, as they may come while it is being updated.
+
+A prediction costs something in a disc around the place where an object will be, as large as the object and the robot's
+inscribed circle. The cost falls linearly with the time until then, from ``prediction_cost`` now to nothing at
+``prediction_time``. Where the object is now the obstacle layers mark what is seen; a prediction is never lethal,
+because it may be wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import field_validator
+
+from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+from mbf_abstract.maps.tracking.tracker import Tracker, TrackingParameters
+from mbf_abstract.parameters import parameter
+
+MAX_WAITING = 64
+"""Scans that may wait for an update; older ones are dropped."""
+PREDICTION_STEP = 0.1
+"""Longest time [s] between two predicted places."""
+LEAST_RADIUS = 0.05
+"""Predicted places of smaller objects [m] are as far apart as those of such a one."""
+
+ObstaclePoints = Callable[[RangeScan], FloatArray]
+"""The points (n, 3) [m] of a scan that may be objects, on the ground below them."""
+
+
+class MovingObstaclesParameters(TrackingParameters):
+    """Parameters of the layers ``moving_obstacles``, beside those of all layers."""
+
+    sources: tuple[str, ...] = parameter(
+        ..., "Names of the sensors it listens to, each of which must send scans.", dynamic=False
+    )
+    min_obstacle_dist: float = parameter(
+        0.0, "Points no farther from the sensor are ignored, such as those of the robot itself.", unit="m", ge=0.0
+    )
+    max_obstacle_dist: float = parameter(8.0, "Points farther from the sensor are ignored.", unit="m", gt=0.0, le=1e3)
+    static_distance: float = parameter(
+        0.15, "Points this near to the static map are part of it.", unit="m", ge=0.0, le=5.0
+    )
+    expected_update_rate: float = parameter(
+        1.0, "Longest allowed time between two scans of a sensor; 0 switches the check off.", unit="s", ge=0.0
+    )
+    prediction_time: float = parameter(
+        2.0, "How far ahead the places of moving objects cost something; 0 = no costs.", unit="s", ge=0.0, le=20.0
+    )
+    prediction_cost: float = parameter(
+        0.8, "Cost of the place where a moving object is now, as a share of that of an obstacle.", ge=0.0, lt=1.0
+    )
+    clear_trails: bool = parameter(True, "Free what obstacle layers keep where a moving object was seen and left.")
+
+    @field_validator("sources")
+    @classmethod
+    def _has_a_source(cls, sources: tuple[str, ...]) -> tuple[str, ...]:
+        if not sources:
+            raise ValueError("the name of at least one sensor")
+        return sources
+
+
+class Sighting(NamedTuple):
+    """What one scan has shown: points (n, 3) [m] off the static map, and whether each (n,) is of a moving object."""
+
+    points: FloatArray
+    of_moving: NDArray[np.bool_]
+
+
+class MovingObstacles:
+    """The objects that a layer tracks.
+
+    Parameters
+    ----------
+    parameters : MovingObstaclesParameters
+    frame_id : str
+        Frame of the map.
+    """
+
+    def __init__(self, parameters: MovingObstaclesParameters, frame_id: str) -> None:
+        self._tracker = Tracker(parameters, frame_id)
+        self._watches = {name: SourceWatch(name) for name in parameters.sources}
+        self._waiting: deque[RangeScan] = deque(maxlen=MAX_WAITING)
+
+    def insert_scan(self, scan: RangeScan) -> None:
+        """Keep a scan for the next update; may be called on any thread."""
+        self._waiting.append(scan)
+        self._watches[scan.source].heard(scan.stamp)
+
+    def take_in(self, parameters: MovingObstaclesParameters, obstacle_points: ObstaclePoints) -> Iterator[Sighting]:
+        """Follow the objects through the scans that wait, one after the other; yield what each has shown."""
+        self._tracker.parameters = parameters
+        while self._waiting:
+            scan = self._waiting.popleft()
+            points = obstacle_points(_within(scan, parameters))
+            numbers = self._tracker.insert(points, scan.origin, scan.stamp)
+            self._watches[scan.source].used()
+            yield Sighting(points, self._tracker.are_moving(numbers))
+
+    def objects(self, now: float) -> tuple[TrackedObject, ...]:
+        """The tracked objects at ``now`` [s]."""
+        return self._tracker.objects(now)
+
+    def stale_reason(self, now: float, limit: float) -> str:
+        """Which sensor is silent for longer than ``limit`` [s], or has sent nothing since a clearing."""
+        return first_reason(watch.stale_reason(now, limit) for watch in self._watches.values())
+
+    def clear(self, within: Callable[[FloatArray], NDArray[np.bool_]] | None = None) -> None:
+        """Forget the scans that wait and all objects, or those whose middles (n, 3) [m] are ``within`` an area."""
+        self._waiting.clear()
+        self._tracker.clear(within)
+        for watch in self._watches.values():
+            watch.cleared()
+
+
+def _within(scan: RangeScan, limits: MovingObstaclesParameters) -> RangeScan:
+    """The hits of a scan whose distances are within the limits."""
+    distances = norm(scan.ends - scan.origin) if len(scan.ends) else np.zeros(0)
+    near = scan.hits & (distances > limits.min_obstacle_dist) & (distances <= limits.max_obstacle_dist)
+    return RangeScan(scan.source, scan.frame_id, scan.origin, scan.ends[near], scan.hits[near], scan.stamp)
+
+
+def predicted_places(
+    known: TrackedObject, prediction_time: float, prediction_cost: float
+) -> tuple[FloatArray, FloatArray]:
+    """Where an object will be within ``prediction_time`` [s], and what that costs.
+
+    Returns
+    -------
+    middles : (n, 3) float64
+        [m], in order of time, at most an object's radius apart; none of an object that does not move.
+    costs : (n,) float64
+        From ``prediction_cost`` at the first one towards 0 at the end of the time.
+    """
+    if known.motion is not Motion.MOVING or prediction_time == 0.0:
+        return np.zeros((0, 3)), np.zeros(0)
+    steps = math.ceil(prediction_time / min(PREDICTION_STEP, max(known.radius, LEAST_RADIUS) / max(known.speed, 1e-6)))
+    shares = np.arange(steps) / steps
+    middles = np.empty((steps, 3))
+    middles[:, 0], middles[:, 1] = known.position_in(shares * prediction_time)
+    middles[:, 2] = known.z
+    return middles, prediction_cost * (1.0 - shares)

@@ -1,0 +1,95 @@
+"""Tracked objects: what a map knows of the things that move on it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import TypeVar
+
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry.transform import Transform
+
+Seconds = TypeVar("Seconds", float, FloatArray)
+
+
+class Motion(str, Enum):
+    """What an executive should make of an object: wait for it, yield to it, or plan around it."""
+
+    MOVING = "moving"
+    WAITING = "waiting"  # stands, but not for long: it may move on
+    PARKED = "parked"
+
+
+@dataclass(frozen=True)
+class TrackedObject:
+    """One object at one time.
+
+    Attributes
+    ----------
+    number : int
+        Identifies it for as long as it is tracked; never used again.
+    motion : Motion
+    x, y, z : float
+        Estimated middle [m], in the frame ``frame_id``; z is that of its points, or of the ground below them.
+    vx, vy : float
+        Estimated velocity [m/s] along the axes of that frame; 0 unless it is moving.
+    radius : float
+        Half of its length [m] along the longer axis, as far as it has been seen.
+    position_deviation, velocity_deviation : float
+        Standard deviations of the estimates [m, m/s], along each axis.
+    age : float
+        Time since it was first seen [s].
+    unseen : float
+        Time since it was last seen [s].
+    standing : float
+        How long it has been standing [s]; 0 while it moves.
+    stamp : float
+        Time of all this [s].
+    frame_id : str
+    """
+
+    number: int
+    motion: Motion
+    x: float
+    y: float
+    z: float
+    vx: float
+    vy: float
+    radius: float
+    position_deviation: float
+    velocity_deviation: float
+    age: float
+    unseen: float
+    standing: float
+    stamp: float
+    frame_id: str
+
+    @property
+    def speed(self) -> float:
+        """Speed [m/s]."""
+        return math.hypot(self.vx, self.vy)
+
+    def position_in(self, seconds: Seconds) -> tuple[Seconds, Seconds]:
+        """Where it will be in some time [s], or in several, if it keeps its velocity, as x and y [m]."""
+        return self.x + seconds * self.vx, self.y + seconds * self.vy
+
+    def seen_from(self, transform: Transform) -> TrackedObject:
+        """Express it in the parent frame of a transform from its own one."""
+        x, y, z = transform.apply(np.array([[self.x, self.y, self.z]]))[0].tolist()
+        there = transform.apply(np.array([[self.x + self.vx, self.y + self.vy, self.z]]))[0].tolist()
+        return replace(self, x=x, y=y, z=z, vx=there[0] - x, vy=there[1] - y, frame_id=transform.parent)
+
+    def to_data(self) -> dict[str, object]:
+        """Plain JSON values, for events."""
+        return {
+            "number": self.number,
+            "motion": self.motion.value,
+            "position": [self.x, self.y, self.z],
+            "velocity": [self.vx, self.vy],
+            "radius": self.radius,
+            "age": self.age,
+            "standing": self.standing,
+        }

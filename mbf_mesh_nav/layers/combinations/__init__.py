@@ -1,0 +1,1 @@
+"""Layers that join the values of several others."""

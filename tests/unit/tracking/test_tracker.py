@@ -1,0 +1,270 @@
+"""The tracker against naive twins, and against objects whose motion is known."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.maps.tracking.kernels import filtering
+from mbf_abstract.maps.tracking.kernels.clustering import bounding_boxes, cluster
+from mbf_abstract.maps.tracking.objects import Motion
+from mbf_abstract.maps.tracking.tracker import MAX_POINTS, Tracker, TrackingParameters
+
+SENSOR = np.array([0.0, 0.0, 0.3])
+PERIOD = 0.1
+coordinates = st.floats(-2.0, 2.0).map(lambda value: round(value, 2))
+clouds = st.lists(st.tuples(coordinates, coordinates, st.sampled_from([0.0, 0.4])), max_size=40)
+
+
+def disc(x, y, radius=0.25, count=24):
+    """Points on the side of an upright cylinder that faces the sensor at (0, 0)."""
+    towards = math.atan2(-y, -x)
+    angles = towards + np.linspace(-1.4, 1.4, count)
+    return np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles), np.zeros(count)])
+
+
+def follow(places, tracker=None, period=PERIOD):
+    """A tracker that has seen a person at each of the places (x, y), None where it is hidden."""
+    tracker = tracker or Tracker(TrackingParameters(), "map")
+    for step, place in enumerate(places):
+        points = np.zeros((0, 3)) if place is None else disc(*place)
+        tracker.insert(points, SENSOR, step * period)
+    return tracker, (len(places) - 1) * period
+
+
+def walk(x, y, vx, vy, scans):
+    return [(x + vx * step * PERIOD, y + vy * step * PERIOD) for step in range(scans)]
+
+
+# ------------------------------------------------------------------------------------------------ naive twins
+def naive_labels(points, distance):
+    labels = [None] * len(points)
+    for seed in range(len(points)):
+        if labels[seed] is None:
+            labels[seed], open_points = len({*labels} - {None}), [seed]
+            while open_points:
+                here = open_points.pop()
+                for other in range(len(points)):
+                    if labels[other] is None and math.dist(points[here], points[other]) <= distance:
+                        labels[other] = labels[seed]
+                        open_points.append(other)
+    return labels
+
+
+@given(clouds, st.sampled_from([0.15, 0.31, 0.77]))
+@settings(max_examples=60, deadline=None)
+def test_clusters_are_the_connected_components_of_near_points(cloud, distance):
+    points = np.array(cloud, dtype=float).reshape(-1, 3)
+    labels, count = cluster(points, np.argsort(points[:, 0], kind="stable"), distance)
+    assert labels.tolist() == naive_labels(cloud, distance)
+    assert count == len(set(labels.tolist()))
+
+
+@given(clouds)
+@settings(max_examples=30, deadline=None)
+def test_boxes_hold_their_points(cloud):
+    points = np.array(cloud, dtype=float).reshape(-1, 3)
+    labels, count = cluster(points, np.argsort(points[:, 0], kind="stable"), 0.5)
+    for number, box in enumerate(bounding_boxes(points, labels, count).tolist()):
+        own = points[labels == number]
+        sides = [own[:, 0].min(), own[:, 0].max(), own[:, 1].min(), own[:, 1].max()]
+        assert box == pytest.approx([*sides, own[:, 2].mean(), len(own)])
+
+
+def naive_owners(middles, places, distance):
+    pairs = sorted((math.dist(a, b), i, j) for i, a in enumerate(middles) for j, b in enumerate(places))
+    owners, taken = [-1] * len(places), set()
+    for gap, i, j in pairs:
+        if gap <= distance and owners[j] == -1 and i not in taken:
+            owners[j] = i
+            taken.add(i)
+    return owners
+
+
+grid_places = st.lists(st.tuples(st.integers(-4, 4), st.integers(-4, 4)), max_size=7)
+
+
+@given(grid_places, grid_places)
+@settings(max_examples=80, deadline=None)
+def test_the_nearest_pairs_are_assigned_first_and_ties_to_the_lower_numbers(middles, places):
+    states = np.zeros((len(middles), filtering.STATE_COLUMNS))
+    states[:, [filtering.X, filtering.Y]] = np.array(middles, dtype=float).reshape(-1, 2)
+    boxes = np.array([[x, x, y, y, 0.0, 5.0] for x, y in places], dtype=float).reshape(-1, 6)
+    owners = filtering.assign(states, boxes, np.array([0.0, 0.0, 0.0]), 1.5, 3.0)
+    assert owners.tolist() == naive_owners(middles, places, 3.0)
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.02, 0.5), st.floats(-5.0, 5.0)), min_size=1, max_size=12),
+    st.floats(0.01, 0.5),
+    st.floats(0.1, 3.0),
+)
+@settings(max_examples=40, deadline=None)
+def test_the_filter_is_that_of_the_textbook(steps, position_deviation, acceleration_deviation):
+    """Predict and correct against the matrix form of the Kalman filter, along x; points have no size."""
+    deviations = np.array([position_deviation, 0.6])
+    states, stamp = np.zeros((1, filtering.STATE_COLUMNS)), 0.0
+    first = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 5.0])
+    filtering.born(first, SENSOR, stamp, states[0], deviations)
+    mean, covariance = np.array([0.0, 0.0]), np.diag(deviations**2)
+    for seconds, measured in steps:
+        stamp += seconds
+        filtering.predict(states, seconds, acceleration_deviation)
+        box = np.array([[measured, measured, 1.0, 1.0, 0.0, 5.0]])
+        filtering.correct(states, box, np.array([0]), SENSOR, stamp, position_deviation, 0.0)
+        model = np.array([[1.0, seconds], [0.0, 1.0]])
+        push = np.array([0.5 * seconds**2, seconds]) * acceleration_deviation
+        mean, covariance = model @ mean, model @ covariance @ model.T + np.outer(push, push)
+        gain = covariance[:, 0] / (covariance[0, 0] + position_deviation**2)
+        mean = mean + gain * (measured - mean[0])
+        covariance = covariance - np.outer(gain, covariance[0])
+    state = states[0]
+    assert state[[filtering.X, filtering.VX]] == pytest.approx(mean, rel=1e-6, abs=1e-9)
+    found = state[[filtering.VAR_POSITION, filtering.COVARIANCE, filtering.VAR_VELOCITY]]
+    assert found == pytest.approx(covariance[[0, 0, 1], [0, 1, 1]], rel=1e-6, abs=1e-9)
+
+
+# ------------------------------------------------------------------------------------------------ behaviour
+def test_a_person_who_walks_has_a_place_and_a_velocity():
+    tracker, now = follow(walk(2.0, -1.0, 0.3, 0.8, 20))
+    (person,) = tracker.objects(now)
+    assert person.motion is Motion.MOVING
+    assert (person.vx, person.vy) == pytest.approx((0.3, 0.8), abs=0.1)
+    assert (person.x, person.y) == pytest.approx(
+        (2.0 + 0.3 * now, -1.0 + 0.8 * now), abs=0.15
+    )  # its far side is hidden
+    assert person.radius == pytest.approx(0.25, abs=0.03)
+    assert person.age == pytest.approx(now) and person.standing == 0.0
+
+
+def test_a_moving_object_is_where_it_will_be_at_the_time_it_is_asked_for():
+    tracker, now = follow(walk(2.0, -1.0, 0.0, 0.8, 20))
+    (here,), (later,) = tracker.objects(now), tracker.objects(now + 0.5)
+    assert (later.x, later.y) == pytest.approx(here.position_in(0.5))
+    assert later.unseen == pytest.approx(0.5)
+
+
+def test_a_person_who_stops_waits_and_is_parked_in_the_end():
+    settings_ = TrackingParameters(parked_time=4.0)
+    places = [*walk(2.0, 0.0, 0.0, 0.8, 15), *[(2.0, 1.2)] * 80]
+    tracker = Tracker(settings_, "map")
+    motions = []
+    for step, place in enumerate(places):
+        tracker.insert(disc(*place), SENSOR, step * PERIOD)
+        motions += [known.motion for known in tracker.objects(step * PERIOD)]
+    assert [motions[0], *(b for a, b in pairwise(motions) if a is not b)] == [
+        Motion.WAITING,
+        Motion.MOVING,
+        Motion.WAITING,
+        Motion.PARKED,
+    ]
+    (person,) = tracker.objects((len(places) - 1) * PERIOD)
+    assert (person.vx, person.vy) == (0.0, 0.0) and person.standing > 4.0
+
+
+def test_the_sensor_that_drives_past_a_box_sees_it_stand():
+    """More and more of its far side comes into view; that is no motion."""
+    tracker = Tracker(TrackingParameters(), "map")
+    side = np.linspace(0.0, 0.7, 15)
+    near = np.column_stack([2.0 + side, np.full(15, 1.0), np.zeros(15)])
+    for step in range(40):
+        shown = near[: 4 + step // 3]
+        tracker.insert(shown, np.array([0.05 * step - 1.0, -0.5, 0.3]), step * PERIOD)
+        assert all(known.motion is not Motion.MOVING for known in tracker.objects(step * PERIOD))
+
+
+def test_a_hidden_person_is_followed_for_a_while_and_then_forgotten():
+    tracker, now = follow([*walk(2.0, -1.0, 0.0, 0.8, 20), *[None] * 8])
+    (person,) = tracker.objects(now)
+    assert (person.x, person.y) == pytest.approx((2.0, -1.0 + 0.8 * now), abs=0.15)
+    assert tracker.objects(now + 0.5) == ()
+    tracker, now = follow([*walk(2.0, -1.0, 0.0, 0.8, 20), *[None] * 15])
+    assert len(tracker) == 0
+
+
+def test_two_people_who_pass_each_other_keep_their_numbers():
+    tracker = Tracker(TrackingParameters(), "map")
+    for step in range(30):
+        one, other = disc(2.0, -1.2 + 0.08 * step), disc(3.2, 1.2 - 0.08 * step)
+        tracker.insert(np.concatenate([one, other]), SENSOR, step * PERIOD)
+    first, second = tracker.objects(2.9)
+    assert (first.number, second.number) == (1, 2)
+    assert first.vy == pytest.approx(0.8, abs=0.1) and second.vy == pytest.approx(-0.8, abs=0.1)
+
+
+def test_walls_and_single_points_are_no_objects():
+    wall = np.column_stack([np.full(60, 3.0), np.linspace(-2.0, 2.0, 60), np.zeros(60)])
+    speckle = np.array([[1.0, 1.0, 0.0]])
+    tracker = Tracker(TrackingParameters(), "map")
+    for step in range(10):
+        found = tracker.insert(np.concatenate([wall, speckle]), SENSOR, step * PERIOD)
+    assert len(tracker) == 0 and not found.any()
+
+
+def test_points_name_the_object_they_belong_to():
+    tracker = Tracker(TrackingParameters(), "map")
+    for step in range(5):
+        points = np.concatenate([disc(2.0, 0.05 * step), [[0.0, -4.0, 0.0]]])
+        found = tracker.insert(points, SENSOR, step * PERIOD)
+    assert set(found[:-1].tolist()) == {1} and found[-1] == 0
+
+
+def test_there_are_never_more_objects_than_allowed():
+    tracker = Tracker(TrackingParameters(max_objects=3), "map")
+    crowd = np.concatenate([disc(2.0, y) for y in (-3.0, -1.5, 0.0, 1.5, 3.0)])
+    for step in range(5):
+        tracker.insert(crowd, SENSOR, step * PERIOD)
+    assert len(tracker.objects(0.4)) == 3
+
+
+def test_a_late_scan_changes_nothing():
+    tracker, now = follow(walk(2.0, 0.0, 0.0, 0.8, 10))
+    before = tracker.objects(now)
+    tracker.insert(disc(4.0, 1.0), SENSOR, 0.2)
+    assert tracker.objects(now) == before
+
+
+def test_a_cloud_of_any_size_is_thinned_to_a_bounded_number_of_points():
+    many = np.column_stack(
+        [np.full(5 * MAX_POINTS, 2.0), np.linspace(0.0, 0.5, 5 * MAX_POINTS), np.zeros(5 * MAX_POINTS)]
+    )
+    tracker = Tracker(TrackingParameters(), "map")
+    for step in range(4):
+        tracker.insert(many, SENSOR, step * PERIOD)
+    assert len(tracker.objects(0.3)) == 1
+
+
+def test_clear_forgets_everything_and_numbers_are_not_used_again():
+    tracker, now = follow(walk(2.0, 0.0, 0.0, 0.8, 10))
+    tracker.clear()
+    assert tracker.objects(now) == ()
+    for step in range(10, 15):
+        tracker.insert(disc(2.0, 0.8), SENSOR, step * PERIOD)
+    assert [known.number for known in tracker.objects(1.4)] == [2]
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=10, deadline=None)
+def test_the_same_scans_give_the_same_objects(seed):
+    def run():
+        rng = np.random.default_rng(seed)
+        tracker = Tracker(TrackingParameters(), "map")
+        for step in range(12):
+            tracker.insert(rng.uniform(-3.0, 3.0, (200, 3)) * (1.0, 1.0, 0.0), SENSOR, step * PERIOD)
+        return tracker.objects(1.2)
+
+    assert run() == run()
+
+
+def test_an_object_is_expressed_in_another_frame():
+    tracker, now = follow(walk(2.0, -1.0, 0.0, 0.8, 20))
+    (person,) = tracker.objects(now)
+    quarter = math.sqrt(0.5)
+    there = person.seen_from(Transform((1.0, 0.0, 0.0), (0.0, 0.0, quarter, quarter), "odom", "map"))
+    assert there.frame_id == "odom"
+    assert (there.x, there.y) == pytest.approx((1.0 - person.y, person.x))
+    assert (there.vx, there.vy) == pytest.approx((-person.vy, person.vx))
