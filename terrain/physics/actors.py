@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
-from terrain.physics.incidents import Thing
 from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.motion_sample import Thing
 from terrain.physics.protocols import SimulatedRobot
 from terrain.physics.robot_models import RobotSpec
 from terrain.physics.world import BulletWorld
@@ -28,23 +27,6 @@ AnyWorld = BulletWorld | KinematicWorld
 PERSON_RADIUS: float = 0.25  # m
 PERSON_HEIGHT: float = 1.7  # m
 COURTESY = 0.3  # m; an actor that gives way stops this far from the robot
-
-
-class Actor(Protocol):
-    """What ``Recorder`` needs to know of a thing that moves.
-
-    Attributes
-    ----------
-    thing : Thing
-    looks : Surface
-        In the actor's own frame.
-    """
-
-    thing: Thing
-    looks: Surface
-
-    def pose(self) -> Pose:
-        """Pose of the actor's frame now."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +90,7 @@ class RouteWalker:
         self._waited = 0.0
         self._gives_way = gives_way
         self._robot: SimulatedRobot | None = None
-        self.thing = body.thing
+        self.thing, self.size = body.thing, size
         if len(size) == 2:
             radius, height = size
             self.body = world.add_cylinder(self.pose(), radius, height, moving=True)
@@ -172,7 +154,7 @@ class SlidingDoor:
         self._orientation = closed.orientation
         self._closes_at = closes_at
         self._duration = duration
-        self.thing, self.looks = Thing.DOOR, box(size)
+        self.thing, self.looks, self.size = Thing.DOOR, box(size), size
         self.body = world.add_box(opened, size, moving=True)
         world.things[self.body] = self.thing
         world.before_step(self._move)

@@ -30,6 +30,22 @@ def depth_in_polygon(corners: FloatArray, other: FloatArray) -> float:
     return depth
 
 
+def gap_to_polygon(corners: FloatArray, other: FloatArray) -> float:
+    """Distance [m] between the convex outlines (n, 2) and (m, 2), counter-clockwise; 0 where they overlap.
+
+    Where they are apart, it lies between a corner of one and an edge of the other.
+    """
+    if depth_in_polygon(corners, other) >= 0.0:
+        return 0.0
+    ours, theirs = corners.tolist(), other.tolist()
+    return min(
+        _distance_to_piece(x, y, a, b)
+        for points, outline in ((ours, theirs), (theirs, ours))
+        for x, y in points
+        for a, b in zip(outline, [*outline[1:], outline[0]], strict=True)
+    )
+
+
 def depth_in_circle(corners: FloatArray, x: float, y: float, radius: float) -> float:
     """Penetration depth [m] of a convex outline (n, 2), counter-clockwise, and a circle."""
     ahead = np.roll(corners, -1, axis=0)

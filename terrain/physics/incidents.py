@@ -11,22 +11,19 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
-from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.tilt import tilt_of
-
-
-class Thing(Enum):
-    """What the robot can touch that is not the ground; everything fixed is a wall."""
-
-    WALL = "wall"
-    DOOR = "door"
-    PERSON = "person"
-    ROBOT = "robot"
+from terrain.physics.encounters import Mover, NearMisses, touched_other
+from terrain.physics.motion_sample import MotionSample, Other, Thing
 
 
 class IncidentKind(Enum):
-    """What went wrong; a collision counts as such, by what was hit, and once more if the robot moved by itself."""
+    """What went wrong; a collision counts as such, by what was hit, and once more if the robot moved by itself.
+
+    A near miss is an encounter with something that moves by itself, without a contact.
+    """
 
     TIPPED_OVER = "tipped_over"
     SLIPPING = "slipping"
@@ -38,47 +35,50 @@ class IncidentKind(Enum):
     COLLISION_WITH_DOOR = "collision_with_door"
     COLLISION_WITH_PERSON = "collision_with_person"
     COLLISION_WITH_ROBOT = "collision_with_robot"
+    NEAR_MISS = "near_miss"
 
 
 COLLISIONS_WITH = {thing: IncidentKind(f"collision_with_{thing.value}") for thing in Thing}
-
-
-@dataclass(frozen=True)
-class MotionSample:
-    """State of a robot at one instant.
-
-    Attributes
-    ----------
-    pose, velocity : Pose, Twist
-        Ground truth of base_link; velocity in the base frame.
-    commanded : Twist
-        Motion asked for.
-    rolling : Twist
-        Motion that the turning wheels would make without slip.
-    body_on_ground : bool
-        Whether the body touches the ground.
-    touched : frozenset of Thing
-        What any part touches that is not ground.
-    power : float
-        Mechanical power of the motors [W], losses counted positive.
-    """
-
-    pose: Pose
-    velocity: Twist
-    commanded: Twist
-    rolling: Twist
-    body_on_ground: bool = False
-    touched: frozenset[Thing] = frozenset()
-    power: float = 0.0
+ANY_COLLISION = (IncidentKind.COLLISION, IncidentKind.COLLISION_WHILE_MOVING)
+CONTACTS = {*ANY_COLLISION, *COLLISIONS_WITH.values()}
 
 
 @dataclass(frozen=True)
 class Incident:
-    """Something that went wrong, when [s] and where."""
+    """Something that went wrong.
+
+    Attributes
+    ----------
+    kind : IncidentKind
+    stamp : float
+        When it counted from [s].
+    pose : Pose
+        Where the robot was; at a near miss, when the gap was smallest.
+    speed : float
+        How fast it was [m/s]; at a contact, just before.
+    moved : Mover or None
+        Who moved, at a contact or a near miss.
+    other : Other or None
+        Whom the robot met; None for a wall, and where nobody was met.
+    """
 
     kind: IncidentKind
     stamp: float
     pose: Pose
+    speed: float = 0.0
+    moved: Mover | None = None
+    other: Other | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the data of its event, metres and metres per second rounded to a micrometre."""
+        data: dict[str, Any] = {"what": self.kind.value, "robot_speed": round(self.speed, 6)}
+        data |= {key: round(value, 6) for key, value in zip("xyz", self.pose.position, strict=True)}
+        if self.moved is not None:
+            data["moved"] = self.moved.value
+        if self.other is not None:
+            gap, speed = round(self.other.gap, 6), round(self.other.speed, 6)
+            data |= {"other": self.other.name, "other_speed": speed, "gap": gap}
+        return data
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,8 @@ class IncidentLimits:
     progress_distance, progress_angle : float
         A robot that is asked to move and neither moves [m] nor turns [rad] this far is stuck after ``stuck_hold`` [s];
         if its body lies on the ground it is high-centred, already after ``high_centred_hold`` [s].
+    near_miss_gap : float
+        Outlines nearer than this [m] without a contact, while somebody moves, are a near miss.
     """
 
     tilt: float = math.radians(60.0)
@@ -111,6 +113,7 @@ class IncidentLimits:
     progress_angle: float = 0.1
     high_centred_hold: float = 1.5
     stuck_hold: float = 3.0
+    near_miss_gap: float = 0.2
 
 
 def roll_pitch(pose: Pose) -> tuple[float, float]:
@@ -150,9 +153,13 @@ class IncidentMonitor:
     _anchor: Pose | None = None
     _moved_in_contact: bool = False
 
+    def __post_init__(self) -> None:
+        self._near_misses = NearMisses(self.limits.near_miss_gap)
+
     def update(self, sample: MotionSample) -> list[Incident]:
         """Take one sample, stamped by its pose; return the incidents that count from this instant on."""
-        self._watch_contact(sample)
+        before, moves = self._last or sample, self._moves(sample)
+        self._moved_in_contact = bool(sample.touched) and (self._moved_in_contact or moves)
         self._sum_up(sample)
         limits, standing = self.limits, self._standing_time(sample)
         conditions: list[tuple[IncidentKind, float, Callable[[MotionSample], bool]]] = [
@@ -164,11 +171,28 @@ class IncidentMonitor:
             (IncidentKind.COLLISION_WHILE_MOVING, 0.0, lambda s: self._moved_in_contact),
             *((kind, 0.0, lambda s, t=thing: t in s.touched) for thing, kind in COLLISIONS_WITH.items()),
         ]
-        return [
-            Incident(kind, sample.pose.stamp, sample.pose)
+        begun = [
+            self._incident(kind, sample, before, moves)
             for kind, hold, condition in conditions
             if self._begins(kind, hold, condition(sample), sample.pose.stamp)
         ]
+        return begun + self._missed(sample, moves)
+
+    def _incident(self, kind: IncidentKind, sample: MotionSample, before: MotionSample, moves: bool) -> Incident:
+        stamp, pose = sample.pose.stamp, sample.pose
+        if kind not in CONTACTS:
+            return Incident(kind, stamp, pose, sample.velocity.speed)
+        things = [thing for thing in sample.touched if kind in (COLLISIONS_WITH[thing], *ANY_COLLISION)]
+        others = [other for other in (touched_other(sample, thing) for thing in things) if other is not None]
+        other = min(others, key=lambda one: (one.gap, one.name), default=None)
+        other_moves = other is not None and other.speed > self.limits.standing_speed
+        return Incident(kind, stamp, pose, before.velocity.speed, Mover.of(moves, other_moves), other)
+
+    def _missed(self, sample: MotionSample, moves: bool) -> list[Incident]:
+        missed = self._near_misses.update(sample, moves, self.limits.standing_speed)
+        self.counts[IncidentKind.NEAR_MISS] += len(missed)
+        stamp = sample.pose.stamp
+        return [Incident(IncidentKind.NEAR_MISS, stamp, a.pose, a.speed, a.moved, a.other) for a in missed]
 
     def _sum_up(self, sample: MotionSample) -> None:
         roll, pitch = roll_pitch(sample.pose)
@@ -180,21 +204,18 @@ class IncidentMonitor:
             self.energy += sample.power * passed
         self._last = sample
 
-    def _watch_contact(self, sample: MotionSample) -> None:
-        """Note whether the robot has moved by itself in this contact, or when it began.
+    def _moves(self, sample: MotionSample) -> bool:
+        """Whether the robot moves by itself: by its command, or by its wheels before a contact.
 
-        What turns its wheels after that may be what pushes it, so only its command counts then.
+        What turns its wheels in a contact may be what pushes it, so only its command counts then.
         """
         limits, before = self.limits, self._last
-        if not sample.touched:
-            self._moved_in_contact = False
-            return
         motions = [sample.commanded]
+        if not sample.touched:
+            motions.append(sample.rolling)
         if before is not None and not before.touched:
             motions.append(before.rolling)
-        self._moved_in_contact |= not all(
-            motion.is_stopped(limits.standing_speed, limits.standing_yaw_rate) for motion in motions
-        )
+        return not all(motion.is_stopped(limits.standing_speed, limits.standing_yaw_rate) for motion in motions)
 
     def _begins(self, kind: IncidentKind, hold: float, holds: bool, now: float) -> bool:
         """Whether ``kind`` has held long enough and was not counted yet."""

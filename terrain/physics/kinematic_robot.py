@@ -13,8 +13,8 @@ import math
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Command, Pose, Twist, normalize_angle
 from terrain.physics.drive import STEERING_SPEED, commanded_twist, steering_command
-from terrain.physics.incidents import MotionSample, Thing
 from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.motion_sample import MotionSample, Thing
 from terrain.physics.robot_models import Drive, RobotSpec
 
 STOPPING_GAP = 0.03  # m; no robot here drives farther in a step

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.physics.contact_depth import depth_in_cells, placed
-from terrain.physics.incidents import Thing
+from terrain.physics.motion_sample import Thing
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.surface import Surface, joined, level_rectangle

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Command, Pose, Twist
-from terrain.physics.incidents import MotionSample
+from terrain.physics.motion_sample import MotionSample, Thing
 from terrain.physics.robot_models import RobotSpec
+from terrain.worlds.surface import Surface
 
 
 class SimulatedWorld(Protocol):
@@ -53,3 +54,23 @@ class SimulatedRobot(Protocol):
 
     def motion_sample(self) -> MotionSample:
         """Return the sample that ``IncidentMonitor`` takes."""
+
+
+class Actor(Protocol):
+    """A thing that moves by itself: a person, a door, another robot.
+
+    Attributes
+    ----------
+    thing : Thing
+    looks : Surface
+        In the actor's own frame.
+    size : (2,) or (3,) float
+        Radius and height of an upright cylinder, or length, width and height of a box [m].
+    """
+
+    thing: Thing
+    looks: Surface
+    size: Sequence[float]
+
+    def pose(self) -> Pose:
+        """Pose of the actor's frame now."""

@@ -24,7 +24,7 @@ from mbf_abstract.geometry import (
 from mbf_abstract.geometry.arithmetic import cross_product, rotated, rotated_back
 from terrain.physics.bullet import quiet_native_output
 from terrain.physics.drive import STEERING_SPEED, commanded_twist, twist_from_wheels, wheel_targets
-from terrain.physics.incidents import MotionSample, Thing
+from terrain.physics.motion_sample import MotionSample, Thing
 from terrain.physics.robot_models import Drive, RobotSpec
 from terrain.physics.world import ROBOT, BulletWorld
 

@@ -13,12 +13,14 @@ Example
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from mbf_abstract.geometry import Pose
+from terrain.physics.encounters import Surroundings
 from terrain.physics.incidents import Incident, IncidentMonitor
-from terrain.physics.protocols import SimulatedRobot, SimulatedWorld
+from terrain.physics.protocols import Actor, SimulatedRobot, SimulatedWorld
 from terrain.sensors.sensor import Sensor
 
 MONITOR_RATE = 20.0  # Hz
@@ -37,6 +39,8 @@ class Simulation:
     robot : SimulatedRobot
     sensors : mapping of str to Sensor
         By topic; each measures at its own rate, the first time at once.
+    actors : sequence of Actor
+        What else moves there; encounters with them are incidents.
 
     Attributes
     ----------
@@ -46,6 +50,8 @@ class Simulation:
         Counts what goes wrong.
     incidents : list of Incident
         All so far.
+    on_incident : list of callables
+        Called with each incident when it begins to count.
     track : list of Pose
         Ground truth of the robot at 20 Hz.
     """
@@ -55,6 +61,7 @@ class Simulation:
         world: SimulatedWorld,
         robot: SimulatedRobot,
         sensors: Mapping[str, Sensor[Any]] | None = None,
+        actors: Sequence[Actor] = (),
     ) -> None:
         self.world = world
         self.robot = robot
@@ -63,6 +70,8 @@ class Simulation:
         self.latest: dict[str, Any] = {}
         self.incidents: list[Incident] = []
         self.track: list[Pose] = []
+        self.on_incident: list[Callable[[Incident], None]] = []
+        self._surroundings = Surroundings(robot.spec, actors)
         self._listeners: list[Listener] = []
         self._monitor_period = self._steps_per(MONITOR_RATE)
         self._schedule = [(name, sensor, self._steps_per(sensor.rate)) for name, sensor in self.sensors.items()]
@@ -90,7 +99,11 @@ class Simulation:
         if self._steps % self._monitor_period == 0:
             sample = self.robot.motion_sample()
             self.track.append(sample.pose)
-            self.incidents += self.monitor.update(sample)
+            found = self.monitor.update(replace(sample, others=self._surroundings.look(sample.pose)))
+            self.incidents += found
+            for listener in self.on_incident:
+                for incident in found:
+                    listener(incident)
         for name, sensor, period in self._schedule:
             if self._steps % period == 0:
                 measurement = sensor.measure(self.world.time)

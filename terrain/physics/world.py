@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.physics.bullet import connect, quiet_native_output
-from terrain.physics.incidents import Thing
+from terrain.physics.motion_sample import Thing
 from terrain.worlds.heightfield import Heightfield
 from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.surface import Surface, box, cylinder, joined, level_rectangle

@@ -18,7 +18,7 @@ from mbf_abstract.event_values import well_formed
 from mbf_abstract.events import Event
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.maps.view import GridView, MapView, MeshView
-from terrain.physics.actors import Actor
+from terrain.physics.protocols import Actor
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.recorded_maps import RecordedGrid, RecordedMesh, add_if_changed
 from terrain.recording.recording import Recording, RobotShape, StampedPoints

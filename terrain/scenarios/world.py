@@ -14,9 +14,9 @@ import numpy as np
 
 from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray, Pose
-from terrain.physics.actors import Actor, AnyWorld, RouteWalker
+from terrain.physics.actors import AnyWorld, RouteWalker
 from terrain.physics.kinematic_world import KinematicWorld
-from terrain.physics.protocols import SimulatedRobot
+from terrain.physics.protocols import Actor, SimulatedRobot
 from terrain.physics.world import TIME_STEP, BulletWorld
 from terrain.scenarios.places import Place
 from terrain.scenarios.world_types import BuildingWorld, LevelsWorld, TerrainWorld

@@ -184,6 +184,7 @@ def _measure(recording: Recording, session: Session, sequence: GoalSequence) -> 
         session.scenario.limits, session.scenario.localization, session.navigator.server.runtime.parameters
     )
     metrics["tip_overs"] = counts[IncidentKind.TIPPED_OVER]
+    metrics["near_misses"] = counts[IncidentKind.NEAR_MISS]
     metrics["energy_j"] = round(session.simulation.monitor.energy, 3)
     metrics["slipped_m"] = round(session.simulation.monitor.slipped, 6)
     metrics["seed"], metrics["digest"] = session.seed, session.digest.hexdigest()

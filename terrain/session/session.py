@@ -18,10 +18,12 @@ from pathlib import Path
 from typing import Any
 
 from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.maps.sensing import RangeScan
 from terrain.physics.command_delay import CommandDelay
+from terrain.physics.incidents import ANY_COLLISION, COLLISIONS_WITH, Incident
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.robot_models import ROBOTS
@@ -90,6 +92,9 @@ class Session(SimulationSession):
         self._scans = 0
         super().__init__(simulation, self.localization, config_file, options, delay)
         self.navigator.server.get_path.listeners.append(self._record_plan)
+        simulation.on_incident.append(self._report_incident)
+        for incident in simulation.incidents:  # of the first instant
+            self._report_incident(incident)
         self.loop.on_sample.append(self._record_sample)
         self.loop.on_scan.append(self._record_scan)
 
@@ -124,7 +129,7 @@ class Session(SimulationSession):
         }
         self.localization = make_localization(self.scenario.localization, robot, self.seed)
         self.faults = FaultSchedule(self.world.physics, sensors, self.localization, self.scenario.faults)
-        return robot, Simulation(self.world.physics, robot, sensors)
+        return robot, Simulation(self.world.physics, robot, sensors, self.world.actors)
 
     def _make_recorder(self) -> Recorder:
         shape = RobotShape.of(self.robot.spec)
@@ -132,6 +137,13 @@ class Session(SimulationSession):
         recorder.ground, recorder.walls = self.world.ground, self.world.walls
         recorder.obstacles, recorder.actors = self._obstacles, self.world.actors
         return recorder
+
+    def _report_incident(self, incident: Incident) -> None:
+        """Put an incident into the log, unless another event holds it: a collision has one of what was hit."""
+        at_once = (other.kind for other in self.simulation.incidents if other.stamp == incident.stamp)
+        if incident.kind in ANY_COLLISION and any(kind in COLLISIONS_WITH.values() for kind in at_once):
+            return
+        self.events.emit(EventKind.INCIDENT, "simulator", **incident.to_json())
 
     def _record_sample(self, time: float, pose: Pose, velocity: Twist) -> None:
         self.recorder.sample(time, pose, velocity, self.navigator.server.runtime.gate.last_command)

@@ -33,6 +33,7 @@ COLUMNS = (
     "collisions",
     "collisions_while_moving",
     "tip_overs",
+    "near_misses",
     "incidents",
     "recoveries",
     "wall_time_s",

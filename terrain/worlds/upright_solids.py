@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray, Pose
-from terrain.physics.contact_depth import depth_in_circle, depth_in_polygon, placed
+from terrain.physics.contact_depth import depth_in_circle, depth_in_polygon, gap_to_polygon, placed
 from terrain.worlds.surface import Surface, box, cylinder
 
 TINY = 1e-12  # stands for a direction of exactly zero, which would divide nothing by nothing
@@ -48,9 +48,13 @@ class UprightSolid:
         """Penetration depth [m] of a convex outline (n, 2), counter-clockwise; below 0 where they are apart."""
         if len(self.size) == 2:
             return depth_in_circle(corners, self.pose.x, self.pose.y, self.size[0])
-        half_length, half_width = 0.5 * self.size[0], 0.5 * self.size[1]
-        box = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * (half_length, half_width)
-        return depth_in_polygon(corners, placed(box, self.pose.x, self.pose.y, self.pose.yaw))
+        return depth_in_polygon(corners, self._corners())
+
+    def gap(self, corners: FloatArray) -> float:
+        """Distance [m] between its outline and a convex one (n, 2), counter-clockwise; 0 where they overlap."""
+        if len(self.size) == 2:
+            return max(0.0, -self.depth(corners))
+        return gap_to_polygon(corners, self._corners())
 
     def ray_distances(self, origins: FloatArray, directions: FloatArray) -> FloatArray:
         """Distance [m] along each ray (n, 3) to its surface, inf for rays that miss it or start inside."""
@@ -70,6 +74,12 @@ class UprightSolid:
         """Its surface in the map."""
         own = cylinder(self.size[0], self.size[1]) if len(self.size) == 2 else box(self.size)
         return own.at(self.pose)
+
+    def _corners(self) -> FloatArray:
+        """Corners (4, 2) [m] of a box in the map, counter-clockwise."""
+        half_length, half_width = 0.5 * self.size[0], 0.5 * self.size[1]
+        box = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * (half_length, half_width)
+        return placed(box, self.pose.x, self.pose.y, self.pose.yaw)
 
     def _in_own_frame(self, dx: NDArray[np.float64] | float, dy: NDArray[np.float64] | float) -> tuple[float, float]:
         """Turn horizontal differences into ahead and left of the solid's heading."""

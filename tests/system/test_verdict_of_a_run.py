@@ -6,6 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
+from mbf_abstract.events import EventKind, read_events
 from terrain.recording.run_folder import read_run
 from terrain.scenarios.scenario import SHIPPED
 from terrain.sweeps.log import SweepLog
@@ -39,6 +40,13 @@ def test_a_contact_while_the_robot_moves_fails_the_run_everywhere(rude, tmp_path
     assert verdict in run.stdout
     assert (metrics["success"], metrics["level"], metrics["outcome"]) == (False, "arrived", "SUCCESS")
     assert metrics["verdict"] == verdict
+    events = [
+        event.data for event in read_events(tmp_path / "run" / "events.jsonl") if event.kind is EventKind.INCIDENT
+    ]
+    contacts = [data for data in events if data["what"] == "collision_with_person"]
+    at_fault = [data for data in events if data["what"].startswith("collision") and data["moved"] in ("robot", "both")]
+    assert len(contacts) == metrics["collisions"] and len(at_fault) >= count
+    assert sum(data["what"] == "near_miss" for data in events) == metrics["near_misses"]
     recording, _ = read_run(tmp_path / "run")
     assert (recording.verdict.success, str(recording.verdict)) == (False, verdict)
     report = (tmp_path / "run" / "report.html").read_text()

@@ -31,7 +31,7 @@ def comparison_html(names: tuple[str, str], left: Run, right: Run) -> str:
         "<h2>Over time</h2>" + beside(*(report.plots_svg(run) if len(run.times) else "" for run in runs)),
         "<h2>Actions and plugins</h2>" + beside(*(timeline_svg(run.events) for run in runs)),
         "<h2>Results of the goals, in order</h2>" + beside(*map(report.goals_table, runs)),
-        "<h2>Faults, stops and recoveries</h2>" + beside(*map(report.notable_table, runs)),
+        "<h2>Incidents, faults, stops and recoveries</h2>" + beside(*map(report.notable_table, runs)),
     ]
     return page(f"{names[0]} and {names[1]}", parts, WIDTH)
 

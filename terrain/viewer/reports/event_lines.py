@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.outcomes import is_success, outcome_name
-from terrain.viewer.pictures.colours import BAD, GOOD, NEITHER
+from terrain.viewer.pictures.colours import BAD, GOOD, NEITHER, WARNING
 
 NOTABLE = {
     EventKind.GOAL_REJECTED,
@@ -19,30 +21,38 @@ NOTABLE = {
     EventKind.FAULT,
     EventKind.QUARANTINE,
     EventKind.SINK_FAILED,
+    EventKind.INCIDENT,
 }
+FAULTS = {EventKind.FAULT, EventKind.QUARANTINE, EventKind.SINK_FAILED}
 LEFT_OUT = ("traceback", "goal_id")
 SHOWN = NOTABLE | {EventKind.GOAL_FINISHED, EventKind.GOAL_PAUSED, EventKind.GOAL_RESUMED, EventKind.CUSTOM}
 REPLACED = "preempted by a new plan"  # message of exe_path's goal when the robot continues on a newer path
 
 
 def event_text(event: Event) -> str:
-    """Return the data of an event as ``key: value`` pairs."""
+    """Return the data of an event as ``key: value`` pairs; an incident as a sentence."""
+    if event.kind is EventKind.INCIDENT:
+        return _incident_text(event.data)
     return ", ".join(f"{key}: {value}" for key, value in event.data.items() if key not in LEFT_OUT)
+
+
+def _incident_text(data: Mapping[str, Any]) -> str:
+    """What happened where, who moved and how fast."""
+    what = str(data["what"]).replace("_", " ")
+    text = f"{what} at ({data['x']:.1f}, {data['y']:.1f}), robot {data['robot_speed']:.2f} m/s"
+    if "other" in data:
+        text += f", {data['other']} {data['other_speed']:.2f} m/s, gap {data['gap']:.2f} m"
+    return text + (f", moved: {data['moved']}" if "moved" in data else "")
 
 
 @dataclass(frozen=True)
 class Line:
-    """One event: time [s], source, text, and whether it is good (None = neither)."""
+    """One event: time [s], source, text, and its colour, for CSS."""
 
     time: float
     source: str
     text: str
-    good: bool | None = None
-
-    @property
-    def colour(self) -> str:
-        """Green, red or grey, for CSS."""
-        return NEITHER if self.good is None else (GOOD if self.good else BAD)
+    colour: str = NEITHER
 
 
 def is_shown(event: Event) -> bool:
@@ -56,8 +66,16 @@ def line_of(event: Event) -> Line:
         outcome = event.data.get("outcome")
         code = outcome if isinstance(outcome, int) else 0
         name = outcome_name(code)
-        good = None if name == "CANCELED" else is_success(code)
-        return Line(event.time, event.source, f"{name}: {event.data.get('message', '')}", good)
-    what = "" if event.kind is EventKind.CUSTOM else event.kind.value.replace("_", " ")
+        colour = NEITHER if name == "CANCELED" else GOOD if is_success(code) else BAD
+        return Line(event.time, event.source, f"{name}: {event.data.get('message', '')}", colour)
+    what = "" if event.kind in (EventKind.CUSTOM, EventKind.INCIDENT) else event.kind.value.replace("_", " ")
     text = " ".join(part for part in (what, event_text(event)) if part)
-    return Line(event.time, event.source, text, False if event.kind is EventKind.FAULT else None)
+    return Line(event.time, event.source, text, colour_of(event))
+
+
+def colour_of(event: Event) -> str:
+    """Return red for a fault and for what fails a run, amber for other incidents, else grey."""
+    if event.kind is EventKind.INCIDENT:
+        contact = str(event.data["what"]).startswith("collision") and event.data["moved"] in ("robot", "both")
+        return BAD if contact or event.data["what"] == "tipped_over" else WARNING
+    return BAD if event.kind in FAULTS else NEITHER

@@ -34,7 +34,7 @@ def report_html(recording: Recording, metrics: Mapping[str, Any]) -> str:
         f"<h2>Actions and plugins</h2>{timeline_svg(recording.events)}",
         "<h2>Metrics</h2>" + table(("name", "value"), metrics.items()),
         "<h2>Results of the goals, in order</h2>" + goals_table(recording),
-        "<h2>Faults, stops and recoveries</h2>" + notable_table(recording),
+        "<h2>Incidents, faults, stops and recoveries</h2>" + notable_table(recording),
     ]
     return page(title_of(recording), parts)
 
@@ -65,7 +65,7 @@ def goals_table(recording: Recording) -> str:
 
 
 def notable_table(recording: Recording) -> str:
-    """Faults, gate events and recoveries."""
+    """Incidents, faults, gate events and recoveries."""
     return table(("time", "what", "who", "text"), _notable(recording))
 
 

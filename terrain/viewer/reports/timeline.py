@@ -13,14 +13,13 @@ from html import escape
 
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.outcomes import is_success, outcome_name
-from terrain.viewer.reports.event_lines import NOTABLE, event_text
+from terrain.viewer.reports.event_lines import NOTABLE, colour_of, event_text
 
 ACTIONS = ("move_base", "get_path", "exe_path", "recovery", "refine_path")
-MARKS_ROW = "stops, faults"
+MARKS_ROW = "incidents, stops"
 WIDTH, ROW, BAR = 900, 30, 18
 LETTER = 7.5  # pixels; labels are wide enough for the longest name
 GOOD, BAD, NEITHER = "#2da44e", "#cf222e", "#9aa4b2"
-FAULTS = {EventKind.FAULT, EventKind.QUARANTINE, EventKind.SINK_FAILED}
 MAX_TICKS = 10
 
 
@@ -104,11 +103,10 @@ class _Frame:
         )
 
     def mark(self, event: Event) -> str:
-        """A diamond: red for a fault, else grey."""
+        """A diamond: red for a fault and what fails a run, amber for other incidents, else grey."""
         x, y = self._x(event.time), self._y(MARKS_ROW) + ROW // 2
         title = escape(f"{event.time:.2f} s: {event.source}: {event.kind.value}: {event_text(event)}")
-        colour = BAD if event.kind in FAULTS else "#57606a"
-        return f'<path d="M{x:.1f} {y - 7}l6 7l-6 7l-6 -7z" fill="{colour}"><title>{title}</title></path>'
+        return f'<path d="M{x:.1f} {y - 7}l6 7l-6 7l-6 -7z" fill="{colour_of(event)}"><title>{title}</title></path>'
 
     def ticks(self) -> Iterator[str]:
         step = _round_step(self._last / MAX_TICKS)

@@ -8,7 +8,8 @@ import pytest
 
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.tilt import tilt_of
-from terrain.physics.incidents import IncidentKind, IncidentMonitor, MotionSample, Thing, roll_pitch
+from terrain.physics.incidents import IncidentKind, IncidentMonitor, roll_pitch
+from terrain.physics.motion_sample import MotionSample, Thing
 
 
 def rolled(angle: float, stamp: float = 0.0, x: float = 0.0) -> Pose:

@@ -8,9 +8,10 @@ import pytest
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.maps.sensing import RangeScan
 from terrain.physics.actors import RouteWalker, SlidingDoor, other_robot
-from terrain.physics.incidents import IncidentKind, Thing
+from terrain.physics.incidents import IncidentKind
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.motion_sample import Thing
 from terrain.physics.robot_models import CAR, HUSKY, ROBOTS, TURTLEBOT, RobotSpec
 from terrain.physics.robots import WheeledRobot
 from terrain.physics.simulation import Simulation

@@ -8,7 +8,7 @@ import pytest
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist
 from mbf_abstract.maps.view import GridView, MeshView
-from terrain.physics.incidents import Thing
+from terrain.physics.motion_sample import Thing
 from terrain.physics.robot_models import CAR, HUSKY, TURTLEBOT
 from terrain.recording.recorder import MAP_PERIOD, MAX_GRID_CELLS, MAX_MESH_VERTICES, Recorder
 from terrain.recording.recording import Recording, RecordingError, RobotShape

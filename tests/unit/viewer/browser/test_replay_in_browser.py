@@ -54,3 +54,32 @@ def test_a_replay_reports_the_state_of_the_tree_along_its_time_bar(chromium, hil
 
     (tmp_path / "screenshot.png").write_bytes(png)
     assert errors == []
+
+
+def test_a_click_on_an_incident_takes_the_time_bar_to_it(chromium, hill_recording, tmp_path):
+    met = {"what": "near_miss", "x": 20.0, "y": 12.0, "z": 1.0, "robot_speed": 1.2}
+    met |= {"moved": "both", "other": "person 2", "other_speed": 0.5, "gap": 0.1}
+    tipped = {"what": "tipped_over", "x": 30.0, "y": 20.0, "z": 1.0, "robot_speed": 0.0}
+    events = [
+        *hill_recording.events,
+        *(Event(at, EventKind.INCIDENT, "simulator", data) for at, data in ((12.0, met), (25.0, tipped))),
+    ]
+    (tmp_path / "replay.html").write_text(replay_html(replace(hill_recording, events=tuple(events))), encoding="utf-8")
+    marks = "document.querySelectorAll('#run-marks button')"
+
+    async def watch(page):
+        await page.open((tmp_path / "replay.html").as_uri())
+        await page.wait_for(DRAWN)
+        await page.press("25.0 s  tipped over at (30.0, 20.0), robot 0.00 m/s")
+        await page.wait_for("document.querySelector('input').value === '24.0'")
+        await page.wait_for(f"{marks}.length === 2 && {marks}[1].style.left !== ''")
+        places = await page.evaluate(f"[...{marks}].map(mark => mark.getBoundingClientRect().left)")
+        await page.evaluate(f"{marks}[0].click()")
+        await page.wait_for("document.querySelector('input').value === '11.0'")
+        return page.errors, places, await page.screenshot()
+
+    errors, places, png = chromium.visit(watch)
+
+    (tmp_path / "screenshot.png").write_bytes(png)
+    assert errors == []
+    assert 0 < places[0] < places[1]

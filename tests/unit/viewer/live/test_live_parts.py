@@ -16,7 +16,7 @@ from terrain.viewer.live.overlay import Overlay
 from terrain.viewer.live.plots import LENGTH, PERIOD, History
 from terrain.viewer.live.session import MAX_LAG, Pace, ViewOptions
 from terrain.viewer.live.status_html import lines_html
-from terrain.viewer.pictures.colours import FLOOR, WALL, cost_ramp
+from terrain.viewer.pictures.colours import BAD, FLOOR, GOOD, NEITHER, WALL, cost_ramp
 from terrain.viewer.reports.tree_html import tree_html
 from terrain.viewer.server.page_server import page_server
 
@@ -120,7 +120,7 @@ def test_the_log_keeps_the_last_end_of_each_action_and_the_newest_line_first():
 
     snapshot = log.snapshot()
 
-    assert [(line.time, line.good) for line in snapshot.lines] == [(3.0, None), (2.0, False), (1.0, True)]
+    assert [(line.time, line.colour) for line in snapshot.lines] == [(3.0, NEITHER), (2.0, BAD), (1.0, GOOD)]
     assert snapshot.ends["get_path"].text == "CANCELED: enough"
 
 
