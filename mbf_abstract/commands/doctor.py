@@ -21,6 +21,7 @@ from mbf_abstract.commands.reporting import FAILURE
 
 NEEDED = (*("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "PIL"),)
 MESH_FILES = ("h5py", "lxml", "collada")
+POINT_CLOUDS = ("laspy", "lazrs")
 SIMULATION = ("pybullet", "matplotlib", "viser", "mcap", "mcap_protobuf", "foxglove_schemas_protobuf")
 DISTRIBUTIONS = {
     "yaml": "pyyaml",
@@ -71,6 +72,8 @@ def examine() -> Iterator[Finding]:
         yield _package(name, "needed by mbf run and pictures: pip install 'mbf-flex[sim]'", optional=True)
     for name in MESH_FILES:
         yield _package(name, "only for meshes in .h5 and .dae files: pip install 'mbf-flex[mesh-files]'", optional=True)
+    for name in POINT_CLOUDS:
+        yield _package(name, "only for .las and .laz in mbf map build: pip install 'mbf-flex[maps]'", optional=True)
     yield _package("rerun", "only for mbf replay --rrd, Python >= 3.11: pip install 'mbf-flex[rerun]'", optional=True)
     yield _check("plugins", _plugins, "mbf plugins lists which and why")
     yield _check("kernel cache", _kernel_cache, "set NUMBA_CACHE_DIR to a folder that can be written")

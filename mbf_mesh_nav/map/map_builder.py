@@ -40,7 +40,7 @@ from mbf_mesh_nav.files.mesh_io import MAX_FACES, SPLIT_CORNERS, read_mesh
 from mbf_mesh_nav.map.layer import LayerContext, LayerParameters, MeshLayer
 from mbf_mesh_nav.map.layer_cache import LayerCache
 from mbf_mesh_nav.map.layer_graph import LayerGraph
-from mbf_mesh_nav.map.map_findings import frame_findings, map_findings
+from mbf_mesh_nav.map.map_findings import frame_findings, header_findings, map_findings
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.densify import densify
 from mbf_mesh_nav.mesh.mesh_report import Finding
@@ -202,7 +202,8 @@ def build_mesh_map(
         graph = _compute_layers(mesh_map, plan, parameters.cache_dir)
         default = parameters.default_layer or parameters.layers[-1].name
         mesh_map.set_layers(graph, default, parameters.edge_cost_factor)
-    report.findings += [*frame_findings(file, parameters.up_axis, parameters.unit), *map_findings(mesh_map)]
+    report.findings += frame_findings(file, parameters.up_axis, parameters.unit)
+    report.findings += [*header_findings(file), *map_findings(mesh_map)]
     return mesh_map
 
 

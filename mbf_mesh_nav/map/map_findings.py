@@ -9,6 +9,7 @@ import numpy as np
 
 from mbf_mesh_nav.files.elevation_files import elevation_readers
 from mbf_mesh_nav.files.file_frames import FileFrame, file_frame
+from mbf_mesh_nav.files.map_header import read_map_header
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import Finding
 
@@ -26,6 +27,18 @@ def frame_findings(file: str, up_axis: str, unit: float) -> Iterator[Finding]:
     if frame != FileFrame():
         text = f"the file has {frame}; it is turned and scaled to z up and metres (see up_axis and unit)"
         yield Finding("file_frame", text, NOWHERE, harmless=True)
+
+
+def header_findings(file: str) -> Iterator[Finding]:
+    """One finding for a map of ``mbf map build``: its origin and its error; ``file`` is "" for arrays."""
+    header = read_map_header(Path(file)) if file else None
+    if header is not None:
+        x, y, z = header.origin
+        text = (
+            f"(0, 0, 0) of the map lies at ({x:.10g}, {y:.10g}, {z:.10g}) of its survey, "
+            f"whose points are {header.error_rms:.3f} m (rms) from the surface"
+        )
+        yield Finding("origin", text, NOWHERE, harmless=True)
 
 
 def map_findings(mesh_map: MeshMap) -> Iterator[Finding]:

@@ -1,0 +1,1 @@
+"""Point clouds on disk: PLY, PCD, LAS and LAZ, and tables of coordinates."""

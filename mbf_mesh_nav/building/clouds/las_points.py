@@ -1,0 +1,91 @@
+"""Surveys in LAS and LAZ files (ASPRS LAS 1.0 to 1.4), through laspy; the extra ``maps``.
+
+Coordinates are whole numbers times a scale plus an offset, so nothing is lost far from the origin. Points that the
+survey itself classifies as noise (classes 7 and 18) or withholds are left out.
+"""
+
+from __future__ import annotations
+
+import re
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, refuse_count
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+
+PACKAGES = {".las": ("laspy",), ".laz": ("laspy", "lazrs")}
+NOISE_CLASSES = (7, 18)
+CHUNK_POINTS = 1_000_000
+GEO_KEYS, WELL_KNOWN_TEXT = 34735, 2112
+MODEL_TYPE, LINEAR_UNIT, GEOGRAPHIC = 1024, 3076, 2
+UNITS = {9001: 1.0, 9002: 0.3048, 9003: 1200.0 / 3937.0}
+"""Length [m] of the linear units of GeoTIFF keys: metre, foot, survey foot of the United States."""
+
+LENGTH_UNIT = re.compile(r'UNIT\["[^"]*(?:met|foot|feet|ft)[^"]*",\s*([0-9.eE+-]+)', re.IGNORECASE)
+"""A linear unit of a coordinate system as well-known text, with its length [m]."""
+
+
+def read_las_points(path: Path, max_points: int) -> StoredPoints:
+    """Read the points of a LAS or LAZ file.
+
+    Raises
+    ------
+    MeshError
+        laspy is not installed, the file is no LAS, cut off, has more than ``max_points`` points, or is in degrees.
+    """
+    if missing := [name for name in PACKAGES[path.suffix.lower()] if find_spec(name) is None]:
+        raise MeshError(str(path), [f"needs {' and '.join(missing)}: pip install 'mbf-flex[maps]'"])
+    import laspy
+
+    try:
+        with laspy.open(path) as reader:
+            header = reader.header
+            count, size = int(header.point_count), int(header.point_format.size)
+            refuse_count(path, count, max_points)
+            if not header.are_points_compressed:
+                found = (path.stat().st_size - int(header.offset_to_point_data)) // size
+                if found < count:
+                    raise MeshError(str(path), [f"the file is cut off: expected {count} points, found {found}"])
+            unit = _unit(path, header)
+            points, is_kept = _read_chunks(path, reader, count)
+    except MeshError:
+        raise
+    except Exception as error:  # laspy, lazrs and struct each raise their own for damaged files
+        raise MeshError(str(path), [f"cannot be read as LAS: {type(error).__name__}: {error}"]) from error
+    dropped = count - int(is_kept.sum())
+    notes = (f"{dropped} points are classified as noise or withheld",) if dropped else ()
+    return StoredPoints(points[is_kept] if dropped else points, notes=notes, unit=unit)
+
+
+def _read_chunks(path: Path, reader: Any, count: int) -> tuple[Any, Any]:
+    points, is_kept = np.empty((count, 3), dtype=np.float64), np.ones(count, dtype=np.bool_)
+    start = 0
+    for chunk in reader.chunk_iterator(CHUNK_POINTS):
+        end = start + len(chunk)
+        if end > count:
+            break
+        for axis, name in enumerate("xyz"):
+            points[start:end, axis] = chunk[name]
+        is_kept[start:end] = ~np.isin(np.asarray(chunk.classification), NOISE_CLASSES)
+        is_kept[start:end] &= np.asarray(chunk.withheld) == 0
+        start = end
+    if start != count:
+        raise MeshError(str(path), [f"the file is cut off: expected {count} points, found {start}"])
+    return points, is_kept
+
+
+def _unit(path: Path, header: Any) -> float:
+    """Length [m] of the file's unit by its coordinate system, 0 if it states none."""
+    records = {int(record.record_id): record for record in [*header.vlrs, *(header.evlrs or ())]}
+    text = str(getattr(records.get(WELL_KNOWN_TEXT), "string", ""))
+    keys = {int(key.id): int(key.value_offset) for key in getattr(records.get(GEO_KEYS), "geo_keys", ())}
+    if keys.get(MODEL_TYPE) == GEOGRAPHIC or text.startswith("GEOGCS"):
+        raise MeshError(str(path), ["its coordinates are degrees; project them to metres first"])
+    lengths = [float(length) for length in LENGTH_UNIT.findall(text)]
+    if len(set(lengths)) > 1:
+        text = ", ".join(f"{length:g} m" for length in lengths)
+        raise MeshError(str(path), [f"its coordinate system mixes units ({text}); convert it to one unit first"])
+    return lengths[0] if lengths else UNITS.get(keys.get(LINEAR_UNIT, 0), 0.0)

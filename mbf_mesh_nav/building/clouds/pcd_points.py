@@ -1,0 +1,118 @@
+"""Point clouds of the Point Cloud Library: PCD 0.7, ascii, binary and binary_compressed.
+
+Format: pointclouds.org, "The PCD (Point Cloud Data) file format". An organised cloud (HEIGHT above 1) has a place for
+every pixel of a camera; pixels without a return are NaN by that format, so they are left out here.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, coordinates, read_records, refuse_count
+from mbf_mesh_nav.building.clouds.text_points import read_rows
+from mbf_mesh_nav.kernels.building.lzf import lzf_decompress
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+
+KINDS = {"F": "f", "I": "i", "U": "u"}
+LENGTHS = {"F": (4, 8), "I": (1, 2, 4, 8), "U": (1, 2, 4, 8)}
+MAX_HEADER_LINES = 100
+MAX_RECORD_BYTES = 4096
+
+
+def read_pcd_points(path: Path, max_points: int) -> StoredPoints:
+    """Read the points of a PCD file.
+
+    Raises
+    ------
+    MeshError
+        No PCD, cut off, damaged, more than ``max_points`` points, or points without x, y and z.
+    """
+    with path.open("rb") as file:
+        header = _read_header(path, file)
+        try:
+            record = _record(header)
+            width, height = int(header["WIDTH"][0]), int(header["HEIGHT"][0])
+            count, form = int(header.get("POINTS", [str(width * height)])[0]), header["DATA"][0]
+        except (LookupError, ValueError) as error:
+            raise MeshError(str(path), [f"its header is no PCD header: {error}"]) from error
+        if count != width * height:
+            raise MeshError(str(path), [f"POINTS {count} is not WIDTH {width} x HEIGHT {height}"])
+        refuse_count(path, count, max_points)
+        if form == "ascii":
+            stored = _read_text(path, file, record, count)
+        elif form == "binary":
+            stored = coordinates(path, read_records(path, file, record, count))
+        elif form == "binary_compressed":
+            stored = coordinates(path, _decompressed(path, file, record, count))
+        else:
+            raise MeshError(str(path), [f"DATA: expected ascii, binary or binary_compressed, got '{form:.40}'"])
+    if height == 1:
+        return stored
+    returned = np.isfinite(stored.points).all(axis=1)
+    note = f"{count - int(returned.sum())} of {count} pixels of the organised cloud have no return"
+    return stored._replace(points=stored.points[returned], notes=(note,))
+
+
+def _read_header(path: Path, file: BinaryIO) -> dict[str, list[str]]:
+    header: dict[str, list[str]] = {}
+    for _ in range(MAX_HEADER_LINES):
+        words = file.readline(4096).decode("ascii", "replace").split()
+        if words and not words[0].startswith("#"):
+            header[words[0].upper()] = words[1:]
+        if "DATA" in header:
+            return header
+    raise MeshError(str(path), ["is no PCD: there is no DATA line in its header"])
+
+
+def _record(header: dict[str, list[str]]) -> np.dtype[np.void]:
+    """Type of one point; raises LookupError or ValueError for a header that does not fit together."""
+    names, sizes, kinds = header["FIELDS"], header["SIZE"], header["TYPE"]
+    counts = header.get("COUNT", ["1"] * len(names))
+    fields = []
+    for number, (name, size, kind, count) in enumerate(zip(names, sizes, kinds, counts, strict=True)):
+        if int(size) not in LENGTHS[kind] or int(count) < 0:
+            raise ValueError(f"field {name:.40}: TYPE {kind} of SIZE {size} x {count}")
+        unique = name if name in "xyz" else f"{name}_{number}"  # padding is called "_" as often as it occurs
+        form = f"<{KINDS[kind]}{int(size)}"
+        fields.append((unique, form) if int(count) == 1 else (unique, form, (int(count),)))
+    record = np.dtype(fields)
+    if record.itemsize > MAX_RECORD_BYTES:
+        raise ValueError(f"{record.itemsize} bytes a point")
+    return record
+
+
+def _read_text(path: Path, file: BinaryIO, record: np.dtype[np.void], count: int) -> StoredPoints:
+    places, column = {}, 0
+    for name in record.names or ():
+        places[name] = column
+        column += int(np.prod(record[name].shape, dtype=np.int64))
+    if missing := [name for name in "xyz" if name not in places]:
+        raise MeshError(str(path), [f"its points have no {', '.join(missing)}"])
+    return StoredPoints(read_rows(path, file, (places["x"], places["y"], places["z"]), None, count))
+
+
+def _decompressed(path: Path, file: BinaryIO, record: np.dtype[np.void], count: int) -> NDArray[np.void]:
+    """Records out of a compressed block, in which one field's values of all points stand after the other's."""
+    sizes = np.frombuffer(file.read(8), dtype="<u4")
+    expected = count * record.itemsize
+    if len(sizes) < 2 or int(sizes[1]) != expected:
+        found = int(sizes[1]) if len(sizes) == 2 else 0
+        raise MeshError(str(path), [f"its compressed block holds {found} bytes, expected {expected}"])
+    block = np.frombuffer(file.read(int(sizes[0])), dtype=np.uint8)
+    if len(block) < sizes[0]:
+        raise MeshError(str(path), [f"the file is cut off: expected {sizes[0]} compressed bytes, found {len(block)}"])
+    content = np.empty(expected, dtype=np.uint8)
+    if lzf_decompress(block.copy(), content) != expected:
+        raise MeshError(str(path), ["its compressed block is damaged"])
+    records = np.zeros(count, dtype=record)
+    start = 0
+    for name in record.names or ():
+        kind = record[name]
+        end = start + count * kind.itemsize
+        records[name] = content[start:end].view(kind.base).reshape(count, *kind.shape)
+        start = end
+    return records

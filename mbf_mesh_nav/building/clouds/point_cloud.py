@@ -1,0 +1,201 @@
+"""Point clouds in metres with z up, near their own origin: several files as one.
+
+Coordinates of a national grid are millions of metres. They are kept relative to an origin, so that what is stored and
+computed later, in single precision too, loses no millimetre.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mbf_abstract.config.bounded_files import special_file
+from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.building.clouds.las_points import read_las_points
+from mbf_mesh_nav.building.clouds.pcd_points import read_pcd_points
+from mbf_mesh_nav.building.clouds.ply_points import read_ply_points
+from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, refuse_count
+from mbf_mesh_nav.building.clouds.text_points import read_text_points
+from mbf_mesh_nav.files.file_frames import FileFrame, on_the_map
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+
+Reader = Callable[[Path, int], StoredPoints]
+READERS: dict[str, Reader] = {
+    ".ply": read_ply_points,
+    ".pcd": read_pcd_points,
+    ".las": read_las_points,
+    ".laz": read_las_points,
+    **dict.fromkeys((".xyz", ".txt", ".csv", ".pts"), read_text_points),
+}
+"""Readers by the ending of the file."""
+MAX_POINTS = 50_000_000
+"""Points of all files together unless the caller asks for more; each takes some hundred bytes while a map is built."""
+FAR = 10_000.0
+"""Coordinates [m] beyond this are of a grid of a country: the map gets an origin of its own."""
+ORIGIN_STEP = 100.0
+COARSEST_STEP = 0.005
+"""Distance [m] of neighbouring four-byte floats above which a file has lost what a map needs."""
+SHORTEST, LONGEST = 1.0, 50_000.0
+"""Extents [m] of a plausible map."""
+SAME_UNIT_RATIO = 200.0
+"""Extents of two files of one map that differ by more are hardly in the same unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """Points [m], z up.
+
+    Attributes
+    ----------
+    points : (n, 3) float64
+        Relative to ``origin``.
+    origin : tuple of float
+        Where the map's (0, 0, 0) lies in the coordinates of the files [m]; zeros for clouds near zero.
+    unit : float
+        Length of the files' unit [m].
+    notes : tuple of str
+        What a user should know of the files.
+    """
+
+    points: FloatArray
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    unit: float = 1.0
+    notes: tuple[str, ...] = ()
+
+
+def read_clouds(
+    files: Sequence[Path],
+    *,
+    up_axis: str = "z",
+    unit: float = 0.0,
+    max_points: int = MAX_POINTS,
+    drop_invalid: bool = False,
+    on_file: Callable[[Path], None] = lambda file: None,
+) -> PointCloud:
+    """Read one or several files as one cloud; their order does not matter for its coordinates.
+
+    Parameters
+    ----------
+    up_axis : str
+        Axis of the files that points up, "x", "y" or "z".
+    unit : float
+        Length of the files' unit [m]; 0 = as the files state, else 1.
+    max_points : int
+        Files of more points, together, are refused before their points are read.
+    drop_invalid : bool
+        Leave out points that are not finite; without it they are an error.
+    on_file : callable, optional
+        Called with each file before it is read. What it raises ends the reading.
+
+    Raises
+    ------
+    MeshError
+        A file cannot be read, holds points that are not finite, or coordinates that are no metres; or too few points.
+    """
+    if not files:
+        raise MeshError("point cloud", ["there is no input file"])
+    parts, notes, stated = list[FloatArray](), list[str](), dict[Path, float]()
+    for file in files:
+        on_file(file)
+        stored = _read(file, max_points - sum(map(len, parts)))
+        points, dropped = _finite(file, stored.points, drop_invalid)
+        stated[file] = unit or stored.unit
+        _refuse_lost_digits(file, points, stored.single_precision, stated[file] or 1.0)
+        parts.append(on_the_map(points, FileFrame(up_axis, stated[file] or 1.0)))
+        notes += [f"{file.name}: {note}" for note in (*stored.notes, *dropped)]
+    if len(set(stated.values())) > 1:
+        text = ", ".join(
+            f"{file.name} {length:g} m" if length else f"{file.name} none" for file, length in stated.items()
+        )
+        raise MeshError("point cloud", [f"the files state different units ({text}); give one unit for all"])
+    _refuse_units(files, parts, is_stated=bool(stated[files[0]]))
+    origin = _origin(parts)
+    for part in parts:
+        part -= origin
+    cloud = parts[0] if len(parts) == 1 else np.concatenate(parts)
+    x, y, z = origin.tolist()
+    return PointCloud(cloud, (x, y, z), stated[files[0]] or 1.0, tuple(notes))
+
+
+def _read(file: Path, max_points: int) -> StoredPoints:
+    reader = READERS.get(file.suffix.lower())
+    if reader is None:
+        raise MeshError(str(file), [f"unknown ending '{file.suffix}', known are: {', '.join(sorted(READERS))}"])
+    if kind := special_file(file):
+        raise MeshError(str(file), [f"expected a file, got {kind}"])
+    if not file.is_file():
+        raise MeshError(str(file), ["there is no such file"])
+    try:
+        stored = reader(file, max_points)
+    except (OSError, MemoryError, ValueError) as error:
+        if isinstance(error, MeshError):
+            raise
+        raise MeshError(str(file), [f"cannot be read: {error}"]) from error
+    refuse_count(file, len(stored.points), max_points)
+    if len(stored.points) == 0:
+        raise MeshError(str(file), ["there is no point in it"])
+    return stored
+
+
+def _finite(file: Path, points: FloatArray, drop_invalid: bool) -> tuple[FloatArray, list[str]]:
+    """The finite points, and a note if others were left out."""
+    is_finite = np.isfinite(points[:, 0]) & np.isfinite(points[:, 1]) & np.isfinite(points[:, 2])
+    if is_finite.all():
+        return points, []
+    count, first = int((~is_finite).sum()), int(np.argmin(is_finite))
+    if not drop_invalid:
+        text = f"{count} of {len(points)} points are not finite, the first is point {first}"
+        raise MeshError(str(file), [text], "Leave them out with --drop-invalid")
+    if count == len(points):
+        raise MeshError(str(file), ["no point in it is finite"])
+    return points[is_finite], [f"{count} points that are not finite are left out"]
+
+
+def _refuse_lost_digits(file: Path, points: FloatArray, single_precision: bool, unit: float) -> None:
+    """Refuse coordinates of a national grid in four-byte floats: a neighbour is half a metre away there."""
+    if not single_precision:
+        return
+    largest = float(np.abs(points).max())
+    step = float(np.spacing(np.float32(largest))) * unit
+    if step > COARSEST_STEP:
+        text = f"coordinates of {largest:.0f} in four-byte floats are only {step:.2g} m exact"
+        raise MeshError(str(file), [text], "Export them as double, or with an offset")
+
+
+def _refuse_units(files: Sequence[Path], parts: Sequence[FloatArray], is_stated: bool) -> None:
+    """Refuse extents that no map in metres has."""
+    extents = [float(max(np.ptp(part[:, 0]), np.ptp(part[:, 1]))) for part in parts]
+    shortest, longest = int(np.argmin(extents)), int(np.argmax(extents))
+    if extents[longest] > SAME_UNIT_RATIO * max(extents[shortest], SHORTEST):
+        text = (
+            f"{files[longest].name} is {extents[longest]:.6g} m long, {files[shortest].name} {extents[shortest]:.6g} m"
+        )
+        raise MeshError("point cloud", [f"the files have hardly the same unit: {text}"])
+    lower = np.min([part.min(axis=0) for part in parts], axis=0)
+    upper = np.max([part.max(axis=0) for part in parts], axis=0)
+    length, height = float(max(upper[:2] - lower[:2])), float(upper[2] - lower[2])
+    size = f"{upper[0] - lower[0]:.6g} x {upper[1] - lower[1]:.6g} x {height:.6g} m"
+    if is_degrees(lower, upper) and height > 10.0 * length:
+        raise MeshError(str(files[0]), [f"x and y look like degrees ({size}); project them to metres first"])
+    if not is_stated and length > LONGEST:
+        text = f"in metres it is {size}: its unit is hardly the metre"
+        raise MeshError(str(files[0]), [text], "Give the unit, e.g. --scale 0.001 for millimetres")
+    if length < SHORTEST:
+        hint = "" if is_stated else "If its unit is not the metre, give it with --scale"
+        raise MeshError(str(files[0]), [f"it is only {size}, too small for a map"], hint)
+
+
+def is_degrees(lower: FloatArray, upper: FloatArray) -> bool:
+    """Whether the bounds (3,) could be longitudes and latitudes of one region."""
+    return bool(np.abs([lower[0], upper[0]]).max() <= 180.0 and np.abs([lower[1], upper[1]]).max() <= 90.0)
+
+
+def _origin(parts: Sequence[FloatArray]) -> FloatArray:
+    """Origin (3,) of the map [m]: zero, or the lower corner rounded down where an axis is far from zero."""
+    lower = np.min([part.min(axis=0) for part in parts], axis=0)
+    upper = np.max([part.max(axis=0) for part in parts], axis=0)
+    is_far = np.maximum(np.abs(lower), np.abs(upper)) > FAR
+    return np.where(is_far, np.floor(lower / ORIGIN_STEP) * ORIGIN_STEP, 0.0)

@@ -1,0 +1,124 @@
+"""Tables of coordinates: .xyz, .txt, .csv and .pts, separated by blanks, tabs, commas or semicolons.
+
+A header line may name the columns; without one the first three are x, y and z. Lines that begin with # or // are left
+out, and so is the first line of a .pts file, which holds the number of its points.
+"""
+
+from __future__ import annotations
+
+import warnings
+from itertools import islice
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, refuse_count
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+
+NAMES = {
+    "x": ("x", "easting", "e", "east", "x[m]"),
+    "y": ("y", "northing", "n", "north", "y[m]"),
+    "z": ("z", "height", "elevation", "h", "z[m]"),
+}
+"""What header lines call the coordinates, in lower case."""
+COMMENTS = ("#", "//")
+LONGEST_LINE = 4096
+HEAD_LINES = 100
+CHUNK_BYTES = 2**24
+
+
+def read_text_points(path: Path, max_points: int) -> StoredPoints:
+    """Read a table of coordinates.
+
+    Raises
+    ------
+    MeshError
+        A row without three numbers, more than ``max_points`` rows, or a header that names no x, y and z.
+    """
+    with path.open("rb") as file:
+        skipped, columns, delimiter = _layout(path, file)
+        file.seek(0)
+        lines = 0
+        while chunk := file.read(CHUNK_BYTES):
+            lines += chunk.count(b"\n")
+            refuse_count(path, lines - skipped, max_points)
+        file.seek(0)
+        for _ in range(skipped):
+            file.readline()
+        return StoredPoints(read_rows(path, file, columns, delimiter))
+
+
+def read_rows(
+    path: Path, file: BinaryIO, columns: tuple[int, int, int], delimiter: str | None, count: int | None = None
+) -> FloatArray:
+    """Read the rows of numbers from the present place of a file on.
+
+    Parameters
+    ----------
+    columns : tuple of int
+        Where x, y and z stand in a row.
+    delimiter : str, optional
+        Blanks and tabs without it.
+    count : int, optional
+        How many rows to read; all without it.
+
+    Raises
+    ------
+    MeshError
+        A row has no such columns or holds something that is no number, or there are fewer than ``count`` rows.
+    """
+    rows = file if count is None else islice((line for line in file if line.strip()), count)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "loadtxt: input contained no data")
+        try:
+            points: FloatArray = np.loadtxt(
+                rows,
+                dtype=np.float64,
+                comments=COMMENTS,
+                delimiter=delimiter,
+                usecols=columns,
+                ndmin=2,
+                encoding="latin-1",
+            )
+        except ValueError as error:
+            raise MeshError(str(path), [f"expected a table of numbers: {error}"]) from error
+    if count is not None and len(points) < count:
+        raise MeshError(str(path), [f"the file is cut off: expected {count} points, found {len(points)}"])
+    return points.reshape(-1, 3)
+
+
+def _layout(path: Path, file: BinaryIO) -> tuple[int, tuple[int, int, int], str | None]:
+    """Lines before the first row, the columns of x, y and z, and the delimiter (None for blanks)."""
+    for number in range(HEAD_LINES):
+        line = file.readline(LONGEST_LINE).decode("latin-1").strip()
+        is_comment = line.startswith(COMMENTS)
+        names = _named_columns(line.lstrip("#/ "))
+        if names is not None:
+            return number + 1, names, _delimiter(line)
+        if not line or is_comment or (path.suffix.lower() == ".pts" and number == 0):
+            continue
+        if _is_number(line.split(_delimiter(line))[0]):
+            return number, (0, 1, 2), _delimiter(line)
+        raise MeshError(str(path), [f"line {number + 1}: expected numbers or the names x, y, z, got '{line:.40}'"])
+    raise MeshError(str(path), ["there is no point in it"])
+
+
+def _named_columns(line: str) -> tuple[int, int, int] | None:
+    """Columns of x, y and z in a header line, None if it is no header."""
+    words = [word.strip().strip('"').lower() for word in line.split(_delimiter(line))]
+    found = [next((words.index(name) for name in NAMES[axis] if name in words), -1) for axis in "xyz"]
+    return None if min(found) < 0 else (found[0], found[1], found[2])
+
+
+def _delimiter(line: str) -> str | None:
+    return next((mark for mark in (";", ",") if mark in line), None)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

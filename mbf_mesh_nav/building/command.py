@@ -1,0 +1,96 @@
+"""``mbf map build``: a map to drive on from point clouds."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from mbf_abstract.commands.reporting import readable_errors
+from mbf_abstract.commands.waiting import waiting
+
+if TYPE_CHECKING:
+    from mbf_mesh_nav.building.map_facts import MapFacts
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the application ``mbf``."""
+    maps = typer.Typer(help="Maps from what a survey measured.", no_args_is_help=True)
+    maps.callback()(_group)
+    maps.command("build")(build)
+    app.add_typer(maps, name="map")
+
+
+def _group() -> None:
+    """Maps from what a survey measured."""
+
+
+def build(
+    inputs: list[Path] = typer.Argument(..., help="Point clouds: PLY, PCD, LAS, LAZ, XYZ, TXT, CSV, PTS."),
+    out: Path = typer.Option(..., "--out", help="The map, a .ply file; replaced when the new one is complete."),
+    up: str = typer.Option("z", "--up", help="Axis of the files that points up: x, y or z."),
+    scale: float = typer.Option(
+        0.0, "--scale", min=0.0, help="Length of the files' unit [m]; 0 = as they state, or 1."
+    ),
+    cell: float = typer.Option(0.0, "--cell", min=0.0, help="Distance of the vertices [m]; 0 = by the density."),
+    clearance: float = typer.Option(1.5, "--clearance", help="Free height that the robot needs [m]."),
+    step_height: float = typer.Option(0.2, "--step-height", help="What is driven over, such as grass [m]."),
+    hole_width: float = typer.Option(1.0, "--hole-width", help="Holes up to this width are filled [m]; 0 = none."),
+    least_area: float = typer.Option(10.0, "--least-area", help="Smaller separate surfaces are left out [m2]."),
+    max_points: int = typer.Option(50_000_000, "--max-points", min=1, help="More points are refused unread."),
+    drop_invalid: bool = typer.Option(False, "--drop-invalid", help="Leave out points that are not finite."),
+    as_json: bool = typer.Option(False, "--json", help="Print the figures as one JSON object."),
+) -> None:
+    """Build the surface that a robot may drive on, and print what was found, filled and left out.
+
+    Ground, bridges and storeys become triangles. There are none where something stands or nothing was measured.
+    """
+    with readable_errors():
+        from mbf_mesh_nav.building.map_build import build_map
+        from mbf_mesh_nav.building.surface import SurfaceParameters
+
+        if up not in ("x", "y", "z"):
+            raise typer.BadParameter(f"expected x, y or z, got {up!r}", param_hint="--up")
+        parameters = SurfaceParameters(
+            cell=cell, clearance=clearance, step_height=step_height, hole_width=hole_width, least_area=least_area
+        )
+        with waiting("reading") as say:
+            facts, _, cloud = build_map(
+                inputs,
+                out,
+                parameters,
+                up_axis=up,
+                unit=scale,
+                max_points=max_points,
+                drop_invalid=drop_invalid,
+                on_step=say,
+            )
+    if as_json:
+        typer.echo(json.dumps({"map": str(out), **asdict(facts), "notes": cloud.notes}))
+        return
+    for note in cloud.notes:
+        typer.echo(f"note: {note}", err=True)
+    for name, text in lines_of(facts):
+        typer.echo(f"{name:12} {text}")
+
+
+def lines_of(facts: MapFacts) -> list[tuple[str, str]]:
+    """Name and text of each line that describes a map."""
+    x, y, z = facts.size
+    origin = ", ".join(f"{value:.10g}" for value in facts.origin)
+    unit = "taken as metres" if facts.unit == 1.0 else f"a unit of {facts.unit:g} m"
+    thrown = f"{facts.outliers} isolated points, {facts.small_area:.0f} m2 of small surfaces"
+    return [
+        ("points", f"{facts.points}, {x:.1f} x {y:.1f} x {z:.1f} m, {unit}"),
+        ("density", f"{facts.density:.0f} points/m2, a vertex every {facts.cell:g} m"),
+        ("surface", f"{facts.area:.0f} m2, of which {facts.stacked_area:.0f} m2 are above others"),
+        ("mesh", f"{facts.vertices} vertices, {facts.faces} faces"),
+        ("holes", f"{facts.filled_area:.1f} m2 filled"),
+        ("obstacles", f"{facts.obstacle_area:.1f} m2"),
+        ("left out", thrown),
+        ("error", f"{facts.error_rms:.4f} m rms of the points, 95 % below {facts.error_95:.4f} m"),
+        ("origin", f"({origin}) of the files is (0, 0, 0) of the map"),
+    ]

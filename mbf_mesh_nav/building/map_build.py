@@ -1,0 +1,100 @@
+"""From files of points to a map file, in one call.
+
+    facts, surface = build_map([Path("scan.las")], Path("map.ply"))
+
+The map is a binary PLY that every reader of meshes reads. Comments in its header keep what a mesh has no place for: the
+origin in the coordinates of the survey, and the error of the surface (``files.map_header``).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mbf_mesh_nav.arrays import FloatArray, IntArray
+from mbf_mesh_nav.building.clouds.point_cloud import MAX_POINTS, PointCloud, read_clouds
+from mbf_mesh_nav.building.map_facts import MapFacts, map_facts
+from mbf_mesh_nav.building.surface import BuiltSurface, SurfaceParameters, build_surface
+from mbf_mesh_nav.files.map_header import MapHeader, header_comments
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+
+FACE = np.dtype([("count", "u1"), ("corners", "<i4", (3,))])
+
+
+def build_map(
+    files: Sequence[Path],
+    out: Path,
+    parameters: SurfaceParameters | None = None,
+    *,
+    up_axis: str = "z",
+    unit: float = 0.0,
+    max_points: int = MAX_POINTS,
+    drop_invalid: bool = False,
+    on_step: Callable[[str], None] = lambda text: None,
+) -> tuple[MapFacts, BuiltSurface, PointCloud]:
+    """Read point clouds, build the surface under them and write it as a map; the same files give the same bytes.
+
+    Parameters
+    ----------
+    files : sequence of path
+        PLY, PCD, LAS, LAZ, XYZ, TXT, CSV or PTS files, all in one coordinate system.
+    out : path
+        A .ply file. It is replaced when the map is complete; until then, and if anything fails, it stays what it was.
+    up_axis, unit, max_points, drop_invalid
+        As in ``read_clouds``.
+    on_step : callable, optional
+        Called with a text before each step. What it raises ends the building.
+
+    Raises
+    ------
+    MeshError
+        A file cannot be used, there is no surface in them, or ``out`` cannot be written.
+    """
+    if out.suffix.lower() != ".ply":
+        raise MeshError(str(out), [f"a map is written as .ply, not as '{out.suffix}'"])
+    if not out.parent.is_dir():
+        raise MeshError(str(out), ["there is no such folder"])
+    if any(file.exists() and out.exists() and file.samefile(out) for file in files):
+        raise MeshError(str(out), ["is one of the inputs, which are never changed"])
+    cloud = read_clouds(
+        files,
+        up_axis=up_axis,
+        unit=unit,
+        max_points=max_points,
+        drop_invalid=drop_invalid,
+        on_file=lambda file: on_step(f"reading {file.name}"),
+    )
+    surface = build_surface(cloud.points, parameters, on_step)
+    facts = map_facts(cloud, surface)
+    on_step(f"writing {out.name}")
+    write_map(out, surface.vertices, surface.faces, MapHeader(cloud.origin, facts.error_rms, facts.error_95))
+    return facts, surface, cloud
+
+
+def write_map(out: Path, vertices: FloatArray, faces: IntArray, header: MapHeader) -> None:
+    """Write a mesh as a binary PLY of eight-byte coordinates; a file of that name is replaced when it is complete.
+
+    Raises
+    ------
+    MeshError
+        It cannot be written.
+    """
+    lines = ["ply", "format binary_little_endian 1.0", *header_comments(header)]
+    lines += [f"element vertex {len(vertices)}", *(f"property double {axis}" for axis in "xyz")]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
+    records = np.empty(len(faces), dtype=FACE)
+    records["count"], records["corners"] = 3, faces
+    unfinished = out.with_name(f".{out.name}.{os.getpid()}")
+    try:
+        with unfinished.open("wb") as file:
+            file.write("\n".join(lines).encode("ascii"))
+            file.write(np.ascontiguousarray(vertices, dtype="<f8").tobytes())
+            file.write(records.tobytes())
+        unfinished.replace(out)
+    except OSError as error:
+        raise MeshError(str(out), [f"cannot be written: {error}"]) from error
+    finally:
+        unfinished.unlink(missing_ok=True)

@@ -1,0 +1,88 @@
+"""Figures of a built map: what the command prints, the report shows and the map file keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
+from mbf_mesh_nav.building.surface import BuiltSurface
+
+
+@dataclass(frozen=True)
+class MapFacts:
+    """Figures of a built map; lengths in metres, areas in square metres of the plan view.
+
+    Attributes
+    ----------
+    points, outliers, surface_points : int
+        Read; thrown away as isolated; on the surface.
+    unit : float
+        Length of the files' unit.
+    origin : tuple of float
+        Where the map's (0, 0, 0) lies in the coordinates of the files.
+    size : tuple of float
+        Extents of the points along x, y and z.
+    cell : float
+        Distance between the vertices.
+    density : float
+        Points of a square metre of surface, the median of all cells.
+    vertices, faces : int
+    area, stacked_area : float
+        Of the surface; of the places with another surface above.
+    filled_area, obstacle_area, small_area : float
+        Of filled holes; of what something stands on; of separate surfaces that were left out.
+    error_rms, error_95, error_max : float
+        Of the surface against its points, the noise of the points included; 95 % are closer than ``error_95``.
+    """
+
+    points: int
+    outliers: int
+    surface_points: int
+    unit: float
+    origin: tuple[float, float, float]
+    size: tuple[float, float, float]
+    cell: float
+    density: float
+    vertices: int
+    faces: int
+    area: float
+    stacked_area: float
+    filled_area: float
+    obstacle_area: float
+    small_area: float
+    error_rms: float
+    error_95: float
+    error_max: float
+
+
+def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
+    """Compute the figures of a surface built from a cloud."""
+    patches, used = surface.patches, surface.is_used
+    square = patches.grid.cell * patches.grid.cell
+    distances = np.abs(surface.distances[np.isfinite(surface.distances)].astype(np.float64))
+    on_surface = used & ~patches.is_filled
+    counts = (patches.ends - patches.firsts)[on_surface]
+    _, levels = np.unique(patches.cells[used], return_counts=True)
+    x, y, z = np.ptp(cloud.points, axis=0).tolist()
+    return MapFacts(
+        points=len(cloud.points),
+        outliers=int(surface.is_outlier.sum()),
+        surface_points=len(distances),
+        unit=cloud.unit,
+        origin=cloud.origin,
+        size=(x, y, z),
+        cell=patches.grid.cell,
+        density=float(np.median(counts)) / square if len(counts) else 0.0,
+        vertices=len(surface.vertices),
+        faces=len(surface.faces),
+        area=square * int(used.sum()),
+        stacked_area=square * int((levels - 1).sum()),
+        filled_area=square * int((patches.is_filled & used).sum()),
+        obstacle_area=square * int(surface.is_obstacle.sum()),
+        small_area=square * int(surface.is_small.sum()),
+        error_rms=float(np.sqrt((distances * distances).mean())) if len(distances) else 0.0,
+        error_95=float(np.percentile(distances, 95.0)) if len(distances) else 0.0,
+        error_max=float(distances.max(initial=0.0)),
+    )

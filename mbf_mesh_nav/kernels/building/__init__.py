@@ -1,0 +1,1 @@
+"""Compiled steps from a point cloud to a mesh."""

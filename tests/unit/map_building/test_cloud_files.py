@@ -1,0 +1,256 @@
+"""Point clouds of every format come out as the same points; whatever is wrong with a file is one clear error."""
+
+import os
+import re
+
+import numpy as np
+import pytest
+from cloud_files import (
+    lzf_compressed,
+    lzf_naive,
+    write_las,
+    write_pcd,
+    write_ply,
+    write_text,
+)
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mbf_mesh_nav.building.clouds.point_cloud import read_clouds
+from mbf_mesh_nav.kernels.building.lzf import lzf_decompress
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+
+POINTS = np.round(np.random.default_rng(5).uniform((0, 0, 0), (30, 20, 4), (400, 3)), 3)
+UTM = np.array([498_765.0, 5_432_100.0, 0.0])
+WRITERS = {
+    "little.ply": write_ply,
+    "big.ply": lambda file, points: write_ply(file, points, "binary_big_endian"),
+    "text.ply": lambda file, points: write_ply(file, points, "ascii"),
+    "binary.pcd": write_pcd,
+    "text.pcd": lambda file, points: write_pcd(file, points, "ascii"),
+    "compressed.pcd": lambda file, points: write_pcd(file, points, "binary_compressed"),
+    "survey.las": lambda file, points: write_las(file, points, offset=np.floor(points.min(axis=0))),
+    "survey.laz": lambda file, points: write_las(file, points, offset=np.floor(points.min(axis=0))),
+    "blanks.xyz": write_text,
+    "commas.csv": lambda file, points: write_text(file, points, ",", "X,Y,Z\n"),
+    "semicolons.txt": lambda file, points: write_text(file, points, ";", "# a survey\n"),
+    "counted.pts": lambda file, points: write_text(file, points, " ", f"{len(points)}\n"),
+}
+
+
+def refusal(file, **options):
+    with pytest.raises(MeshError) as caught:
+        read_clouds([file], **options)
+    return str(caught.value)
+
+
+def cut(file, keep):
+    os.truncate(file, int(keep * file.stat().st_size))
+    return file
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_every_format_gives_the_points_that_were_written(tmp_path, name):
+    cloud = read_clouds([WRITERS[name](tmp_path / name, POINTS)])
+    np.testing.assert_allclose(cloud.points, POINTS, rtol=0, atol=1e-9)
+    assert cloud.origin == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_coordinates_of_a_national_grid_lose_no_millimetre(tmp_path, name):
+    cloud = read_clouds([WRITERS[name](tmp_path / name, POINTS + UTM)])
+    assert np.abs(cloud.points).max() < 1000.0
+    np.testing.assert_allclose(cloud.points + cloud.origin, POINTS + UTM, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(cloud.points.astype(np.float32) + np.float64(cloud.origin), POINTS + UTM, atol=5e-5)
+
+
+def test_several_tiles_have_one_origin_whatever_their_order(tmp_path):
+    west = write_las(tmp_path / "west.las", POINTS + UTM, offset=UTM)
+    east = write_ply(tmp_path / "east.ply", POINTS + UTM + [30.0, 0.0, 0.0])
+    one, other = read_clouds([west, east]), read_clouds([east, west])
+    assert one.origin == other.origin == (498_700.0, 5_432_100.0, 0.0)
+    assert np.ptp(one.points[:, 0]) > 55.0
+
+
+def test_columns_are_found_by_their_names(tmp_path):
+    file = tmp_path / "survey.csv"
+    rows = "".join(f"{number};{z};{x};{y}\n" for number, (x, y, z) in enumerate(POINTS.tolist()))
+    file.write_text("id;height;easting;northing\n" + rows)
+    np.testing.assert_array_equal(read_clouds([file]).points, POINTS)
+
+
+def test_the_up_axis_and_the_unit_are_applied(tmp_path):
+    x, y, z = (1000.0 * POINTS).T
+    file = write_text(tmp_path / "millimetres.xyz", np.column_stack([x, z, -y]))
+    np.testing.assert_allclose(read_clouds([file], up_axis="y", unit=0.001).points, POINTS, atol=1e-9)
+
+
+@pytest.mark.parametrize(("unit", "length"), [('"metre",1', 1.0), ('"US survey foot",0.3048006096', 0.3048006096)])
+def test_the_unit_of_a_las_file_is_that_of_its_coordinate_system(tmp_path, unit, length):
+    text = f'PROJCS["a grid",GEOGCS["a globe",UNIT["degree",0.0174532925]],UNIT[{unit}]]'
+    cloud = read_clouds([write_las(tmp_path / "survey.las", POINTS, well_known_text=text)])
+    np.testing.assert_allclose(cloud.points, length * POINTS, atol=1e-6)
+    assert cloud.unit == length
+
+
+def test_noise_that_the_survey_marks_is_left_out_and_reported(tmp_path):
+    classes = np.where(np.arange(len(POINTS)) % 10 == 0, 7, 2)
+    cloud = read_clouds([write_las(tmp_path / "survey.laz", POINTS, classes=classes)])
+    assert len(cloud.points) == 360
+    assert cloud.notes == ("survey.laz: 40 points are classified as noise or withheld",)
+
+
+def test_pixels_of_an_organised_cloud_without_return_are_left_out(tmp_path):
+    points = POINTS.copy()
+    points[::4] = np.nan
+    cloud = read_clouds([write_pcd(tmp_path / "camera.pcd", points, height=20)])
+    np.testing.assert_array_equal(cloud.points, points[np.isfinite(points[:, 0])])
+    assert cloud.notes == ("camera.pcd: 100 of 400 pixels of the organised cloud have no return",)
+
+
+@pytest.mark.parametrize("name", [name for name in WRITERS if not name.endswith((".txt", ".csv", ".xyz", ".pts"))])
+@pytest.mark.parametrize("keep", [0.01, 0.5, 0.99])
+def test_a_truncated_file_is_refused(tmp_path, name, keep):
+    file = cut(WRITERS[name](tmp_path / name, POINTS), keep)
+    assert re.match(re.escape(f"{file}: "), refusal(file))
+
+
+def test_a_truncated_las_file_names_what_is_missing(tmp_path):
+    file = cut(write_las(tmp_path / "survey.las", POINTS), 0.5)
+    assert re.search(r"the file is cut off: expected 400 points, found 1\d\d", refusal(file))
+
+
+@pytest.mark.parametrize("name", [name for name in WRITERS if not name.startswith("survey")])  # LAS: whole numbers
+def test_points_that_are_not_finite_are_refused_unless_they_shall_be_dropped(tmp_path, name):
+    points = POINTS.copy()
+    points[[7, 9]] = [[np.nan], [np.inf]]
+    file = WRITERS[name](tmp_path / name, points)
+    assert "2 of 400 points are not finite, the first is point 7. Leave them out with --drop-invalid" in refusal(file)
+    cloud = read_clouds([file], drop_invalid=True)
+    np.testing.assert_array_equal(cloud.points, np.delete(points, [7, 9], axis=0))
+    assert cloud.notes == (f"{name}: 2 points that are not finite are left out",)
+
+
+@pytest.mark.parametrize("form", ["binary_little_endian", "ascii"])
+def test_a_header_that_promises_a_thousand_million_points_is_refused_unread(tmp_path, form):
+    file = write_ply(tmp_path / "huge.ply", POINTS, form, promised=10**9)
+    assert "1000000000 points, the limit is 50000000 (max_points)" in refusal(file)
+    assert "the file is cut off: expected 1000000000 points, found 4" in refusal(file, max_points=2 * 10**9)
+
+
+@pytest.mark.parametrize("form", ["ascii", "binary", "binary_compressed"])
+def test_a_pcd_header_that_promises_too_much_is_refused_unread(tmp_path, form):
+    file = write_pcd(tmp_path / "huge.pcd", POINTS, form, promised=10**9)
+    assert "1000000000 points, the limit is 50000000 (max_points)" in refusal(file)
+
+
+def test_a_las_header_that_promises_too_much_is_refused_unread(tmp_path):
+    file = write_las(tmp_path / "huge.las", POINTS)
+    content = bytearray(file.read_bytes())
+    content[247:255] = (10**9).to_bytes(8, "little")
+    file.write_bytes(content)
+    assert "1000000000 points, the limit is" in refusal(file)
+    assert "the file is cut off: expected 1000000000 points, found 400" in refusal(file, max_points=2 * 10**9)
+
+
+def test_the_limit_is_on_all_files_together(tmp_path):
+    files = [write_text(tmp_path / f"{number}.xyz", POINTS) for number in range(3)]
+    with pytest.raises(MeshError, match=r"2.xyz: 400 points, the limit is 200"):
+        read_clouds(files, max_points=1000)
+
+
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        ("", "there is no point in it"),
+        ("1 2 3\n1 2\n", "expected a table of numbers"),
+        ("1 2 3\n1 2 three\n", "expected a table of numbers: could not convert string 'three'"),
+        ("a b c\n1 2 3\n", "line 1: expected numbers or the names x, y, z, got 'a b c'"),
+    ],
+)
+def test_a_table_that_is_none_is_refused(tmp_path, content, text):
+    file = tmp_path / "table.xyz"
+    file.write_text(content)
+    assert text in refusal(file)
+
+
+def test_coordinates_that_four_bytes_cannot_hold_are_refused(tmp_path):
+    file = write_ply(tmp_path / "lost.ply", POINTS + UTM, kind="float")
+    assert "coordinates of 5432120 in four-byte floats are only 0.5 m exact" in refusal(file)
+
+
+@pytest.mark.parametrize(
+    ("points", "text"),
+    [
+        (POINTS * 1e4, "its unit is hardly the metre. Give the unit, e.g. --scale 0.001 for millimetres"),
+        (POINTS * 0.001, "too small for a map. If its unit is not the metre, give it with --scale"),
+        (POINTS * [1e-5, 1e-5, 10.0] + [8.05, 52.27, 60.0], "x and y look like degrees"),
+    ],
+)
+def test_extents_that_no_map_has_are_refused(tmp_path, points, text):
+    assert text in refusal(write_text(tmp_path / "odd.xyz", points))
+
+
+def test_files_of_different_units_are_refused(tmp_path):
+    metres, millimetres = write_text(tmp_path / "m.xyz", POINTS), write_text(tmp_path / "mm.xyz", 1000.0 * POINTS)
+    with pytest.raises(MeshError, match=r"hardly the same unit: mm.xyz is 29\d*.?\d* m long, m.xyz 29"):
+        read_clouds([metres, millimetres])
+    feet = 'PROJCS["a grid",UNIT["foot",0.3048]]'
+    with pytest.raises(MeshError, match=r"different units \(m.xyz none, f.las 0.3048 m\); give one unit for all"):
+        read_clouds([metres, write_las(tmp_path / "f.las", POINTS, well_known_text=feet)])
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ('GEOGCS["a globe",UNIT["degree",0.0174532925]]', "its coordinates are degrees"),
+        (
+            'COMPD_CS["both",PROJCS["a",UNIT["metre",1]],VERT_CS["b",UNIT["foot",0.3048]]]',
+            "mixes units (1 m, 0.3048 m)",
+        ),
+    ],
+)
+def test_a_las_file_in_degrees_or_mixed_units_is_refused(tmp_path, text, reason):
+    assert reason in refusal(write_las(tmp_path / "survey.las", POINTS, well_known_text=text))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "text"),
+    [
+        ("a.ply", b"solid\n", "is no PLY"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement face 0\nend_header\n", "there is no element 'vertex'"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex -4\nend_header\n", "its header promises -4 points"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex many\n", "a line that is no PLY: 'element vertex many'"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n", "have no y, z"),
+        ("a.pcd", b"VERSION 0.7\nFIELDS x y\nSIZE 4\nTYPE F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2\n", "no PCD header"),
+        ("a.pcd", b"nothing", "is no PCD"),
+        ("a.las", b"LASF" + bytes(100), "cannot be read as LAS"),
+        ("a.e57", b"", "unknown ending '.e57', known are: .csv, .las, .laz, .pcd"),
+    ],
+)
+def test_a_file_that_is_not_what_its_name_says_is_refused(tmp_path, name, content, text):
+    file = tmp_path / name
+    file.write_bytes(content)
+    assert text in refusal(file)
+
+
+def test_a_missing_file_and_a_pipe_are_refused(tmp_path):
+    assert "there is no such file" in refusal(tmp_path / "none.las")
+    os.mkfifo(tmp_path / "pipe.xyz")
+    assert "expected a file, got a pipe" in refusal(tmp_path / "pipe.xyz")
+
+
+@given(st.binary(max_size=600).map(lambda block: block + block[:300] + bytes(40)))
+def test_lzf_blocks_are_decompressed_as_by_the_definition(content):
+    packed = lzf_compressed(content)
+    out = np.zeros(len(content), dtype=np.uint8)
+    assert lzf_decompress(np.frombuffer(packed, np.uint8).copy(), out) == len(content)
+    assert out.tobytes() == content == lzf_naive(packed)
+
+
+@given(st.binary(max_size=80), st.integers(0, 200))
+def test_a_damaged_lzf_block_writes_nothing_outside(block, room):
+    out = np.zeros(room + 8, dtype=np.uint8)
+    written = lzf_decompress(np.frombuffer(block, np.uint8).copy(), out[:room])
+    assert -1 <= written <= room
+    assert not out[room:].any()
