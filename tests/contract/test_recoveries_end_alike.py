@@ -15,8 +15,8 @@ from mbf_abstract.testing.contract.rig import rig
 from mbf_abstract.time.cancel import CancelToken
 
 START = Pose.planar(3.0, 3.0)
-MOVING = ["back_up", "drive_on_heading", "move_away", "rotate"]
-PARAMETERS = {"move_away": {"clearance": 2.0}}
+MOVING = ["back_up", "drive_on_heading", "give_way", "move_away", "rotate"]
+PARAMETERS = {"move_away": {"clearance": 2.0}, "give_way": {"wait": 0.2, "random_extra": 0.0}}
 
 
 def nothing(x, y):

@@ -34,18 +34,19 @@ class WaitRecovery(AbstractRecovery):
 
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
         """Wait; ends early when cancelled, or where something else drives the robot."""
-        motion, token, duration = request.motion, request.cancel_token, self._duration()
-        if token.cancelled:
-            return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
-        # A goal that is paused is refused too: its sleep lasts until it is resumed, so the second refusal counts.
-        stands = motion.send(Twist()) or (motion.sleep(PERIOD) and motion.send(Twist()))
-        if not stands and not token.cancelled:
-            return RecoveryResult(RecoveryOutcome.STOPPED, GATE_REFUSED)
-        if not motion.sleep(duration):
-            return ended_by_others(token)
-        return RecoveryResult(RecoveryOutcome.SUCCESS, f"waited {duration:.3g} s")
-
-    def _duration(self) -> float:
-        """Time of this run [s], between ``duration`` and ``random_extra`` more."""
         extra = self.parameters.random_extra
-        return self.parameters.duration + (extra * float(self.rng.random()) if extra > 0.0 else 0.0)
+        return stand(request, self.parameters.duration + (extra * float(self.rng.random()) if extra > 0.0 else 0.0))
+
+
+def stand(request: RecoveryRequest, duration: float) -> RecoveryResult:
+    """Stop the robot and let it stand for a time [s]; part of other behaviours, too."""
+    motion, token = request.motion, request.cancel_token
+    if token.cancelled:
+        return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
+    # A goal that is paused is refused too: its sleep lasts until it is resumed, so the second refusal counts.
+    stands = motion.send(Twist()) or (motion.sleep(PERIOD) and motion.send(Twist()))
+    if not stands and not token.cancelled:
+        return RecoveryResult(RecoveryOutcome.STOPPED, GATE_REFUSED)
+    if not motion.sleep(duration):
+        return ended_by_others(token)
+    return RecoveryResult(RecoveryOutcome.SUCCESS, f"waited {duration:.3g} s")

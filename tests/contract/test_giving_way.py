@@ -1,0 +1,140 @@
+"""Giving way on each map: into bays, around corners, aside in halls, and nowhere if there is no place for it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.maps.recoveries.give_way import GiveWayParameters, GiveWayRecovery
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.plugins import RecoveryRequest
+from mbf_abstract.testing.contract.recovery import RigMotion
+from mbf_abstract.testing.contract.rig import rig
+from mbf_abstract.time.cancel import CancelToken
+
+RADIUS = 0.2  # m, of the robot
+START = Pose.planar(4.5, 3.0)
+
+
+def corridor(x, y):
+    """Wall but for a corridor of 0.8 m along y = 3."""
+    return ~((np.abs(y - 3.0) < 0.4) & (x > 0.3) & (x < 7.7))
+
+
+def bay(x0, x1, above):
+    """The corridor with a bay between x0 and x1, above or below it."""
+
+    def lethal(x, y):
+        beside = (y >= 3.0) & (y < 4.6) if above else (y <= 3.0) & (y > 1.4)
+        return corridor(x, y) & ~((x > x0) & (x < x1) & beside)
+
+    return lethal
+
+
+def corner(x, y):
+    """The corridor ends at x = 3 and goes on along x = 3, upwards."""
+    return (corridor(x, y) | (x < 2.6)) & ~((np.abs(x - 3.0) < 0.4) & (y > 2.6) & (y < 5.8))
+
+
+def hall(x, y):
+    return np.zeros_like(x, dtype=bool)
+
+
+class Watched(RigMotion):
+    """Notes how near the robot's centre comes to a wall [m]."""
+
+    least_gap = math.inf
+
+    def send(self, command):
+        pose = self.pose()
+        self.least_gap = min(self.least_gap, float(np.hypot(*(self.walls - (pose.x, pose.y)).T).min(initial=math.inf)))
+        return super().send(command)
+
+
+@pytest.fixture
+def give_way(world):
+    """``give_way(lethal, start, track, **parameters)`` -> result, motion with its end and seconds."""
+
+    def run(lethal, start=START, track=(), **parameters):
+        navigation_map = world.map_of(lethal)
+
+        def make_context(base):
+            return world.context(**vars(base), navigation_map=navigation_map)
+
+        with rig(GiveWayRecovery, make_context, GiveWayParameters(**parameters), start) as made:
+            made.plugin.robot._track = tuple((x, y, 0.0) for x, y in track)
+            token = CancelToken()
+            motion = Watched(made, token, lambda pose: pose)
+            x, y = np.meshgrid(np.arange(81) * 0.1, np.arange(61) * 0.1)  # the vertices of the mesh
+            motion.walls = np.column_stack([x[lethal(x, y)], y[lethal(x, y)]])
+            result = made.plugin.run_behavior(RecoveryRequest(motion, token))
+            motion.end, motion.seconds = made.robot.pose, made.clock.now()
+            return result, motion
+
+    return run
+
+
+def backward(motion):
+    return any(command.vx < 0.0 for command in motion.commands)
+
+
+@pytest.mark.parametrize("above", [True, False])
+@pytest.mark.parametrize(("x0", "x1"), [(2.4, 3.4), (5.4, 6.4)], ids=["behind", "ahead"])
+def test_in_a_corridor_the_nearest_bay_is_taken(give_way, x0, x1, above):
+    result, motion = give_way(bay(x0, x1, above))
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert x0 < motion.end.x < x1
+    assert (motion.end.y - 3.0 if above else 3.0 - motion.end.y) > 0.7
+    assert motion.least_gap > RADIUS - 0.05
+    assert backward(motion) == (x0 < 4.0)
+    assert motion.commands[-1] == Twist()
+
+
+def test_a_long_corridor_without_a_bay_is_left_as_it_is(give_way):
+    result, motion = give_way(corridor, reach=1.5)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    assert "no place 0.8 m beside its way within a manoeuvre of 1.5 m" in result.message
+    assert all(command.is_stopped() for command in motion.commands)
+
+
+def test_the_way_it_came_is_way_too_and_not_a_place_to_stand(give_way):
+    """Around the corner, on its own track, it would stand where the other one goes next."""
+    track = [(3.0, 5.0 - 0.1 * k) for k in range(20)] + [(3.0 + 0.1 * k, 3.0) for k in range(10)]
+    start = Pose.planar(4.0, 3.0)
+    assert give_way(corner, start, reach=3.0)[0].outcome == RecoveryOutcome.SUCCESS
+    assert give_way(corner, start, track, reach=3.0)[0].outcome == RecoveryOutcome.IMPASSABLE
+
+
+def test_in_a_hall_it_steps_aside(give_way):
+    result, motion = give_way(hall, distance=0.6)
+    assert result.outcome == RecoveryOutcome.SUCCESS
+    assert 0.5 < abs(motion.end.y - 3.0) < 1.1 and abs(motion.end.x - 4.5) < 1.5
+
+
+def test_it_waits_between_its_bounds_and_the_same_for_the_same_seed(give_way):
+    times = [give_way(hall, wait=1.0, random_extra=2.0)[1].seconds for _ in range(2)]
+    at_once = give_way(hall, wait=0.0, random_extra=0.0)[1].seconds
+    assert times[0] == times[1]
+    assert 1.0 < times[0] - at_once < 3.1
+
+
+def test_a_robot_that_touches_what_stands_before_it_is_let_out(give_way):
+    """Its front is 0.05 m inside a wall that was not there when it came."""
+    closed = bay(2.4, 3.4, True)
+    result, motion = give_way(lambda x, y: closed(x, y) | (x > 4.65))
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert motion.end.y > 3.7
+
+
+def test_it_follows_the_surface_where_the_way_is_not_along_x(give_way):
+    def lethal(x, y):
+        along, across = (
+            (x - 4.0) * math.cos(0.6) + (y - 3.0) * math.sin(0.6),
+            (y - 3.0) * math.cos(0.6) - (x - 4.0) * math.sin(0.6),
+        )
+        return (np.abs(across) > 0.4) & ~((np.abs(along + 1.2) < 0.5) & (across > 0.0) & (across < 1.7))
+
+    result, motion = give_way(lethal, Pose.planar(4.0, 3.0, 0.6))
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert motion.least_gap > RADIUS - 0.05
