@@ -1,7 +1,8 @@
 """Things that move by themselves: people and other robots on routes, doors that close. No map shows them.
 
 Their positions are functions of the world's time and of their parameters; only those with ``gives_way`` depend on the
-robot too. Seeds go into the routes. They are as heavy as walls: an actor that does not give way pushes a robot aside.
+robot too, and people who yield (``terrain.physics.people``). Seeds go into the routes. They are as heavy as walls: an
+actor that does not give way pushes a robot aside.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
@@ -26,7 +28,7 @@ AnyWorld = BulletWorld | KinematicWorld
 
 PERSON_RADIUS: float = 0.25  # m
 PERSON_HEIGHT: float = 1.7  # m
-COURTESY = 0.3  # m; an actor that gives way stops this far from the robot
+COURTESY = 0.3  # m; actors that yield keep so far from the robot
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,16 @@ class Body:
 PERSON = Body()
 
 
+def closed_route(route: ArrayLike) -> FloatArray:
+    """Corners (n + 1, 3) [m] of a route (n, 2) or (n, 3) that ends where it begins; the ground is at 0 without z."""
+    corners = np.asarray(route, dtype=float)
+    if corners.shape[1] == 2:
+        corners = np.column_stack([corners, np.zeros(len(corners))])
+    return np.vstack([corners, corners[:1]])
+
+
 class RouteWalker:
-    """A person or thing that follows a closed route of straight lines at constant speed.
+    """A thing that follows a closed route of straight lines at constant speed, or a person who does not look.
 
     Parameters
     ----------
@@ -65,6 +75,11 @@ class RouteWalker:
     body : Body
     gives_way : bool
         Wait as long as the robot it has met is just ahead, instead of pushing it.
+
+    Attributes
+    ----------
+    reach : float
+        Radius of a circle around it [m].
     """
 
     def __init__(
@@ -76,18 +91,15 @@ class RouteWalker:
         body: Body = PERSON,
         gives_way: bool = False,
     ) -> None:
-        corners = np.asarray(route, dtype=float)
-        if corners.shape[1] == 2:
-            corners = np.column_stack([corners, np.zeros(len(corners))])
-        self._corners = np.vstack([corners, corners[:1]])
+        self._corners = closed_route(route)
         self._travelled = np.concatenate([[0.0], np.cumsum(norm(np.diff(self._corners, axis=0)))])
         self._world = world
         self._speed = speed
         self._start = start
         size = body.size
         self._lift = 0.5 * size[-1]
-        self._reach = size[0] if len(size) == 2 else 0.5 * math.hypot(size[0], size[1])
-        self._waited = 0.0
+        self.reach = size[0] if len(size) == 2 else 0.5 * math.hypot(size[0], size[1])
+        self._waited, self._waits = 0.0, False
         self._gives_way = gives_way
         self._robot: SimulatedRobot | None = None
         self.thing, self.size = body.thing, size
@@ -110,12 +122,18 @@ class RouteWalker:
         ahead = self._corners[leg] - self._corners[leg - 1]
         return Pose.planar(x, y, math.atan2(ahead[1], ahead[0]), z + self._lift)
 
+    def velocity(self) -> tuple[float, float]:
+        """Velocity in the map [m/s]."""
+        yaw, speed = self.pose().yaw, 0.0 if self._waits else self._speed
+        return speed * math.cos(yaw), speed * math.sin(yaw)
+
     def meet(self, robot: SimulatedRobot) -> None:
         """Give way to this robot from now on."""
         self._robot = robot if self._gives_way else None
 
     def _move(self) -> None:
-        if self._robot is not None and self._is_ahead(self._robot):
+        self._waits = self._robot is not None and self._is_ahead(self._robot)
+        if self._waits:
             self._waited += self._world.time_step
         self._world.place_body(self.body, self.pose())
 
@@ -123,7 +141,7 @@ class RouteWalker:
         """Whether the robot is near, and on the side this one walks to."""
         here, there = self.pose(), robot.pose()
         dx, dy = there.x - here.x, there.y - here.y
-        near = math.hypot(dx, dy) < self._reach + robot.spec.circumscribed_radius + COURTESY
+        near = math.hypot(dx, dy) < self.reach + robot.spec.circumscribed_radius + COURTESY
         return near and dx * math.cos(here.yaw) + dy * math.sin(here.yaw) > 0.0
 
 

@@ -16,6 +16,7 @@ from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.physics.actors import (
+    PERSON,
     PERSON_HEIGHT,
     PERSON_RADIUS,
     Body,
@@ -23,6 +24,7 @@ from terrain.physics.actors import (
     SlidingDoor,
     other_robot,
 )
+from terrain.physics.people import Person, Walls
 from terrain.physics.robot_models import ROBOTS
 from terrain.scenarios.places import PlanarPose
 from terrain.scenarios.world import ScenarioWorld
@@ -41,7 +43,9 @@ class Walker(ParameterModel):
     start: float = parameter(0.0, "How far along the route it starts.", unit="m", ge=0.0)
     radius: float = parameter(PERSON_RADIUS, "Of the upright cylinder it is.", unit="m", gt=0.0)
     height: float = parameter(PERSON_HEIGHT, "Of the upright cylinder it is.", unit="m", gt=0.0)
-    gives_way: bool = parameter(False, "Wait while the robot is just ahead, instead of pushing it.")
+    blind: bool = parameter(
+        False, "Follow the route at constant speed and push what is in the way, instead of yielding as people do."
+    )
 
 
 class OtherRobot(ParameterModel):
@@ -52,7 +56,7 @@ class OtherRobot(ParameterModel):
     route: tuple[tuple[float, float], ...] = parameter(..., "Corners; the last leg leads back to the first.", unit="m")
     speed: float = parameter(0.5, "Speed.", unit="m/s", ge=0.0, le=5.0)
     start: float = parameter(0.0, "How far along the route it starts.", unit="m", ge=0.0)
-    gives_way: bool = parameter(False, "Wait while the robot is just ahead, instead of pushing it.")
+    blind: bool = parameter(False, "Push the robot that is in its way, instead of waiting while it is just ahead.")
 
 
 class Crowd(ParameterModel):
@@ -63,7 +67,9 @@ class Crowd(ParameterModel):
     speed: float = parameter(0.6, "Walking speed.", unit="m/s", ge=0.0, le=5.0)
     x_range: tuple[float, float] | None = parameter(None, "Part of the building where they walk.", unit="m")
     y_range: tuple[float, float] | None = parameter(None, "Part of the building where they walk.", unit="m")
-    gives_way: bool = parameter(False, "Wait while the robot is just ahead, instead of pushing it.")
+    blind: bool = parameter(
+        False, "Follow the route at constant speed and push what is in the way, instead of yielding as people do."
+    )
 
 
 class Door(ParameterModel):
@@ -84,37 +90,48 @@ def add_actors(
     world: ScenarioWorld, actors: Sequence[Walker | OtherRobot | Crowd | Door], rng: np.random.Generator
 ) -> None:
     """Put the actors of a scenario into its world and its list; routes of crowds come from ``rng``."""
+    walls = None if world.grid is None else Walls(world.grid)
     for actor in actors:
         if isinstance(actor, Crowd):
-            world.actors.extend(_crowd(world, actor, rng))
+            world.actors.extend(_crowd(world, actor, walls, rng))
         elif isinstance(actor, Door):
             opened, closed = (_leaf_pose(world, place, actor.size[2]) for place in (actor.opened, actor.closed))
             world.actors.append(SlidingDoor(world.physics, opened, closed, actor.size, actor.closes_at, actor.duration))
         else:
             route = np.array([(x, y, world.height_at(x, y)) for x, y in actor.route])
-            world.actors.append(_on_route(world, actor, route))
+            world.actors.append(_on_route(world, actor, route, walls))
 
 
-def _on_route(world: ScenarioWorld, actor: Walker | OtherRobot, route: FloatArray) -> RouteWalker:
+def _on_route(
+    world: ScenarioWorld, actor: Walker | OtherRobot, route: FloatArray, walls: Walls | None
+) -> RouteWalker | Person:
     if isinstance(actor, OtherRobot):
-        return other_robot(world.physics, ROBOTS[actor.model], route, actor.speed, actor.start, actor.gives_way)
+        return other_robot(world.physics, ROBOTS[actor.model], route, actor.speed, actor.start, not actor.blind)
     body = Body((actor.radius, actor.height))
-    return RouteWalker(world.physics, route, actor.speed, actor.start, body, actor.gives_way)
+    return _person(world, route, actor, actor.start, walls, body)
 
 
-def _crowd(world: ScenarioWorld, crowd: Crowd, rng: np.random.Generator) -> list[RouteWalker]:
+def _person(
+    world: ScenarioWorld,
+    route: FloatArray,
+    actor: Walker | Crowd,
+    start: float,
+    walls: Walls | None,
+    body: Body = PERSON,
+) -> RouteWalker | Person:
+    if actor.blind:
+        return RouteWalker(world.physics, route, actor.speed, start, body)
+    return Person(world.physics, route, actor.speed, start, body, walls)
+
+
+def _crowd(
+    world: ScenarioWorld, crowd: Crowd, walls: Walls | None, rng: np.random.Generator
+) -> list[RouteWalker | Person]:
     if world.grid is None:
         raise ValueError("a crowd needs a world with a 2D map to draw its routes on")
     grid = _part_of(world.grid, crowd)
     return [
-        RouteWalker(
-            world.physics,
-            random_route(grid, rng),
-            crowd.speed,
-            float(rng.uniform(0.0, 20.0)),
-            gives_way=crowd.gives_way,
-        )
-        for _ in range(crowd.count)
+        _person(world, random_route(grid, rng), crowd, float(rng.uniform(0.0, 20.0)), walls) for _ in range(crowd.count)
     ]
 
 

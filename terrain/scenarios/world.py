@@ -16,6 +16,7 @@ from mbf_abstract.config.findings import ConfigError, Finding
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.physics.actors import AnyWorld, RouteWalker
 from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.people import Person
 from terrain.physics.protocols import Actor, SimulatedRobot
 from terrain.physics.world import TIME_STEP, BulletWorld
 from terrain.scenarios.places import Place
@@ -60,9 +61,12 @@ class ScenarioWorld:
     actors: list[Actor] = field(default_factory=list)
 
     def introduce(self, robot: SimulatedRobot) -> None:
-        """Make the robot known to the walkers, which may give way to it."""
-        for actor in self.actors:
-            if isinstance(actor, RouteWalker):
+        """Make robot, people and other robots known to each other, as far as they yield."""
+        walking = [actor for actor in self.actors if isinstance(actor, RouteWalker | Person)]
+        for actor in walking:
+            if isinstance(actor, Person):
+                actor.meet(robot, walking)
+            else:
                 actor.meet(robot)
 
     def open_surface(self) -> Surface:

@@ -1,6 +1,7 @@
 """A run that arrives and drives into people is no success, wherever one looks."""
 
 import json
+import re
 
 import pytest
 from typer.testing import CliRunner
@@ -23,7 +24,7 @@ def mbf(*arguments):
 def rude(tmp_path):
     """The crowded corridor, with people who do not look where they walk; with seed 1 the robot arrives nevertheless."""
     text = (SHIPPED / "crowded_corridor.yaml").read_text()
-    text = text.replace(", gives_way: true", "").replace("config/", f"{SHIPPED}/config/")
+    text = re.sub(r"(type: (walker|crowd))", r"\1, blind: true", text).replace("config/", f"{SHIPPED}/config/")
     (tmp_path / "rude.yaml").write_text(text)
     return tmp_path / "rude.yaml"
 
