@@ -9,9 +9,11 @@ import yaml
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.sensing import RangeScan
+from terrain.physics.actors import RouteWalker, SlidingDoor
 from terrain.physics.incidents import IncidentKind
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.people import Person
 from terrain.physics.robot_models import TURTLEBOT
 from terrain.scenarios.actors import Crowd, Door, OtherRobot, Walker, add_actors
 from terrain.scenarios.faults import FaultSchedule, LocalizationJump, SensorFault, seen_from
@@ -101,7 +103,7 @@ def test_a_scan_turns_and_moves_with_the_estimated_pose():
 
 def test_actors_move_in_the_world_and_the_seed_draws_the_crowd(tmp_path):
     actors = (
-        Walker(type="walker", route=((4.0, 9.7), (6.0, 9.7)), speed=1.0),
+        Walker(type="walker", route=((4.0, 9.7), (6.0, 9.7)), speed=1.0, blind=True),
         Door(type="door", opened={"x": 9.0, "y": 11.0}, closed={"x": 7.5, "y": 11.0}, closes_at=0.0),
         OtherRobot(type="robot", model="turtlebot", route=((3.0, 9.7), (3.0, 10.7)), speed=0.5),
         Crowd(type="crowd", count=2, x_range=(1.0, 10.0), y_range=(8.6, 10.9)),
@@ -123,6 +125,7 @@ def test_actors_move_in_the_world_and_the_seed_draws_the_crowd(tmp_path):
     assert places[0] == places[1]
     assert places[0][3:] != places[2][3:]
     assert [actor.thing.value for actor in world.actors] == ["person", "door", "robot", "person", "person"]
+    assert [type(actor) for actor in world.actors] == [RouteWalker, SlidingDoor, RouteWalker, Person, Person]
 
 
 def test_each_broken_limit_is_named():
