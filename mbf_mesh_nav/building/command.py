@@ -5,15 +5,11 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.commands.waiting import waiting
-
-if TYPE_CHECKING:
-    from mbf_mesh_nav.building.map_facts import MapFacts
 
 
 def register(app: typer.Typer) -> None:
@@ -42,6 +38,7 @@ def build(
     least_area: float = typer.Option(10.0, "--least-area", help="Smaller separate surfaces are left out [m2]."),
     max_points: int = typer.Option(50_000_000, "--max-points", min=1, help="More points are refused unread."),
     drop_invalid: bool = typer.Option(False, "--drop-invalid", help="Leave out points that are not finite."),
+    report: Path | None = typer.Option(None, "--report", help="Also write this HTML file: pictures and a test plan."),
     as_json: bool = typer.Option(False, "--json", help="Print the figures as one JSON object."),
 ) -> None:
     """Build the surface that a robot may drive on, and print what was found, filled and left out.
@@ -50,6 +47,7 @@ def build(
     """
     with readable_errors():
         from mbf_mesh_nav.building.map_build import build_map
+        from mbf_mesh_nav.building.map_facts import lines_of
         from mbf_mesh_nav.building.surface import SurfaceParameters
 
         if up not in ("x", "y", "z"):
@@ -58,7 +56,7 @@ def build(
             cell=cell, clearance=clearance, step_height=step_height, hole_width=hole_width, least_area=least_area
         )
         with waiting("reading") as say:
-            facts, _, cloud = build_map(
+            facts, surface, cloud = build_map(
                 inputs,
                 out,
                 parameters,
@@ -68,29 +66,18 @@ def build(
                 drop_invalid=drop_invalid,
                 on_step=say,
             )
+            if report is not None:
+                from mbf_mesh_nav.building.report import write_report
+
+                say("planning between the farthest places")
+                plan = write_report(report, inputs, out, facts, surface, cloud)
+                notes = (*cloud.notes, f"test plan by {plan.text}")
+            else:
+                notes = cloud.notes
     if as_json:
-        typer.echo(json.dumps({"map": str(out), **asdict(facts), "notes": cloud.notes}))
+        typer.echo(json.dumps({"map": str(out), **asdict(facts), "notes": notes}))
         return
-    for note in cloud.notes:
+    for note in notes:
         typer.echo(f"note: {note}", err=True)
     for name, text in lines_of(facts):
         typer.echo(f"{name:12} {text}")
-
-
-def lines_of(facts: MapFacts) -> list[tuple[str, str]]:
-    """Name and text of each line that describes a map."""
-    x, y, z = facts.size
-    origin = ", ".join(f"{value:.10g}" for value in facts.origin)
-    unit = "taken as metres" if facts.unit == 1.0 else f"a unit of {facts.unit:g} m"
-    thrown = f"{facts.outliers} isolated points, {facts.small_area:.0f} m2 of small surfaces"
-    return [
-        ("points", f"{facts.points}, {x:.1f} x {y:.1f} x {z:.1f} m, {unit}"),
-        ("density", f"{facts.density:.0f} points/m2, a vertex every {facts.cell:g} m"),
-        ("surface", f"{facts.area:.0f} m2, of which {facts.stacked_area:.0f} m2 are above others"),
-        ("mesh", f"{facts.vertices} vertices, {facts.faces} faces"),
-        ("holes", f"{facts.filled_area:.1f} m2 filled"),
-        ("obstacles", f"{facts.obstacle_area:.1f} m2"),
-        ("left out", thrown),
-        ("error", f"{facts.error_rms:.4f} m rms of the points, 95 % below {facts.error_95:.4f} m"),
-        ("origin", f"({origin}) of the files is (0, 0, 0) of the map"),
-    ]

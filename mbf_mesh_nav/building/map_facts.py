@@ -86,3 +86,22 @@ def map_facts(cloud: PointCloud, surface: BuiltSurface) -> MapFacts:
         error_95=float(np.percentile(distances, 95.0)) if len(distances) else 0.0,
         error_max=float(distances.max(initial=0.0)),
     )
+
+
+def lines_of(facts: MapFacts) -> list[tuple[str, str]]:
+    """Name and text of each line that describes a map."""
+    x, y, z = facts.size
+    origin = ", ".join(f"{value:.10g}" for value in facts.origin)
+    unit = "taken as metres" if facts.unit == 1.0 else f"a unit of {facts.unit:g} m"
+    thrown = f"{facts.outliers} isolated points, {facts.small_area:.0f} m2 of small surfaces"
+    return [
+        ("points", f"{facts.points}, {x:.1f} x {y:.1f} x {z:.1f} m, {unit}"),
+        ("density", f"{facts.density:.0f} points/m2, a vertex every {facts.cell:g} m"),
+        ("surface", f"{facts.area:.0f} m2, of which {facts.stacked_area:.0f} m2 are above others"),
+        ("mesh", f"{facts.vertices} vertices, {facts.faces} faces"),
+        ("holes", f"{facts.filled_area:.1f} m2 filled"),
+        ("obstacles", f"{facts.obstacle_area:.1f} m2"),
+        ("left out", thrown),
+        ("error", f"{facts.error_rms:.4f} m rms of the points, 95 % below {facts.error_95:.4f} m"),
+        ("origin", f"({origin}) of the files is (0, 0, 0) of the map"),
+    ]

@@ -30,7 +30,7 @@ SETTLINGS = 2
 """Times that slopes and heights are computed from each other."""
 LEAST_POINTS = 100
 CROWN_UPWARD = 0.7071
-"""Mean z of the unit normals below which a separate surface is no ground."""
+"""Mean z of the unit normals below which a surface above ground is a crown."""
 Step = Callable[[str], None]
 
 
@@ -197,7 +197,7 @@ def _settled(patches: SurfacePatches, points: FloatArray, chosen: SurfaceParamet
 def _is_large(patches: SurfacePatches, faces: IntArray, least_area: float) -> BoolArray:
     """Mask (F,) of the faces of connected surfaces that are large enough and no crowns of trees.
 
-    Surfaces are connected across edges. Those that are mostly upper ends of thick runs of points, or
+    Surfaces are connected across edges. Those above ground that are mostly upper ends of thick runs of points, or
     steeper than 45 degrees on average, are crowns.
     """
     across = faces_across_edges(faces, *faces_of_vertices(faces, len(patches.cells)))
@@ -206,11 +206,14 @@ def _is_large(patches: SurfacePatches, faces: IntArray, least_area: float) -> Bo
     graph = coo_array((np.ones(len(face), dtype=np.int8), ends), (len(faces), len(faces)))
     groups: NDArray[np.int32] = connected_components(graph, directed=False)[1]
     counts = np.bincount(groups)
-    tops = np.bincount(groups, weights=patches.is_top[faces].sum(axis=1))
+    tops, grounds = (
+        np.bincount(groups, weights=mask[faces].sum(axis=1)) / (3.0 * counts)
+        for mask in (patches.is_top, patches.is_ground)
+    )
     areas = 0.5 * counts * patches.grid.cell * patches.grid.cell
     corners = np.column_stack([patches.centres, patches.heights])
     upward = np.bincount(groups, weights=unit_face_normals(corners, faces)[:, 2]) / counts
-    is_crown = (tops > 1.5 * counts) | (upward < CROWN_UPWARD)
+    is_crown = (grounds < 0.5) & ((tops > 0.5) | (upward < CROWN_UPWARD))
     return np.asarray(((areas >= least_area) & ~is_crown)[groups])
 
 

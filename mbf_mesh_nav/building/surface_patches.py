@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, FloatArray, IntArray
-from mbf_mesh_nav.kernels.building.columns import TOP
+from mbf_mesh_nav.kernels.building.columns import LOWEST, TOP
 from mbf_mesh_nav.kernels.building.patches import link_patches
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
@@ -89,6 +89,11 @@ class SurfacePatches:
     def is_filled(self) -> BoolArray:
         """Mask (P,) of the patches without a point, which fill a hole."""
         return np.asarray(self.firsts == self.ends)
+
+    @property
+    def is_ground(self) -> BoolArray:
+        """Mask (P,) of the lowest patches of their columns, and of those that fill a hole."""
+        return np.asarray(self.kinds == LOWEST)
 
     @property
     def is_top(self) -> BoolArray:
