@@ -1,0 +1,254 @@
+"""Full circle: a cloud of a known world, the map built from it, a plan on the built map, the drive in the true world.
+
+    python benchmarks/maps.py [--quick] [--json] [--workers 2] [--terrains 40] [--buildings 10] [--sizes 1,10]
+
+Terrains are those of ``outdoor_terrains.py`` of every level, with posts, on seeds that nothing was chosen on. Their
+clouds have 100 points on a square metre with noise of 2 cm, crowns above the posts, and grass of 10 cm on a fifth of
+the ground. Buildings are the shipped bridge and garage, scanned on all sides with the same density and noise. Each is
+driven once on the built map and once on the true one, of which the faces below the posts are cut out. Rates are over
+the terrains with a route (``benchmarks.reachability``, posts included). ``--sizes`` are millions of points, each built
+in a process of its own; CPU time and peak memory are of that process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from outdoor_terrains import FROM_CORNER, LEVELS, SIZE, generated
+from reachability import is_reachable
+
+from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
+from mbf_mesh_nav.building.map_build import write_map
+from mbf_mesh_nav.building.map_facts import map_facts
+from mbf_mesh_nav.building.surface import BuiltSurface, build_surface
+from mbf_mesh_nav.files.map_header import MapHeader
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from terrain.physics.robot_models import HUSKY
+from terrain.scenarios.environment import FOREST_STREAM, WORLD_STREAM
+from terrain.scenarios.obstacles import Forest, Obstacle
+from terrain.scenarios.places import coordinates
+from terrain.scenarios.scenario import Scenario, load_scenario
+from terrain.scenarios.world_types import GarageWorld
+from terrain.sweeps.sweep import SweepRun, run_once
+from terrain.sweeps.worker_pool import run_in_workers
+from terrain.worlds.generate import fractal_terrain
+from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.surface import Surface
+
+FloatArray = NDArray[np.float64]
+DENSITY, NOISE, GRASS, GRASS_SHARE = 100.0, 0.02, 0.1, 0.2
+FIRST_SEED, CLOUD_STREAM = 7000, 99
+POSTS = Forest(x_range=(2.0, SIZE[0] - 2.0), y_range=(2.0, SIZE[1] - 2.0), count=12, gap=2.4, diameter=0.3, height=1.5)
+MAP_FILE = "mesh_map.mesh_file"
+Row = dict[str, Any]
+
+
+def scan_ground(ground: Heightfield, rng: np.random.Generator, grass_share: float) -> FloatArray:
+    """Points on the ground, on a share of its squares of 4 m every other one on a blade of grass."""
+    count = int(DENSITY * ground.size[0] * ground.size[1])
+    corner = (ground.x0, ground.y0)
+    x, y = rng.uniform(corner, np.add(corner, ground.size), (count, 2)).T
+    square = (x // 4.0 * 7.0 + y // 4.0 * 13.0) % 10.0
+    blade = np.where(
+        (square < 10.0 * grass_share) & (rng.uniform(size=count) < 0.5), rng.uniform(0.0, GRASS, count), 0.0
+    )
+    return np.column_stack([x, y, ground.height_at(x, y) + blade + rng.normal(0.0, NOISE, count)])
+
+
+def scan_post(post: Obstacle, foot: float, rng: np.random.Generator) -> FloatArray:
+    """Points on the side of a post, and in a crown of 3 m from 2.5 m above the ground on."""
+    radius, height = 0.5 * post.size[0], post.size[2]
+    count = int(DENSITY * 2.0 * np.pi * radius * height)
+    angle, up = rng.uniform(0.0, 2.0 * np.pi, count), rng.uniform(0.0, height, count)
+    side = np.column_stack([post.x + radius * np.cos(angle), post.y + radius * np.sin(angle), foot + up])
+    directions = rng.normal(size=(800, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    reach = rng.uniform(0.3, 1.0, (800, 1)) * (1.5, 1.5, 1.2)
+    return np.vstack([side + rng.normal(0.0, NOISE, side.shape), [post.x, post.y, foot + 3.7] + directions * reach])
+
+
+def scan_surface(surface: Surface, rng: np.random.Generator) -> FloatArray:
+    """Points evenly on all faces."""
+    a, b, c = (np.asarray(surface.vertices, dtype=np.float64)[surface.faces[:, corner]] for corner in range(3))
+    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    face = np.repeat(np.arange(len(areas)), rng.poisson(DENSITY * areas))
+    u, v = np.sqrt(rng.uniform(size=(len(face), 1))), rng.uniform(size=(len(face), 1))
+    points = a[face] * (1.0 - u) + b[face] * (u * (1.0 - v)) + c[face] * (u * v)
+    return points + rng.normal(0.0, NOISE, points.shape)
+
+
+def terrain_row(level: int, seed: int, folder: Path) -> tuple[Scenario, Row]:
+    """Build the map of one terrain with posts; the scenario, and how the map compares with the truth."""
+    scenario = generated(level).model_copy(update={"forests": (POSTS,), "limits": load_scenario("post_forest").limits})
+    clear = coordinates((scenario.start, *scenario.goals))
+    ground = scenario.world.heightfield(np.random.default_rng([seed, WORLD_STREAM]), clear)  # type: ignore[union-attr]
+    posts = POSTS.posts(np.random.default_rng([seed, FOREST_STREAM]), clear)
+    places = np.array([[post.x, post.y] for post in posts])
+    rng = np.random.default_rng([seed, CLOUD_STREAM])
+    parts = [scan_ground(ground, rng, GRASS_SHARE)]
+    parts += [scan_post(post, float(ground.height_at(post.x, post.y)), rng) for post in posts]
+    surface = build_surface(np.vstack(parts))
+    truth = heightfield_mesh(ground.heights, ground.dx, ground.dy, ground.x0, ground.y0)
+    centres = truth[0][truth[1]].mean(axis=1)[:, :2]
+    near = np.linalg.norm(centres[:, None] - places[None], axis=2).min(axis=1) < 0.3
+    maps = write_maps(folder, f"level_{level}_{seed}", surface, (truth[0], truth[1][~near]))
+    row = {"world": scenario.name, "seed": seed, "maps": maps, **accuracy(surface, ground, rng)}
+    on_map = MeshMap.from_arrays(surface.vertices, surface.faces).locator
+    above = np.column_stack([places, np.full(len(places), 100.0)])
+    hit, lengths = on_map.cast_rays(above, np.tile([0.0, 0.0, -1.0], (len(places), 1)))
+    height = 100.0 - lengths - ground.height_at(*places.T)
+    row["posts"], row["posts_missed"] = len(posts), int(((hit >= 0) & (np.abs(height) < 1.0)).sum())
+    row["route"] = has_route(scenario, ground, places)
+    return scenario, row
+
+
+def has_route(scenario: Scenario, ground: Heightfield, posts: FloatArray) -> bool:
+    """Whether the judge finds a route with the posts as pillars of the ground."""
+    x, y = np.meshgrid(ground.x0 + ground.dx * np.arange(ground.nx), ground.y0 + ground.dy * np.arange(ground.ny))
+    near = np.hypot(x[..., None] - posts[:, 0], y[..., None] - posts[:, 1]).min(axis=-1) < 0.2
+    with_posts = ground.with_heights(ground.heights + np.where(near, 1.5, 0.0))
+    start, goal = scenario.start, scenario.goals[0]
+    return is_reachable(with_posts, HUSKY, (start.x, start.y, start.yaw), (goal.x, goal.y))  # type: ignore[union-attr]
+
+
+def accuracy(surface: BuiltSurface, ground: Heightfield, rng: np.random.Generator) -> Row:
+    """Root mean square of the height of the built surface above the true ground, at random places."""
+    low = np.array([ground.x0, ground.y0])
+    x, y = rng.uniform(low + FROM_CORNER, low + np.subtract(ground.size, FROM_CORNER), (4000, 2)).T
+    bare = (x // 4.0 * 7.0 + y // 4.0 * 13.0) % 10.0 >= 10.0 * GRASS_SHARE
+    above = np.column_stack([x, y, ground.height_at(x, y) + 1.0])
+    locator = MeshMap.from_arrays(surface.vertices, surface.faces).locator
+    face, length = locator.cast_rays(above, np.tile([0.0, 0.0, -1.0], (len(above), 1)))
+    error = 1.0 - length
+    found = face >= 0
+    return {
+        "rms_bare_m": float(np.sqrt(np.mean(error[found & bare] ** 2))),
+        "rms_grass_m": float(np.sqrt(np.mean(error[found & ~bare] ** 2))),
+        "covered": float(found.mean()),
+    }
+
+
+def building_row(number: int, folder: Path) -> tuple[Scenario, Row]:
+    """Build the map of the bridge, or of a garage of two to six floors."""
+    seed = FIRST_SEED + number
+    scenario = load_scenario("bridge" if number % 2 == 0 else "garage_roof")
+    if number % 2:
+        scenario = scenario.model_copy(update={"world": GarageWorld(type="garage", floors=2 + number // 2)})
+    world = scenario.world.levels()  # type: ignore[union-attr]
+    rng = np.random.default_rng([seed, CLOUD_STREAM])
+    surface = build_surface(np.vstack([scan_surface(world.ground, rng), scan_surface(world.walls, rng)]))
+    maps = write_maps(folder, f"{scenario.name}_{number}", surface, None)
+    return scenario, {"world": scenario.name, "seed": seed, "maps": maps, "route": True}
+
+
+def write_maps(folder: Path, name: str, built: BuiltSurface, truth: Any) -> dict[str, str]:
+    """Write the built map and the true one; settings name no file where the world writes the true one itself."""
+    header = MapHeader((0.0, 0.0, 0.0), 0.0, 0.0)
+    files = {"built": folder / f"{name}_built.ply"}
+    write_map(files["built"], built.vertices, built.faces, header)
+    if truth is not None:
+        files["true"] = folder / f"{name}_true.ply"
+        write_map(files["true"], *truth, header)
+    return {"true": "", **{key: str(file) for key, file in files.items()}}
+
+
+def drive(chosen: list[tuple[Scenario, Row]], workers: int) -> list[Row]:
+    """Drive each on the built and on the true map; one row each."""
+    jobs, about = [], {}
+    for scenario, row in chosen:
+        for kind, file in row["maps"].items():
+            run = SweepRun(row["seed"], {MAP_FILE: file} if file else {})
+            jobs.append((scenario, run))
+            about[scenario.name, row["seed"], file] = {**row, "map": kind}
+    rows = []
+    for (scenario, run), metrics in run_in_workers(run_once, jobs, workers):
+        row = about[scenario.name, run.seed, run.settings.get(MAP_FILE, "")]
+        row = {**row, "arrived": metrics["success"], "incidents": sorted(metrics.get("incidents", {}))}
+        rows.append({**row, "outcome": metrics["outcome"], "message": metrics["message"]})
+        answer = (row["world"], row["seed"], row["map"], "route" if row["route"] else "no route", metrics["outcome"])
+        print(" | ".join(map(str, (*answer, ",".join(row["incidents"]), metrics["message"]))), flush=True)
+    return rows
+
+
+def summarise(rows: list[Row]) -> Row:
+    """Arrival on both maps where there is a route, and the accuracy of the built ones."""
+    figures: Row = {}
+    for kind in ("built", "true"):
+        routed = [row for row in rows if row["map"] == kind and row["route"]]
+        arrived = sum(bool(row["arrived"]) for row in routed)
+        tipped = sum("tipped_over" in row["incidents"] for row in routed)
+        hit = sum("collision" in row["incidents"] for row in routed)
+        figures[kind] = {"with_route": len(routed), "arrived": arrived, "tipped_over": tipped, "collided": hit}
+    built = [row for row in rows if row["map"] == "built" and "rms_bare_m" in row]
+    for name in ("rms_bare_m", "rms_grass_m", "covered"):
+        if built:
+            values = [row[name] for row in built]
+            figures[name] = {"mean": float(np.mean(values)), "min": min(values), "max": max(values)}
+    figures["posts"] = sum(row["posts"] for row in built)
+    figures["posts_missed"] = sum(row["posts_missed"] for row in built)
+    return figures
+
+
+def build_of_size(millions: float) -> Row:
+    """Build a cloud of so many points in this process: CPU and wall time [s], peak memory [MB], error."""
+    side = float(np.sqrt(1e6 * millions / DENSITY))
+    rng = np.random.default_rng(1)
+    ground = fractal_terrain(side, side, 0.5, rng, median_slope=10.0)
+    build_surface(scan_ground(ground.crop(0.0, 20.0, 0.0, 20.0), rng, 0.0))  # the kernels are compiled
+    points = scan_ground(ground, rng, 0.0)
+    before, wall = time.process_time(), time.perf_counter()
+    surface = build_surface(points)
+    cpu, wall = time.process_time() - before, time.perf_counter() - wall
+    facts = map_facts(PointCloud(points), surface)
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    figures = {"points": len(points), "cpu_s": cpu, "wall_s": wall, "peak_mb": memory, "faces": facts.faces}
+    return {**figures, **accuracy(surface, ground, rng)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="four terrains, one building, one million points")
+    parser.add_argument("--json", action="store_true", help="print the figures as last line")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--terrains", type=int, default=40)
+    parser.add_argument("--buildings", type=int, default=10)
+    parser.add_argument("--sizes", default="1,10", help="millions of points, comma separated; empty = none")
+    parser.add_argument("--one-size", type=float, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.one_size:
+        print(json.dumps(build_of_size(arguments.one_size)))
+        return
+    terrains, buildings, sizes = arguments.terrains, arguments.buildings, arguments.sizes
+    if arguments.quick:
+        terrains, buildings, sizes = 4, 1, "1"
+    figures: Row = {"sizes": []}
+    for size in filter(None, sizes.split(",")):
+        command = [sys.executable, __file__, "--one-size", size]
+        answer = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        figures["sizes"].append(json.loads(answer.splitlines()[-1]))
+        print(figures["sizes"][-1], flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        chosen = [terrain_row(n % LEVELS, FIRST_SEED + n // LEVELS, Path(folder)) for n in range(terrains)]
+        figures["terrains"] = summarise(drive(chosen, arguments.workers))
+        figures["buildings"] = summarise(
+            drive([building_row(n, Path(folder)) for n in range(buildings)], arguments.workers)
+        )
+    for name, line in figures.items():
+        print(f"{name:10} {line}")
+    if arguments.json:
+        print(json.dumps(figures))
+
+
+if __name__ == "__main__":
+    main()
