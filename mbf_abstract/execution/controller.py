@@ -239,10 +239,23 @@ class ControllerExecution:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, str(error))
         if result.success and result.command is None:
             result = ControlResult(ExePathOutcome.NO_VALID_CMD, "success, but no command")
+        if result.success:
+            result = self._avoid_contact(pose, velocity, result)
         self.last_result = result
         self._cycles += 1
         self._failed_cycles += not result.success
         return result
+
+    def _avoid_contact(self, pose: Pose, velocity: Twist, result: ControlResult) -> ControlResult:
+        """Let the map slow the command down where the robot would touch something that moves."""
+        hook = partial(self._runtime.map_hooks.avoid_contact, pose, velocity, result)
+        try:
+            return self._run.call_beside("the map's avoid_contact()", hook)
+        except Abandoned:
+            raise
+        except Exception as error:
+            text = f"avoid_contact raised {type(error).__name__}: {error_text(error)}"
+            return ControlResult(ExePathOutcome.MAP_ERROR, text)
 
     # ------------------------------------------------------------------------------- judging a command
     def _judge(self, result: ControlResult, lease: Lease) -> ControllerEnd | None:

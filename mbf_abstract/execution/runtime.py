@@ -13,10 +13,11 @@ from mbf_abstract.drive.robot import RobotInformation
 from mbf_abstract.drive.velocity_gate import VelocityGate
 from mbf_abstract.events import EventBus
 from mbf_abstract.execution.supervisor import Supervisor
+from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.callbacks import CallbackThread
 from mbf_abstract.maps.relaxation import Relaxation
-from mbf_abstract.plugins import PluginKind
+from mbf_abstract.plugins import ControlResult, PluginKind
 from mbf_abstract.time.clock import Clock
 
 
@@ -25,6 +26,9 @@ class MapHooks(Protocol):
 
     def map_problem(self) -> str:
         """Why the map must not be driven on right now (e.g. a silent sensor); empty = it is current."""
+
+    def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
+        """The answer of a controller with a command by which the robot touches nothing that moves."""
 
     def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
         """Keep the map alive while a goal of this kind runs."""

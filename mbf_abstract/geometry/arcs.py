@@ -34,8 +34,12 @@ def arc_poses(
 
     Exact integration of a constant twist (vx, vy [m/s], wz [rad/s]).
     """
+    return poses_on_arc(pose, vx, vy, wz, np.append(np.arange(step, duration, step), duration))
+
+
+def poses_on_arc(pose: tuple[float, float, float], vx: float, vy: float, wz: float, times: FloatArray) -> FloatArray:
+    """Poses (n, 3) of a body that keeps a velocity, after some ``times`` (n,) [s] above 0; see ``arc_poses``."""
     x, y, yaw = pose
-    times = np.append(np.arange(step, duration, step), duration)
     # Driven is an arc; its chord points half the turn away from the heading and is sin(half) / half times as long.
     half_turns = (0.5 * wz) * times
     chords = times * (np.sin(half_turns) / half_turns) if abs(wz) > STRAIGHT else times

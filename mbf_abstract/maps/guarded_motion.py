@@ -55,7 +55,11 @@ class GuardedRecovery(MapPlugin, AbstractRecovery):
 
     def obstacle_ahead(self, pose: Pose, command: Twist) -> str:
         """What the robot would touch if it moved on with ``command``, and where; empty if the motion is free."""
-        return self.navigation_map.obstacle_ahead(self.on_map(pose), command, self.parameters.check_ahead_time)
+        there = self.on_map(pose)
+        share, reason, _ = self.navigation_map.safe_share(there, command, command, self.clock.now())
+        if share == 0.0:
+            return reason
+        return self.navigation_map.obstacle_ahead(there, command, self.parameters.check_ahead_time)
 
     def run_behavior(self, request: RecoveryRequest) -> RecoveryResult:
         """Run ``recover``, report a lost pose as TF_ERROR, and send zero velocity at the end."""

@@ -9,9 +9,11 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layers.layer_stack import LayerStack
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.tracking.contact import ContactParameters, safe_share
 from mbf_abstract.maps.tracking.objects import TrackedObject
 
 
@@ -87,6 +89,21 @@ class LayeredMap(NavigationMap):
         """The objects of all layers that follow some, at ``now`` [s]."""
         with self._lock:
             return tuple(known for layer in self.layers.enabled for known in layer.tracked_objects(now))
+
+    def safe_share(self, pose: Pose, velocity: Twist, command: Twist, now: float) -> tuple[float, str, float]:
+        """The least share that any layer with moving objects allows."""
+        least = super().safe_share(pose, velocity, command, now)
+        with self._lock:
+            tracking = [(layer, layer.tracked_objects(now)) for layer in self.layers.enabled]
+        for layer, objects in tracking:
+            limits = layer.parameters
+            if not objects or not isinstance(limits, ContactParameters) or not limits.stop_before_contact:
+                continue
+            share, touched = safe_share(self.robot_box, pose, velocity, command, objects, limits)
+            if touched is not None and share < least[0]:
+                text = f"object {touched.number} moves in the way, at ({touched.x:.2f}, {touched.y:.2f})"
+                least = share, text, limits.max_wait
+        return least
 
     def set_layer_parameters(self, name: str, parameters: Any, until: float = math.inf) -> None:
         """Replace the parameters of one layer, all or none.

@@ -18,6 +18,7 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.queries import PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.tracking.contact import RobotBox
 from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.plugins import Plugin, PluginContext
 
@@ -112,6 +113,34 @@ class NavigationMap(ABC):
 
         Obstacles on other storeys do not count.
         """
+
+    @property
+    def robot_box(self) -> RobotBox:
+        """The robot's outline for contacts with moving objects."""
+        return RobotBox.disc(self.inscribed_radius)
+
+    def safe_share(self, pose: Pose, velocity: Twist, command: Twist, now: float) -> tuple[float, str, float]:
+        """How much of a command the robot may follow and still stop before it touches anything that moves.
+
+        Parameters
+        ----------
+        pose, velocity : Pose, Twist
+            Of the robot.
+        command : Twist
+            What it is about to follow.
+        now : float
+            [s]
+
+        Returns
+        -------
+        share : float
+            1 where nothing is touched, 0 where it must stop at once.
+        reason : str
+            What it would touch with the whole command; empty where the share is 1.
+        max_wait : float
+            How long [s] to wait for that before the path counts as blocked.
+        """
+        return 1.0, "", 0.0
 
     # -------------------------------------------------------------------------------------------------- layers
     def clear(self, layer_names: Iterable[str] | None = None) -> list[str]:

@@ -12,11 +12,15 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from mbf_abstract.config.configuration import Config
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.scan_intake import ScanIntake
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.served_map import ServedMap
-from mbf_abstract.plugins import PluginKind
+from mbf_abstract.maps.tracking.contact_guard import ContactGuard
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.plugins import ControlResult, PluginKind
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.server.plugin_host import ServerError
 
@@ -43,6 +47,7 @@ class MapServer(AbstractNavigationServer):
     def load_map(self, config: Config) -> None:
         """Build the maps and begin to update them."""
         self.served = {}
+        self._contact_guard = ContactGuard()
         for served in self.serve_maps(config):
             self.served[served.name] = served  # at once: what is there is closed if the next one fails
         self._scans = ScanIntake(self.runtime, self.served)
@@ -67,6 +72,15 @@ class MapServer(AbstractNavigationServer):
         served = self._served(name) if name else list(self.served.values())[-1]
         reason: str = served.map.stale_reason(self.runtime.clock.now())
         return reason
+
+    def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
+        """Slow down, or stop, in time before what moves on the map that the robot drives on."""
+        navigation_map = list(self.served.values())[-1].map
+        try:
+            there = self.runtime.transforms.transform_pose(pose, navigation_map.frame_id)
+        except TransformError as error:
+            return ControlResult(ExePathOutcome.TF_ERROR, str(error))
+        return self._contact_guard.judge(navigation_map, there, velocity, answer, self.runtime.clock.now())
 
     @contextmanager
     def using_map(self, kind: PluginKind) -> Iterator[None]:

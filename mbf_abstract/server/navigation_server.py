@@ -36,7 +36,7 @@ from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.view import FieldView, FloorMap, MapView
 from mbf_abstract.parameters import ParameterModel, with_changes
-from mbf_abstract.plugins import ControlRequest, PlanRequest, PluginKind
+from mbf_abstract.plugins import ControlRequest, ControlResult, PlanRequest, PluginKind
 from mbf_abstract.server.plugin_host import PluginHost
 from mbf_abstract.server.process_end import ProcessEndWatch
 from mbf_abstract.time.clock import Clock
@@ -180,6 +180,10 @@ class AbstractNavigationServer(PluginHost):
     def map_problem(self) -> str:
         """Why the map must not be driven on right now; empty = it is current."""
         return ""
+
+    def avoid_contact(self, pose: Pose, velocity: Twist, answer: ControlResult) -> ControlResult:
+        """The answer of a controller with a command by which the robot touches nothing that moves; as it is here."""
+        return answer
 
     def using_map(self, kind: PluginKind) -> AbstractContextManager[None]:
         """Keep the map alive while a goal of this kind runs."""

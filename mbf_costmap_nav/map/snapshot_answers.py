@@ -12,10 +12,14 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.maps.layered_map import LayeredMap
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import PlaceQuery, PoseAnswer
+from mbf_abstract.maps.tracking.contact import RobotBox
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.grid.motion_check import nearest_lethal, obstacle_ahead
 from mbf_costmap_nav.map import pose_checks
+
+ROUND = 1.05
+"""An outline whose radii differ by less than this factor is that of a round robot."""
 
 
 class SnapshotAnswers(LayeredMap):
@@ -38,6 +42,17 @@ class SnapshotAnswers(LayeredMap):
     def inscribed_radius(self) -> float:
         """Distance [m] from the base to the nearest side of the padded footprint."""
         return self.footprint.inscribed_radius
+
+    @property
+    def robot_box(self) -> RobotBox:
+        """The box around the padded footprint; a circle for a round robot."""
+        outline = self.footprint
+        if len(outline.vertices) < 3:
+            return RobotBox.disc(0.0)
+        if outline.circumscribed_radius < ROUND * outline.inscribed_radius:
+            return RobotBox.disc(outline.circumscribed_radius)
+        (back, right), (front, left) = outline.vertices.min(axis=0).tolist(), outline.vertices.max(axis=0).tolist()
+        return RobotBox(back, front, right, left, 0.0)
 
     def point_check(self) -> PlaceCheck:
         """State and cost of the cells of points."""

@@ -156,7 +156,9 @@ global_costmap:
   height: 8.0
   resolution: 0.1
   robot_radius: 0.3
-  layers: [{name: obstacles, type: obstacle}, {name: inflation, type: inflation}]
+  layers:
+    [{name: obstacles, type: obstacle}, {name: moving, type: moving_obstacles}, {name: inflation, type: inflation}]
+  moving: {sources: [lidar]}
   obstacles: {sources: {lidar: {obstacle_max_range: 4.5, raytrace_max_range: 5.0}}}
   inflation: {inflation_radius: 0.5}
 local_costmap:
@@ -166,7 +168,9 @@ local_costmap:
   resolution: 0.05
   robot_radius: 0.3
   update_frequency: 10.0
-  layers: [{name: obstacles, type: obstacle}, {name: inflation, type: inflation}]
+  layers:
+    [{name: obstacles, type: obstacle}, {name: moving, type: moving_obstacles}, {name: inflation, type: inflation}]
+  moving: {sources: [lidar]}
   obstacles: {sources: {lidar: {obstacle_max_range: 4.5, raytrace_max_range: 5.0}}}
   inflation: {inflation_radius: 0.5}
 """
@@ -181,9 +185,14 @@ controllers: [{name: follower, type: path_follower}]
 mesh_map:
   mesh_file: floor.ply
   inscribed_radius: 0.3
-  default_layer: inflation
-  layers: [{name: obstacles, type: obstacle}, {name: inflation, type: inflation, inputs: [obstacles]}]
+  default_layer: safe
+  layers:
+    - {name: obstacles, type: obstacle}
+    - {name: moving, type: moving_obstacles, inputs: [obstacles]}
+    - {name: inflation, type: inflation, inputs: [moving]}
+    - {name: safe, type: max_combination, inputs: [inflation, moving]}
   obstacles: {sources: [lidar]}
+  moving: {sources: [lidar], inscribed_radius: 0.3}
   inflation: {inscribed_radius: 0.3, inflation_radius: 0.5, lethal_value: .inf, inscribed_value: 1.0}
 """
 )

@@ -24,6 +24,7 @@ from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.maps.layers.source_watch import SourceWatch, first_reason
 from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.tracking.contact import ContactParameters
 from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
 from mbf_abstract.maps.tracking.tracker import Tracker, TrackingParameters
 from mbf_abstract.parameters import parameter
@@ -39,7 +40,7 @@ ObstaclePoints = Callable[[RangeScan], FloatArray]
 """The points (n, 3) [m] of a scan that may be objects, on the ground below them."""
 
 
-class MovingObstaclesParameters(TrackingParameters):
+class MovingObstaclesParameters(TrackingParameters, ContactParameters):
     """Parameters of the layers ``moving_obstacles``, beside those of all layers."""
 
     sources: tuple[str, ...] = parameter(

@@ -1,0 +1,156 @@
+"""Whether the robot can still stop before it touches something that moves.
+
+The rule is passive motion safety (Macek, Vasquez, Fraichard, Siegwart 2009): a motion is safe if the robot can stand
+before any contact. Contacts that happen while it stands are not its fault. So a command is followed for a reaction
+time, then the robot brakes; objects keep their velocities until it stands. A robot that is nearer than the margin to an
+object already may move as long as the gap gets no smaller.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray, Pose, Twist
+from mbf_abstract.geometry.arcs import poses_on_arc
+from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+from mbf_abstract.parameters import ParameterModel, parameter
+
+SHARES = (1.0, 0.75, 0.5, 0.25)
+"""Shares of a command that are tried, in this order, before the robot stops."""
+STEP = 0.1
+"""Time [s] between two looks at robot and objects."""
+SAME_STOREY = 1.0
+"""Objects whose ground is farther above or below the robot [m] are on another storey."""
+NEARER = 0.005
+"""A gap that gets smaller by less than this [m] counts as kept."""
+
+
+class ContactParameters(ParameterModel):
+    """How the robot stops before moving objects."""
+
+    stop_before_contact: bool = parameter(
+        True, "Slow down and stop in time before moving objects, whatever the controller."
+    )
+    contact_margin: float = parameter(0.1, "Distance kept to moving objects.", unit="m", ge=0.0, le=5.0)
+    reaction_time: float = parameter(0.3, "Time until the robot begins to brake.", unit="s", ge=0.0, le=5.0)
+    decel_lim_x: float = parameter(0.5, "Deceleration of the robot.", unit="m/s^2", gt=0.0, le=100.0)
+    decel_lim_theta: float = parameter(1.0, "Deceleration of its turns.", unit="rad/s^2", gt=0.0, le=100.0)
+    max_wait: float = parameter(
+        10.0, "The path is blocked once the robot has waited for moving objects for this long.", unit="s", ge=0.0
+    )
+
+
+class RobotBox(NamedTuple):
+    """The robot's outline for contacts: a box in its own frame [m], grown by a radius [m] to all sides.
+
+    A round robot is a box without extent and its radius.
+    """
+
+    back: float
+    front: float
+    right: float
+    left: float
+    radius: float
+
+    @classmethod
+    def disc(cls, radius: float) -> RobotBox:
+        """Box of a round robot."""
+        return cls(0.0, 0.0, 0.0, 0.0, radius)
+
+    def gaps(self, poses: FloatArray, places: FloatArray, radii: FloatArray) -> FloatArray:
+        """Gaps (n, m) [m] of the robot at ``poses`` (n, 3) to discs at ``places`` (n, m, 2)."""
+        dx, dy = places[:, :, 0] - poses[:, None, 0], places[:, :, 1] - poses[:, None, 1]
+        c, s = np.cos(poses[:, None, 2]), np.sin(poses[:, None, 2])
+        ahead, aside = c * dx + s * dy, c * dy - s * dx
+        beyond_x = np.maximum(np.maximum(self.back - ahead, ahead - self.front), 0.0)
+        beyond_y = np.maximum(np.maximum(self.right - aside, aside - self.left), 0.0)
+        return np.asarray(np.hypot(beyond_x, beyond_y) - self.radius - radii)
+
+
+def safe_share(
+    box: RobotBox,
+    pose: Pose,
+    velocity: Twist,
+    command: Twist,
+    objects: Sequence[TrackedObject],
+    limits: ContactParameters,
+) -> tuple[float, TrackedObject | None]:
+    """Largest share of a command with which the robot can stand before any contact, and what it would touch.
+
+    Parameters
+    ----------
+    box : RobotBox
+    pose : Pose
+        Of the robot, in the frame of the objects.
+    velocity : Twist
+        Measured.
+    command : Twist
+        What it is about to follow.
+    objects : sequence of TrackedObject
+        Those that move count; all are of the same moment.
+    limits : ContactParameters
+
+    Returns
+    -------
+    share : float
+        One of ``SHARES``, or 0.
+    touched : TrackedObject or None
+        What the robot would touch first with the whole command; None where the share is 1.
+    """
+    near = [known for known in objects if known.motion is Motion.MOVING and abs(known.z - pose.z) < SAME_STOREY]
+    if not near or command.is_stopped(1e-9, 1e-9):
+        return 1.0, None
+    touched = None
+    for share in SHARES:
+        found = _first_contact(box, pose, velocity, command, share, near, limits)
+        if found is None:
+            return share, touched
+        touched = touched or found
+    return 0.0, touched
+
+
+def _first_contact(
+    box: RobotBox,
+    pose: Pose,
+    velocity: Twist,
+    command: Twist,
+    share: float,
+    objects: Sequence[TrackedObject],
+    limits: ContactParameters,
+) -> TrackedObject | None:
+    """What the robot would touch before it stands."""
+    times, driven = _braking(velocity, command, share, limits)
+    start = pose.x, pose.y, pose.yaw
+    moving = poses_on_arc(start, command.vx, command.vy, command.wz, driven)
+    middles = np.array([(known.x, known.y) for known in objects])
+    velocities = np.array([(known.vx, known.vy) for known in objects])
+    places = middles[None] + times[:, None, None] * velocities[None]
+    radii = np.array([known.radius for known in objects]) + limits.contact_margin
+    gaps = box.gaps(moving, places, radii)
+    present = box.gaps(np.array([start]), middles[None], radii)
+    contact = (gaps < 0.0) & (gaps < present - NEARER)
+    if not contact.any():
+        return None
+    return objects[int(np.argmax(contact[int(np.argmax(contact.any(axis=1)))]))]
+
+
+def _braking(velocity: Twist, command: Twist, share: float, limits: ContactParameters) -> tuple[FloatArray, FloatArray]:
+    """Times (n,) [s] until the robot stands, and the motion by then as a time (n,) [s] of following the whole command.
+
+    The pace is the motion as a share of the command, first that of the measured velocity.
+    """
+    if command.speed > 0.0:
+        now, slowing = velocity.speed / command.speed, limits.decel_lim_x / command.speed
+    else:
+        now, slowing = abs(velocity.wz / command.wz), limits.decel_lim_theta / abs(command.wz)
+    react = limits.reaction_time
+    pace = max(share, now - slowing * react)
+    end = react + pace / slowing
+    times = np.linspace(0.0, end, math.ceil(end / STEP) + 1)[1:]
+    braked = np.maximum(times - react, 0.0)
+    before = np.minimum(times, react) * max(share, 0.5 * (now + pace))
+    return times, before + braked * (pace - 0.5 * slowing * braked)

@@ -1,0 +1,120 @@
+"""A robot meets what moves, on both maps: it stops in time, goes on, and its map says what blocks its path."""
+
+import math
+import re
+
+import pytest
+
+from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
+from mbf_abstract.testing.conformance.rig import ROBOT_RADIUS, Box
+from mbf_abstract.testing.conformance.site import site
+from mbf_abstract.time.clock import Priority
+
+HALF, STEP = 0.25, 0.05  # m, s
+PARAMETERS = {"controller_max_retries": -1, "controller_patience": 5.0}
+
+
+@pytest.fixture(params=["costmap", "mesh"])
+def make_map_server(request, backends):
+    return backends[request.param]
+
+
+class Walker:
+    """A box that moves at constant velocity, and stops after some time; it does not stop for the robot."""
+
+    def __init__(self, rig, x, y, vx, vy, until=math.inf):
+        self.rig, self.x, self.y, self.vx, self.vy, self.until = rig, x, y, vx, vy, until
+        self.touched_by = ""  # who moved when it first touched the robot: "robot", or "walker" alone
+        self._place()
+        rig.clock.spawn(self._walk, "walker", Priority.SIMULATOR)
+        self.over = False
+        rig.on_close(self.stop)
+
+    def stop(self):
+        self.over = True
+
+    def _place(self):
+        self.rig.boxes = [Box(self.x - HALF, self.y - HALF, self.x + HALF, self.y + HALF)]
+
+    def _walk(self):
+        clock, began, steps = self.rig.clock, self.rig.clock.now(), 0
+        while not self.over:
+            if clock.now() - began < self.until:
+                self.x, self.y = self.x + self.vx * STEP, self.y + self.vy * STEP
+                self._place()
+            pose = self.rig.robot.pose
+            if not self.touched_by and self.rig.boxes[0].gap(pose.x, pose.y) < ROBOT_RADIUS:
+                self.touched_by = "walker" if self.rig.robot.command.is_stopped() else "robot"
+            steps += 1
+            clock.sleep_until(began + steps * STEP)
+
+
+def drive(made, walker_from, velocity, **changes):
+    if changes:
+        for name in made.server.served:
+            made.server.set_layer_parameters(f"{name}.moving", **changes)
+    walker = Walker(made.rig, *walker_from, *velocity)
+    result = made.navigator.exe_path(made.path((2.0, 4.0), (8.0, 4.0)))
+    return walker, result
+
+
+CROSSINGS = {"costmap": ((4.4, 7.3), (0.0, -0.6)), "mesh": ((4.0, 7.5), (0.0, -1.2))}
+
+
+def test_the_robot_touches_nobody_who_crosses_its_path(make_map_server):
+    with site(make_map_server, **PARAMETERS) as made:
+        walker, result = drive(made, *CROSSINGS[made.server.backend])
+        assert result.success, result.message
+        assert walker.touched_by == ""
+
+
+def test_without_the_guard_it_drives_into_them(make_map_server):
+    with site(make_map_server, **PARAMETERS) as made:
+        walker, _ = drive(made, *CROSSINGS[made.server.backend], stop_before_contact=False)
+        assert walker.touched_by == "robot"
+
+
+def test_the_robot_stands_when_somebody_runs_into_it(make_map_server):
+    """Whoever comes along its path and does not stop touches a robot that stands."""
+    with site(make_map_server, **PARAMETERS) as made:
+        walker, _ = drive(made, (7.5, 4.0), (-0.7, 0.0))
+        assert walker.touched_by == "walker"
+
+
+def test_a_recovery_touches_nobody_either(make_map_server):
+    with site(make_map_server, **PARAMETERS) as made:
+        walker = Walker(made.rig, 0.4, 4.0, 0.3, 0.0)
+        made.rig.clock.sleep(1.5)
+        result = made.navigator.recover("back_up")
+        assert result.outcome == RecoveryOutcome.IMPASSABLE
+        assert "in the way" in result.message
+        if made.server.backend == "costmap":  # on the mesh what is marked now is in the way even sooner
+            assert re.search(r"object \d+ moves in the way, at \(\d\.\d\d, \d\.\d\d\)", result.message)
+        assert walker.touched_by != "robot"
+
+
+def test_a_guard_that_raises_holds_the_robot(make_map_server):
+    with site(make_map_server, controller_max_retries=0) as made:
+
+        def raising(pose, velocity, answer):
+            raise RuntimeError("no objects today")
+
+        made.server.avoid_contact = raising
+        result = made.navigator.exe_path(made.path((2.0, 4.0), (4.0, 4.0)))
+        assert result.outcome == ExePathOutcome.MAP_ERROR
+        assert "avoid_contact raised RuntimeError: no objects today" in result.message
+        assert not made.rig.robot.moved_after(0.0)
+
+
+def test_a_map_knows_who_moves_on_it(make_map_server):
+    with site(make_map_server, **PARAMETERS) as made:
+        Walker(made.rig, 4.0, 6.5, 0.0, -0.5, until=4.0)
+        made.rig.clock.sleep(2.5)
+        navigation_map = list(made.server.served.values())[-1].map
+        (seen,) = navigation_map.tracked_objects(made.rig.clock.now())
+        assert seen.motion.value == "moving"
+        assert (seen.vx, seen.vy) == pytest.approx((0.0, -0.5), abs=0.15)
+        assert seen.frame_id == "map"
+        made.rig.clock.sleep(4.0)
+        (seen,) = navigation_map.tracked_objects(made.rig.clock.now())
+        assert seen.motion.value == "waiting" and seen.speed == 0.0

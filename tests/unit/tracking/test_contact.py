@@ -1,0 +1,179 @@
+"""Stopping in time before what moves: against a naive twin, and the rule that a robot that stands is never at fault."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbf_abstract.geometry import AckermannCommand, Pose, Twist
+from mbf_abstract.maps.tracking.contact import SHARES, ContactParameters, RobotBox, safe_share
+from mbf_abstract.maps.tracking.contact_guard import ContactGuard
+from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+from mbf_abstract.outcomes import ExePathOutcome
+from mbf_abstract.plugins import ControlResult
+
+LIMITS = ContactParameters(contact_margin=0.1, reaction_time=0.2, decel_lim_x=0.5)
+DISC = RobotBox.disc(0.3)
+CARRIER = RobotBox(-0.35, 0.35, -0.25, 0.25, 0.0)
+HERE = Pose.planar(0.0, 0.0)
+AHEAD = Twist.planar(0.6)
+
+
+def moving(x, y, vx=0.0, vy=0.0, radius=0.25, motion=Motion.MOVING, z=0.0):
+    return TrackedObject(1, motion, x, y, z, vx, vy, radius, 0.05, 0.1, 5.0, 0.0, 0.0, 0.0, "map")
+
+
+def share_of(command, *objects, box=DISC, velocity=None, limits=LIMITS, pose=HERE):
+    return safe_share(box, pose, command if velocity is None else velocity, command, objects, limits)[0]
+
+
+def test_on_a_free_way_the_whole_command_is_safe():
+    assert share_of(AHEAD) == 1.0
+    assert share_of(AHEAD, moving(5.0, 0.0, -0.5)) == 1.0
+    assert share_of(AHEAD, moving(0.0, 3.0, 0.0, 0.5)) == 1.0
+
+
+def test_the_robot_stops_before_who_comes_towards_it():
+    found = [share_of(AHEAD, moving(x, 0.0, -0.8)) for x in (1.2, 1.7, 2.2, 3.5)]
+    assert found[0] == 0.0 and found[-1] == 1.0
+    assert found == sorted(found)
+
+
+def test_it_slows_down_behind_who_is_slower():
+    assert share_of(AHEAD, moving(0.75, 0.0, 0.3)) < 1.0
+    assert share_of(AHEAD, moving(0.75, 0.0, 0.8)) == 1.0
+
+
+def test_who_crosses_in_front_is_let_by():
+    assert share_of(AHEAD, moving(0.9, -0.6, 0.0, 0.8)) == 0.0
+    assert share_of(AHEAD, moving(0.9, 0.8, 0.0, 0.8)) == 1.0, "it has passed"
+
+
+def test_a_robot_that_is_too_near_already_may_leave_but_not_come_nearer():
+    beside = moving(0.6, 0.0, 0.0, 0.02)
+    assert share_of(Twist.planar(-0.3), beside) == 1.0
+    assert share_of(Twist.planar(0.3), beside) == 0.0
+
+
+def test_a_robot_that_is_caught_up_anyway_stands():
+    assert share_of(Twist.planar(-0.3), moving(0.75, 0.0, -0.8)) == 0.0
+    assert share_of(Twist.planar(-0.6), moving(0.75, 0.0, -0.3)) == 1.0, "it gets away"
+
+
+def test_what_stands_is_the_business_of_the_obstacle_layers():
+    for motion in (Motion.WAITING, Motion.PARKED):
+        assert share_of(AHEAD, moving(0.8, 0.0, motion=motion)) == 1.0
+
+
+def test_who_is_on_another_storey_does_not_count():
+    assert share_of(AHEAD, moving(0.8, 0.0, z=3.0)) == 1.0
+
+
+def test_a_standing_robot_and_a_command_of_zero_are_never_at_fault():
+    assert share_of(Twist(), moving(0.5, 0.0, -1.0)) == 1.0
+
+
+def test_corners_count_in_a_turn_on_the_spot():
+    turn = Twist.planar(wz=1.0)
+    beside = moving(0.0, 0.68, 0.01, 0.0)
+    assert share_of(turn, beside, box=RobotBox.disc(0.25)) == 1.0
+    assert share_of(turn, beside, box=CARRIER) < 1.0
+
+
+def test_what_would_be_touched_first_is_named():
+    near, far = replace(moving(1.0, 0.0, -0.5), number=7), replace(moving(1.3, 0.0, -0.5), number=8)
+    assert safe_share(DISC, HERE, AHEAD, AHEAD, [far, near], LIMITS)[1] is near
+
+
+speeds = st.floats(-1.0, 1.0)
+
+
+@given(st.floats(0.05, 1.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), speeds, speeds, st.floats(-1.0, 1.0))
+@settings(max_examples=150, deadline=None)
+def test_with_the_share_that_is_safe_the_robot_stands_before_any_contact(v, x, y, vx, vy, wz):
+    """The naive twin integrates robot and object in small steps, with the rule of braking that the docs state."""
+    command, known = Twist.planar(v, 0.0, wz), moving(x, y, vx, vy)
+    share = share_of(command, known, box=CARRIER)
+    if share == 0.0:
+        return
+    px = py = yaw = time = 0.0
+    pace, dt = 1.0, 0.01
+    react = 0.0
+    worst = math.inf
+    present = CARRIER.gaps(np.zeros((1, 3)), np.array([[[x, y]]]), np.array([0.25]))[0, 0]
+    while pace > 0.0:
+        px, py = px + pace * v * dt * math.cos(yaw), py + pace * v * dt * math.sin(yaw)
+        yaw, time = yaw + pace * wz * dt, time + dt
+        slowed = LIMITS.decel_lim_x / v * dt
+        react += dt
+        pace = max(share, pace - slowed) if react <= LIMITS.reaction_time else pace - slowed
+        place = np.array([[[x + vx * time, y + vy * time]]])
+        radii = np.array([0.25])
+        gap = CARRIER.gaps(np.array([[px, py, yaw]]), place, radii)[0, 0]
+        if gap < present - 0.05:
+            worst = min(worst, gap)
+    assert worst > 0.0, f"share {share}: it comes to {worst:.3f} m although {LIMITS.contact_margin} m are kept"
+
+
+@given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-3.2, 3.2), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
+@settings(max_examples=60, deadline=None)
+def test_gaps_are_distances_from_a_box(x, y, yaw, px, py):
+    found = CARRIER.gaps(np.array([[x, y, yaw]]), np.array([[[px, py]]]), np.array([0.2]))[0, 0]
+    edge = [(a, b) for a in np.linspace(-0.35, 0.35, 141) for b in (-0.25, 0.25)]
+    edge += [(a, b) for a in (-0.35, 0.35) for b in np.linspace(-0.25, 0.25, 101)]
+    c, s = math.cos(yaw), math.sin(yaw)
+    nearest = min(math.hypot(x + c * a - s * b - px, y + s * a + c * b - py) for a, b in edge)
+    ahead, aside = c * (px - x) + s * (py - y), c * (py - y) - s * (px - x)
+    inside = abs(ahead) <= 0.35 and abs(aside) <= 0.25
+    assert found == pytest.approx(-0.2 if inside else nearest - 0.2, abs=0.005)
+
+
+def test_the_same_question_has_the_same_answer():
+    crowd = [moving(0.3 * k, 1.0 - 0.1 * k, -0.4, 0.05 * k) for k in range(6)]
+    assert len({safe_share(CARRIER, HERE, AHEAD, AHEAD, crowd, LIMITS) for _ in range(3)}) == 1
+    assert share_of(AHEAD, *crowd, box=CARRIER) in (*SHARES, 0.0)
+
+
+class Answering:
+    """A map that answers always alike."""
+
+    def __init__(self, share, reason="object 1 moves in the way", max_wait=2.0):
+        self.answer = share, reason, max_wait
+
+    def safe_share(self, pose, velocity, command, now):
+        return self.answer
+
+
+def judged(guard, share, command, now=0.0, **answer):
+    return guard.judge(Answering(share, **answer), HERE, Twist(), ControlResult(0, "", command), now)
+
+
+def test_the_guard_slows_down_along_the_same_arc():
+    guard = ContactGuard()
+    assert judged(guard, 1.0, Twist.planar(0.6, 0.0, 0.4), reason="") == ControlResult(
+        0, "", Twist.planar(0.6, 0.0, 0.4)
+    )
+    slow = judged(guard, 0.5, Twist.planar(0.6, 0.0, 0.4))
+    assert slow.command == Twist.planar(0.3, 0.0, 0.2) and slow.success and "moves in the way" in slow.message
+    assert judged(guard, 0.25, AckermannCommand(0.8, 0.3)).command == AckermannCommand(0.2, 0.3)
+
+
+def test_the_guard_waits_and_then_calls_the_path_blocked():
+    guard = ContactGuard()
+    for step in range(40):
+        answer = judged(guard, 0.0, AHEAD, now=0.05 * step)
+        assert answer.success and answer.command == Twist()
+    late = judged(guard, 0.0, AHEAD, now=2.1)
+    assert late.outcome == ExePathOutcome.BLOCKED_PATH and "waited 2.1 s for it" in late.message
+    again = judged(guard, 0.0, AHEAD, now=10.0)
+    assert again.success, "a new wait"
+
+
+def test_a_wait_goes_on_over_short_moments_of_driving():
+    guard = ContactGuard()
+    for step in range(60):
+        judged(guard, 0.0 if step % 3 else 1.0, AHEAD, now=0.05 * step)
+    assert judged(guard, 0.0, AHEAD, now=3.0).outcome == ExePathOutcome.BLOCKED_PATH
