@@ -119,6 +119,11 @@ class TransformBuffer:
         with self._lock:
             return sorted(self._frame_names)
 
+    def newest(self) -> list[Transform]:
+        """Return the newest transform of each frame to its parent, by the names of the frames."""
+        with self._lock:
+            return [cache.newest for _, cache in sorted(self._caches.items())]
+
     def lookup(
         self,
         target: str,

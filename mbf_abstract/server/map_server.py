@@ -62,6 +62,8 @@ class MapServer(AbstractNavigationServer):
 
     def take_scan(self, scan: RangeScan) -> None:
         """Hand a scan to every map with a layer that listens to its source, as ``ScanIntake.take``."""
+        for listener in self.scan_listeners:
+            listener(scan)
         self._scans.take(scan)
 
     def map_problem(self, name: str = "") -> str:

@@ -60,6 +60,11 @@ class AbstractNavigationServer(PluginHost):
         Where events go.
     seed : int
         Seed of the plugins' random generators.
+
+    Attributes
+    ----------
+    scan_listeners : list of callables
+        Called with every scan that comes, on its driver's thread, before the map takes it: must be short.
     """
 
     config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {}
@@ -78,6 +83,7 @@ class AbstractNavigationServer(PluginHost):
     ) -> None:
         self.config = config
         self._closed = False
+        self.scan_listeners: list[Callable[[RangeScan], None]] = []
         check_driver(robot, clock)
         self._own_turning_radius = turning_radius_of(robot)
         super().__init__(self._make_runtime(config.parameters, robot, clock, transforms, events), seed)

@@ -57,7 +57,9 @@ class MapFreeServer(AbstractNavigationServer):
         raise NotImplementedError("a server without a map answers no questions about it")
 
     def take_scan(self, scan: RangeScan) -> None:
-        """Ignore it."""
+        """Show it to those who listen; there is no map to take it."""
+        for listener in self.scan_listeners:
+            listener(scan)
 
     def map_problem(self) -> str:
         """Return ``map_trouble``."""

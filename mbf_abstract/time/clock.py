@@ -189,6 +189,11 @@ def wall_seconds() -> float:
     return time.perf_counter()
 
 
+def unix_seconds() -> float:
+    """Read the calendar [s since 1970], for stamps that other programs read; it may be set back while we run."""
+    return time.time()
+
+
 class Stopwatch:
     """Time that passes on a clock while not paused; the base of patience, oscillation and progress checks."""
 

@@ -14,6 +14,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from types import FrameType
 
+from mbf_abstract.access.page_access import LOOPBACK, PageAccess, Role, is_loopback
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.time.clock import Clock, WallClock
@@ -23,7 +24,6 @@ from terrain.viewer.live.controls import LiveControls
 from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.page import LivePage
 from terrain.viewer.live.plots import PERIOD, UNWATCHED_PERIOD, History
-from terrain.viewer.server.page_access import LOOPBACK, PageAccess, Role, is_loopback
 from terrain.viewer.server.page_server import page_server
 
 FRAME_PERIOD = 0.1  # s of wall time between two drawings

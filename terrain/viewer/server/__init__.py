@@ -1,1 +1,1 @@
-"""The server of a page, and its access control."""
+"""The server of a page, and the guard between it and its visitors."""

@@ -15,7 +15,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from terrain.viewer.server.page_access import PageAccess
+from mbf_abstract.access.page_access import PageAccess
 from terrain.viewer.server.page_messages import is_allowed
 
 MAX_MESSAGE = 64 * 1024  # bytes; messages of a browser are far shorter

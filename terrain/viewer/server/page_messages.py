@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from terrain.viewer.server.page_access import Role
+from mbf_abstract.access.page_access import Role
 
 MAX_NUMBER = 1e9
 MAX_PIXELS = 100_000

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from typing import Any
 
+from mbf_abstract.access.page_access import NOBODY, PageAccess
 from terrain.viewer.pictures.picture import ViewerMissing
-from terrain.viewer.server.page_access import NOBODY, PageAccess
 from terrain.viewer.server.page_guard import PageGuard
 
 

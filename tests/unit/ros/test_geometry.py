@@ -12,7 +12,7 @@ from mbf_abstract.geometry import Twist
 from mbf_abstract.geometry.transform import Transform
 from mbf_ros.messages import geometry
 from mbf_ros.messages.geometry import InvalidValueError, MessageContext
-from mbf_ros.messages.interfaces import completed, json_values
+from mbf_ros.messages.interfaces import completed, json_text
 
 CONTEXT = MessageContext("map", 1_700_000_000.0)
 
@@ -58,7 +58,7 @@ def test_a_transform_without_a_stamp_is_as_old_as_its_arrival():
 
 def test_transforms_come_back_as_they_were():
     sent = [Transform((1.0, 2.0, 3.0), (0.0, 0.0, 0.6, 0.8), "map", "odom", 2.5)]
-    text = json.dumps(json_values(geometry.transforms_message(sent, CONTEXT)))
+    text = json_text(geometry.transforms_message(sent, CONTEXT))
     assert geometry.transforms_of(completed("tf2_msgs/TFMessage", json.loads(text)), CONTEXT, 0.0) == sent
 
 
@@ -78,7 +78,7 @@ def test_what_is_no_transform_is_refused(bad, text):
 def test_odometry_comes_back_as_it_was():
     sent = Odometry(Twist.planar(0.5, 0.1, -0.2), 4.0)
     message = geometry.odometry_message(sent, Transform((1, 2, 0), parent="odom"), CONTEXT)
-    back = completed("nav_msgs/Odometry", json.loads(json.dumps(json_values(message))))
+    back = completed("nav_msgs/Odometry", json.loads(json_text(message)))
     assert geometry.odometry_of(back, CONTEXT, received=9.0) == sent
     assert (back["header"]["frame_id"], back["child_frame_id"]) == ("odom", "base_link")
 

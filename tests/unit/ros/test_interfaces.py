@@ -1,5 +1,6 @@
 """The interface file has the types of ROS 2, proved by their RIHS01 hashes, and messages are checked against it."""
 
+import base64
 import json
 import math
 from importlib.resources import files
@@ -7,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from mbf_ros.messages.interfaces import MessageError, completed, fields_of, json_values, known_types
+from mbf_ros.messages.interfaces import MessageError, completed, fields_of, json_text, known_types
 
 COMPILED = dict(
     line.split()
@@ -134,8 +137,41 @@ def test_json_has_null_for_what_is_not_finite_and_base64_for_bytes():
         "d": np.uint8([1, 2, 255]),
         "e": np.int8([-1]),
     }
-    text = json.dumps(json_values(values), allow_nan=False)
+    text = json_text(values)
     assert json.loads(text) == {"a": None, "b": [None, 1.5], "c": [1.0, None], "d": "AQL/", "e": [-1]}
+
+
+def plain(value):
+    """The naive twin of ``json_text``: values for the library's encoder."""
+    if isinstance(value, dict):
+        return {key: plain(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [plain(inner) for inner in value]
+    if isinstance(value, np.ndarray):
+        return base64.b64encode(value.tobytes()).decode() if value.dtype == np.uint8 else plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+numbers = st.lists(st.floats() | st.integers(-(2**31), 2**31 - 1), max_size=8)
+leaves = (
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text()
+    | numbers.map(np.array)
+    | st.binary().map(lambda data: np.frombuffer(data, np.uint8))
+)
+
+
+@given(st.recursive(leaves, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=12))
+def test_a_message_is_written_as_the_librarys_encoder_would_write_it(value):
+    assert json.loads(json_text(value)) == json.loads(json.dumps(plain(value), allow_nan=False))
+
+
+@pytest.mark.parametrize("count", [0, 9_999, 10_000, 10_001, 25_000])
+def test_a_long_list_is_written_whole(count):
+    assert json.loads(json_text(np.arange(count))) == list(range(count))
 
 
 def test_the_interface_file_comes_with_the_package():

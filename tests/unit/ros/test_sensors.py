@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_ros.messages.geometry import InvalidValueError, MessageContext
-from mbf_ros.messages.interfaces import completed, json_values
+from mbf_ros.messages.interfaces import completed, json_text
 from mbf_ros.messages.sensors import laser_scan, laser_scan_of, point_cloud, point_cloud_of, range_of
 
 CONTEXT = MessageContext("map", 100.0)
@@ -70,7 +70,7 @@ def test_our_scan_becomes_the_laser_scan_of_its_naive_twin(rays, count):
     scan = RangeScan.of_rays("lidar", (0.5, -0.5, 0.3), ends, [hit for *_, hit in rays], 3.0, "laser")
     message = laser_scan(scan, CONTEXT, count)
     np.testing.assert_array_equal(message["ranges"], np.float32(naive_sectors(scan, count)))
-    assert completed("sensor_msgs/LaserScan", json.loads(json.dumps(json_values(message))))["angle_min"] == -math.pi + (
+    assert completed("sensor_msgs/LaserScan", json.loads(json_text(message)))["angle_min"] == -math.pi + (
         math.pi / count
     )
 
@@ -78,7 +78,7 @@ def test_our_scan_becomes_the_laser_scan_of_its_naive_twin(rays, count):
 @given(st.lists(st.tuples(*[st.floats(-100, 100, width=32)] * 3), max_size=20))
 def test_points_come_back_as_they_were(points):
     cloud = np.array(points, dtype=np.float64).reshape(-1, 3)
-    text = json.dumps(json_values(point_cloud(cloud, "lidar", 3.0, CONTEXT)))
+    text = json_text(point_cloud(cloud, "lidar", 3.0, CONTEXT))
     scan = point_cloud_of(completed("sensor_msgs/PointCloud2", json.loads(text)), CONTEXT, "cloud", 0.0)
     np.testing.assert_array_equal(scan.ends, cloud)
     assert scan.hits.all() and scan.stamp == 3.0

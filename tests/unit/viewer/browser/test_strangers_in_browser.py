@@ -6,7 +6,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from terrain.viewer.server.page_access import PageAccess, Role
+from mbf_abstract.access.page_access import PageAccess, Role
 from terrain.viewer.server.page_server import page_server
 
 pytestmark = pytest.mark.timeout(300)

@@ -14,7 +14,7 @@ import viser
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from terrain.viewer.server.page_access import NOBODY, PageAccess, Role, is_loopback
+from mbf_abstract.access.page_access import NOBODY, PageAccess, Role, is_loopback
 from terrain.viewer.server.page_guard import MAX_REFUSED, MAX_VISITORS
 from terrain.viewer.server.page_messages import is_allowed
 from terrain.viewer.server.page_server import page_server

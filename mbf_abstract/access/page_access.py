@@ -1,7 +1,7 @@
-"""Access to the page of a run, to watch or to steer, by the address, the ``Host`` and the ``Origin`` of a request.
+"""Access to a page or a WebSocket, to watch or to steer, by the address, the ``Host`` and the ``Origin`` of a request.
 
 A browser lets any web page open a WebSocket to this machine, so it is not enough to listen at loopback. Three things
-are checked before a request reaches viser:
+are checked before a request is answered:
 
 - the path of the address begins with a token, known only to those who were given the address, and allows a ``Role``;
 - ``Host`` names this machine; another name is a foreign domain that was made to point here (DNS rebinding);

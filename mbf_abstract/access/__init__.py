@@ -1,0 +1,1 @@
+"""Who may reach a server on this machine, whatever it serves."""

@@ -1,0 +1,163 @@
+"""The command ``mbf bridge serve``: a navigator behind a rosbridge server, with a robot of a scenario or a real one."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from mbf_abstract.commands.reporting import readable_errors
+from mbf_abstract.commands.waiting import waiting
+
+if TYPE_CHECKING:
+    from mbf_abstract.access.page_access import PageAccess
+    from mbf_abstract.session import NavigationSession
+    from mbf_ros.rosbridge.server import RosbridgeServer
+    from mbf_ros.rosbridge.serving import BridgeOptions
+    from mbf_ros.rosbridge.topic_robot import TopicRobot
+
+WORLDS_GROUP = "mbf.worlds"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the application ``mbf``."""
+    bridge = typer.Typer(help="Navigation for clients of rosbridge: roslibpy, roslib pages.", no_args_is_help=True)
+    bridge.command("serve")(serve)
+    app.add_typer(bridge, name="bridge")
+
+
+def serve(
+    what: str = typer.Argument(
+        ..., metavar="CONFIG|SCENARIO", help="A navigation file, whose robot is a client; or a scenario, simulated."
+    ),
+    backend: str = typer.Option("", "--backend", help="Map backend of a scenario; its own if not given."),
+    seed: int = typer.Option(-1, "--seed", min=-1, help="Seed of a scenario; its own if not given."),
+    host: str = typer.Option("127.0.0.1", "--host", help="Interface; others than loopback are not encrypted."),
+    port: int = typer.Option(9090, "--port", min=0, max=65535, help="Port; 0 takes a free one."),
+    token: bool = typer.Option(
+        False, "--token", help="Only for those who know the token in the address; always so beyond loopback."
+    ),
+    allow_origin: list[str] = typer.Option(
+        [], "--allow-origin", help="Origin of a web page that may connect, e.g. https://dash.local; may be repeated."
+    ),
+    max_message: int = typer.Option(
+        10_000_000, "--max-message", min=1000, help="Longest message of a client, in bytes."
+    ),
+    sensor: list[str] = typer.Option(
+        ["/scan:LaserScan=scan", "/points:PointCloud2=points", "/range:Range=range"],
+        "--sensor",
+        help="TOPIC:TYPE=SOURCE of a sensor of the robot, with its source in CONFIG; may be repeated.",
+    ),
+    stamped: bool = typer.Option(False, "--stamped", help="Publish /cmd_vel as TwistStamped."),
+    keep_goals: bool = typer.Option(
+        False, "--keep-goals", help="A goal goes on when its client is gone; else it is canceled."
+    ),
+) -> None:
+    """Serve a navigator to clients of rosbridge, until Ctrl-C."""
+    with readable_errors():
+        from mbf_ros.rosbridge.server import ServerOptions
+        from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
+
+        access = _access(host, token)
+        server_options = ServerOptions(access, port, tuple(allow_origin), max_message)
+        options = BridgeOptions(server_options, not keep_goals, stamped, _sensors(sensor))
+        with waiting("reading the configuration") as on_step:
+            session, robot = _open(what, backend or None, seed if seed >= 0 else None, on_step)
+        with session, serve_session(session, options, robot) as server:
+            _report(server, options, robot is not None)
+            _wait_for_ctrl_c()
+
+
+def _access(host: str, token: bool) -> PageAccess:
+    from mbf_abstract.access.page_access import PageAccess, is_loopback
+
+    return PageAccess.by_token(host) if token or not is_loopback(host) else PageAccess.open(host)
+
+
+def _sensors(texts: list[str]) -> dict[str, tuple[str, str]]:
+    """Type and source by topic; raises ValueError where a text is no TOPIC:TYPE=SOURCE."""
+    from mbf_ros.rosbridge.topic_robot import SENSORS
+
+    found = {}
+    for text in texts:
+        topic, _, rest = text.partition(":")
+        kind, _, source = rest.partition("=")
+        name = f"sensor_msgs/{kind}"
+        if not topic or not source or name not in SENSORS:
+            kinds = ", ".join(one.partition("/")[2] for one in SENSORS)
+            raise ValueError(f"--sensor must be TOPIC:TYPE=SOURCE with one of the types {kinds}, got {text!r}")
+        found[topic] = (name, source)
+    return found
+
+
+def _open(
+    what: str, backend: str | None, seed: int | None, on_step: Callable[[str], None]
+) -> tuple[NavigationSession, TopicRobot | None]:
+    """A session of a navigation file with a robot that is a client, or of a scenario, simulated."""
+    if _is_navigation(Path(what)):
+        if backend is not None or seed is not None:
+            raise ValueError("--backend and --seed are of scenarios; a navigation file names its backend itself")
+        return _real_robot(Path(what))
+    worlds = [point for point in entry_points(group=WORLDS_GROUP)]
+    if not worlds:
+        raise ValueError(f"{what} is no navigation file, and no package with scenarios is installed")
+    opener: Callable[..., Any] = worlds[0].load()
+    return opener(what, backend, seed, on_step), None
+
+
+def _is_navigation(file: Path) -> bool:
+    """Whether a file is a navigation file; what is wrong with one is found when it is read."""
+    from mbf_abstract.config.yaml_source import load_yaml
+
+    if not file.is_file():
+        return False
+    return "navigation" not in load_yaml(file).data
+
+
+def _real_robot(file: Path) -> tuple[NavigationSession, TopicRobot]:
+    from mbf_abstract.geometry.transform_buffer import TransformBuffer
+    from mbf_abstract.server.factory import read_config
+    from mbf_abstract.session import NavigationSession
+    from mbf_abstract.time.clock import WallClock
+    from mbf_ros.rosbridge.topic_robot import TopicRobot
+
+    server_class, config = read_config(file)
+    session, transforms = NavigationSession(WallClock()), TransformBuffer(config.parameters.tf_cache_time)
+    robot = TopicRobot(transforms, session.clock.now)
+    session.serve(server_class, config, robot, transforms)
+    return session, robot
+
+
+def _report(server: RosbridgeServer, options: BridgeOptions, is_real: bool) -> None:
+    """Print where clients connect, and what they should know."""
+    from mbf_abstract.access.page_access import Role, is_loopback
+
+    access = options.server.access
+    for role, text in ((Role.STEER, "page"), (Role.WATCH, "page, to watch only")):
+        if address := access.address(server.port, role):
+            typer.echo(f"{text}: {address}")
+            typer.echo(f"rosbridge: {address.replace('http', 'ws', 1)}")
+    if is_real:
+        typer.echo("the robot is the client that publishes /odom and /tf and listens to /cmd_vel")
+    if not is_loopback(access.host):
+        typer.echo(
+            f"warning: other machines can reach {access.host}, and nothing is encrypted; who has or overhears the "
+            "address can drive the robot",
+            err=True,
+        )
+
+
+def _wait_for_ctrl_c() -> None:
+    """Wait for Ctrl-C; SIGTERM ends the program by an exception, see ``server.process_end``."""
+    pressed = threading.Event()
+    before = signal.signal(signal.SIGINT, lambda number, stack: pressed.set())
+    try:
+        while not pressed.wait(1.0):  # a wait without an end would not let signals through on Windows
+            pass
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,249 @@
+"""The WebSocket server in front of a bridge: who is let in, frames in and out, and the page that it serves.
+
+It runs on a thread and an event loop of its own. Other threads hand it work with ``post`` and never wait for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import http
+import logging
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from mbf_abstract.access.page_access import PageAccess
+from mbf_abstract.events import EventBus, EventKind
+from mbf_abstract.time.clock import ClockThread, WallClock
+from mbf_ros.rosbridge.bridge import Bridge
+from mbf_ros.rosbridge.client import Client
+
+POLICY_VIOLATION, TRY_AGAIN_LATER = 1008, 1013  # WebSocket close codes (RFC 6455, 7.4.1)
+TIME_TO_AUTHENTICATE = 10.0  # s
+TIME_TO_START, TIME_TO_STOP = 10.0, 2.0  # s
+WRITE_LIMIT = 32 * 1024  # bytes on their way to one client, after which frames wait in its outbox
+SECURITY_HEADERS = {
+    "Referrer-Policy": "no-referrer",  # the token is in the address
+    "Cache-Control": "no-store",
+    "X-Frame-Options": "DENY",
+    "X-Content-Type-Options": "nosniff",
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
+    "connect-src 'self' ws: wss:",
+}
+
+_logger = logging.getLogger(__name__)
+_logger.addHandler(logging.NullHandler())  # wrong requests must not fill the terminal
+
+
+@dataclass(frozen=True)
+class ServerOptions:
+    """Where and for whom the server listens.
+
+    Attributes
+    ----------
+    access : PageAccess
+        Interface and tokens; without a token everybody is let in who can reach a loopback interface.
+    port : int
+        0 takes a free one.
+    origins : tuple of str
+        Origins of web pages that may connect, beside the page that the server has served itself.
+    max_message : int
+        Longest message of a client [bytes].
+    max_clients : int
+    """
+
+    access: PageAccess = field(default_factory=PageAccess.open)
+    port: int = 9090
+    origins: tuple[str, ...] = ()
+    max_message: int = 10_000_000
+    max_clients: int = 50
+
+
+class ServerError(Exception):
+    """The server cannot listen; the text says why."""
+
+
+class RosbridgeServer:
+    """Serves a bridge from ``start`` until it is closed.
+
+    Parameters
+    ----------
+    bridge : Bridge
+    events : EventBus
+        Learns who comes and goes.
+    options : ServerOptions
+    pages : mapping of str to (str, bytes)
+        Content type and content of each path that is answered over HTTP.
+
+    Attributes
+    ----------
+    port : int
+        Where it listens, once it has started.
+
+    Raises
+    ------
+    ServerError
+        The package websockets is missing.
+    """
+
+    def __init__(
+        self,
+        bridge: Bridge,
+        events: EventBus,
+        options: ServerOptions,
+        pages: Mapping[str, tuple[str, bytes]] | None = None,
+    ) -> None:
+        try:
+            import websockets.asyncio.server  # noqa: F401
+        except ImportError as error:
+            raise ServerError(f"rosbridge needs websockets: pip install 'mbf-flex[bridge]' ({error})") from error
+        self.port = 0
+        self._bridge, self._events, self._options, self._pages = bridge, events, options, dict(pages or {})
+        self._loop = asyncio.new_event_loop()
+        self._end: asyncio.Event | None = None
+        self._clients: set[Client] = set()
+        self._started = threading.Event()
+        self._problem: BaseException | None = None
+        self._thread: ClockThread | None = None
+
+    def start(self) -> None:
+        """Listen; raises ServerError where nothing can listen there."""
+        self._thread = WallClock().spawn(self._run, "rosbridge")
+        self._started.wait(TIME_TO_START)
+        if self._problem is not None:
+            host, port = self._options.access.host, self._options.port
+            raise ServerError(f"cannot listen at {host}:{port}: {self._problem}") from self._problem
+
+    def post(self, call: Callable[..., None], *arguments: Any) -> None:
+        """Have a function called on the event loop; never waits, and does nothing once the server is closed."""
+        if not self._loop.is_closed():
+            try:
+                self._loop.call_soon_threadsafe(call, *arguments)
+            except RuntimeError:  # closed at this moment
+                return
+
+    def close(self) -> None:
+        """Disconnect all clients and listen no more; idempotent."""
+        if self._end is not None:
+            self.post(self._end.set)
+        if self._thread is not None:
+            self._thread.join(TIME_TO_STOP)
+
+    # ---------------------------------------------------------------------------------------- on the event loop
+    def _run(self) -> None:
+        try:
+            self._loop.run_until_complete(self._serve())
+        except BaseException as error:
+            self._problem = error
+        finally:
+            self._started.set()
+            self._loop.close()
+
+    async def _serve(self) -> None:
+        from websockets.asyncio.server import serve
+
+        self._end = asyncio.Event()
+        async with serve(
+            self._handle,
+            self._options.access.host,
+            self._options.port,
+            process_request=self._answer_request,
+            max_size=self._options.max_message,
+            write_limit=WRITE_LIMIT,
+            compression=None,
+            logger=_logger,
+        ) as server:
+            self.port = next(iter(server.sockets)).getsockname()[1]
+            self._started.set()
+            await self._end.wait()
+        for task in asyncio.all_tasks() - {asyncio.current_task()}:
+            task.cancel()
+
+    def _answer_request(self, connection: Any, request: Any) -> Any:
+        """Refuse a request, answer it with a page, or let the WebSocket begin (None)."""
+        refused = self._refusal(request.path, request.headers)
+        if refused is not None:
+            return connection.respond(refused[0], f"{refused[1]}\n")
+        if request.headers.get("Upgrade", "").lower() == "websocket":
+            return None
+        found = self._options.access.role_and_path(request.path)
+        if found is None:
+            return connection.respond(http.HTTPStatus.FORBIDDEN, "the address needs the token\n")
+        page = self._pages.get(found[1])
+        if page is None:
+            return connection.respond(http.HTTPStatus.NOT_FOUND, "there is no such page\n")
+        response = connection.respond(http.HTTPStatus.OK, "")
+        response.body = page[1]
+        del response.headers["Content-Type"], response.headers["Content-Length"]
+        response.headers.update({**SECURITY_HEADERS, "Content-Type": page[0], "Content-Length": str(len(page[1]))})
+        return response
+
+    def _refusal(self, path: str, headers: Any) -> tuple[http.HTTPStatus, str] | None:
+        """Why a request is refused, None if it is not; programs that are no browser send no ``Origin``."""
+        access, hosts, origins = self._options.access, headers.get_all("Host"), headers.get_all("Origin")
+        if len(hosts) != 1 or not access.knows_host(hosts[0]):
+            return http.HTTPStatus.FORBIDDEN, "this is not the name of the machine that serves"
+        own = origins and access.is_same_site(origins[0], hosts[0])
+        if len(origins) > 1 or (origins and not own and origins[0] not in self._options.origins):
+            return http.HTTPStatus.FORBIDDEN, f"a page of {origins[0]} may not connect; see --allow-origin"
+        if path not in ("", "/") and access.role_and_path(path) is None:
+            return http.HTTPStatus.FORBIDDEN, "the token in the address is wrong"
+        return None
+
+    async def _handle(self, connection: Any) -> None:
+        """Serve one client until it is gone."""
+        from websockets.exceptions import ConnectionClosed
+
+        if len(self._clients) >= self._options.max_clients:
+            await connection.close(TRY_AGAIN_LATER, "too many clients")
+            return
+        client = self._welcome(connection)
+        sending = asyncio.create_task(self._send(client, connection))
+        authenticating = asyncio.create_task(self._await_token(client))
+        try:
+            async for frame in connection:
+                self._bridge.take(client, frame)
+                if client.outbox.overflowed:
+                    client.hang_up("too many answers wait to be read")
+                    break
+                await asyncio.sleep(0)  # a client that sends without a pause leaves the others their turns
+        except ConnectionClosed:
+            pass
+        finally:
+            sending.cancel()
+            authenticating.cancel()
+            self._clients.discard(client)
+            self._bridge.forget(client)
+            self._events.emit(EventKind.CUSTOM, "rosbridge", message="client gone", client=client.name)
+
+    def _welcome(self, connection: Any) -> Client:
+        found = self._options.access.role_and_path(connection.request.path)
+        address = connection.remote_address or ("?", 0)
+
+        def hang_up(reason: str) -> None:
+            closing = connection.close(POLICY_VIOLATION, reason)
+            self._loop.call_soon(lambda: asyncio.ensure_future(closing))
+
+        client = Client(f"{address[0]}:{address[1]}", found[0] if found else None, hang_up)
+        self._clients.add(client)
+        self._events.emit(EventKind.CUSTOM, "rosbridge", message="client connected", client=client.name)
+        return client
+
+    @staticmethod
+    async def _send(client: Client, connection: Any) -> None:
+        """Send what is in the outbox; ``send`` waits for a client that reads slowly, and nobody waits for ``send``."""
+        from websockets.exceptions import ConnectionClosed
+
+        try:
+            while True:
+                await connection.send(await client.outbox.take())
+        except ConnectionClosed:
+            return
+
+    @staticmethod
+    async def _await_token(client: Client) -> None:
+        if client.role is None:
+            await asyncio.sleep(TIME_TO_AUTHENTICATE)
+            if client.role is None:
+                client.hang_up("no token")

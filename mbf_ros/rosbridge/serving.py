@@ -1,0 +1,92 @@
+"""A navigation session on a rosbridge: everything that a client finds, from one call.
+
+Example
+-------
+>>> with serve_session(session) as server:
+...     print(f"roslibpy.Ros('127.0.0.1', {server.port})")
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+
+from mbf_abstract.session import NavigationSession
+from mbf_abstract.time.clock import unix_seconds
+from mbf_ros.messages.geometry import MessageContext
+from mbf_ros.rosbridge.actionlib import ActionlibServer
+from mbf_ros.rosbridge.authentication import Authentication
+from mbf_ros.rosbridge.bridge import Bridge
+from mbf_ros.rosbridge.navigation import NODE, ServerParameters, serve_navigator
+from mbf_ros.rosbridge.page import page_files
+from mbf_ros.rosbridge.publishing import Publisher
+from mbf_ros.rosbridge.rosapi import serve_rosapi
+from mbf_ros.rosbridge.server import RosbridgeServer, ServerOptions
+from mbf_ros.rosbridge.topic_robot import TopicRobot
+
+
+@dataclass(frozen=True)
+class BridgeOptions:
+    """What is served, and how.
+
+    Attributes
+    ----------
+    server : ServerOptions
+        Where and for whom.
+    cancel_on_disconnect : bool
+        Whether the goals of a client that is gone are canceled, and the robot stops.
+    stamped_commands : bool
+        Publish ``/cmd_vel`` as TwistStamped, as Nav2 does from Kilted on, instead of Twist.
+    sensors : mapping of str to (str, str)
+        Of a ``TopicRobot``: type and source in the configuration of each topic of a sensor.
+    """
+
+    server: ServerOptions = field(default_factory=ServerOptions)
+    cancel_on_disconnect: bool = True
+    stamped_commands: bool = False
+    sensors: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+
+@contextmanager
+def serve_session(
+    session: NavigationSession, options: BridgeOptions | None = None, robot: TopicRobot | None = None
+) -> Iterator[RosbridgeServer]:
+    """Serve a session whose navigator is there; its clock must be a wall clock.
+
+    Parameters
+    ----------
+    session : NavigationSession
+    options : BridgeOptions, optional
+    robot : TopicRobot, optional
+        The session's driver, if the robot is a client; else the robot is simulated, and its tf, odometry and scans are
+        published.
+
+    Raises
+    ------
+    ServerError
+        The package websockets is missing, or nothing can listen there.
+    """
+    options = options or BridgeOptions()
+    clock, events, navigator = session.clock, session.events, session.navigator
+    runtime = navigator.server.runtime
+    context = MessageContext(runtime.robot.global_frame, unix_seconds() - clock.now())
+    authentication = Authentication(options.server.access.roles, unix_seconds)
+    bridge = Bridge(clock, events, context, authentication, options.cancel_on_disconnect)
+    server = RosbridgeServer(bridge, events, options.server, page_files())
+    serve_navigator(bridge, navigator, context)
+    serve_rosapi(bridge, ServerParameters(navigator), NODE, context, clock.now)
+    actionlib = ActionlibServer(bridge.topics, navigator, context, clock.now, server.post)
+    if robot is not None:
+        robot.listen(bridge.topics, context, navigator.server.take_scan, options.sensors)
+    with ExitStack() as closing:
+        publisher = Publisher(
+            session, bridge.topics, context, server.post, actionlib, robot is None, options.stamped_commands
+        )
+        closing.callback(publisher.close)
+        if robot is not None:
+            robot.on_command.append(publisher.send_command)
+            closing.callback(robot.on_command.remove, publisher.send_command)
+        closing.callback(server.close)
+        server.start()
+        yield server

@@ -1,0 +1,230 @@
+"""Topics: who publishes, who listens, and how often. The server is the hub: clients hear each other through it.
+
+A message of a known type is checked, whoever publishes it; one of another type goes on as it is. A topic of the
+navigator's own cannot be published by clients: the velocity gate stays the only one that commands the robot.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from mbf_ros.messages.interfaces import Message, MessageError, completed, full_name, known_types
+from mbf_ros.rosbridge.client import Client
+from mbf_ros.rosbridge.protocol import OperationError, absolute, frame
+
+MAX_TOPICS = 500
+MAX_THROTTLE, MAX_QUEUE = 3_600_000, 1000  # ms, messages
+
+
+class Subscription:
+    """One client's subscription of one topic, of one or more ids; the least throttle and the longest queue hold."""
+
+    def __init__(self, client: Client, topic: str, spelling: str) -> None:
+        self._client = client
+        self._topic = topic
+        self._spelling = spelling
+        self._wishes: dict[str | None, tuple[float, int]] = {}
+        self._held: deque[str] = deque()
+        self._due = 0.0
+        self._timer: asyncio.TimerHandle | None = None
+
+    def wish(self, wish_id: str | None, throttle: float, queue: int) -> None:
+        """Add an id with its least time between two messages [s] and how many may wait."""
+        self._wishes[wish_id] = (throttle, queue)
+
+    def withdraw(self, wish_id: str | None) -> bool:
+        """Remove an id, all without one; whether none is left."""
+        if wish_id is None:
+            self._wishes.clear()
+        self._wishes.pop(wish_id, None)
+        if not self._wishes:
+            self.end()
+        return not self._wishes
+
+    def end(self) -> None:
+        """Send nothing more."""
+        if self._timer is not None:
+            self._timer.cancel()
+        self._client.outbox.forget(self._topic)
+
+    def offer(self, text: str) -> None:
+        """Send a frame now, or hold it until the next one is due."""
+        if self._spelling != self._topic:  # the client knows the topic by this name only
+            old, new = (f'"topic":{json.dumps(name)}' for name in (self._topic, self._spelling))
+            text = text.replace(old, new, 1)
+        throttle = min(throttle for throttle, _ in self._wishes.values())
+        keep = max(1, *(queue for _, queue in self._wishes.values()))
+        now = asyncio.get_running_loop().time()
+        if self._timer is None and now >= self._due:
+            self._due = now + throttle
+            self._client.outbox.newest(self._topic, text, keep)
+            return
+        while len(self._held) >= keep:
+            self._held.popleft()
+        self._held.append(text)
+        if self._timer is None:
+            self._timer = asyncio.get_running_loop().call_at(self._due, self._send_held)
+
+    def _send_held(self) -> None:
+        self._timer = None
+        text = self._held.popleft()
+        rest, self._held = self._held, deque()
+        self._due = 0.0
+        self.offer(text)
+        for held in rest:
+            self.offer(held)
+
+
+@dataclass(eq=False)
+class Topic:
+    """A topic.
+
+    Attributes
+    ----------
+    type : str
+        Full name of its messages.
+    is_ours : bool
+        Whether only the navigator publishes it.
+    on_message : callable, optional
+        Takes what clients publish.
+    latched : str, optional
+        The frame that every new subscriber gets first.
+    keeps_last : bool
+        Whether the last message becomes the latched one.
+    newcomers : int
+        How often somebody has begun to listen.
+    """
+
+    type: str
+    is_ours: bool = False
+    on_message: Callable[[Message], None] | None = None
+    latched: str | None = None
+    keeps_last: bool = False
+    newcomers: int = 0
+    publishers: set[Client] = field(default_factory=set)
+    subscriptions: dict[Client, Subscription] = field(default_factory=dict)
+
+
+class TopicTable:
+    """All topics by name; used on the event loop, but for ``is_wanted``."""
+
+    def __init__(self) -> None:
+        self._topics: dict[str, Topic] = {}
+
+    def __getitem__(self, name: str) -> Topic:
+        return self._topics[name]
+
+    def types(self) -> dict[str, str]:
+        """Types by the names of the topics, sorted."""
+        return {name: self._topics[name].type for name in sorted(self._topics)}
+
+    # ------------------------------------------------------------------------------------- for the navigator
+    def add_output(self, name: str, type_name: str, latched: bool = False) -> None:
+        """Add a topic that the navigator publishes; a latched one sends its last message to new subscribers."""
+        self._topics[name] = Topic(full_name(type_name), is_ours=True, keeps_last=latched)
+
+    def add_input(self, name: str, type_name: str, on_message: Callable[[Message], None]) -> None:
+        """Add a topic that the navigator listens to; ``on_message`` may raise MessageError."""
+        self._topics[name] = Topic(full_name(type_name), on_message=on_message)
+
+    def is_wanted(self, name: str) -> bool:
+        """Whether a message now has a use: somebody listens, or will get it later. On any thread."""
+        topic = self._topics[name]
+        return topic.keeps_last or bool(topic.subscriptions)
+
+    def newcomers(self, name: str) -> int:
+        """How often somebody has begun to listen. On any thread."""
+        return self._topics[name].newcomers
+
+    def send(self, name: str, text: str) -> None:
+        """Send the frame of a message to those who listen."""
+        topic = self._topics[name]
+        if topic.keeps_last:
+            topic.latched = text
+        for subscription in topic.subscriptions.values():
+            subscription.offer(text)
+
+    # ------------------------------------------------------------------------------------------ for clients
+    def advertise(self, client: Client, name: str, type_name: str, latched: bool) -> None:
+        """Let a client publish a topic; raises OperationError where it is ours, or has another type."""
+        topic = self._of_type(name, type_name)
+        if topic.is_ours:
+            raise OperationError(f"advertise: {name} is published by the navigator only")
+        topic.keeps_last = topic.keeps_last or latched
+        topic.publishers.add(client)
+
+    def unadvertise(self, client: Client, name: str) -> None:
+        """Let a client publish a topic no more."""
+        if name in self._topics:
+            self._topics[name].publishers.discard(client)
+            self._drop_unused(name)
+
+    def publish(self, name: str, values: Any) -> None:
+        """Take a message of a client, and send it to those who listen.
+
+        Raises
+        ------
+        OperationError
+            The topic is ours, was not advertised, or the message is not of its type.
+        """
+        topic = self._topics.get(name)
+        if topic is None:
+            raise OperationError(f"publish: {name} was not advertised, so its type is not known")
+        if topic.is_ours:
+            raise OperationError(f"publish: {name} is published by the navigator only")
+        try:
+            message = completed(topic.type, values) if topic.type in known_types() else values
+            if topic.on_message is not None:
+                topic.on_message(message)
+        except MessageError as error:
+            raise OperationError(f"publish to {name}: {error}") from error
+        if topic.subscriptions or topic.keeps_last:
+            self.send(name, frame("publish", topic=name, msg=message))
+
+    def subscribe(
+        self, client: Client, spelling: str, type_name: str, wish_id: str | None, throttle: int, queue: int
+    ) -> None:
+        """Let a client listen, at most once in ``throttle`` [ms]; raises OperationError where it has another type."""
+        name = absolute(spelling)
+        topic = self._of_type(name, type_name) if type_name or name not in self._topics else self._topics[name]
+        subscription = topic.subscriptions.setdefault(client, Subscription(client, name, spelling))
+        topic.newcomers += 1
+        subscription.wish(wish_id, throttle / 1000.0, queue)
+        if topic.latched is not None:
+            subscription.offer(topic.latched)
+
+    def unsubscribe(self, client: Client, name: str, wish_id: str | None) -> None:
+        """End the subscription of one id, or of all."""
+        topic = self._topics.get(name)
+        if topic is not None and client in topic.subscriptions and topic.subscriptions[client].withdraw(wish_id):
+            del topic.subscriptions[client]
+            self._drop_unused(name)
+
+    def forget(self, client: Client) -> None:
+        """End everything of a client that is gone."""
+        for name in list(self._topics):
+            self.unsubscribe(client, name, None)
+            self.unadvertise(client, name)
+
+    def _of_type(self, name: str, type_name: str) -> Topic:
+        """The topic of a name, new where there is none; raises OperationError where it has another type."""
+        wanted = full_name(type_name)
+        if name not in self._topics:
+            if len(self._topics) >= MAX_TOPICS:
+                raise OperationError(f"there are {MAX_TOPICS} topics already")
+            if not wanted:
+                raise OperationError(f"the topic {name!r} is not known, so its type must be given")
+            self._topics[name] = Topic(wanted)
+        if self._topics[name].type != wanted:
+            raise OperationError(f"{name} has the type {self._topics[name].type}, not {wanted}")
+        return self._topics[name]
+
+    def _drop_unused(self, name: str) -> None:
+        topic = self._topics[name]
+        if not (topic.is_ours or topic.on_message or topic.publishers or topic.subscriptions):
+            del self._topics[name]

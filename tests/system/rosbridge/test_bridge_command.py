@@ -1,0 +1,62 @@
+"""``mbf bridge serve`` from the terminal: what it prints, how it ends, and what it refuses."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+from typer.testing import CliRunner
+
+from mbf_abstract.cli import make_app
+
+MBF = [sys.executable, "-c", "from mbf_abstract.cli import main; main()", "bridge", "serve"]
+CONFIG = """
+backend: costmap
+global_costmap: {width: 4.0, height: 4.0, layers: [{name: area, type: keepout}], area: {zones: []}}
+local_costmap: {width: 4.0, height: 4.0, layers: [{name: area, type: keepout}], area: {zones: []}}
+planners: [{name: shortest, type: dijkstra}]
+"""
+
+
+@pytest.fixture
+def config(tmp_path):
+    file = tmp_path / "robot.yaml"
+    file.write_text(CONFIG)
+    return file
+
+
+def test_it_serves_until_it_is_interrupted(config, raw, ask):
+    process = subprocess.Popen([*MBF, str(config), "--port", "0", "--token"], stdout=subprocess.PIPE, text=True)
+    try:
+        lines = [process.stdout.readline() for _ in range(5)]
+        assert lines[0].startswith("page: http://127.0.0.1:") and lines[2].startswith("page, to watch only: http://")
+        assert "the robot is the client that publishes /odom and /tf" in lines[4]
+        port, _, path = lines[1].strip().removeprefix("rosbridge: ws://127.0.0.1:").partition("/")
+        operation = {"op": "call_service", "service": "/rosapi/nodes"}
+        answer = ask(raw(int(port), path=f"/{path}"), operation, "service_response")
+        assert answer["values"] == {"nodes": ["/move_base_flex"]}
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 0
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (["--sensor", "/scan"], "--sensor must be TOPIC:TYPE=SOURCE with one of the types LaserScan"),
+        (["--sensor", "/scan:Image=camera"], "got '/scan:Image=camera'"),
+        (["--seed", "3"], "--backend and --seed are of scenarios"),
+        (["--host", "192.0.2.1", "--port", "0"], "cannot listen at 192.0.2.1:0"),
+    ],
+)
+def test_what_cannot_be_served_is_refused_with_one_text(config, options, text):
+    result = CliRunner().invoke(make_app(), ["bridge", "serve", str(config), *options])
+    assert result.exit_code == 2
+    assert text in result.output
+
+
+def test_what_is_neither_file_nor_scenario_is_named(tmp_path):
+    result = CliRunner().invoke(make_app(), ["bridge", "serve", str(tmp_path / "nothing.yaml")])
+    assert result.exit_code == 2 and "nothing.yaml" in result.output
