@@ -34,16 +34,16 @@ class Limits:
 
 @dataclass(frozen=True)
 class TreeShape:
-    """What can be taken away from the tree, and how its second planner works."""
+    """What can be taken away from the tree, and how its second planner works: by default as it ships."""
 
-    reuse_path: bool = True
-    by_outcome: bool = True
-    second_planner_pause: float = 8.0
-    second_planner_look_ahead: float = 3.0
-    longest_update: float = 1.5
+    reuse_path: bool = TreeOptions.reuse_path
+    by_outcome: bool = TreeOptions.by_outcome
+    second_planner_pause: float = TreeOptions.second_planner_pause
+    second_planner_look_ahead: float = TreeOptions.second_planner_look_ahead
+    longest_update: float = TreeOptions.longest_update
     controller_max_retries: int = 15
-    control_retries: int = 8
-    replans: int = 3
+    control_retries: int = TreeOptions.control_retries
+    replans: int = TreeOptions.replans
 
 
 @dataclass(frozen=True)

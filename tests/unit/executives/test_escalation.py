@@ -26,9 +26,9 @@ def run(session, options=OPTIONS, target=GOAL):
 
 def test_without_escalation_the_tree_does_what_it_did(make_session, recoveries):
     session = make_session()
-    session.controller.play(*[BLOCKED] * 6, session.controller.follow)
+    session.controller.play(*[BLOCKED] * 10, session.controller.follow)
     assert run(session).success
-    assert recoveries(session) == ["clear"] * 5  # the sixth failure costs a plan
+    assert recoveries(session) == ["clear"] * 9  # the ninth failure costs a plan
 
 
 def test_a_robot_that_is_stuck_gets_the_escalation_and_a_fresh_plan(make_session, recoveries):

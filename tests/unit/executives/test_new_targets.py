@@ -51,7 +51,9 @@ def eventful(make_session):
 
 
 def tree():
-    return navigation_tree(TreeOptions(check_poses=False, second_planner_pause=0.3, progress_timeout=5.0))
+    return navigation_tree(
+        TreeOptions(check_poses=False, second_planner_pause=0.3, second_planner_look_ahead=0.0, progress_timeout=5.0)
+    )
 
 
 def assert_at_rest(session):

@@ -107,7 +107,7 @@ def test_it_gives_up_after_its_replans_with_the_last_failure(make_session):
     session = make_session()
     session.controller.play(BLOCKED)
     result = run(session, navigation_tree(OPTIONS))
-    stuck = "stuck at (0.00, 0.00): BLOCKED_PATH 20 times; tried clear, back_up"
+    stuck = "stuck at (0.00, 0.00): BLOCKED_PATH 36 times; tried clear, back_up"
     assert result.message == f"BLOCKED_PATH: a chair; {stuck}"
     assert plans(session) == 1 + OPTIONS.replans
     assert session.robot.command.is_stopped()
@@ -131,7 +131,7 @@ def test_without_codes_recoveries_are_taken_in_their_fixed_order(make_session, r
 
 def test_the_second_planner_updates_the_path_and_the_robot_does_not_stop(make_session):
     session = make_session()
-    options = TreeOptions(check_poses=False, second_planner_pause=0.5)
+    options = TreeOptions(check_poses=False, second_planner_pause=0.5, second_planner_look_ahead=0.0)
     result = run(session, navigation_tree(options), Pose.planar(3.0, 0.0))
     assert result.success
     assert plans(session) > 4
@@ -148,7 +148,9 @@ def test_an_update_that_is_a_detour_is_not_taken(make_session):
         return straight_plan(replace(request, goal=Pose.planar(9.0, 0.0)))
 
     session.planner.play(straight_plan, *[detour] * 9)
-    options = TreeOptions(check_poses=False, second_planner_pause=0.5, longest_update=1.5)
+    options = TreeOptions(
+        check_poses=False, second_planner_pause=0.5, second_planner_look_ahead=0.0, longest_update=1.5
+    )
     assert run(session, navigation_tree(options), Pose.planar(2.0, 0.0)).success
     assert plans(session) > 1
     assert len(session.controller.paths) == 1
@@ -157,7 +159,7 @@ def test_an_update_that_is_a_detour_is_not_taken(make_session):
 def test_a_second_planner_that_fails_harms_nothing(make_session, recoveries):
     session = make_session()
     session.planner.play(straight_plan, NO_PATH)
-    options = TreeOptions(check_poses=False, second_planner_pause=0.5)
+    options = TreeOptions(check_poses=False, second_planner_pause=0.5, second_planner_look_ahead=0.0)
     assert run(session, navigation_tree(options)).success
     assert recoveries(session) == []
 
@@ -166,7 +168,7 @@ def test_a_failing_second_planner_does_not_hide_why_driving_failed(make_session,
     session = make_session()
     session.planner.play(straight_plan, NO_PATH)
     session.controller.play(*[drive(0.2)] * 10, COLLISION, session.controller.follow)
-    options = TreeOptions(check_poses=False, second_planner_pause=0.05)
+    options = TreeOptions(check_poses=False, second_planner_pause=0.05, second_planner_look_ahead=0.0)
     assert run(session, navigation_tree(options)).success
     assert recoveries(session) == ["back_up"]
 

@@ -36,7 +36,11 @@ S, F = Status.SUCCESS, Status.FAILURE
 
 def make_tree(name):
     if name == "navigation":
-        return navigation_tree(TreeOptions(check_poses=False, second_planner_pause=0.3, progress_timeout=1.0))
+        return navigation_tree(
+            TreeOptions(
+                check_poses=False, second_planner_pause=0.3, second_planner_look_ahead=0.0, progress_timeout=1.0
+            )
+        )
     if name == "move base":
         return MoveBase()
     states = {
