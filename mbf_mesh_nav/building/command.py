@@ -25,9 +25,9 @@ def _group() -> None:
 
 
 def build(
-    inputs: list[Path] = typer.Argument(..., help="Point clouds: PLY, PCD, LAS, LAZ, XYZ, TXT, CSV, PTS."),
+    inputs: list[Path] = typer.Argument(..., help="Point clouds (PLY, PCD, LAS, XYZ, ...), or meshes to sample."),
     out: Path = typer.Option(..., "--out", help="The map, a .ply file; replaced when the new one is complete."),
-    up: str = typer.Option("z", "--up", help="Axis of the files that points up: x, y or z."),
+    up: str = typer.Option("", "--up", help="Axis of the files that points up: x, y or z; else as they state, or z."),
     scale: float = typer.Option(
         0.0, "--scale", min=0.0, help="Length of the files' unit [m]; 0 = as they state, or 1."
     ),
@@ -50,7 +50,7 @@ def build(
         from mbf_mesh_nav.building.map_facts import lines_of
         from mbf_mesh_nav.building.surface import SurfaceParameters
 
-        if up not in ("x", "y", "z"):
+        if up not in ("", "x", "y", "z"):
             raise typer.BadParameter(f"expected x, y or z, got {up!r}", param_hint="--up")
         parameters = SurfaceParameters(
             cell=cell, clearance=clearance, step_height=step_height, hole_width=hole_width, least_area=least_area

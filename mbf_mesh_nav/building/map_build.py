@@ -29,7 +29,7 @@ def build_map(
     out: Path,
     parameters: SurfaceParameters | None = None,
     *,
-    up_axis: str = "z",
+    up_axis: str = "",
     unit: float = 0.0,
     max_points: int = MAX_POINTS,
     drop_invalid: bool = False,
@@ -40,7 +40,7 @@ def build_map(
     Parameters
     ----------
     files : sequence of path
-        PLY, PCD, LAS, LAZ, XYZ, TXT, CSV or PTS files, all in one coordinate system.
+        Point clouds, or meshes to sample, all in one coordinate system; see ``clouds.point_cloud``.
     out : path
         A .ply file. It is replaced when the map is complete; until then, and if anything fails, it stays what it was.
     up_axis, unit, max_points, drop_invalid

@@ -57,9 +57,13 @@ def read_ply_points(path: Path, max_points: int) -> StoredPoints:
             if form == "ascii"
             else _read_binary(path, file, before, element, BYTE_ORDERS[form])
         )
-    faces = sum(other.count for other in elements if other.name == "face")
-    notes = (f"{faces} faces in the file are not used, only its vertices",) if faces else ()
-    return stored._replace(notes=notes)
+    return stored
+
+
+def has_faces(path: Path) -> bool:
+    """Whether a PLY file is a mesh by its header; raises ``MeshError`` for a header that is none."""
+    with path.open("rb") as file:
+        return any(element.name == "face" and element.count for element in _read_header(path, file)[1])
 
 
 def _read_header(path: Path, file: BinaryIO) -> tuple[str, list[_Element]]:

@@ -15,10 +15,12 @@ import numpy as np
 from mbf_abstract.config.bounded_files import special_file
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.building.clouds.las_points import read_las_points
+from mbf_mesh_nav.building.clouds.mesh_points import MESH_ENDINGS, read_mesh_points
 from mbf_mesh_nav.building.clouds.pcd_points import read_pcd_points
-from mbf_mesh_nav.building.clouds.ply_points import read_ply_points
+from mbf_mesh_nav.building.clouds.ply_points import has_faces, read_ply_points
 from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, refuse_count
 from mbf_mesh_nav.building.clouds.text_points import read_text_points
+from mbf_mesh_nav.files.elevation_files import elevation_readers
 from mbf_mesh_nav.files.file_frames import FileFrame, on_the_map
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 
@@ -69,7 +71,7 @@ class PointCloud:
 def read_clouds(
     files: Sequence[Path],
     *,
-    up_axis: str = "z",
+    up_axis: str = "",
     unit: float = 0.0,
     max_points: int = MAX_POINTS,
     drop_invalid: bool = False,
@@ -80,7 +82,7 @@ def read_clouds(
     Parameters
     ----------
     up_axis : str
-        Axis of the files that points up, "x", "y" or "z".
+        Axis of the files that points up, "x", "y" or "z"; "" = z, for meshes as in ``files.file_frames``.
     unit : float
         Length of the files' unit [m]; 0 = as the files state, else 1.
     max_points : int
@@ -100,11 +102,11 @@ def read_clouds(
     parts, notes, stated = list[FloatArray](), list[str](), dict[Path, float]()
     for file in files:
         on_file(file)
-        stored = _read(file, max_points - sum(map(len, parts)))
+        stored, is_on_map = _read(file, max_points - sum(map(len, parts)), up_axis, unit)
         points, dropped = _finite(file, stored.points, drop_invalid)
         stated[file] = unit or stored.unit
         _refuse_lost_digits(file, points, stored.single_precision, stated[file] or 1.0)
-        parts.append(on_the_map(points, FileFrame(up_axis, stated[file] or 1.0)))
+        parts.append(points if is_on_map else on_the_map(points, FileFrame(up_axis or "z", stated[file] or 1.0)))
         notes += [f"{file.name}: {note}" for note in (*stored.notes, *dropped)]
     if len(set(stated.values())) > 1:
         text = ", ".join(
@@ -120,16 +122,21 @@ def read_clouds(
     return PointCloud(cloud, (x, y, z), stated[files[0]] or 1.0, tuple(notes))
 
 
-def _read(file: Path, max_points: int) -> StoredPoints:
-    reader = READERS.get(file.suffix.lower())
-    if reader is None:
-        raise MeshError(str(file), [f"unknown ending '{file.suffix}', known are: {', '.join(sorted(READERS))}"])
+def _read(file: Path, max_points: int, up_axis: str, unit: float) -> tuple[StoredPoints, bool]:
+    """Contents of a file, and whether they are in metres with z up already."""
+    ending = file.suffix.lower()
+    if ending in elevation_readers():
+        raise MeshError(str(file), ["an elevation model is a map as it is: mbf plan and mesh_map.mesh_file read it"])
+    if ending not in READERS and ending not in MESH_ENDINGS:
+        known = ", ".join(sorted({*READERS, *MESH_ENDINGS}))
+        raise MeshError(str(file), [f"unknown ending '{file.suffix}', known are: {known}"])
     if kind := special_file(file):
         raise MeshError(str(file), [f"expected a file, got {kind}"])
     if not file.is_file():
         raise MeshError(str(file), ["there is no such file"])
     try:
-        stored = reader(file, max_points)
+        is_mesh = ending in MESH_ENDINGS or (ending == ".ply" and has_faces(file))
+        stored = read_mesh_points(file, max_points, up_axis, unit) if is_mesh else READERS[ending](file, max_points)
     except (OSError, MemoryError, ValueError) as error:
         if isinstance(error, MeshError):
             raise
@@ -137,7 +144,7 @@ def _read(file: Path, max_points: int) -> StoredPoints:
     refuse_count(file, len(stored.points), max_points)
     if len(stored.points) == 0:
         raise MeshError(str(file), ["there is no point in it"])
-    return stored
+    return stored, is_mesh
 
 
 def _finite(file: Path, points: FloatArray, drop_invalid: bool) -> tuple[FloatArray, list[str]]:
