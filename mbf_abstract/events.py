@@ -63,6 +63,7 @@ class EventKind(str, Enum):
     TREE = "tree"  # tree, then nodes where a run of it begins, or tick and changes: [index, status, message] of each
     MAP = "map"  # message: what a map server did or found, such as a defect of the mesh it has loaded
     INCIDENT = "incident"  # what, x, y, z, robot_speed; moved, other, other_speed and gap where something was met
+    OBJECT = "object"  # number, motion, position, velocity, radius; source: map; a tracked object moves, stops, is gone
     PARAMETER_CHANGED = "parameter_changed"  # name, old, new
     SINK_FAILED = "sink_failed"  # sink, message
     CUSTOM = "custom"  # anything a user or a plugin wants to see in the log

@@ -5,6 +5,7 @@ An executive asks these before it sends a goal. Poses may be in any known frame;
 
 from __future__ import annotations
 
+import math
 from typing import Any, TypeAlias
 
 from mbf_abstract.drive.robot import RobotInformation
@@ -13,6 +14,8 @@ from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.navigation_map import PlaceCheck
 from mbf_abstract.maps.queries import AS_CONFIGURED, CellState, PathAnswer, PlaceAnswer, PlaceQuery, PoseAnswer
 from mbf_abstract.maps.served_map import ServedMap
+from mbf_abstract.maps.tracking.blocking import Blockage, blockages
+from mbf_abstract.maps.tracking.objects import TrackedObject
 
 Served: TypeAlias = ServedMap[Any]
 
@@ -85,6 +88,43 @@ class MapQueries:
             there = self._on(served, pose)
             answer: PoseAnswer = served.map.find_valid_pose(there, dist_tolerance, angle_tolerance, query)
             return answer
+
+    def tracked_objects(self) -> tuple[TrackedObject, ...]:
+        """What moves, or has stopped, as the map knows it that the robot drives on, else the one plans are made on.
+
+        In the frame of that map; empty if no layer tracks objects.
+        """
+        return self._tracking()[1]
+
+    def what_blocks(self, path: Path, within_time: float = 2.0) -> tuple[Blockage, ...]:
+        """Tracked objects on a path, or on their way onto it, the first along the path first; empty if there is none.
+
+        Parameters
+        ----------
+        path : Path
+        within_time : float
+            How far ahead [s] the places of moving objects count.
+
+        Raises
+        ------
+        ValueError
+            The time is negative or not finite.
+        """
+        if not 0.0 <= within_time < math.inf:
+            raise ValueError(f"within_time must be 0 s or more and finite, got {within_time}")
+        served, objects = self._tracking()
+        if not objects or len(path) == 0:
+            return ()
+        there = self._transforms.transform_path(path, served.map.frame_id)
+        return blockages(served.map.robot_box, there, objects, within_time)
+
+    def _tracking(self) -> tuple[Served, tuple[TrackedObject, ...]]:
+        """The first map that knows objects, the local one first, and they."""
+        for served in self._all():
+            with served.in_use():
+                if objects := served.tracked_objects():
+                    return served, objects
+        return self._global, ()
 
     def clear_map(self) -> None:
         """Forget what sensors have marked, on the local map first, and update the maps."""

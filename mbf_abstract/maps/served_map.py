@@ -19,6 +19,8 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.sensing import TRANSFORM_TOLERANCE
+from mbf_abstract.maps.tracking.motion_changes import MotionChanges
+from mbf_abstract.maps.tracking.objects import TrackedObject
 from mbf_abstract.parameters import ParameterModel, with_changes
 from mbf_abstract.time.ticker import Ticker
 
@@ -64,6 +66,7 @@ class ServedMap(Generic[Map]):
         self.parameters = parameters
         self._runtime = runtime
         self.transform_tolerance = transform_tolerance
+        self._motions = MotionChanges()
         self._lock = threading.Lock()
         self._users, self._running, self._idle_since = 0, False, runtime.clock.now()
         if not runtime.parameters.shutdown_costmaps:
@@ -92,6 +95,13 @@ class ServedMap(Generic[Map]):
             except (RobotStateError, TransformError):
                 pose = None
         self.map.update(pose, self._runtime.clock.now())
+        for event in self._motions.changes(self.tracked_objects()):
+            self._runtime.events.emit(EventKind.OBJECT, self.name, **event)
+
+    def tracked_objects(self) -> tuple[TrackedObject, ...]:
+        """What the map tracks, now."""
+        objects: tuple[TrackedObject, ...] = self.map.tracked_objects(self._runtime.clock.now())
+        return objects
 
     def _start(self) -> None:
         if not self._running:

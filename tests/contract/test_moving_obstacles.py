@@ -5,6 +5,8 @@ import re
 
 import pytest
 
+from mbf_abstract.events import EventKind
+from mbf_abstract.maps.tracking.objects import Motion
 from mbf_abstract.outcomes import ExePathOutcome, RecoveryOutcome
 from mbf_abstract.testing.conformance.rig import ROBOT_RADIUS, Box
 from mbf_abstract.testing.conformance.site import site
@@ -106,15 +108,28 @@ def test_a_guard_that_raises_holds_the_robot(make_map_server):
         assert not made.rig.robot.moved_after(0.0)
 
 
-def test_a_map_knows_who_moves_on_it(make_map_server):
+def test_a_map_knows_who_moves_on_it_and_what_blocks_a_path(make_map_server):
     with site(make_map_server, **PARAMETERS) as made:
-        Walker(made.rig, 4.0, 6.5, 0.0, -0.5, until=4.0)
+        queries, path = made.server.queries, made.path((2.0, 4.0), (8.0, 4.0))
+        assert queries.tracked_objects() == () == queries.what_blocks(path)
+        Walker(made.rig, 4.0, 6.5, 0.0, -0.5, until=5.0)
         made.rig.clock.sleep(2.5)
-        navigation_map = list(made.server.served.values())[-1].map
-        (seen,) = navigation_map.tracked_objects(made.rig.clock.now())
-        assert seen.motion.value == "moving"
+        (seen,) = queries.tracked_objects()
+        assert seen.motion is Motion.MOVING and seen.frame_id == "map"
         assert (seen.vx, seen.vy) == pytest.approx((0.0, -0.5), abs=0.15)
-        assert seen.frame_id == "map"
-        made.rig.clock.sleep(4.0)
-        (seen,) = navigation_map.tracked_objects(made.rig.clock.now())
-        assert seen.motion.value == "waiting" and seen.speed == 0.0
+        (blockage,) = queries.what_blocks(path, within_time=3.0)
+        assert blockage.by.number == seen.number and 1.0 < blockage.distance < 2.0
+        made.rig.clock.sleep(5.0)
+        (blockage,) = queries.what_blocks(path)
+        assert blockage.by.motion is Motion.WAITING and blockage.by.speed == 0.0
+        motions = [event.data["motion"] for event in made.rig.memory.of_kind(EventKind.OBJECT)]
+        assert motions[0] == "moving" and motions[-1] == "waiting"
+        with pytest.raises(ValueError, match="within_time must be 0 s or more and finite, got nan"):
+            queries.what_blocks(path, within_time=math.nan)
+
+
+@pytest.mark.parametrize("name", ["elevation_grid"])
+def test_a_map_without_such_a_layer_knows_nobody(backends, name):
+    with site(backends[name], **PARAMETERS) as made:
+        path = made.path((2.0, 4.0), (8.0, 4.0))
+        assert made.server.queries.tracked_objects() == () == made.server.queries.what_blocks(path)

@@ -90,6 +90,4 @@ class TrackedObject:
             "position": [self.x, self.y, self.z],
             "velocity": [self.vx, self.vy],
             "radius": self.radius,
-            "age": self.age,
-            "standing": self.standing,
         }

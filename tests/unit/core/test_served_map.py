@@ -22,6 +22,9 @@ class CountedMap:
     def clear(self):
         self.cleared += 1
 
+    def tracked_objects(self, now):
+        return ()
+
 
 @pytest.fixture
 def serve():

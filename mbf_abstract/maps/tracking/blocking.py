@@ -1,0 +1,63 @@
+"""What blocks a path: objects that stand on it, or will come onto it in the next seconds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbf_abstract.geometry import Path
+from mbf_abstract.maps.tracking.contact import SAME_STOREY, RobotBox
+from mbf_abstract.maps.tracking.objects import Motion, TrackedObject
+
+STEP = 0.2
+"""Time [s] between two looks at where a moving object will be."""
+
+
+@dataclass(frozen=True)
+class Blockage:
+    """One object on a path.
+
+    Attributes
+    ----------
+    by : TrackedObject
+        Its ``motion`` says what to do: wait for what moves, yield to what waits, plan around what is parked.
+    pose : int
+        Index of the first pose of the path at which the robot would touch it.
+    distance : float
+        Length [m] of the path up to there.
+    """
+
+    by: TrackedObject
+    pose: int
+    distance: float
+
+
+def blockages(box: RobotBox, path: Path, objects: Iterable[TrackedObject], within_time: float) -> tuple[Blockage, ...]:
+    """Objects that block a path, in the order of their places along it.
+
+    Parameters
+    ----------
+    box : RobotBox
+    path : Path
+        In the frame of the objects.
+    objects : iterable of TrackedObject
+    within_time : float
+        How far ahead [s] the places of moving objects count; 0 = only where they are now.
+    """
+    poses = np.array([(pose.x, pose.y, pose.yaw) for pose in path]).reshape(-1, 3)
+    heights = path.positions[:, 2]
+    found = []
+    for known in objects:
+        ahead = within_time if known.motion is Motion.MOVING else 0.0
+        times = np.linspace(0.0, ahead, math.ceil(ahead / STEP) + 1)
+        places = np.column_stack(known.position_in(times))
+        on_each = np.broadcast_to(places, (len(poses), *places.shape))
+        gaps = box.gaps(poses, on_each, np.full(len(times), known.radius))
+        touches = (gaps < 0.0).any(axis=1) & (np.abs(heights - known.z) < SAME_STOREY)
+        if touches.any():
+            pose = int(np.argmax(touches))
+            found.append(Blockage(known, pose, path.length - float(path.remaining_lengths[pose])))
+    return tuple(sorted(found, key=lambda blockage: (blockage.pose, blockage.by.number)))
