@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -149,7 +150,7 @@ def _on_loop(loop: asyncio.AbstractEventLoop, call: Callable[[Any], None]) -> Ca
     """Let a callback of a goal run on the event loop, unless the server is closed by then."""
 
     def post(value: Any) -> None:
-        if not loop.is_closed():
+        with suppress(RuntimeError):  # the server is closed
             loop.call_soon_threadsafe(call, value)
 
     return post

@@ -12,7 +12,7 @@ from mbf_abstract.navigator import Navigator
 from mbf_ros.messages import mbf_actions, nav2_actions
 from mbf_ros.messages.action_mapping import ActionMapping
 from mbf_ros.messages.geometry import MessageContext, pose_of
-from mbf_ros.messages.interfaces import Message, MessageError
+from mbf_ros.messages.interfaces import Message, MessageError, json_text
 from mbf_ros.messages.mbf_queries import MAP_QUESTIONS, MapQuestion
 from mbf_ros.rosbridge.actions import ServedAction
 from mbf_ros.rosbridge.bridge import Bridge
@@ -68,7 +68,7 @@ class ServerParameters:
         if key not in NavigationParameters.model_fields:
             return default
         value: Any = self._server.runtime.parameters.model_dump(mode="json")[key]
-        return json.dumps(value)
+        return json_text(value)
 
     def set(self, name: str, value: str) -> None:
         """Change a parameter; raises ValueError where it is not known, not legal or read only at the start."""

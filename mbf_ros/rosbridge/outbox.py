@@ -29,6 +29,11 @@ class Outbox:
         self._waiting: OrderedDict[Hashable, deque[str]] = OrderedDict()
         self._ready = asyncio.Event()
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether all frames have been taken."""
+        return not self._waiting
+
     def answer(self, frame: str) -> None:
         """Add a frame that must not be lost."""
         self._answers += 1

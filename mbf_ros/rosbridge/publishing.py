@@ -115,7 +115,7 @@ class Publisher:
         add("/cmd_vel", "geometry_msgs/TwistStamped" if self._stamped_commands else "geometry_msgs/Twist")
         add("/plan", "nav_msgs/Path", latched=True)
         add(f"{NODE}/current_goal", "geometry_msgs/PoseStamped", latched=True)
-        add(f"{NODE}/events", "std_msgs/String")
+        add(f"{NODE}/events", "std_msgs/String", depth=MAX_EVENTS)
         add(f"{NODE}/vector_field", "visualization_msgs/MarkerArray")
         if self._simulated:
             add("/tf", "tf2_msgs/TFMessage")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Protocol
 
 from mbf_ros.messages.geometry import MessageContext
-from mbf_ros.messages.interfaces import Message, fields_of, full_name, known_types
+from mbf_ros.messages.interfaces import Message, MessageError, fields_of, full_name, known_types
 from mbf_ros.rosbridge.bridge import Bridge
 from mbf_ros.rosbridge.services import Service
 
@@ -52,7 +52,7 @@ def serve_rosapi(
         return {"subscribers": [node] if known and topics[name].on_message is not None else []}  # type: ignore[index]
 
     def set_parameter(request: Message) -> Message:
-        parameters.set(str(request["name"]), str(request["value"]))
+        parameters.set(_text(request, "name"), _text(request, "value"))
         return {"successful": True, "reason": ""}
 
     reading: dict[str, Callable[[Message], Message]] = {
@@ -75,7 +75,7 @@ def serve_rosapi(
         "GetParamNames": lambda _: {"names": parameters.names()},
         "GetParam": lambda request: {
             "value": parameters.get(
-                str(request["name"]), str(request.get("default") or request.get("default_value", ""))
+                _text(request, "name"), str(request.get("default") or request.get("default_value", ""))
             )
         },
         "HasParam": lambda request: {"exists": request.get("name") in parameters.names()},
@@ -86,6 +86,14 @@ def serve_rosapi(
     for name, call in reading.items():
         services[f"/rosapi/{_snake(name)}"] = Service(f"rosapi_msgs/srv/{name}", call, changes_nothing=True)
     services["/rosapi/set_param"] = Service("rosapi_msgs/srv/SetParam", set_parameter)
+
+
+def _text(request: Message, name: str) -> str:
+    """A text of a request; raises MessageError where it is missing or none."""
+    value = request.get(name)
+    if not isinstance(value, str):
+        raise MessageError(f"the field {name!r} must be a text, got {value!r}")
+    return value
 
 
 def _of_both(time: Message) -> Message:

@@ -10,6 +10,7 @@ import http
 import logging
 import threading
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,7 +22,7 @@ from mbf_ros.rosbridge.client import Client
 
 POLICY_VIOLATION, TRY_AGAIN_LATER = 1008, 1013  # WebSocket close codes (RFC 6455, 7.4.1)
 TIME_TO_AUTHENTICATE = 10.0  # s
-TIME_TO_START, TIME_TO_STOP = 10.0, 2.0  # s
+TIME_TO_START, TIME_TO_SEND, TIME_TO_STOP = 10.0, 0.5, 3.0  # s
 WRITE_LIMIT = 32 * 1024  # bytes on their way to one client, after which frames wait in its outbox
 SECURITY_HEADERS = {
     "Referrer-Policy": "no-referrer",  # the token is in the address
@@ -117,11 +118,8 @@ class RosbridgeServer:
 
     def post(self, call: Callable[..., None], *arguments: Any) -> None:
         """Have a function called on the event loop; never waits, and does nothing once the server is closed."""
-        if not self._loop.is_closed():
-            try:
-                self._loop.call_soon_threadsafe(call, *arguments)
-            except RuntimeError:  # closed at this moment
-                return
+        with suppress(RuntimeError):  # the loop is closed
+            self._loop.call_soon_threadsafe(call, *arguments)
 
     def close(self) -> None:
         """Disconnect all clients and listen no more; idempotent."""
@@ -157,8 +155,15 @@ class RosbridgeServer:
             self.port = next(iter(server.sockets)).getsockname()[1]
             self._started.set()
             await self._end.wait()
+            with suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(self._until_sent(), TIME_TO_SEND)
         for task in asyncio.all_tasks() - {asyncio.current_task()}:
             task.cancel()
+
+    async def _until_sent(self) -> None:
+        """Wait until nothing waits in the outboxes, so that the last command reaches its robot."""
+        while not all(client.outbox.is_empty for client in self._clients):
+            await asyncio.sleep(0.01)
 
     def _answer_request(self, connection: Any, request: Any) -> Any:
         """Refuse a request, answer it with a page, or let the WebSocket begin (None)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 from mbf_abstract.time.clock import Clock
@@ -82,7 +83,7 @@ class ServiceTable:
 
         def run() -> None:
             outcome = _outcome(service, request)
-            if not loop.is_closed():
+            with suppress(RuntimeError):  # the server is closed
                 loop.call_soon_threadsafe(finish, *outcome)
 
         self._clock.spawn(run, f"service {name}")

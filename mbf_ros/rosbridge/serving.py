@@ -88,5 +88,7 @@ def serve_session(
             robot.on_command.append(publisher.send_command)
             closing.callback(robot.on_command.remove, publisher.send_command)
         closing.callback(server.close)
+        if robot is not None:  # while the robot can still hear it
+            closing.callback(runtime.gate.close, "the bridge is closed")
         server.start()
         yield server

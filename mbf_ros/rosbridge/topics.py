@@ -19,15 +19,18 @@ from mbf_ros.rosbridge.protocol import OperationError, absolute, frame
 
 MAX_TOPICS = 500
 MAX_THROTTLE, MAX_QUEUE = 3_600_000, 1000  # ms, messages
+DEPTH = 10
+"""How many messages of a topic wait for a client that asks for no queue; the default of ROS."""
 
 
 class Subscription:
     """One client's subscription of one topic, of one or more ids; the least throttle and the longest queue hold."""
 
-    def __init__(self, client: Client, topic: str, spelling: str) -> None:
+    def __init__(self, client: Client, topic: str, spelling: str, depth: int) -> None:
         self._client = client
         self._topic = topic
         self._spelling = spelling
+        self._depth = depth
         self._wishes: dict[str | None, tuple[float, int]] = {}
         self._held: deque[str] = deque()
         self._due = 0.0
@@ -62,7 +65,7 @@ class Subscription:
         now = asyncio.get_running_loop().time()
         if self._timer is None and now >= self._due:
             self._due = now + throttle
-            self._client.outbox.newest(self._topic, text, keep)
+            self._client.outbox.newest(self._topic, text, max(keep, 1 if throttle else self._depth))
             return
         while len(self._held) >= keep:
             self._held.popleft()
@@ -98,6 +101,8 @@ class Topic:
         Whether the last message becomes the latched one.
     newcomers : int
         How often somebody has begun to listen.
+    depth : int
+        How many messages wait for a client that asks neither for a queue nor for a throttle.
     """
 
     type: str
@@ -106,6 +111,7 @@ class Topic:
     latched: str | None = None
     keeps_last: bool = False
     newcomers: int = 0
+    depth: int = DEPTH
     publishers: set[Client] = field(default_factory=set)
     subscriptions: dict[Client, Subscription] = field(default_factory=dict)
 
@@ -124,9 +130,9 @@ class TopicTable:
         return {name: self._topics[name].type for name in sorted(self._topics)}
 
     # ------------------------------------------------------------------------------------- for the navigator
-    def add_output(self, name: str, type_name: str, latched: bool = False) -> None:
+    def add_output(self, name: str, type_name: str, latched: bool = False, depth: int = DEPTH) -> None:
         """Add a topic that the navigator publishes; a latched one sends its last message to new subscribers."""
-        self._topics[name] = Topic(full_name(type_name), is_ours=True, keeps_last=latched)
+        self._topics[name] = Topic(full_name(type_name), is_ours=True, keeps_last=latched, depth=depth)
 
     def add_input(self, name: str, type_name: str, on_message: Callable[[Message], None]) -> None:
         """Add a topic that the navigator listens to; ``on_message`` may raise MessageError."""
@@ -192,7 +198,7 @@ class TopicTable:
         """Let a client listen, at most once in ``throttle`` [ms]; raises OperationError where it has another type."""
         name = absolute(spelling)
         topic = self._of_type(name, type_name) if type_name or name not in self._topics else self._topics[name]
-        subscription = topic.subscriptions.setdefault(client, Subscription(client, name, spelling))
+        subscription = topic.subscriptions.setdefault(client, Subscription(client, name, spelling, topic.depth))
         topic.newcomers += 1
         subscription.wish(wish_id, throttle / 1000.0, queue)
         if topic.latched is not None:

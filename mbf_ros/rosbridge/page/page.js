@@ -8,6 +8,7 @@ const pen = canvas.getContext("2d");
 
 const state = { transforms: {}, grid: null, mesh: null, costs: null, ground: null, scan: null, plan: [], goal: null };
 const view = { x: 0, y: 0, scale: 30, placed: false }; // centre [m] and pixels per metre
+const frames = { robot_frame: "base_link", global_frame: "map" };
 let socket = null;
 let nextId = 1;
 let goalId = null; // of the goal that this page has sent
@@ -23,6 +24,9 @@ function connect() {
     element("connection").classList.remove("lost");
     for (const [topic, [type, , throttle]] of Object.entries(TOPICS)) {
       send({ op: "subscribe", topic, type, throttle_rate: throttle });
+    }
+    for (const name of Object.keys(frames)) {
+      send({ op: "call_service", id: name, service: "/rosapi/get_param", args: { name: `${NODE}/${name}` } });
     }
   };
   socket.onmessage = (event) => take(JSON.parse(event.data));
@@ -43,6 +47,7 @@ function take(message) {
   if (message.op === "publish") TOPICS[message.topic]?.[1](message.msg);
   else if (message.op === "action_feedback" && message.id === goalId) takeFeedback(message.values);
   else if (message.op === "action_result" && message.id === goalId) takeResult(message);
+  else if (message.op === "service_response" && message.id in frames) frames[message.id] = JSON.parse(message.values.value);
   else if (message.op === "status") show("result", message.msg);
   redraw();
 }
@@ -51,7 +56,7 @@ function take(message) {
 const TOPICS = {
   "/tf": ["tf2_msgs/TFMessage", takeTransforms, 50],
   "/tf_static": ["tf2_msgs/TFMessage", takeTransforms, 0],
-  "/cmd_vel": ["geometry_msgs/Twist", takeCommand, 100],
+  "/cmd_vel": ["", takeCommand, 100],
   "/plan": ["nav_msgs/Path", (path) => { state.plan = path.poses.map((one) => one.pose.position); }, 100],
   "/scan": ["sensor_msgs/LaserScan", (scan) => { state.scan = scan; }, 200],
   [`${NODE}/current_goal`]: ["geometry_msgs/PoseStamped", (goal) => { state.goal = flat(goal.pose.position, goal.pose.orientation); }, 0],
@@ -70,7 +75,7 @@ function takeTransforms(message) {
     const { translation, rotation } = one.transform;
     state.transforms[one.child_frame_id] = { parent: one.header.frame_id, ...flat(translation, rotation) };
   }
-  const robot = poseOf("base_link");
+  const robot = poseOf(frames.robot_frame);
   if (robot) show("pose", `${robot.x.toFixed(2)}, ${robot.y.toFixed(2)} m, ${(robot.yaw * 180 / Math.PI).toFixed(0)}°`);
 }
 
@@ -83,7 +88,8 @@ function poseOf(frame) { // in the frame at the root of the tree, seen from abov
   return state.transforms[frame] ? pose : null;
 }
 
-function takeCommand(twist) {
+function takeCommand(message) { // a Twist or a TwistStamped
+  const twist = message.twist ?? message;
   show("command", `${twist.linear.x.toFixed(2)} m/s, ${twist.angular.z.toFixed(2)} rad/s`);
 }
 
@@ -104,7 +110,7 @@ function takeResult(message) {
 function sendGoal(goal) {
   goalId = `goal:${nextId++}`;
   const orientation = { x: 0, y: 0, z: Math.sin(goal.yaw / 2), w: Math.cos(goal.yaw / 2) };
-  const pose = { header: { frame_id: "map" }, pose: { position: { x: goal.x, y: goal.y, z: groundAt(goal.x, goal.y) }, orientation } };
+  const pose = { header: { frame_id: frames.global_frame }, pose: { position: { x: goal.x, y: goal.y, z: groundAt(goal.x, goal.y) }, orientation } };
   const action = { action: "/navigate_to_pose", action_type: "nav2_msgs/action/NavigateToPose" };
   send({ op: "send_action_goal", id: goalId, ...action, args: { pose }, feedback: true });
   state.goal = goal;
@@ -193,7 +199,7 @@ function draw() {
   drawPlan();
   const aimed = drag?.goal ?? state.goal;
   if (aimed) arrow(aimed, "#c62828", 18);
-  const robot = poseOf("base_link");
+  const robot = poseOf(frames.robot_frame);
   if (robot) arrow(robot, "#1565c0", 22);
 }
 
@@ -249,7 +255,7 @@ canvas.addEventListener("pointermove", (event) => {
 });
 canvas.addEventListener("pointerup", () => {
   if (drag && !drag.moves) {
-    const robot = poseOf("base_link");
+    const robot = poseOf(frames.robot_frame);
     const ahead = robot ? Math.atan2(drag.at.y - robot.y, drag.at.x - robot.x) : 0;
     sendGoal(drag.goal ?? { ...drag.at, yaw: ahead });
   }

@@ -3,8 +3,10 @@
 import json
 import math
 import threading
+from contextlib import suppress
 
 import pytest
+from websockets.exceptions import ConnectionClosed
 
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.config.navigation_parameters import NavigationParameters
@@ -14,6 +16,8 @@ from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.testing.scripted_session import SCRIPTED, MapFreeServer, _spec
 from mbf_abstract.time.clock import WallClock
+from mbf_ros.rosbridge.server import ServerOptions
+from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
 from mbf_ros.rosbridge.topic_robot import TopicRobot
 
 PERIOD = 0.05
@@ -51,6 +55,10 @@ class RemoteRobot:
         self._thread.join(20)
 
     def _run(self):
+        with suppress(ConnectionClosed):
+            self._drive()
+
+    def _drive(self):
         speed = 0.0
         while not self._ended.is_set():
             speed = self._newest_speed(speed)
@@ -105,6 +113,19 @@ def test_when_it_falls_silent_the_goal_ends_and_it_is_stopped(remote, lost):
     result = handle.wait(20)
     assert result.outcome_name == "TF_ERROR" and not result.success
     assert session.navigator.server.runtime.gate.last_command.is_stopped()
+
+
+def test_when_the_server_ends_zero_is_the_last_that_it_hears(session_and_robot, raw):
+    session, driver = session_and_robot
+    with session, serve_session(session, BridgeOptions(ServerOptions(port=0)), driver) as server:
+        robot, driving, known = RemoteRobot(raw(server.port)), threading.Event(), threading.Event()
+        session.navigator.server.runtime.transforms.when_available("map", "base_link", None, lambda _: known.set())
+        assert known.wait(20)
+        handle = session.navigator.send(MoveBaseGoal(Pose.planar(50.0, 0.0)))
+        handle.add_feedback_callback(lambda feedback: driving.set() if feedback.last_command.vx > 0.1 else None)
+        assert driving.wait(20)
+    robot._thread.join(20)
+    assert max(robot.commands) > 0.1 and robot.commands[-1] == 0.0
 
 
 def test_wrong_transforms_are_refused_with_a_text(session_and_robot, serving, raw, ask):

@@ -46,7 +46,7 @@ def test_a_click_is_a_goal_and_cancel_ends_it(chromium, served):
 
     async def visit(page):
         await page.open(address)
-        await page.wait_for("state.ground !== null && poseOf('base_link') !== null")
+        await page.wait_for("state.ground !== null && poseOf(frames.robot_frame) !== null")
         blocked, free, goal = [
             await page.evaluate(f"toPixel({{x: {x}, y: {y}}})") for x, y in ((4, 4.5), (4, 2), (6, 1))
         ]
