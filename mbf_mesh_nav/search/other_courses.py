@@ -17,7 +17,7 @@ import numpy as np
 from mbf_mesh_nav.arrays import Float32Array
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.locate import SurfacePoint
-from mbf_mesh_nav.search.corridor import Corridor, Piece
+from mbf_mesh_nav.search.corridor import Corridor, Piece, joined
 from mbf_mesh_nav.search.leg_search import LegQuery
 
 FEW_FACES = 150
@@ -68,7 +68,7 @@ class OtherCourses:
             if place is None:
                 continue
             tried += 1
-            through = self._corridor.shorten(*_joined(_reversed(self._to_start(place)), self._to_goal(place)))
+            through = self._corridor.shorten(*joined(_reversed(self._to_start(place)), self._to_goal(place)))
             beside[self._mesh_map.faces[through[1]]] = True
             best = min(best, through, key=lambda piece: self._cost(piece, course))
         return min(best, self._corridor.pass_vertices(*best), key=lambda piece: self._cost(piece, course))
@@ -93,10 +93,6 @@ def _reversed(piece: Piece) -> Piece:
     """The path reversed; the face of the segment to a point is that of the segment from the one before it."""
     positions, faces = piece
     return positions[::-1], np.concatenate([faces[-1:], faces[:0:-1]])
-
-
-def _joined(head: Piece, tail: Piece) -> Piece:
-    return np.concatenate([head[0], tail[0][1:]]), np.concatenate([head[1], tail[1][1:]])
 
 
 def reversed_query(query: LegQuery) -> LegQuery:

@@ -1,0 +1,1 @@
+"""Refiners on triangle meshes."""
