@@ -1,13 +1,13 @@
 """The ``move_base`` action: go to a pose by planning, following and recovering, as one explicit state machine.
 
-It is a client of the server's own ``get_path``, ``exe_path`` and ``recovery`` in a slot of its own, and does nothing an
-outside executive could not do. All that happens comes as messages into one mailbox and is handled in order by one
-thread, so nothing can be lost between two callbacks.
+It is a client of the server's own ``get_path``, ``refine_path``, ``exe_path`` and ``recovery`` in a slot of its own,
+and does nothing an outside executive could not do. All that happens comes as messages into one mailbox and is handled
+in order by one thread, so nothing can be lost between two callbacks.
 
 ======================  =====================================================================================
 event                   what follows
 ======================  =====================================================================================
-plan found              follow it; while driving: swap the path without stopping
+plan found              refine it (``plan_refiner``), follow it; while driving: swap the path without stopping
 plan failed             recover (trigger *plan*), else end with the planner's code
 plan failed, driving    ``replan_failed_policy``: keep the old path | stop and end | recover
 path followed           succeeded
@@ -35,6 +35,7 @@ from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.get_path import GetPathAction
 from mbf_abstract.actions.move_base_machine import MoveBaseMachine, SubActions
 from mbf_abstract.actions.recovery import RecoveryAction
+from mbf_abstract.actions.refine_path import RefinePathAction
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.execution.plan_check import arrival_problem, in_global_frame
 from mbf_abstract.execution.runtime import Runtime
@@ -65,16 +66,19 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
         get_path: GetPathAction,
         exe_path: ExePathAction,
         recovery: RecoveryAction,
+        refine_path: RefinePathAction,
     ) -> None:
         super().__init__(runtime)
         self._plugins = plugins
-        self._sub_actions = SubActions(get_path, exe_path, recovery)
+        self._sub_actions = SubActions(get_path, exe_path, recovery, refine_path)
 
     def _check(self, goal: MoveBaseGoal) -> tuple[int, str] | None:
         """Accept only names that are loaded and tolerances that make sense."""
         wanted = [(PluginKind.PLANNER, goal.planner), (PluginKind.CONTROLLER, goal.controller)]
         behaviors = (*(goal.recovery_behaviors or ()), *self.runtime.parameters.escalation_behaviors)
         wanted += [(PluginKind.RECOVERY, name) for name in behaviors]
+        if refiner := self.runtime.parameters.plan_refiner:
+            wanted.append((PluginKind.REFINER, refiner))
         for kind, name in wanted:
             problem = self._plugins.problem(kind, name)
             if problem:

@@ -10,6 +10,7 @@ from mbf_abstract.actions.exe_path import ExePathAction
 from mbf_abstract.actions.get_path import GetPathAction
 from mbf_abstract.actions.move_base_states import MoveBaseState, Trigger
 from mbf_abstract.actions.recovery import RecoveryAction
+from mbf_abstract.actions.refine_path import RefinePathAction
 from mbf_abstract.actions.stuck_monitor import StuckMonitor
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
@@ -25,6 +26,8 @@ from mbf_abstract.goals.goal_types import (
     MoveBaseGoal,
     MoveBaseResult,
     RecoveryGoal,
+    RefinePathGoal,
+    RefinePathResult,
 )
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
@@ -47,6 +50,7 @@ class SubActions(NamedTuple):
     get_path: GetPathAction
     exe_path: ExePathAction
     recovery: RecoveryAction
+    refine_path: RefinePathAction
 
 
 class MoveBaseMachine:
@@ -158,10 +162,18 @@ class MoveBaseMachine:
         )
 
     def _on_plan(self, result: Any) -> End | None:
+        if isinstance(result, RefinePathResult) and result.refined_path is not None:  # the plan itself without success
+            self._follow_path(result.refined_path)
+            return None
         if result.success and result.path is not None:
             if self._trigger is Trigger.PLAN:
                 self._reset_recovery()
-            self._follow_path(result.path)
+            refiner = self._runtime.parameters.plan_refiner
+            if refiner:
+                goal = RefinePathGoal(result.path, refiner, concurrency_slot=SUB_GOAL_SLOT)
+                self._plan = self._send(self._sub_actions.refine_path, goal)
+            else:
+                self._follow_path(result.path)
             return None
         if self._follow is None:
             failure = (result.outcome, result.message)

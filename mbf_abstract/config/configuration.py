@@ -199,7 +199,8 @@ class _Validation:
         parameters = self._parameters()
         for key, kind in PLUGIN_LISTS.items():
             self._plugin_list(key, kind)
-        self._escalation_behaviors()
+        self._listed_names("escalation_behaviors", "recovery_behaviors")
+        self._listed_names("plan_refiner", "refiners")
         validator = SectionValidator(self.document, self.registry, self.findings)
         sections = {key: validator.validate(model, key) for key, model in self.sections.items()}
         self._unknown_keys()
@@ -226,15 +227,16 @@ class _Validation:
             if isinstance(name, str) and self._name_is_free(name, (key, index, "name")) and declared:
                 self._plugin(kind, declared, (key, index))
 
-    def _escalation_behaviors(self) -> None:
-        """Check that each behaviour for a robot that is stuck is one of the recovery behaviours of the file."""
-        names = self.data.get("escalation_behaviors")
-        items = self.data.get("recovery_behaviors")
+    def _listed_names(self, key: str, plugin_list: str) -> None:
+        """Check that the plugins a key names, one or a list of them, are among those of a list of the file."""
+        names, items = self.data.get(key), self.data.get(plugin_list)
         listed = [item["name"] for item in items or () if isinstance(item, dict) and isinstance(item.get("name"), str)]
-        for index, name in enumerate(names if isinstance(names, list) else ()):
-            if isinstance(name, str) and name not in listed:
-                expected = "the name of one of the recovery_behaviors"
-                self._report(("escalation_behaviors", index), expected, repr(name), suggest(name, listed))
+        paths: list[tuple[KeyPath, Any]] = [((key,), names)]
+        if isinstance(names, list):
+            paths = [((key, index), name) for index, name in enumerate(names)]
+        for path, name in paths:
+            if isinstance(name, str) and name and name not in listed:
+                self._report(path, f"the name of one of the {plugin_list}", repr(name), suggest(name, listed))
 
     def _name_is_free(self, name: str, path: KeyPath) -> bool:
         if name in self.lines_of_names:

@@ -39,6 +39,9 @@ class NavigationParameters(ParameterModel):
     refiner_max_retries: int = parameter(
         0, "Further refiner calls after a failure; 0 = none, -1 = unlimited.", ge=-1, le=1000
     )
+    plan_refiner: str = parameter(
+        "", "Refiner that move_base, and a run's reference trees, send every plan through; empty = none."
+    )
     replan_failed_policy: Literal["keep", "stop", "recover"] = parameter(
         "keep", "What move_base does if planning while driving fails: keep the old path, stop, or start recovery."
     )

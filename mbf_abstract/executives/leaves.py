@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from dataclasses import replace
 from typing import Any
 
 from py_trees.common import Status
@@ -22,6 +23,8 @@ from mbf_abstract.goals.goal_types import (
     GetPathResult,
     MoveBaseGoal,
     RecoveryGoal,
+    RefinePathGoal,
+    RefinePathResult,
 )
 from mbf_abstract.goals.handle import AnyGoalHandle
 
@@ -50,12 +53,20 @@ class ActionLeaf(Leaf):
         if not result.success:
             self.mission.fail(result)
 
+    def own_result(self, result: ActionResult) -> ActionResult:
+        """The result of the leaf, made of that of the last goal; here it is that."""
+        return result
+
+    def following_goal(self, result: ActionResult) -> Any:
+        """Return a goal to send after the one with this result, None if that was the last; here it always was."""
+        return None
+
     def initialise(self) -> None:
         """Forget the goal of an earlier entry."""
         self.handle = None
 
     def update(self) -> Status:
-        """Send the goal, return RUNNING until it is final, then whether it succeeded."""
+        """Send the goal, and those that follow it; return RUNNING until all are final, then whether it succeeded."""
         if self.handle is None:
             if self.moves_robot and self.mission.robot_is_stopping:
                 self.feedback_message = "waiting until the robot has stopped"
@@ -65,7 +76,12 @@ class ActionLeaf(Leaf):
         if result is None:
             self.feedback_message = self.handle.status.value
             return Status.RUNNING
+        following = self.following_goal(result)
+        if following is not None:
+            self.handle = self.mission.send(following)
+            return Status.RUNNING
         self.feedback_message = f"{result.outcome_name}: {result.message}"
+        result = self.own_result(result)
         self.take_result(result)
         return Status.SUCCESS if result.success else Status.FAILURE
 
@@ -76,7 +92,7 @@ class ActionLeaf(Leaf):
 
 
 class GetPath(ActionLeaf):
-    """Plan to the mission's target, or to a fixed one; the path becomes the mission's path.
+    """Plan to the mission's target, or to a fixed one; the path, refined or not, becomes the mission's path.
 
     Parameters
     ----------
@@ -88,6 +104,8 @@ class GetPath(ActionLeaf):
         As in ``GetPathGoal`` [m, rad].
     slot : int
         Give a second planner that runs beside the first a slot of its own.
+    refiner : str
+        Refiner that a plan goes through; one that it cannot refine is kept as it is. Empty = none.
     """
 
     moves_robot = False
@@ -100,9 +118,12 @@ class GetPath(ActionLeaf):
         dist_tolerance: float | None = None,
         angle_tolerance: float | None = None,
         slot: int = 0,
+        refiner: str = "",
     ) -> None:
         super().__init__(name)
         self.planner = planner
+        self.refiner = refiner
+        self._plan: GetPathResult | None = None
         self.target = target
         self.dist_tolerance = dist_tolerance
         self.angle_tolerance = angle_tolerance
@@ -117,6 +138,19 @@ class GetPath(ActionLeaf):
             angle_tolerance=self.angle_tolerance,
             concurrency_slot=self.slot,
         )
+
+    def following_goal(self, result: ActionResult) -> Any:
+        """Refine a plan, where a refiner is given."""
+        if not self.refiner or not isinstance(result, GetPathResult) or not result.success or result.path is None:
+            return None
+        self._plan = result
+        return RefinePathGoal(result.path, self.refiner, self.slot)
+
+    def own_result(self, result: ActionResult) -> ActionResult:
+        """The plan, with the refined path where there is one."""
+        if isinstance(result, RefinePathResult) and self._plan is not None:
+            return replace(self._plan, path=result.refined_path)  # without success the path of the plan
+        return result
 
     def take_result(self, result: ActionResult) -> None:
         """Keep the path, or the failure."""
@@ -134,8 +168,10 @@ class UpdatePath(GetPath):
         A path that is longer than this many times the rest of the present one is not taken; waiting is better then.
     """
 
-    def __init__(self, name: str = "update path", planner: str = "", slot: int = 0, longest: float = math.inf) -> None:
-        super().__init__(name, planner, slot=slot)
+    def __init__(
+        self, name: str = "update path", planner: str = "", slot: int = 0, longest: float = math.inf, refiner: str = ""
+    ) -> None:
+        super().__init__(name, planner, slot=slot, refiner=refiner)
         self.longest = longest
 
     def take_result(self, result: ActionResult) -> None:

@@ -19,6 +19,8 @@ from mbf_abstract.navigator import Navigator
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, is_success
 from mbf_abstract.time.clock import Clock
 
+PLANNING = ("get_path", "refine_path")
+"""Actions that do not hold the robot."""
 PATIENCE_CODES = (GetPathOutcome.PAT_EXCEEDED, ExePathOutcome.PAT_EXCEEDED)
 
 
@@ -107,7 +109,7 @@ class MissionContext:
     @property
     def robot_is_stopping(self) -> bool:
         """Whether a canceled goal of this mission still holds the robot."""
-        return any(goal.cancel_requested and goal.action != "get_path" for goal in self.running_goals())
+        return any(goal.cancel_requested and goal.action not in PLANNING for goal in self.running_goals())
 
     @property
     def paused(self) -> bool:

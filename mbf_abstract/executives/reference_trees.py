@@ -52,6 +52,8 @@ class TreeOptions:
     ----------
     planner, second_planner, controller : str
         Empty = the first one loaded.
+    refiner : str
+        Every plan goes through it; empty = none.
     clear, out_of_collision, relax_planner, relax_controller, move_away : str
         Recovery behaviours by what they are for; empty = none.
     check_poses : bool
@@ -77,6 +79,7 @@ class TreeOptions:
     planner: str = ""
     second_planner: str = ""
     controller: str = ""
+    refiner: str = ""
     clear: str = "clear"
     out_of_collision: str = "back_up"
     relax_planner: str = ""
@@ -114,7 +117,9 @@ def navigation_tree(options: TreeOptions = TreeOptions()) -> Behaviour:
 def planning_tree(options: TreeOptions = TreeOptions(), name: str = "planning") -> Behaviour:
     """Make the planning tree (Figure 6): plan, with a memory list of recoveries."""
     recoveries = _recoveries(options.clear, options.relax_planner, options.move_away)
-    return MemRec(name, GetPath(planner=options.planner), recoveries, give_up_on=BEYOND_RECOVERY)
+    return MemRec(
+        name, GetPath(planner=options.planner, refiner=options.refiner), recoveries, give_up_on=BEYOND_RECOVERY
+    )
 
 
 def control_tree(options: TreeOptions = TreeOptions()) -> Behaviour:
@@ -153,7 +158,7 @@ def _drive(options: TreeOptions) -> Behaviour:
 
 def _second_planner(options: TreeOptions) -> Behaviour:
     planner = options.second_planner or options.planner
-    update = UpdatePath("update path", planner, SECOND_PLANNER_SLOT, options.longest_update)
+    update = UpdatePath("update path", planner, SECOND_PLANNER_SLOT, options.longest_update, options.refiner)
     if options.second_planner_look_ahead <= 0.0:
         return update
     blocked = PathBlocked("path blocked?", options.second_planner_look_ahead)

@@ -99,7 +99,9 @@ class AbstractNavigationServer(PluginHost):
         self.exe_path = ExePathAction(self.runtime, self.plugins)
         self.recovery = RecoveryAction(self.runtime, self.plugins)
         self.refine_path = RefinePathAction(self.runtime, self.plugins)
-        self.move_base = MoveBaseAction(self.runtime, self.plugins, self.get_path, self.exe_path, self.recovery)
+        self.move_base = MoveBaseAction(
+            self.runtime, self.plugins, self.get_path, self.exe_path, self.recovery, self.refine_path
+        )
         self.follow_waypoints = FollowWaypointsAction(self.runtime, self.move_base)
 
     # --------------------------------------------------------------------------- hooks for a map's server

@@ -129,6 +129,7 @@ class TreeDrive:
         return TreeOptions(
             planner=planner,
             controller=controller,
+            refiner=self._navigator.server.runtime.parameters.plan_refiner,
             clear=loaded("clear"),
             out_of_collision=loaded("back_up"),
             relax_controller=loaded("relax"),

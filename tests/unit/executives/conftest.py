@@ -1,5 +1,7 @@
 """A session for executives, and tree nodes that a test scripts."""
 
+from types import MappingProxyType
+
 import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -22,9 +24,11 @@ def make_session():
     """Make sessions with three recoveries; all are closed at the end of the test."""
     sessions = []
 
-    def make(**parameters):
+    def make(plugins=MappingProxyType({}), **parameters):
         sessions.append(
-            ScriptedSession(PLUGINS, **{"planner_max_retries": 0, "controller_max_retries": 0, **parameters})
+            ScriptedSession(
+                {**PLUGINS, **plugins}, **{"planner_max_retries": 0, "controller_max_retries": 0, **parameters}
+            )
         )
         return sessions[-1]
 

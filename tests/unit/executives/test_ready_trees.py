@@ -8,10 +8,10 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.executives.reference_trees import TreeOptions, control_tree, navigation_tree, planning_tree
 from mbf_abstract.executives.tree_executive import TreeExecutive
 from mbf_abstract.geometry import Pose
-from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
-from mbf_abstract.plugins import ControlResult, PlanResult
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RefinePathOutcome
+from mbf_abstract.plugins import ControlResult, PlanResult, RefineResult
 from mbf_abstract.testing.faulty import drive
-from mbf_abstract.testing.scripted import straight_plan
+from mbf_abstract.testing.scripted import ScriptedRefiner, straight_plan
 
 GOAL = Pose.planar(2.0, 0.0)
 NO_PATH = PlanResult(GetPathOutcome.NO_PATH_FOUND, "walled in")
@@ -235,3 +235,30 @@ def test_the_running_node_is_written_to_the_event_log(make_session):
     run(session, navigation_tree(OPTIONS))
     at_work = [event.data["new"] for event in session.recorded(EventKind.STATE_CHANGED) if event.source == "tree"]
     assert at_work[:2] == ["get path", "follow path"]
+
+
+def test_every_plan_of_a_tree_goes_through_its_refiner(make_session):
+    session = make_session(plugins={"refiner": ScriptedRefiner})
+    options = replace(OPTIONS, refiner="refiner", second_planner_pause=1.0)
+    assert run(session, navigation_tree(options)).success
+    assert len(session.refiner.requests) == plans(session) > 1
+
+
+def test_a_plan_that_cannot_be_refined_is_driven_as_it_is(make_session, recoveries):
+    session = make_session(plugins={"refiner": ScriptedRefiner})
+    session.refiner.play(RefineResult(RefinePathOutcome.FAILURE, "too rough"))
+    assert run(session, navigation_tree(replace(OPTIONS, refiner="refiner"))).success
+    assert (len(session.refiner.requests), recoveries(session)) == (1, [])
+
+
+def test_a_tree_that_is_canceled_while_a_plan_is_refined_drives_nothing(make_session):
+    session = make_session(plugins={"refiner": ScriptedRefiner})
+    executive = TreeExecutive(navigation_tree(replace(OPTIONS, refiner="refiner")), session.navigator)
+
+    def cancel(path):
+        executive.cancel("enough")
+        return RefineResult(0, "", path)
+
+    session.refiner.play(cancel)
+    assert not executive.run(GOAL).success
+    assert session.controller.requests == []

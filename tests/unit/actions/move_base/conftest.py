@@ -43,9 +43,9 @@ def make_session():
     """Make any number of sessions; ``retries`` holds for planner and controller, the server's defaults without it."""
     with ExitStack() as stack:
 
-        def make(retries=None, **parameters):
+        def make(retries=None, plugins=PLUGINS, **parameters):
             if retries is not None:
                 parameters |= {"planner_max_retries": retries, "controller_max_retries": retries}
-            return stack.enter_context(MoveBaseSession(PLUGINS, **parameters))
+            return stack.enter_context(MoveBaseSession(plugins, **parameters))
 
         yield make
