@@ -25,13 +25,14 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+import yaml
 from outdoor_terrains import FRESH_SEED, LEVELS, SCALES, has_route, terrains
 
 from mbf_abstract.geometry import Path, quaternion_from_yaw
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_mesh_nav.plugins import MeshPlanner
-from terrain.scenarios.scenario import Scenario
+from terrain.scenarios.scenario import SHIPPED, Scenario
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.sweeps.log import SweepLog
 from terrain.sweeps.sweep import Job, SweepRun, hash_of, run_once
@@ -46,6 +47,13 @@ SLOPE_ONLY = {  # what mesh_navigation's steepness and inflation layers know: sl
     "{name: inflation, type: inflation, inputs: [ground]}, "
     "{name: safe, type: max_combination, inputs: [inflation, steepness]}]",
 }
+_GRAPH = yaml.safe_load((SHIPPED / "config" / "outdoor_graph_mesh.yaml").read_text())
+GRAPH = {  # the default of ``mbf run outdoor``: A* over slope, roughness and steps, tilt as the limit, string pulling
+    "planner": "astar",
+    "refiners": json.dumps(_GRAPH["refiners"]),
+    "plan_refiner": _GRAPH["plan_refiner"],
+    **{f"mesh_map.{key}": json.dumps(value) for key, value in _GRAPH["mesh_map"].items() if key != "mesh_file"},
+}
 FLAT = {  # the best of five variants of lethal slope, inflation and collision check on the seeds from 1000
     "backend": "costmap",
     "planner": "astar",
@@ -54,6 +62,7 @@ FLAT = {  # the best of five variants of lethal slope, inflation and collision c
     "pursuit.collision_check": "false",
 }
 METHODS = {
+    "mesh vertex graph": GRAPH,
     "mesh cvp": {"planner": "cvp"},
     "mesh heading-aware": {"planner": "heading_astar", "mesh_map.tilt.needed_headings": "0.0"},
     "mesh dijkstra by slope": SLOPE_ONLY,

@@ -41,21 +41,28 @@ planners:
   - {{name: dijkstra, type: dijkstra}}
   - {{name: astar, type: astar}}
   - {{name: cvp, type: cvp}}
+refiners:
+  - {{name: string_pulling, type: string_pulling}}
+plan_refiner: string_pulling
 mesh_map:
   mesh_file: {file}
   repair: [duplicate_vertices, zero_area, duplicate_faces, non_manifold, non_manifold_vertices, unreferenced]
   inscribed_radius: 0.3
   edge_cost_factor: 1.0
-  default_layer: inflation
+  default_layer: safe
   layers:
     - {{name: border, type: border}}
     - {{name: steepness, type: steepness}}
     - {{name: height_diff, type: height_diff}}
     - {{name: lethal, type: max_combination, inputs: [border, steepness, height_diff]}}
     - {{name: inflation, type: inflation, inputs: [lethal]}}
+    - {{name: roughness, type: roughness}}
+    - {{name: effort, type: weighted_sum, inputs: [steepness, roughness, height_diff]}}
+    - {{name: safe, type: max_combination, inputs: [inflation, effort]}}
   border: {{threshold: 0.5}}
-  steepness: {{threshold: 0.7}}
-  height_diff: {{threshold: 0.2, height_limit: 1.0}}
+  steepness: {{threshold: 0.7, combination_weight: 0.9}}
+  height_diff: {{threshold: 0.2, height_limit: 1.0, combination_weight: 0.5}}
+  roughness: {{threshold: 3.0, combination_weight: 0.6}}
   inflation: {{inscribed_radius: 0.3, inflation_radius: 0.6, lethal_value: .inf}}
 """
 

@@ -92,6 +92,7 @@ class Session(SimulationSession):
         self._scans = 0
         super().__init__(simulation, self.localization, config_file, options, delay)
         self.navigator.server.get_path.listeners.append(self._record_plan)
+        self.navigator.server.refine_path.listeners.append(self._record_refined_plan)
         simulation.on_incident.append(self._report_incident)
         for incident in simulation.incidents:  # of the first instant
             self._report_incident(incident)
@@ -152,6 +153,11 @@ class Session(SimulationSession):
         self._scans += 1
         if self._scans % SCANS_PER_RECORDED == 1:
             self.recorder.scan(scan.stamp, scan.points)
+
+    def _record_refined_plan(self, handle: AnyGoalHandle) -> None:
+        path = handle.result.refined_path if handle.result is not None else None
+        if path is not None:
+            self.recorder.path(self.simulation.time, path.positions)
 
     def _record_plan(self, handle: AnyGoalHandle) -> None:
         path = handle.result.path if handle.result is not None else None

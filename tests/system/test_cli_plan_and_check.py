@@ -92,6 +92,15 @@ def test_a_plan_on_a_bare_mesh_takes_the_height_of_the_ground(hill, tmp_path):
     assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_plan_on_a_bare_mesh_goes_straight_where_nothing_costs(tmp_path):
+    vertices, faces = heightfield_mesh(np.zeros((36, 36)), 0.2, 0.2)
+    trimesh.Trimesh(vertices, faces, process=False).export(tmp_path / "plain.ply")
+    result = mbf("plan", tmp_path / "plain.ply", "--start", 1.5, 1.5, "--goal", 5.3, 3.1, "--json")
+    answer = json.loads(result.stdout)
+    assert (result.exit_code, answer["outcome_name"]) == (0, "SUCCESS"), answer
+    assert answer["length_m"] == pytest.approx(np.hypot(3.8, 1.6), abs=1e-4)
+
+
 @pytest.fixture(scope="module")
 def two_storeys(tmp_path_factory):
     """A mesh file of a floor with a hole of 2 m x 2 m, and a roof above half of it."""
