@@ -25,7 +25,12 @@ def _group() -> None:
 
 
 def build(
-    inputs: list[Path] = typer.Argument(..., help="Point clouds (PLY, PCD, LAS, XYZ, ...), or meshes to sample."),
+    inputs: list[Path] | None = typer.Argument(
+        None, help="Point clouds (PLY, PCD, LAS, XYZ, ...), or meshes to sample."
+    ),
+    from_run: list[Path] = typer.Option(
+        [], "--from-run", help="Folder of a run: what its range sensors hit. May be given several times."
+    ),
     out: Path = typer.Option(..., "--out", help="The map, a .ply file; replaced when the new one is complete."),
     up: str = typer.Option("", "--up", help="Axis of the files that points up: x, y or z; else as they state, or z."),
     scale: float = typer.Option(
@@ -55,9 +60,10 @@ def build(
         parameters = SurfaceParameters(
             cell=cell, clearance=clearance, step_height=step_height, hole_width=hole_width, least_area=least_area
         )
+        files = [*(inputs or ()), *from_run]
         with waiting("reading") as say:
             facts, surface, cloud = build_map(
-                inputs,
+                files,
                 out,
                 parameters,
                 up_axis=up,
@@ -70,7 +76,7 @@ def build(
                 from mbf_mesh_nav.building.report import write_report
 
                 say("planning between the farthest places")
-                plan = write_report(report, inputs, out, facts, surface, cloud)
+                plan = write_report(report, files, out, facts, surface, cloud)
                 notes = (*cloud.notes, f"test plan by {plan.text}")
             else:
                 notes = cloud.notes

@@ -26,17 +26,23 @@ def without_holes(patches: SurfacePatches, widest: float, rise: float, clearance
     clearance : float
         Free height [m] below and above a filling; where points are nearer, something stands and nothing is filled.
     """
-    passes = round(0.5 * widest / patches.grid.cell)
-    for _ in range(passes):
+    for reach in range(
+        1, round(0.5 * widest / patches.grid.cell) + 1
+    ):  # small ones first, so that a wider limit only adds
+        patches = _closed(patches, reach, rise, clearance)
+    return patches
+
+
+def _closed(patches: SurfacePatches, reach: int, rise: float, clearance: float) -> SurfacePatches:
+    """Copy that has grown by ``reach`` cells and shrunk by as many again, as far as it had grown."""
+    is_old = np.ones(len(patches.cells), dtype=np.bool_)
+    for _ in range(reach):
         cells, heights = _grown(patches, rise, clearance)
-        if not len(cells):
-            break
-        patches = patches.with_fillings(cells, heights)
-    for _ in range(passes):
-        at_boundary = patches.is_filled & (patches.links(rise) < 0).any(axis=1)
-        if not at_boundary.any():
-            break
-        patches = patches.without(at_boundary)
+        patches, order = patches.with_fillings(cells, heights)
+        is_old = np.append(is_old, np.zeros(len(cells), dtype=np.bool_))[order]
+    for _ in range(reach):
+        at_boundary = ~is_old & (patches.links(rise) < 0).any(axis=1)
+        patches, is_old = patches.without(at_boundary), is_old[~at_boundary]
     return patches
 
 

@@ -119,8 +119,11 @@ class SurfacePatches:
         """Copy without the patches of a mask (P,)."""
         return self._taken(np.flatnonzero(~dropped))
 
-    def with_fillings(self, cells: IntArray, heights: FloatArray) -> SurfacePatches:
-        """Copy with patches of no points at ``heights`` (n,) [m] of ``cells`` (n,)."""
+    def with_fillings(self, cells: IntArray, heights: FloatArray) -> tuple[SurfacePatches, NDArray[np.int64]]:
+        """Copy with patches of no points at ``heights`` (n,) [m] of ``cells`` (n,), and its order (P + n,).
+
+        The order has numbers of the old patches, and from P on of the new ones.
+        """
         none, count = np.zeros(len(cells), dtype=np.int64), np.zeros(len(cells), dtype=np.int32)
         joined = replace(
             self,
@@ -133,7 +136,8 @@ class SurfacePatches:
             heights=np.concatenate([self.heights, heights]),
             standing=np.concatenate([self.standing, count]),
         )
-        return joined._taken(np.lexsort((joined.heights, joined.cells)))
+        order = np.lexsort((joined.heights, joined.cells))
+        return joined._taken(order), order
 
     def _taken(self, chosen: NDArray[np.int64]) -> SurfacePatches:
         return SurfacePatches(

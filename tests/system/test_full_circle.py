@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from mbf_mesh_nav.building.map_build import build_map
+from mbf_mesh_nav.building.surface import SurfaceParameters
+from mbf_mesh_nav.mesh.mesh_report import MeshError
 from terrain.scenarios.environment import FOREST_STREAM, WORLD_STREAM
 from terrain.scenarios.obstacles import Forest
 from terrain.scenarios.places import coordinates
@@ -54,3 +56,31 @@ def test_a_robot_without_eyes_gets_through_posts_on_a_map_built_from_a_scan(scen
     assert "collision" not in result.metrics["incidents"]
     on_the_bare_ground = drive(scenario, tmp_path / "without", "")
     assert "collision" in on_the_bare_ground.metrics["incidents"]  # so the map is what kept it off the posts
+
+
+def test_a_map_is_built_from_a_run_s_own_scans(tmp_path):
+    forest = load_scenario("post_forest").model_copy(update={"physics": "kinematic"})
+    run_scenario(forest, RunOptions(tmp_path / "run", seed=SEED))
+    facts, surface, _ = build_map([tmp_path / "run"], tmp_path / "map.ply", SurfaceParameters(hole_width=4.0))
+    clear = coordinates((forest.start, *forest.goals))
+    ground = forest.world.heightfield(np.random.default_rng([SEED, WORLD_STREAM]), clear)
+    errors = surface.vertices[:, 2] - ground.height_at(surface.vertices[:, 0], surface.vertices[:, 1])
+    assert np.sqrt(np.nanmean(errors * errors)) < 0.03
+    assert facts.area > 250.0
+    (seen_posts,) = np.nonzero(surface.is_obstacle)
+    posts = forest.forests[0].posts(np.random.default_rng([SEED, FOREST_STREAM]), clear)
+    places = np.array([[post.x, post.y] for post in posts])
+    distances = np.linalg.norm(surface.patches.centres[seen_posts][:, None] - places[None], axis=2)
+    assert distances.min(axis=1).max() < 0.75  # nothing else is an obstacle
+    assert (distances.min(axis=0) < 0.75).mean() > 0.7  # and most posts are
+
+
+def test_a_folder_without_a_run_and_a_run_without_scans_are_refused(tmp_path):
+    with pytest.raises(MeshError, match=r"cannot be read as a run: .*recording.npz: is no readable recording"):
+        build_map([tmp_path], tmp_path / "map.ply")
+    np.savez(tmp_path / "recording.npz", scans=np.zeros((0, 3)))
+    with pytest.raises(MeshError, match="no range sensor hit anything in this run"):
+        build_map([tmp_path], tmp_path / "map.ply")
+    np.savez(tmp_path / "recording.npz", scans=np.zeros((100, 3)))
+    with pytest.raises(MeshError, match="its arrays take 2400 bytes, the limit is 1200"):
+        build_map([tmp_path], tmp_path / "map.ply", max_points=50)

@@ -18,6 +18,7 @@ from mbf_mesh_nav.building.clouds.las_points import read_las_points
 from mbf_mesh_nav.building.clouds.mesh_points import MESH_ENDINGS, read_mesh_points
 from mbf_mesh_nav.building.clouds.pcd_points import read_pcd_points
 from mbf_mesh_nav.building.clouds.ply_points import has_faces, read_ply_points
+from mbf_mesh_nav.building.clouds.run_points import read_run_points
 from mbf_mesh_nav.building.clouds.stored_points import StoredPoints, refuse_count
 from mbf_mesh_nav.building.clouds.text_points import read_text_points
 from mbf_mesh_nav.files.elevation_files import elevation_readers
@@ -77,7 +78,7 @@ def read_clouds(
     drop_invalid: bool = False,
     on_file: Callable[[Path], None] = lambda file: None,
 ) -> PointCloud:
-    """Read one or several files as one cloud; their order does not matter for its coordinates.
+    """Read one or several files, or folders of runs, as one cloud; their order does not matter for its coordinates.
 
     Parameters
     ----------
@@ -123,7 +124,9 @@ def read_clouds(
 
 
 def _read(file: Path, max_points: int, up_axis: str, unit: float) -> tuple[StoredPoints, bool]:
-    """Contents of a file, and whether they are in metres with z up already."""
+    """Contents of a file, or of the folder of a run, and whether they are in metres with z up already."""
+    if file.is_dir():
+        return read_run_points(file, max_points), True
     ending = file.suffix.lower()
     if ending in elevation_readers():
         raise MeshError(str(file), ["an elevation model is a map as it is: mbf plan and mesh_map.mesh_file read it"])

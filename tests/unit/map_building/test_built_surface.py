@@ -109,6 +109,18 @@ def test_holes_are_filled_up_to_the_width_and_stay_where_they_are_wider(rng):
     np.testing.assert_array_equal(filled.vertices.min(axis=0)[:2], open_.vertices.min(axis=0)[:2])
 
 
+def test_a_wider_limit_never_fills_less(rng):
+    points = ground(rng, hills, size=(10.0, 8.0))
+    for x, y, radius in rng.uniform((0.0, 0.0, 0.2), (10.0, 8.0, 1.2), (18, 3)).tolist():
+        points = points[np.hypot(points[:, 0] - x, points[:, 1] - y) > radius]
+    places = [set()]
+    for width in (0.0, 0.5, 1.0, 1.5, 2.0, 3.0):
+        surface = build_surface(points, SurfaceParameters(cell=0.25, hole_width=width))
+        places.append(set(map(tuple, surface.vertices[:, :2].tolist())))
+        assert places[-2] <= places[-1]
+    assert len(places[-1]) > 1.1 * len(places[1])
+
+
 def test_nothing_is_filled_through_a_wall_on_an_upper_floor(rng):
     floors = [rectangle(rng, (0.0, 12.0), (0.0, 8.0), (z, z)) for z in (0.0, 3.0)]
     wall = np.column_stack([rng.uniform(5.95, 6.05, 6000), rng.uniform(0.0, 8.0, 6000), rng.uniform(0.0, 5.5, 6000)])
