@@ -50,9 +50,9 @@ SLOPE_ONLY = {  # what mesh_navigation's steepness and inflation layers know: sl
 _GRAPH = yaml.safe_load((SHIPPED / "config" / "outdoor_graph_mesh.yaml").read_text())
 GRAPH = {  # the default of ``mbf run outdoor``: A* over slope, roughness and steps, tilt as the limit, string pulling
     "planner": "astar",
-    "refiners": json.dumps(_GRAPH["refiners"]),
+    "refiners": yaml.safe_dump(_GRAPH["refiners"]),
     "plan_refiner": _GRAPH["plan_refiner"],
-    **{f"mesh_map.{key}": json.dumps(value) for key, value in _GRAPH["mesh_map"].items() if key != "mesh_file"},
+    **{f"mesh_map.{key}": yaml.safe_dump(value) for key, value in _GRAPH["mesh_map"].items() if key != "mesh_file"},
 }
 FLAT = {  # the best of five variants of lethal slope, inflation and collision check on the seeds from 1000
     "backend": "costmap",
