@@ -4,14 +4,15 @@
     python docs/generate_reference.py --check    write nothing; exit code 1 and the names of pages that are out of date
 
 Written are ``configuration.md`` (every parameter of every model), the example plugins (what ``mbf new`` writes), the
-listings in the guides (the text of the example files) and the table of ``faults_and_promises.md`` (the docstrings of
-``tests/faults``).
+listings in the guides (the text of the example files), the table of metrics in ``verdict.md`` and the table of
+``faults_and_promises.md`` (the docstrings of ``tests/faults``).
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import inspect
 import re
 import sys
 from pathlib import Path
@@ -19,6 +20,7 @@ from pathlib import Path
 from parameter_tables import configuration_page
 
 from mbf_abstract.commands.new import plugin_source
+from terrain.recording.metrics import Metrics
 
 DOCS = Path(__file__).resolve().parent
 REPOSITORY = DOCS.parent
@@ -36,6 +38,8 @@ EXAMPLES = {
 
 LISTING = re.compile(r"(<!-- listing: (?P<file>\S+) -->\n)(?:```python\n.*?\n```\n)?", re.DOTALL)
 TABLE = re.compile(r"(<!-- table: tests/faults -->\n)(?:\|.*\n)*")
+METRICS = re.compile(r"(<!-- table: metrics -->\n)(?:\|.*\n)*")
+METRIC = re.compile(r"^(?P<names>\w[\w, ]*) : .*\n(?P<text>(?: {4}.*\n?)+)", re.MULTILINE)
 FAULT_ROW = re.compile(r"Fault table, rows? (?P<rows>[\d, and]+)[^:]*: (?P<text>.+)", re.DOTALL)
 
 
@@ -47,8 +51,19 @@ def generate() -> dict[Path, str]:
     for page in sorted(DOCS.glob("*.md")):
         if page not in texts:
             text = LISTING.sub(lambda match: _listing(match, texts), page.read_text(encoding="utf-8"))
-            texts[page] = TABLE.sub(lambda match: match[1] + fault_table(), text)
+            text = TABLE.sub(lambda match: match[1] + fault_table(), text)
+            texts[page] = METRICS.sub(lambda match: match[1] + metrics_table(), text)
     return texts
+
+
+def metrics_table() -> str:
+    """Return a table of the metrics that a recording holds, from the docstring of their model."""
+    text = inspect.getdoc(Metrics) or ""
+    rows = ["| name | meaning |", "|---|---|"]
+    for match in METRIC.finditer(text.partition("----------\n")[2]):
+        names = ", ".join(f"`{name}`" for name in match["names"].split(", "))
+        rows.append(f"| {names} | {' '.join(match['text'].replace('``', '`').split())} |")
+    return "\n".join(rows) + "\n"
 
 
 def _listing(match: re.Match[str], texts: dict[Path, str]) -> str:

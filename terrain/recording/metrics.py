@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import arcsin, arctan2, norm
+from terrain.recording.clearance import clearances
 from terrain.recording.recording import Recording
 
 STANDING_SPEED = 0.02  # m/s; slower counts as standing
@@ -28,8 +30,11 @@ class Metrics:
     ----------
     time_s : float
         Simulated length of the run.
-    path_length_m, planned_length_m : float
-        Length of the driven track and of the first plan, both in 3D.
+    path_length_m : float
+        Length of the driven track, in 3D.
+    planned_length_m : float
+        Length of the plans in 3D, each counted as far as it was followed: to where the next one begins, the last one to
+        its end.
     mean_speed : float
         Track length by time [m/s].
     climb_m : float
@@ -47,6 +52,15 @@ class Metrics:
         recovery runs, as the event log has them.
     gate_stops, faults : int
         Stops made by the velocity gate and not by a plugin; plugin faults.
+    clearance_min_m, clearance_median_m : float or None
+        Distance of the robot's outline from the nearest wall, obstacle, person, door or other robot, as seen from
+        above; None where there is none.
+    planning_time_median_s, planning_time_p95_s : float or None
+        Time of the run's clock that planners took; in simulated time a call takes none, its wall time is in
+        ``timing.json``.
+    mean_command_acceleration, mean_command_yaw_acceleration : float
+        Control effort: mean magnitude of the change of the commanded speed [m/s^2] and yaw rate [rad/s^2], from one
+        sample to the next.
     """
 
     scenario: str
@@ -70,6 +84,12 @@ class Metrics:
     recoveries: int
     gate_stops: int
     faults: int
+    clearance_min_m: float | None
+    clearance_median_m: float | None
+    planning_time_median_s: float | None
+    planning_time_p95_s: float | None
+    mean_command_acceleration: float
+    mean_command_yaw_acceleration: float
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values, numbers rounded to micrometres and microdegrees."""
@@ -84,12 +104,15 @@ def measure(recording: Recording) -> Metrics:
     errors = cross_track_errors(recording)
     errors = errors[np.isfinite(errors)]
     events = recording.events
+    planning = planning_times(events)
+    kept = clearances(recording)
+    kept = kept[np.isfinite(kept)]
     return Metrics(
         scenario=recording.scenario,
         backend=recording.backend,
         time_s=recording.duration,
         path_length_m=length,
-        planned_length_m=_length(recording.paths[0][1]) if recording.paths else 0.0,
+        planned_length_m=followed_length([path for _, path in recording.paths]),
         mean_speed=length / recording.duration if recording.duration > 0.0 else 0.0,
         climb_m=float(np.maximum(steps[:, 2], 0.0).sum()),
         max_tilt_deg=_largest_degrees(recording.tilt),
@@ -106,6 +129,12 @@ def measure(recording: Recording) -> Metrics:
         recoveries=_count(events, EventKind.RECOVERY),
         gate_stops=sum(e.kind is EventKind.ROBOT_STOPPED and e.source == "velocity_gate" for e in events),
         faults=_count(events, EventKind.FAULT),
+        clearance_min_m=float(kept.min()) if kept.size else None,
+        clearance_median_m=float(np.median(kept)) if kept.size else None,
+        planning_time_median_s=float(np.percentile(planning, 50.0)) if planning else None,
+        planning_time_p95_s=float(np.percentile(planning, 95.0)) if planning else None,
+        mean_command_acceleration=mean_change(recording.times, recording.commands[:, 0]),
+        mean_command_yaw_acceleration=mean_change(recording.times, recording.commands[:, 2]),
     )
 
 
@@ -120,6 +149,45 @@ def count_stops(twists: FloatArray) -> int:
     """How often motion (n, 3) ends: changes from moving to standing, the last one at the goal included."""
     moving = (np.hypot(twists[:, 0], twists[:, 1]) > STANDING_SPEED) | (np.abs(twists[:, 2]) > STANDING_YAW_RATE)
     return int(np.count_nonzero(moving[:-1] & ~moving[1:]))
+
+
+def mean_change(times: FloatArray, values: FloatArray) -> float:
+    """Mean magnitude of the change per second of ``values`` (n,) sampled at ``times`` (n,) [s]."""
+    passed = np.diff(times)
+    changes = np.abs(np.diff(values))[passed > 0.0] / passed[passed > 0.0]
+    return float(changes.mean()) if changes.size else 0.0
+
+
+def planning_times(events: tuple[Event, ...]) -> list[float]:
+    """How long [s] each call of a planner took that has ended, by the events' clock."""
+    began: dict[tuple[str, object], float] = {}
+    times = []
+    for event in events:
+        if event.data.get("method") == "make_plan":
+            call = (event.source, event.data.get("goal_id"))
+            if event.kind is EventKind.PLUGIN_CALL_STARTED:
+                began[call] = event.time
+            elif event.kind is EventKind.PLUGIN_CALL_ENDED and call in began:
+                times.append(event.time - began.pop(call))
+    return times
+
+
+def followed_length(plans: list[FloatArray]) -> float:
+    """Length [m] of plans (m, 3), each to where the next one begins, the last one to its end."""
+    plans = [plan for plan in plans if len(plan)]
+    lengths = [_length_until(plan, following[0]) for plan, following in pairwise(plans)]
+    return sum(lengths) + (_length(plans[-1]) if plans else 0.0)
+
+
+def _length_until(line: FloatArray, point: FloatArray) -> float:
+    """Length [m] of a polyline (m, 3) up to its place nearest to a point (3,)."""
+    starts, pieces = line[:-1], np.diff(line, axis=0)
+    if len(pieces) == 0:
+        return 0.0
+    lengths = norm(pieces)
+    share = np.clip(np.sum((point - starts) * pieces, axis=1) / np.maximum(lengths**2, 1e-12), 0.0, 1.0)
+    nearest = int(np.argmin(norm(starts + share[:, None] * pieces - point)))
+    return float(lengths[:nearest].sum() + share[nearest] * lengths[nearest])
 
 
 def cross_track_errors(recording: Recording) -> FloatArray:

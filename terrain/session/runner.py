@@ -23,6 +23,7 @@ from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.time.clock import wall_seconds
 from terrain.physics.incidents import IncidentKind
 from terrain.recording.metrics import measure
+from terrain.recording.planning_times import PlanningTimes
 from terrain.recording.recording import Recording
 from terrain.recording.run_folder import RecordingParts, clear_results, has_parts
 from terrain.recording.verdict import Verdict, judge
@@ -111,7 +112,8 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     clear_results(options.folder)
     write_versions(options.folder)
     log = JsonLinesSink(options.folder / "events.jsonl")
-    session = Session(scenario, replace(options, sinks=(*options.sinks, log)))
+    planning = PlanningTimes()
+    session = Session(scenario, replace(options, sinks=(*options.sinks, log, planning)))
     parts = RecordingParts(
         options.folder, session.recorder, session.events, session.memory.events, lambda: session.loop.origin
     )  # fmt: skip
@@ -130,9 +132,13 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     recording = session.recorder.finish(events=session.memory.events, began=session.loop.origin)
     metrics, result = _measure(recording, session, sequence), sequence.last_result or NO_GOALS
     if options.geodesic and result.success:
-        metrics |= _compare_with_geodesic(recording, session.world)
+        metrics |= _compare_with_geodesic(recording, session.world, metrics["path_length_m"])
     recording = replace(recording, verdict=judge(result, session.scenario.limits, metrics))
-    metrics = _write_numbers(recording, metrics, wall_time, options.folder)
+    if options.geodesic:
+        metrics["spl"] = success_by_path_length(recording.verdict.success, metrics)
+    factor = recording.duration / wall_time if wall_time > 0.0 else 0.0
+    timing = {"wall_time_s": round(wall_time, 3), "real_time_factor": round(factor, 2), **planning.to_json()}
+    metrics = _write_numbers(recording, metrics, timing, options.folder)
     parts.remove()
     for problem in options.write_views(options.folder, recording, metrics):
         options.on_note(problem)
@@ -191,23 +197,33 @@ def _measure(recording: Recording, session: Session, sequence: GoalSequence) -> 
     return metrics
 
 
-def _write_numbers(recording: Recording, measured: Mapping[str, Any], wall_time: float, folder: Path) -> Metrics:
+def _write_numbers(
+    recording: Recording, measured: Mapping[str, Any], timing: Mapping[str, Any], folder: Path
+) -> Metrics:
     """Write metrics.json, timing.json and the recording; returns the contents of the first two."""
     metrics = {**measured, **recording.verdict.to_json()}
-    factor = recording.duration / wall_time if wall_time > 0.0 else 0.0
-    timing = {"wall_time_s": round(wall_time, 3), "real_time_factor": round(factor, 2)}
     for name, numbers in (("metrics.json", metrics), ("timing.json", timing)):
         write_whole(folder / name, json.dumps(numbers, indent=2, sort_keys=True) + "\n")
     recording.save(folder / "recording.npz")
     return {**metrics, **timing}
 
 
-def _compare_with_geodesic(recording: Recording, world: ScenarioWorld) -> dict[str, float]:
+def success_by_path_length(success: bool, metrics: Mapping[str, Any]) -> float | None:
+    """Success weighted by path length (SPL): the shortest path by the longer of it and the track; 0 for no success.
+
+    Anderson et al., On Evaluation of Embodied Navigation Agents, 2018. None where the shortest path is not known.
+    """
+    if not success:
+        return 0.0
+    shortest = metrics.get("geodesic_m")
+    return None if shortest is None else round(shortest / max(shortest, metrics["path_length_m"]), 6)
+
+
+def _compare_with_geodesic(recording: Recording, world: ScenarioWorld, driven: float) -> dict[str, float]:
     """Return the shortest path over all goals to where the robot stopped, and the ratio of the driven path to it."""
     goals = [goal.position for goal in recording.goals[:-1]]
     stops = [recording.start.position, *goals, tuple(recording.poses[-1, :3].tolist())]
     shortest = geodesic_length(world.open_surface(), stops)
     if not 0.0 < shortest < float("inf"):
         return {}
-    driven = measure(recording).path_length_m
     return {"geodesic_m": round(shortest, 6), "path_over_geodesic": round(driven / shortest, 6)}

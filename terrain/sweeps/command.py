@@ -64,9 +64,9 @@ def sweep(
             rows = [log.rows[run.key(hashed)] for run in planned]
         files = write_tables(f"{loaded.name}: {loaded.proves}", rows, out)
         summary = summarise(rows)
-        table = Table(*summary[0])
-        for line in summary:
-            table.add_row(*(escape(well_formed(str(value))) for value in line.values()))
+        table = Table("", *(escape(well_formed(line["variant"])) for line in summary))
+        for name in list(summary[0])[1:]:  # a row for each number, so that it fits a narrow terminal
+            table.add_row(name.replace("_", " "), *(str(line[name]) for line in summary))
         console.print(table)
         console.print("results in " + ", ".join(map(str, files)), soft_wrap=True, markup=False)
 

@@ -26,6 +26,7 @@ COLUMNS = (
     "planned_length_m",
     "geodesic_m",
     "path_over_geodesic",
+    "spl",
     "max_roll_deg",
     "max_pitch_deg",
     "energy_j",
@@ -35,7 +36,13 @@ COLUMNS = (
     "tip_overs",
     "near_misses",
     "incidents",
+    "clearance_min_m",
+    "clearance_median_m",
     "recoveries",
+    "mean_command_acceleration",
+    "mean_command_yaw_acceleration",
+    "planning_wall_median_ms",
+    "planning_wall_p95_ms",
     "wall_time_s",
     "verdict",
 )
@@ -68,6 +75,7 @@ def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
     for variant in sorted({row["variant"] for row in rows}):
         runs = [row for row in rows if row["variant"] == variant]
         arrived = [row for row in runs if row["success"]]
+        clearances, spl = _numbers(runs, "clearance_min_m"), _numbers(runs, "spl")
         ratios = [row["path_over_geodesic"] for row in arrived if row.get("path_over_geodesic")]
         lines.append(
             {
@@ -78,12 +86,19 @@ def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
                 "median_time_s": round(median(row["time_s"] for row in arrived), 1) if arrived else "",
                 "median_length_m": round(median(row["path_length_m"] for row in arrived), 1) if arrived else "",
                 "median_path_over_geodesic": round(median(ratios), 3) if ratios else "",
+                "median_clearance_m": round(median(clearances), 2) if clearances else "",
+                "mean_spl": round(sum(spl) / len(spl), 3) if spl else "",
                 "collisions": sum(row.get("collisions") or 0 for row in runs),
                 "tip_overs": sum(row.get("tip_overs") or 0 for row in runs),
                 "runs_with_incidents": sum(bool(row.get("incidents")) for row in runs),
             }
         )
     return lines
+
+
+def _numbers(rows: Sequence[Row], name: str) -> list[float]:
+    """The values of a column, without the rows that have none."""
+    return [row[name] for row in rows if isinstance(row.get(name), int | float)]
 
 
 def _flat(row: Row) -> dict[str, Any]:

@@ -100,5 +100,6 @@ def run_once(job: Job) -> dict[str, Any]:
                 "verdict": f"{name}: {message}",
                 "outcome": name,
                 "message": message,
+                "spl": 0.0,
             }
     return result.metrics

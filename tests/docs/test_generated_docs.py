@@ -1,10 +1,13 @@
 """What the documentation takes from the code is what the code says now."""
 
+import dataclasses
 import importlib
 import re
 from pathlib import Path
 
 import pytest
+
+from terrain.recording.metrics import Metrics
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -44,3 +47,11 @@ def test_every_relative_link_leads_to_a_file():
             if not (page.parent / target).exists():
                 dead.append(f"{page.name}: {target}")
     assert not dead
+
+
+def test_every_metric_of_a_recording_has_a_row_with_a_sentence(generated):
+    rows = re.findall(r"^\| (`.*`) \| (.+) \|$", generated[DOCS / "verdict.md"], re.MULTILINE)
+    named = {name.strip("`"): text for names, text in rows for name in names.split(", ")}
+    fields = {field.name for field in dataclasses.fields(Metrics)} - {"scenario", "backend"}
+    assert fields <= set(named)
+    assert all(text.endswith(".") for name, text in named.items() if name in fields)

@@ -156,6 +156,16 @@ def test_the_summary_counts_per_variant_and_takes_medians_of_successes():
     assert lines["planner=astar"]["median_time_s"] == ""
 
 
+def test_the_summary_takes_spl_over_all_runs_and_the_median_of_the_closest_distances():
+    rows = [
+        row(0, spl=0.9, clearance_min_m=0.2),
+        row(1, spl=0.0, success=False, clearance_min_m=0.1),
+        row(2, spl=None),
+    ]
+    (line,) = summarise(rows)
+    assert (line["mean_spl"], line["median_clearance_m"]) == (0.45, 0.15)
+
+
 @pytest.mark.parametrize(("text", "seeds"), [("0:3", [0, 1, 2]), ("7", [7]), ("1,5", [1, 5])])
 def test_seeds_are_a_range_or_a_list(text, seeds):
     assert parse_seeds(text) == seeds

@@ -6,14 +6,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose, Twist
 from terrain.physics.incidents import roll_pitch
 from terrain.physics.robot_models import HUSKY
-from terrain.recording.metrics import count_stops, cross_track_errors, measure
+from terrain.recording.metrics import (
+    count_stops,
+    cross_track_errors,
+    followed_length,
+    mean_change,
+    measure,
+    planning_times,
+)
+from terrain.recording.planning_times import PlanningTimes
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
+from terrain.session.runner import success_by_path_length
 
 
 def straight_run(goals):
@@ -89,3 +101,70 @@ def test_cross_track_error_is_measured_to_the_plan_of_the_time():
 
     np.testing.assert_allclose(errors[:5], 0.5)
     np.testing.assert_allclose(errors[5:], 0.2)
+
+
+def test_every_plan_counts_as_far_as_it_was_followed():
+    first = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]])
+    second = np.array([[4.0, 0.3, 0.0], [4.0, 5.0, 0.0], [6.0, 5.0, 0.0]])
+    to_the_next_goal = np.array([[6.0, 5.0, 0.0], [6.0, 9.0, 0.0]])
+
+    assert followed_length([]) == 0.0
+    assert followed_length([first]) == pytest.approx(10.0)
+    assert followed_length([first, second]) == pytest.approx(4.0 + 6.7)
+    assert followed_length([first, first, first, second]) == pytest.approx(4.0 + 6.7)
+    assert followed_length([first, second, to_the_next_goal]) == pytest.approx(4.0 + 6.7 + 4.0)
+    assert followed_length([first, np.zeros((0, 3)), second[:1]]) == pytest.approx(4.0)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_place_where_a_plan_was_left_is_the_nearest_of_all_its_places(seed):
+    rng = np.random.default_rng(seed)
+    plan, left_at = rng.uniform(-5.0, 5.0, (6, 3)), rng.uniform(-5.0, 5.0, (1, 3))
+    lengths = np.linalg.norm(np.diff(plan, axis=0), axis=1)
+    along = np.concatenate([np.linspace(0.0, 1.0, 2001)[:-1] * length for length in lengths])
+    along += np.repeat(np.concatenate([[0.0], np.cumsum(lengths)[:-1]]), 2000)
+    places = np.column_stack([np.interp(along, np.concatenate([[0.0], np.cumsum(lengths)]), x) for x in plan.T])
+    apart = np.linalg.norm(places - left_at, axis=1)
+
+    followed = followed_length([plan, left_at])
+
+    assert apart[np.argmin(np.abs(along - followed))] == pytest.approx(apart.min(), abs=0.02)
+
+
+def test_control_effort_is_the_mean_change_of_the_command():
+    times = np.array([0.0, 0.1, 0.2, 0.2, 0.4])
+    assert mean_change(times, np.array([0.0, 0.5, 0.0, 0.0, 0.0])) == pytest.approx((5.0 + 5.0 + 0.0) / 3)
+    assert mean_change(times[:1], times[:1]) == 0.0
+    assert measure(straight_run([])).mean_command_acceleration == 0.0
+
+
+def test_planning_times_are_those_of_calls_that_have_ended(hill_recording):
+    never_ended = Event(5.0, EventKind.PLUGIN_CALL_STARTED, "dijkstra", {"goal_id": 9, "method": "make_plan"})
+
+    assert planning_times((*hill_recording.events, never_ended)) == pytest.approx([0.4])
+    metrics = measure(hill_recording)
+    assert (metrics.planning_time_median_s, metrics.planning_time_p95_s) == pytest.approx((0.4, 0.4))
+    assert measure(straight_run([])).planning_time_p95_s is None
+
+
+def test_the_wall_time_of_planners_is_taken_call_by_call():
+    times = PlanningTimes()
+    assert times.to_json()["planning_wall_max_ms"] is None
+    for goal in (1, 2, 3):
+        for kind in (EventKind.PLUGIN_CALL_STARTED, EventKind.PLUGIN_CALL_ENDED):
+            times.write(Event(0.0, kind, "dijkstra", {"goal_id": goal, "method": "make_plan"}))
+    times.write(Event(0.0, EventKind.PLUGIN_CALL_ENDED, "dijkstra", {"goal_id": 4, "method": "make_plan"}))
+    times.write(Event(0.0, EventKind.PLUGIN_CALL_STARTED, "dijkstra", {"goal_id": 5, "method": "make_plan"}))
+
+    taken = times.to_json()
+
+    assert 0.0 <= taken["planning_wall_median_ms"] <= taken["planning_wall_p95_ms"] <= taken["planning_wall_max_ms"]
+
+
+@pytest.mark.parametrize(
+    ("success", "shortest", "driven", "spl"),
+    [(True, 10.0, 12.5, 0.8), (True, 10.0, 9.9, 1.0), (False, 10.0, 10.0, 0.0), (True, None, 10.0, None)],
+)
+def test_success_is_weighted_by_the_length_of_the_path(success, shortest, driven, spl):
+    metrics = {"path_length_m": driven} | ({} if shortest is None else {"geodesic_m": shortest})
+    assert success_by_path_length(success, metrics) == spl
