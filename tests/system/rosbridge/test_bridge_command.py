@@ -6,6 +6,7 @@ import sys
 
 import pytest
 from typer.testing import CliRunner
+from websockets.exceptions import ConnectionClosed
 
 from mbf_abstract.cli import make_app
 
@@ -25,7 +26,8 @@ def config(tmp_path):
     return file
 
 
-def test_it_serves_until_it_is_interrupted(config, raw, ask):
+@pytest.mark.parametrize(("signal_", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 128 + signal.SIGTERM)])
+def test_it_serves_until_it_is_interrupted_and_says_farewell(config, raw, ask, signal_, code):
     process = subprocess.Popen([*MBF, str(config), "--port", "0", "--token"], stdout=subprocess.PIPE, text=True)
     try:
         lines = [process.stdout.readline() for _ in range(5)]
@@ -33,10 +35,12 @@ def test_it_serves_until_it_is_interrupted(config, raw, ask):
         assert "the robot is the client that publishes /odom and /tf" in lines[4]
         port, _, path = lines[1].strip().removeprefix("rosbridge: ws://127.0.0.1:").partition("/")
         operation = {"op": "call_service", "service": "/rosapi/nodes"}
-        answer = ask(raw(int(port), path=f"/{path}"), operation, "service_response")
-        assert answer["values"] == {"nodes": ["/move_base_flex"]}
-        process.send_signal(signal.SIGINT)
-        assert process.wait(60) == 0
+        socket = raw(int(port), path=f"/{path}")
+        assert ask(socket, operation, "service_response")["values"] == {"nodes": ["/move_base_flex"]}
+        process.send_signal(signal_)
+        with pytest.raises(ConnectionClosed, match="1001"):  # going away
+            ask(socket, operation, "nothing")
+        assert process.wait(60) == code
     finally:
         process.kill()
         process.communicate()
