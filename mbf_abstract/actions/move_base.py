@@ -18,7 +18,7 @@ new goal                takes over: the old one ends CANCELED, the robot drives 
 cancel                  cancel the sub-goals, wait for their ends, end CANCELED
 ======================  =====================================================================================
 
-A robot that is stuck (``stuck_failures`` failures of one kind at one place) gets the behaviours of
+A robot that is stuck (failures of one kind at one place, again and again) gets the behaviours of
 ``escalation_behaviors`` instead of those of the list, and so does one whose list is used up; see
 ``actions.stuck_monitor``. By default there are none, and the machine is that of Move Base Flex.
 

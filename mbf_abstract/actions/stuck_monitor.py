@@ -1,9 +1,9 @@
 """Finds a robot that gets nowhere: the same failure at the same place, again and again, whatever is tried against it.
 
 An executive notes every failure it recovers from and every behaviour it has run. Where failures of one kind have come
-``stuck_failures`` times within ``stuck_distance`` of a place, the robot is stuck there: the monitor emits an event, and
-the behaviours of ``escalation_behaviors`` are due, one after the other. Each runs once at a place; then there is
-nothing left to try, and ``described`` gives the text with which the executive gives up.
+``stuck_failures`` times within ``stuck_distance`` of a place, and go on after ``stuck_time``, the robot is stuck there:
+the monitor emits an event, and the behaviours of ``escalation_behaviors`` are due, one after the other. Each runs once
+at a place; then there is nothing left to try, and ``described`` gives the text with which the executive gives up.
 
 When to use: one monitor for each goal of an executive of your own; ``move_base`` and the missions of behaviour trees
 have one. When not: a robot that moves without getting anywhere raises no failure; the oscillation and progress watches
@@ -15,7 +15,6 @@ counts is where a failure was met, not what the robot did in between; a plan tha
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -24,6 +23,8 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import is_success, outcome_name
+
+TIME_RESOLUTION = 1e-9  # s
 
 
 @dataclass
@@ -34,8 +35,8 @@ class TroubleSpot:
     ----------
     place : Pose
         Where the robot was at the first failure.
-    failures : Counter of int
-        Failures by outcome code.
+    failures : dict of int to list of float
+        Times [s] of the failures of each outcome code.
     tried : dict of str to int
         Behaviours that ran here, with their last outcome, in the order of their first run.
     escalations : int
@@ -43,14 +44,15 @@ class TroubleSpot:
     """
 
     place: Pose
-    failures: Counter[int] = field(default_factory=Counter)
+    failures: dict[int, list[float]] = field(default_factory=dict)
     tried: dict[str, int] = field(default_factory=dict)
     escalations: int = 0
 
     def __str__(self) -> str:
         x, y, z = self.place.position
         where = f"({x:.2f}, {y:.2f})" if z == 0.0 else f"({x:.2f}, {y:.2f}, {z:.2f})"
-        (outcome, count), *_ = self.failures.most_common(1)
+        outcome = max(self.failures, key=lambda code: len(self.failures[code]))
+        count = len(self.failures[outcome])
         ends = [name if is_success(end) else f"{name} ({outcome_name(end)})" for name, end in self.tried.items()]
         return f"stuck at {where}: {outcome_name(outcome)} {count} times; tried {', '.join(ends) or 'nothing'}"
 
@@ -83,17 +85,24 @@ class StuckMonitor:
             self._present = None
             return
         self._present = spot = self._spot_at(pose)
-        spot.failures[outcome] += 1
-        if spot.failures[outcome] == self._runtime.parameters.stuck_failures:
+        was_stuck = self._is_too_much(spot.failures.setdefault(outcome, []))
+        spot.failures[outcome].append(self._runtime.clock.now())
+        if self._is_too_much(spot.failures[outcome]) and not was_stuck:
             self._runtime.events.emit(
                 EventKind.STUCK,
                 "stuck_monitor",
                 place=list(spot.place.position),
                 outcome=int(outcome),
-                failures=spot.failures[outcome],
+                failures=len(spot.failures[outcome]),
                 tried=list(spot.tried),
                 message=str(spot),
             )
+
+    def _is_too_much(self, times: Sequence[float]) -> bool:
+        """Whether failures of one kind at one place, at these times [s], mean that the robot is stuck."""
+        parameters = self._runtime.parameters
+        enough = 0 < parameters.stuck_failures <= len(times)
+        return enough and times[-1] - times[0] >= parameters.stuck_time - TIME_RESOLUTION
 
     def _spot_at(self, pose: Pose) -> TroubleSpot:
         """Return the oldest place within the distance, else a new one."""
@@ -113,8 +122,7 @@ class StuckMonitor:
     @property
     def stuck(self) -> bool:
         """Whether the last failure was one too many at its place."""
-        limit = self._runtime.parameters.stuck_failures
-        return self._present is not None and 0 < limit <= max(self._present.failures.values())
+        return self._present is not None and any(map(self._is_too_much, self._present.failures.values()))
 
     @property
     def escalates(self) -> bool:

@@ -111,6 +111,9 @@ class NavigationParameters(ParameterModel):
     stuck_failures: int = parameter(
         3, "Failures of one kind at one place, for one goal, that count as stuck; 0 = never.", ge=0, le=1000
     )
+    stuck_time: float = parameter(
+        10.0, "And that come at least this long after the first of them.", unit="s", ge=0.0, le=3600.0
+    )
     stuck_distance: float = parameter(0.5, "Failures this near to each other are at one place.", unit="m", ge=0.0)
     escalation_behaviors: tuple[str, ...] = parameter(
         (),

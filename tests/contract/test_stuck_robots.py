@@ -15,7 +15,12 @@ from mbf_abstract.testing.conformance.site import site
 WALL = Box(5.0, -0.5, 5.4, 8.5)  # across the whole floor
 GOAL = Pose.planar(8.0, 4.0)
 ESCALATION = ("wait", "back_up", "relax")
-PARAMETERS = {"planner_patience": 0.5, "controller_max_retries": 3, "escalation_behaviors": ESCALATION}
+PARAMETERS = {
+    "planner_patience": 0.5,
+    "controller_max_retries": 3,
+    "stuck_time": 2.0,
+    "escalation_behaviors": ESCALATION,
+}
 
 
 def with_tree(made):
@@ -25,7 +30,7 @@ def with_tree(made):
 
 
 def with_move_base(made):
-    result = made.navigator.send(MoveBaseGoal(GOAL, recovery_behaviors=("clear", "clear"))).wait()
+    result = made.navigator.send(MoveBaseGoal(GOAL, recovery_behaviors=("clear",) * 6)).wait()
     return result.success, result.message
 
 

@@ -35,7 +35,7 @@ def stand():
     sessions = []
 
     def make(escalation=(), **parameters):
-        sessions.append(ScriptedSession(**parameters))
+        sessions.append(ScriptedSession(**{"stuck_time": 0.0, **parameters}))
         return Stand(sessions[-1], escalation)
 
     yield make
@@ -46,6 +46,14 @@ def stand():
 def test_the_third_failure_of_one_kind_at_one_place_is_one_too_many(stand):
     made = stand()
     assert [made.fail() for _ in range(4)] == [False, False, True, True]
+
+
+def test_failures_in_quick_succession_are_one_too_many_only_after_a_time(stand):
+    """A controller that fails at once beside a robot that passes is not stuck yet."""
+    made = stand(stuck_time=2.0)
+    quick = [made.fail() for _ in range(20)]  # 0.05 s between two
+    made.session.clock.sleep(1.5)
+    assert not any(quick) and made.fail()
 
 
 def test_failures_of_different_kinds_are_counted_apart(stand):
@@ -138,20 +146,25 @@ def test_without_escalation_the_usual_recoveries_go_on(stand):
     st.lists(st.tuples(st.integers(0, 40), st.sampled_from([BLOCKED, COLLISION])), max_size=30),
     st.integers(0, 4),
     st.integers(0, 12),
+    st.sampled_from([0.0, 0.5]),
 )
-def test_it_counts_as_a_naive_counter_does(failures, limit, tenths):
+def test_it_counts_as_a_naive_counter_does(failures, limit, tenths, wait):
     """The twin keeps the whole history: a failure belongs to the first place ever founded within the distance."""
-    with ScriptedSession(stuck_failures=limit, stuck_distance=tenths / 10.0) as session:
+    parameters = {"stuck_failures": limit, "stuck_distance": tenths / 10.0, "stuck_time": wait}
+    with ScriptedSession(**parameters) as session:
         made = Stand(session)
-        founded, belongs = [], []
+        founded, history, stuck = [], [], set()
         for tenth, outcome in failures:
             x = tenth / 10.0
             place = next((index for index, other in enumerate(founded) if abs(other - x) <= tenths / 10.0), None)
             if place is None:
                 place = len(founded)
                 founded.append(x)
-            belongs.append((place, outcome))
-            counts = [belongs.count((place, code)) for code in (BLOCKED, COLLISION)]
-            assert made.fail(x, outcome) == (0 < limit <= max(counts))
-        expected = sum(0 < limit <= belongs.count(kind) for kind in set(belongs))
-        assert len(session.recorded(EventKind.STUCK)) == expected
+            answer = made.fail(x, outcome)
+            history.append((place, outcome, session.clock.now()))
+            for kind in (BLOCKED, COLLISION):
+                times = [time for *where, time in history if where == [place, kind]]
+                if 0 < limit <= len(times) and times[-1] - times[0] >= wait - 1e-6:
+                    stuck.add((place, kind))
+            assert answer == any((place, kind) in stuck for kind in (BLOCKED, COLLISION))
+        assert len(session.recorded(EventKind.STUCK)) == len(stuck)

@@ -32,7 +32,7 @@ def test_without_escalation_the_tree_does_what_it_did(make_session, recoveries):
 
 
 def test_a_robot_that_is_stuck_gets_the_escalation_and_a_fresh_plan(make_session, recoveries):
-    session = make_session(escalation_behaviors=LADDER)
+    session = make_session(stuck_time=0.0, escalation_behaviors=LADDER)
     session.controller.play(*[BLOCKED] * 4, session.controller.follow)
     assert run(session).success
     assert recoveries(session) == ["clear", "clear", "relax", "back_up"]
@@ -40,14 +40,14 @@ def test_a_robot_that_is_stuck_gets_the_escalation_and_a_fresh_plan(make_session
 
 
 def test_planning_that_fails_for_good_is_escalated_too(make_session, recoveries):
-    session = make_session(escalation_behaviors=LADDER)
+    session = make_session(stuck_time=0.0, escalation_behaviors=LADDER)
     session.planner.play(NO_PATH, NO_PATH, NO_PATH, straight_plan)
     assert run(session).success
     assert recoveries(session) == ["clear", "relax", "back_up"]
 
 
 def test_it_gives_up_with_the_place_and_what_was_tried(make_session, recoveries):
-    session = make_session(escalation_behaviors=LADDER)
+    session = make_session(stuck_time=0.0, escalation_behaviors=LADDER)
     session.plugin("back_up", ScriptedRecovery).play(RecoveryResult(RecoveryOutcome.IMPASSABLE, "a wall"))
     session.controller.play(BLOCKED)
     result = run(session)
@@ -60,21 +60,21 @@ def test_it_gives_up_with_the_place_and_what_was_tried(make_session, recoveries)
 
 
 def test_a_task_that_leaves_no_failure_behind_is_not_escalated(make_session, recoveries):
-    session = make_session(escalation_behaviors=LADDER)
+    session = make_session(stuck_time=0.0, escalation_behaviors=LADDER)
     tree = Escalation("stuck?", Do("no", lambda mission: False))
     assert TreeExecutive(tree, session.navigator).run(GOAL).status == Status.FAILURE
     assert recoveries(session) == []
 
 
 def test_a_target_that_makes_no_sense_is_not_escalated(make_session, recoveries):
-    session = make_session(escalation_behaviors=LADDER, stuck_failures=1)
+    session = make_session(stuck_time=0.0, escalation_behaviors=LADDER, stuck_failures=1)
     session.planner.play(PlanResult(GetPathOutcome.INVALID_GOAL, "in the sky"))
     assert not run(session).success
     assert recoveries(session) == []
 
 
 def test_each_run_has_the_whole_escalation(make_session, recoveries):
-    session = make_session(escalation_behaviors=LADDER, stuck_failures=1)
+    session = make_session(stuck_time=0.0, escalation_behaviors=LADDER, stuck_failures=1)
     session.planner.play(NO_PATH)
     executive = TreeExecutive(navigation_tree(OPTIONS), session.navigator)
     for _ in range(2):
@@ -83,7 +83,7 @@ def test_each_run_has_the_whole_escalation(make_session, recoveries):
 
 
 def test_the_state_of_the_escalation_can_be_read_from_the_events(make_session):
-    session = make_session(escalation_behaviors=("relax",), stuck_failures=1)
+    session = make_session(stuck_time=0.0, escalation_behaviors=("relax",), stuck_failures=1)
     session.planner.play(NO_PATH, straight_plan)
     assert run(session).success
     tips = [event.data["new"] for event in session.recorded(EventKind.STATE_CHANGED) if event.source == "tree"]
@@ -92,7 +92,7 @@ def test_the_state_of_the_escalation_can_be_read_from_the_events(make_session):
 
 @pytest.mark.parametrize("cycles", [2, 3])
 def test_a_robot_that_is_not_stuck_keeps_its_usual_recoveries(make_session, recoveries, cycles):
-    session = make_session(escalation_behaviors=LADDER, stuck_failures=cycles + 1)
+    session = make_session(stuck_time=0.0, escalation_behaviors=LADDER, stuck_failures=cycles + 1)
     session.controller.play(*[BLOCKED] * cycles, session.controller.follow)
     assert run(session).success
     assert recoveries(session) == ["clear"] * cycles

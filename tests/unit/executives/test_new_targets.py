@@ -38,7 +38,7 @@ def eventful(make_session):
     """A session in which every branch has its turn: plans take time and fail, driving fails, the robot is stuck."""
 
     def make(**options):
-        session = make_session(escalation_behaviors=("relax",), stuck_distance=1.0, **options)
+        session = make_session(stuck_time=0.0, escalation_behaviors=("relax",), stuck_distance=1.0, **options)
         session.planner.modelled_compute_time = 0.2
         session.planner.play(NO_PATH, straight_plan)
         for name in ("clear", "back_up", "relax"):
@@ -176,7 +176,7 @@ def test_a_canceled_run_takes_no_new_target(make_session):
 
 
 def test_failures_on_the_way_to_the_old_target_are_forgotten(make_session, recoveries):
-    session = make_session(escalation_behaviors=("relax",))
+    session = make_session(stuck_time=0.0, escalation_behaviors=("relax",))
     session.planner.play(NO_PATH, NO_PATH, NO_PATH, NO_PATH, straight_plan)
     executive = TreeExecutive(navigation_tree(TreeOptions(check_poses=False)), session.navigator)
     ticks = when_running(executive, "escalate", lambda: executive.change_target(OTHER))

@@ -107,8 +107,7 @@ def test_it_gives_up_after_its_replans_with_the_last_failure(make_session):
     session = make_session()
     session.controller.play(BLOCKED)
     result = run(session, navigation_tree(OPTIONS))
-    stuck = "stuck at (0.00, 0.00): BLOCKED_PATH 36 times; tried clear, back_up"
-    assert result.message == f"BLOCKED_PATH: a chair; {stuck}"
+    assert result.message == "BLOCKED_PATH: a chair"
     assert plans(session) == 1 + OPTIONS.replans
     assert session.robot.command.is_stopped()
 

@@ -70,8 +70,7 @@ def test_failed_planning_runs_the_behaviours_in_order_and_ends_with_the_planners
     result = session.send().wait()
     assert session.recoveries == ["first", "second", "third"]
     assert session.plans == 4
-    stuck = "stuck at (0.00, 0.00): NO_PATH_FOUND 4 times; tried first, second, third"
-    assert (result.outcome, result.message) == (GetPathOutcome.NO_PATH_FOUND, f"walled in; {stuck}")
+    assert (result.outcome, result.message) == (GetPathOutcome.NO_PATH_FOUND, "walled in")
 
 
 def test_failed_control_runs_the_behaviours_in_order_and_ends_with_the_controllers_code(make_session):
@@ -79,8 +78,7 @@ def test_failed_control_runs_the_behaviours_in_order_and_ends_with_the_controlle
     session.controller.play(BLOCKED)
     result = session.send().wait()
     assert session.recoveries == ["first", "second", "third"]
-    stuck = "stuck at (0.00, 0.00): BLOCKED_PATH 4 times; tried first, second, third"
-    assert (result.outcome, result.message) == (ExePathOutcome.BLOCKED_PATH, f"a chair; {stuck}")
+    assert (result.outcome, result.message) == (ExePathOutcome.BLOCKED_PATH, "a chair")
 
 
 def test_a_recovery_that_helps_lets_the_goal_succeed(make_session):

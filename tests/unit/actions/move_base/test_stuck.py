@@ -14,14 +14,14 @@ BLOCKED = ControlResult(ExePathOutcome.BLOCKED_PATH, "a chair")
 
 
 def test_behaviours_of_the_escalation_are_not_among_those_run_by_default(make_session):
-    session = make_session(retries=0, escalation_behaviors=("second",), stuck_failures=0)
+    session = make_session(retries=0, stuck_time=0.0, escalation_behaviors=("second",), stuck_failures=0)
     session.planner.play(session.no_path)
     session.send().wait()
     assert session.recoveries == ["first", "third", "second"]  # after the list, as nothing else is left
 
 
 def test_a_robot_that_is_stuck_gets_the_escalation_instead_of_the_list(make_session):
-    session = make_session(retries=0, escalation_behaviors=("third", "second"))
+    session = make_session(retries=0, stuck_time=0.0, escalation_behaviors=("third", "second"))
     session.controller.play(BLOCKED)
     result = session.send(recovery_behaviors=("first",) * 9).wait()
     assert session.recoveries == ["first", "first", "third", "second"]
@@ -31,7 +31,7 @@ def test_a_robot_that_is_stuck_gets_the_escalation_instead_of_the_list(make_sess
 
 
 def test_an_escalation_that_helps_lets_the_goal_succeed(make_session):
-    session = make_session(retries=0, escalation_behaviors=("third",))
+    session = make_session(retries=0, stuck_time=0.0, escalation_behaviors=("third",))
     session.controller.play(BLOCKED, BLOCKED, BLOCKED, session.controller.follow)
     assert session.send().wait().success
     assert session.recoveries == ["first", "second", "third"]
@@ -39,7 +39,9 @@ def test_an_escalation_that_helps_lets_the_goal_succeed(make_session):
 
 def test_a_list_that_motion_resets_for_ever_ends_at_the_place_it_comes_back_to(make_session):
     """Without the escalation this goes on for ever: the way to the place resets the list each time."""
-    session = make_session(retries=0, oscillation_distance=0.1, escalation_behaviors=("third",), stuck_distance=0.3)
+    session = make_session(
+        retries=0, stuck_time=0.0, oscillation_distance=0.1, escalation_behaviors=("third",), stuck_distance=0.3
+    )
     forth, back = [drive(0.5)] * 10, [drive(-0.5)] * 10
     session.controller.play(*([BLOCKED, *forth, *back] * 40))
     result = session.send(4.0, recovery_behaviors=("first", "second")).wait()
@@ -48,7 +50,7 @@ def test_a_list_that_motion_resets_for_ever_ends_at_the_place_it_comes_back_to(m
 
 
 def test_a_plan_that_is_found_each_time_and_refused_each_time_is_no_progress(make_session):
-    session = make_session(retries=0, escalation_behaviors=("third",))
+    session = make_session(retries=0, stuck_time=0.0, escalation_behaviors=("third",))
     session.controller.play(BLOCKED)
     session.planner.play(*[session.no_path, straight_plan] * 20)
     result = session.send(recovery_behaviors=("first", "second", "first", "second", "first")).wait()
@@ -57,7 +59,7 @@ def test_a_plan_that_is_found_each_time_and_refused_each_time_is_no_progress(mak
 
 
 def test_a_failed_behaviour_of_the_escalation_is_named_with_its_outcome(make_session):
-    session = make_session(retries=0, escalation_behaviors=("third",))
+    session = make_session(retries=0, stuck_time=0.0, escalation_behaviors=("third",))
     session.plugin("third", ScriptedRecovery).play(RecoveryResult(RecoveryOutcome.IMPASSABLE, "a wall"))
     session.planner.play(session.no_path)
     result = session.send(recovery_behaviors=()).wait()
@@ -67,14 +69,16 @@ def test_a_failed_behaviour_of_the_escalation_is_named_with_its_outcome(make_ses
 
 
 def test_where_recovery_is_off_nothing_is_escalated(make_session):
-    session = make_session(retries=0, recovery_enabled=False, escalation_behaviors=("third",), stuck_failures=1)
+    session = make_session(
+        retries=0, stuck_time=0.0, recovery_enabled=False, escalation_behaviors=("third",), stuck_failures=1
+    )
     session.planner.play(session.no_path)
     session.send().wait()
     assert session.recoveries == []
 
 
 def test_a_new_goal_has_the_whole_escalation_again(make_session):
-    session = make_session(retries=0, escalation_behaviors=("third",), stuck_failures=1)
+    session = make_session(retries=0, stuck_time=0.0, escalation_behaviors=("third",), stuck_failures=1)
     session.controller.play(BLOCKED)
     for _ in range(2):
         session.send(recovery_behaviors=()).wait()
@@ -82,7 +86,7 @@ def test_a_new_goal_has_the_whole_escalation_again(make_session):
 
 
 def test_a_goal_that_takes_over_has_the_whole_escalation_again(make_session):
-    session = make_session(retries=0, escalation_behaviors=("third",), stuck_failures=1)
+    session = make_session(retries=0, stuck_time=0.0, escalation_behaviors=("third",), stuck_failures=1)
     newer = []
 
     def send_another(request):
@@ -99,7 +103,7 @@ def test_a_goal_that_takes_over_has_the_whole_escalation_again(make_session):
 
 
 def test_a_cancel_ends_a_behaviour_of_the_escalation(make_session):
-    session = make_session(retries=0, escalation_behaviors=("third",), stuck_failures=1)
+    session = make_session(retries=0, stuck_time=0.0, escalation_behaviors=("third",), stuck_failures=1)
     handles = []
 
     def slow(request):
