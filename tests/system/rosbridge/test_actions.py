@@ -9,6 +9,8 @@ from mbf_abstract.plugins import ControlResult, PlanResult
 from mbf_abstract.testing.scripted_session import ScriptedSession
 from mbf_abstract.time.clock import WallClock
 from mbf_ros.messages.geometry import MessageContext, path_message
+from mbf_ros.messages.interfaces import fields_of
+from mbf_ros.rosbridge.navigation import ACTIONS
 
 SUCCEEDED, CANCELED, ABORTED = (roslibpy.core.GoalStatus(code) for code in (4, 5, 6))
 
@@ -78,6 +80,32 @@ def test_a_path_is_planned_and_driven_as_it_came(serving, connect, send):
     assert status == SUCCEEDED and len(values["path"]["poses"]) > 3
     drive = send(ros, "/move_base_flex/exe_path", "mbf_msgs/action/ExePath", {"path": values["path"]})
     assert drive.result()[0] == SUCCEEDED
+
+
+NEAR = {"poses": [target(0.0), target(0.2), target(0.4)]}
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "goal"),
+    [
+        ("/move_base_flex/get_path", "mbf_msgs/GetPath", {"target_pose": target(0.4)}),
+        ("/move_base_flex/exe_path", "mbf_msgs/ExePath", {"path": NEAR}),
+        ("/move_base_flex/recovery", "mbf_msgs/Recovery", {"behavior": "recovery"}),
+        ("/move_base_flex/move_base", "mbf_msgs/MoveBase", {"target_pose": target(0.4)}),
+        ("/compute_path_to_pose", "nav2_msgs/ComputePathToPose", {"goal": target(0.4)}),
+        ("/compute_path_through_poses", "nav2_msgs/ComputePathThroughPoses", {"goals": [target(0.2), target(0.4)]}),
+        ("/follow_path", "nav2_msgs/FollowPath", {"path": NEAR}),
+        ("/navigate_to_pose", "nav2_msgs/NavigateToPose", {"pose": target(0.4)}),
+        ("/follow_waypoints", "nav2_msgs/FollowWaypoints", {"poses": [target(0.2), target(0.4)]}),
+        ("/smooth_path", "nav2_msgs/SmoothPath", {"path": NEAR}),
+    ],
+)
+def test_every_action_is_served(serving, connect, send, name, kind, goal):
+    _, server = serving()
+    status, values = send(connect(server.port), name, kind, goal).result()
+    package, _, short = kind.partition("/")
+    assert status == SUCCEEDED and name in ACTIONS
+    assert set(values) == {field.name for field in fields_of(f"{package}/action/{short}_Result")}
 
 
 def test_a_goal_is_canceled_while_it_runs_and_the_robot_stops(serving, connect, send):

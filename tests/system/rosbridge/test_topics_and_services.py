@@ -44,6 +44,13 @@ def test_a_simulated_robot_is_seen_in_tf_odometry_and_commands(serving, connect,
     assert plan.wait()[0]["poses"][-1]["pose"]["position"]["x"] == pytest.approx(0.6)
 
 
+def test_commands_are_stamped_where_that_is_asked_for(serving, connect, answers):
+    _, server = serving(stamped_commands=True)
+    commands = listen(answers, connect(server.port), "/cmd_vel", "geometry_msgs/TwistStamped")
+    (first, *_) = commands.wait()
+    assert first["header"]["frame_id"] == "base_link" and first["twist"]["linear"]["x"] == 0.0
+
+
 def test_a_scan_is_seen_as_laser_scan_and_points_in_the_frame_of_the_sensor(serving, connect, answers):
     session, server = serving()
     ros = connect(server.port)
