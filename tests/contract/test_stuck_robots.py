@@ -13,6 +13,8 @@ from mbf_abstract.testing.conformance.rig import Box
 from mbf_abstract.testing.conformance.site import site
 
 WALL = Box(5.0, -0.5, 5.4, 8.5)  # across the whole floor
+DOOR = [Box(5.0, -0.5, 5.4, 3.5), Box(5.0, 4.5, 5.4, 8.5)]  # 1 m wide; the robot has 0.6 m
+SOMEBODY = Box(5.0, 3.5, 5.4, 4.5)
 GOAL = Pose.planar(8.0, 4.0)
 ESCALATION = ("wait", "back_up", "relax")
 PARAMETERS = {
@@ -38,14 +40,14 @@ EXECUTIVES = {"tree": with_tree, "move_base": with_move_base}
 
 
 class OpensWhenStuck:
-    """Takes the wall away as soon as the robot counts as stuck: an event sink."""
+    """Leaves only some boxes as soon as the robot counts as stuck: an event sink."""
 
-    def __init__(self, rig):
-        self.rig = rig
+    def __init__(self, rig, boxes=()):
+        self.rig, self.boxes = rig, list(boxes)
 
     def write(self, event):
         if event.kind is EventKind.STUCK:
-            self.rig.boxes = []
+            self.rig.boxes = self.boxes
 
     def close(self):
         pass
@@ -64,6 +66,17 @@ def test_a_robot_that_is_walled_in_and_freed_again_arrives(make_server, executiv
         assert success, message
         assert made.rig.robot.pose.distance_to(GOAL) < 0.3
         assert "wait" in behaviours(made)
+        made.expect_no_contact()
+
+
+@pytest.mark.parametrize("executive", EXECUTIVES)
+def test_a_door_that_somebody_stands_in_is_passed_when_he_has_gone(make_server, executive):
+    with site(make_server, **PARAMETERS) as made:
+        made.place(*DOOR, SOMEBODY)
+        made.rig.events.add_sink(OpensWhenStuck(made.rig, DOOR))
+        success, message = EXECUTIVES[executive](made)
+        assert success, message
+        assert made.rig.robot.pose.distance_to(GOAL) < 0.3
         made.expect_no_contact()
 
 
