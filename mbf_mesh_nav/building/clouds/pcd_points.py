@@ -21,6 +21,8 @@ KINDS = {"F": "f", "I": "i", "U": "u"}
 LENGTHS = {"F": (4, 8), "I": (1, 2, 4, 8), "U": (1, 2, 4, 8)}
 MAX_HEADER_LINES = 100
 MAX_RECORD_BYTES = 4096
+MOST_EXPANSION = 88
+"""Three bytes of an LZF block stand for at most 264."""
 
 
 def read_pcd_points(path: Path, max_points: int) -> StoredPoints:
@@ -105,6 +107,8 @@ def _decompressed(path: Path, file: BinaryIO, record: np.dtype[np.void], count: 
     block = np.frombuffer(file.read(int(sizes[0])), dtype=np.uint8)
     if len(block) < sizes[0]:
         raise MeshError(str(path), [f"the file is cut off: expected {sizes[0]} compressed bytes, found {len(block)}"])
+    if expected > MOST_EXPANSION * len(block):
+        raise MeshError(str(path), [f"{len(block)} compressed bytes cannot hold {expected}"])
     content = np.empty(expected, dtype=np.uint8)
     if lzf_decompress(block.copy(), content) != expected:
         raise MeshError(str(path), ["its compressed block is damaged"])

@@ -107,6 +107,7 @@ def _read_text(path: Path, file: BinaryIO, before: list[_Element], vertex: _Elem
     if missing := [name for name in "xyz" if name not in names]:
         raise MeshError(str(path), [f"its points have no {', '.join(missing)}"])
     for _ in range(sum(element.count for element in before)):
-        file.readline()
+        if not file.readline():
+            raise MeshError(str(path), ["the file is cut off before its points"])
     columns = (names.index("x"), names.index("y"), names.index("z"))
     return StoredPoints(read_rows(path, file, columns, None, vertex.count))

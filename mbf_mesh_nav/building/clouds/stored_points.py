@@ -54,8 +54,10 @@ def read_records(path: Path, file: BinaryIO, record: np.dtype[np.void], count: i
     Raises
     ------
     MeshError
-        The file is cut off.
+        The file is cut off, or a record has no field.
     """
+    if record.itemsize == 0:
+        raise MeshError(str(path), ["its points have no properties"])
     here = file.seek(0, os.SEEK_CUR)
     found = (os.fstat(file.fileno()).st_size - here) // record.itemsize
     if found < count:

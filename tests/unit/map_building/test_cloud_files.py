@@ -37,6 +37,9 @@ WRITERS = {
     "counted.pts": lambda file, points: write_text(file, points, " ", f"{len(points)}\n"),
 }
 
+PLY_HEAD, TEXT_HEAD = b"ply\nformat binary_little_endian 1.0\n", b"ply\nformat ascii 1.0\n"
+VERTEX = b"element vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+
 
 def refusal(file, **options):
     with pytest.raises(MeshError) as caught:
@@ -144,6 +147,15 @@ def test_a_pcd_header_that_promises_too_much_is_refused_unread(tmp_path, form):
     assert "1000000000 points, the limit is 50000000 (max_points)" in refusal(file)
 
 
+def test_a_compressed_block_that_cannot_hold_what_it_promises_is_refused_before_it_is_unpacked(tmp_path):
+    file = write_pcd(tmp_path / "bomb.pcd", POINTS, "binary_compressed")
+    head, _, body = file.read_bytes().partition(b"DATA binary_compressed\n")
+    head = head.replace(b"WIDTH 400", b"WIDTH 40000000").replace(b"POINTS 400", b"POINTS 40000000")
+    sizes = np.array([len(body) - 8, 40_000_000 * 27], "<u4").tobytes()
+    file.write_bytes(head + b"DATA binary_compressed\n" + sizes + body[8:])
+    assert "compressed bytes cannot hold 1080000000" in refusal(file)
+
+
 def test_a_las_header_that_promises_too_much_is_refused_unread(tmp_path):
     file = write_las(tmp_path / "huge.las", POINTS)
     content = bytearray(file.read_bytes())
@@ -222,6 +234,9 @@ def test_a_las_file_in_degrees_or_mixed_units_is_refused(tmp_path, text, reason)
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex -4\nend_header\n", "its header promises -4 points"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex many\n", "a line that is no PLY: 'element vertex many'"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n", "have no y, z"),
+        ("a.ply", PLY_HEAD + b"element vertex 9\nend_header\n", "its points have no properties"),
+        ("a.ply", TEXT_HEAD + b"element a 999999999999\n" + VERTEX + b"end_header\n", "cut off before its points"),
+        ("a.ply", PLY_HEAD + b"element vertex 9\n" + 2 * b"property float x\n" + b"end_header\n", "cannot be read"),
         ("a.pcd", b"VERSION 0.7\nFIELDS x y\nSIZE 4\nTYPE F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2\n", "no PCD header"),
         ("a.pcd", b"nothing", "is no PCD"),
         ("a.las", b"LASF" + bytes(100), "cannot be read as LAS"),
