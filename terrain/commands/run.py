@@ -36,6 +36,11 @@ def run(
     ),
     out: Path | None = typer.Option(None, "--out", help="Folder for the results; runs/<time> if not given."),
     map_file: Path | None = typer.Option(None, "--map", help="Drive in the building of this map_server yaml instead."),
+    planner: str = typer.Option("", "--planner", help="Planner to use: a name in the configuration, or a type."),
+    controller: str = typer.Option("", "--controller", help="Controller to use, likewise."),
+    settings: list[str] = typer.Option(
+        [], "--set", help="KEY=VALUE: world.KEY of the scenario, or a dotted path of the configuration; repeatable."
+    ),
     wall_clock: bool = typer.Option(False, "--wall-clock", help="Real time instead of as fast as possible."),
     executive: str = typer.Option(
         "move_base", "--executive", help="Who decides: move_base, classic, or a tree (see mbf tree list)."
@@ -53,6 +58,7 @@ def run(
         1.0, "--view-speed", min=0.0, help="With --view: at most so many times real time; 0 = no limit."
     ),
     stay: bool = typer.Option(True, "--stay/--no-stay", help="With --view: wait for goals from the page at the end."),
+    show: bool = typer.Option(False, "--open", help="Open the replay in the browser at the end."),
     quiet: bool = typer.Option(False, "--quiet", help="Print the result without progress."),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object with verdict and metrics."),
 ) -> None:
@@ -61,6 +67,7 @@ def run(
     Success: it arrived, broke no limit, did not tip over and touched nothing while it moved. Else the code is 1, and 2
     for a mistake in scenario, configuration or arguments.
     """
+    chosen = settings_of(settings, planner=planner, controller=controller)
     with readable_errors():
         from terrain.commands.live_line import LiveLine
         from terrain.scenarios.on_map import on_map
@@ -79,6 +86,7 @@ def run(
                 backend=backend or None,
                 seed=seed if seed >= 0 else None,
                 wall_clock=wall_clock,
+                settings=chosen,
                 on_progress=live.progress,
                 on_step=live.step,
                 on_note=live.note,
@@ -93,15 +101,25 @@ def run(
                 options = replace(options, watch=watch, stay=stay)
             result = run_scenario(loaded, options)
     _print_result(result, as_json)
+    page = (folder / "replay.html").resolve()
+    if show and page.is_file():
+        typer.launch(page.as_uri())
     if not result.success:
         raise typer.Exit(FAILURE)
 
 
-def scenarios() -> None:
+def scenarios(
+    copy: str = typer.Option("", "--copy", metavar="NAME", help="Copy this scenario with its configurations."),
+    to: Path = typer.Option(Path(), "--to", help="With --copy: the folder to copy to."),
+) -> None:
     """List the scenarios that come with the package, and what each of them proves."""
     with readable_errors():
-        from terrain.scenarios.scenario import load_scenario, shipped_scenarios
+        from terrain.scenarios.scenario import copy_scenario, load_scenario, shipped_scenarios
 
+        if copy:
+            for file in copy_scenario(copy, to):
+                typer.echo(file)
+            return
         for name in shipped_scenarios():
             loaded = load_scenario(name)
             typer.echo(f"{name:16} {loaded.proves}  [{', '.join(loaded.navigation)}]")
@@ -166,6 +184,19 @@ def compare(
         with waiting("writing the page"):
             write_whole(out, comparison_html(names, *runs))
     typer.echo(out.resolve())
+
+
+def settings_of(texts: list[str], **chosen: str) -> dict[str, str]:
+    """Return the settings of ``--set KEY=VALUE`` and those with an option of their own, each key once."""
+    settings = {key: value for key, value in chosen.items() if value}
+    for text in texts:
+        key, _, value = text.partition("=")
+        if not key or not value:
+            raise typer.BadParameter(f"expected KEY=VALUE, got {text!r}", param_hint="--set")
+        if key in settings:
+            raise typer.BadParameter(f"{key} is set twice", param_hint="--set")
+        settings[key] = value
+    return settings
 
 
 def new_run_folder(parent: Path, now: datetime) -> Path:

@@ -141,6 +141,33 @@ def proprioceptive_sensors(scenario: Scenario) -> list[str]:
     return [ODOMETRY] * (scenario.odometry == "wheels") + [IMU] * scenario.imu
 
 
+def copy_scenario(name: str, folder: Path) -> list[Path]:
+    """Copy a shipped scenario with the configurations it names into ``folder``; the copy runs as it is.
+
+    Returns
+    -------
+    list of Path
+        The copies, the scenario first.
+
+    Raises
+    ------
+    ConfigError
+        There is no such scenario, or a file of a copy's name is there already; then nothing is copied.
+    """
+    known = shipped_scenarios()
+    if name not in known:
+        raise ConfigError([Finding("scenarios", 1, name, f"one of {', '.join(known)}", repr(name))])
+    files = list(load_yaml(known[name]).data["navigation"].values())
+    copies = {folder / known[name].name: known[name]} | {folder / file: SHIPPED / file for file in files}
+    there = [Finding(str(copy), 1, "", "no file, because a copy comes here", "one") for copy in copies if copy.exists()]
+    if there:
+        raise ConfigError(there)
+    for copy, source in copies.items():
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(source.read_bytes())
+    return list(copies)
+
+
 def shipped_scenarios() -> dict[str, Path]:
     """Names and files of the scenarios that come with the package."""
     return {file.stem: file for file in sorted(SHIPPED.glob("*.yaml"))}
