@@ -101,9 +101,9 @@ def run(
                 options = replace(options, watch=watch, stay=stay)
             result = run_scenario(loaded, options)
     _print_result(result, as_json)
-    page = (folder / "replay.html").resolve()
-    if show and page.is_file():
-        typer.launch(page.as_uri())
+    replay_page = (folder / "replay.html").resolve()
+    if show and replay_page.is_file():
+        typer.launch(replay_page.as_uri())
     if not result.success:
         raise typer.Exit(FAILURE)
 
