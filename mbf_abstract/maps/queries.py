@@ -84,3 +84,6 @@ class PlaceQuery:
 
 AS_CONFIGURED = PlaceQuery()
 """The robot with its configured outline, and costs as they are."""
+
+PADDED = PlaceQuery(use_padded_footprint=True)
+"""The robot with its padded outline, as controllers and recoveries check it."""

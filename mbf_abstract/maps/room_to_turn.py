@@ -1,13 +1,14 @@
 """Making room to turn: what a controller drives where its own motion would swing the outline into something.
 
-When to use: in controllers that look ahead with the robot's whole outline, on paths of planners that know its inscribed
-radius only. A long robot beside a wall can drive, but not turn; it has to drive on until its corners pass. When not:
-round robots, which can always turn, and turning to what lies behind: the map's recoveries (``back_up``, ``move_away``)
-make room for that. What stands on the path itself blocks going straight on, too.
+When to use: in controllers that look ahead with the robot's whole outline. A long robot beside a wall can drive, but
+not turn; it has to drive on until its corners pass. When not: round robots, which can always turn, and turning to what
+lies behind: the planner's manoeuvres or the map's recoveries (``back_up``, ``move_away``) make room for that. What
+stands on the path itself blocks all of it.
 
-Rule: where the wanted motion is blocked, wider and wider curves to the same side are tried, then going straight on;
-instead of a turn on the spot to what lies ahead, creeping along such curves. In this the robot may drive ``distance``
-[m] until it gets ahead on its path again.
+Rule: where the wanted motion is blocked but the outline fits on the path ahead, the robot creeps close along the path,
+or turns to it on the spot. Else wider and wider curves to the same side are tried, then going straight on; instead of a
+turn on the spot to what lies ahead, creeping along such curves. In all this the robot may drive ``distance`` [m] until
+it gets ahead on its path again.
 """
 
 from __future__ import annotations
@@ -15,10 +16,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from mbf_abstract.geometry import Pose, Twist
+import numpy as np
+
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import FloatArray, Pose, Twist, normalize_angle
+from mbf_abstract.geometry.arcs import arc_to
+from mbf_abstract.geometry.arithmetic import arctan2
 
 AHEAD = 0.05  # m of progress on the path that give back the whole distance
 CREEPING = 0.1  # m/s
+NEAR = (0.2, 0.1)
+"""How far [m] ahead on the path the points lie that a robot creeps to where its usual look-ahead is blocked."""
+LOOKS_ALONG = 0.25 * math.pi
+"""At most so far [rad] off the path's direction a robot creeps along it."""
+SMALL_TURN = 0.05
+"""By less than this [rad] no robot turns on the spot to make its way free."""
+SPACING, ARM = 0.05, 0.2
+"""Distance [m] of the poses on a path; each looks along the line between the points ``ARM`` before and behind it."""
 WIDER = (0.5, 0.25, 0.0)
 """Shares of the wanted turn, tried in this order."""
 CURVES = (2.0, 1.0, 0.5, 0.0)
@@ -34,7 +48,13 @@ class RoomToTurn:
         self._made_room_at: Pose | None = None
 
     def choose(
-        self, pose: Pose, progress: float, motions: list[Twist], distance: float, blocked: Callable[[Twist], str]
+        self,
+        pose: Pose,
+        progress: float,
+        motions: list[Twist],
+        distance: float,
+        blocked: Callable[[Twist], str],
+        along: Callable[[], list[Twist]] = list,
     ) -> tuple[Twist | None, str]:
         """Return the first motion that is free, or None and what blocks the first of all.
 
@@ -50,15 +70,20 @@ class RoomToTurn:
             How far [m] it may drive to make room; 0 = never.
         blocked : callable
             What the robot would touch along a motion, as a text; empty if nothing.
+        along : callable
+            Motions that keep to the path, tried before the others; see ``along_path``.
         """
         self._count_distance(pose, progress)
         wanted, *others = motions
         reason = blocked(wanted)
         if not reason:
             return wanted, ""
-        if others and self._driven >= distance > 0.0:
+        if distance == 0.0:
+            return None, reason
+        others = [*along(), *others]
+        if others and self._driven >= distance:
             return None, f"{reason}; {self._driven:.2f} m of driving on made no room to turn"
-        motion = next((motion for motion in others if not blocked(motion)), None) if distance > 0.0 else None
+        motion = next((motion for motion in others if not blocked(motion)), None)
         if motion is None:
             return None, reason
         self._made_room_at = pose
@@ -85,3 +110,40 @@ def curves_ahead(turn: Twist, bearing: float, backward: bool = False) -> list[Tw
         return [turn]
     speed = -CREEPING if backward else CREEPING
     return [turn, *(Twist.planar(speed, wz=math.copysign(CREEPING * curve, turn.wz)) for curve in CURVES)]
+
+
+def along_path(tracker: PathTracker, pose: Pose, backward: bool = False) -> list[Twist]:
+    """Creeping along arcs to points close ahead on a path seen from above, forward or backward as it is to be driven.
+
+    Where the outline fits on the path (``poses_ahead``) these arcs are free although the one to a point farther ahead,
+    which cuts the path's corners, is not. None where the robot does not look along the path.
+    """
+    motions, cusp = [], tracker.next_cusp
+    end, before = tracker.point_at(cusp), tracker.point_at(max(cusp - NEAR[-1], 0.0))
+    for distance in NEAR:
+        beyond = tracker.progress + distance - cusp
+        # Past a cusp the arc leads straight on.
+        point = end + (end - before) * (beyond / NEAR[-1]) if beyond > 0.0 else tracker.point_at(cusp + beyond)
+        x, y = point.tolist()
+        bearing, curvature = arc_to(pose, np.array([x, y, pose.z]))
+        if abs(off_course(bearing, backward)) <= LOOKS_ALONG:
+            speed = -CREEPING if backward else CREEPING
+            motions.append(Twist.planar(speed, wz=speed * curvature))
+    return motions
+
+
+def off_course(bearing: float, backward: bool) -> float:
+    """Angle [rad] from the direction of driving to a bearing in the robot's frame."""
+    return normalize_angle(bearing + math.pi) if backward else bearing
+
+
+def poses_ahead(tracker: PathTracker, distance: float, backward: bool) -> FloatArray:
+    """Poses (n, 3: x, y [m], yaw [rad]) of a robot that keeps to its path, up to ``distance`` [m] or the next cusp."""
+    last = float(max(tracker.cusps[tracker.cusps <= tracker.progress], default=0.0))
+    end = min(tracker.progress + distance, tracker.next_cusp)
+    lengths = np.append(np.arange(tracker.progress, end, SPACING), end)
+    steps = tracker.points_at(np.minimum(lengths + ARM, tracker.next_cusp)) - tracker.points_at(
+        np.maximum(lengths - ARM, last)
+    )
+    yaws = arctan2(steps[:, 1], steps[:, 0]) + (math.pi if backward else 0.0)
+    return np.column_stack([tracker.points_at(lengths)[:, :2], yaws])

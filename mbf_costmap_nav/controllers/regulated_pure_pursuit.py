@@ -16,7 +16,15 @@ from typing import ClassVar
 
 from mbf_abstract.geometry import Path, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_poses
-from mbf_abstract.maps.room_to_turn import RoomToTurn, curves_ahead, wider_curves
+from mbf_abstract.maps.room_to_turn import (
+    SMALL_TURN,
+    RoomToTurn,
+    along_path,
+    curves_ahead,
+    off_course,
+    poses_ahead,
+    wider_curves,
+)
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import ControlRequest, ControlResult
@@ -157,16 +165,33 @@ class RegulatedPurePursuitController(PathFollower):
 
     def _motions(self, cycle: ControlCycle) -> list[Twist]:
         """The motion that is wanted, then those that make room for it."""
-        yaw_rate, tracker = cycle.request.velocity.wz, cycle.tracker
         if (turn := self._turn_at_goal(cycle)) is not None:
-            return [Twist.planar(wz=self.rotation_speed(turn, yaw_rate))]
-        carrot = self._carrot(cycle)
-        backward = self.parameters.allow_reversing and tracker.driving_backward
-        bearing = math.atan2(carrot[1], carrot[0])
-        error = normalize_angle(bearing + math.pi) if backward else bearing
+            return [self._turn(cycle, turn)]
+        carrot, backward = self._carrot(cycle), self._backward(cycle)
+        error = off_course(math.atan2(carrot[1], carrot[0]), backward)
         if self.rotates and abs(error) > self.parameters.rotate_to_heading_min_angle:
-            return curves_ahead(Twist.planar(wz=self.rotation_speed(error, yaw_rate)), error, backward)
+            return curves_ahead(self._turn(cycle, error), error, backward)
         return wider_curves(self._drive(cycle, carrot, backward))
+
+    def _along_path(self, cycle: ControlCycle) -> list[Twist]:
+        """Motions that keep to the path, if the outline fits on it as far as the look-ahead at full speed."""
+        backward, pose = self._backward(cycle), cycle.request.pose
+        ahead = poses_ahead(cycle.tracker, self.look_ahead_distance(self.full_speed), backward)
+        if cycle.footprint.first_collision(cycle.costmap, ahead) >= 0:
+            return []
+        close = along_path(cycle.tracker, pose, backward)
+        motions = [motion for motion in close if abs(motion.wz) * self.turning_radius <= abs(motion.vx)]
+        if self._at_goal or not self.rotates:
+            return motions
+        carrot = self._carrot(cycle)
+        error = off_course(math.atan2(carrot[1], carrot[0]), backward)
+        return [*motions, self._turn(cycle, error)] if abs(error) > SMALL_TURN else motions
+
+    def _backward(self, cycle: ControlCycle) -> bool:
+        return self.parameters.allow_reversing and cycle.tracker.driving_backward
+
+    def _turn(self, cycle: ControlCycle, angle: float) -> Twist:
+        return Twist.planar(wz=self.rotation_speed(angle, cycle.request.velocity.wz))
 
     # ------------------------------------------------------------------------------------------------ steering
     def look_ahead_distance(self, speed: float) -> float:
@@ -243,7 +268,12 @@ class RegulatedPurePursuitController(PathFollower):
             return ControlResult(ExePathOutcome.SUCCESS, "", motions[0])
         pose, progress, distance = cycle.request.pose, cycle.tracker.progress, self.parameters.make_room_dist
         command, reason = self._room_to_turn.choose(
-            pose, progress, motions, distance, lambda motion: self._blocked(cycle, motion)
+            pose,
+            progress,
+            motions,
+            distance,
+            lambda motion: self._blocked(cycle, motion),
+            lambda: self._along_path(cycle),
         )
         return ControlResult(ExePathOutcome.BLOCKED_PATH if reason else ExePathOutcome.SUCCESS, reason, command)
 

@@ -214,6 +214,12 @@ class Costmap(GridGeometry):
         cell = self.world_to_cell(x, y)
         return None if cell is None else self.cost(*cell)
 
+    def part(self, box: CellBox) -> Costmap:
+        """Return the cells of a box, which must lie on the grid, as a costmap of its own."""
+        x, y = self.origin_x + box.x0 * self.resolution, self.origin_y + box.y0 * self.resolution
+        cells = self.cells[box.y0 : box.y1, box.x0 : box.x1]
+        return Costmap(cells, self.resolution, x, y, self.frame_id, self.stamp, self.version)
+
     def __repr__(self) -> str:
         return (
             f"<Costmap {self.width} x {self.height} cells of {self.resolution:g} m at "

@@ -14,7 +14,6 @@ within it that can be reached at the goal's heading (exactly, or within half a b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
@@ -25,27 +24,17 @@ from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import PlanRequest, PlanResult
-from mbf_costmap_nav.grid.costmap import LETHAL, Costmap
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
-from mbf_costmap_nav.kernels.car.ground import ground_of, pose_cost
-from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP, HEADINGS, Target, hybrid_search
-from mbf_costmap_nav.kernels.car.motion_primitives import Car
-from mbf_costmap_nav.kernels.car.shorter_drive import shortened
-from mbf_costmap_nav.kernels.search.grid_search import CANCELED, FOUND, search
+from mbf_costmap_nav.kernels.car.hybrid_astar import GAVE_UP
+from mbf_costmap_nav.kernels.search.grid_search import FOUND
+from mbf_costmap_nav.planning.car_search import CarLeg, CarWorld, Driving, search_drive
 from mbf_costmap_nav.planning.grid_planning import check_tolerance, heights_along, marked_if_permanent, off_map
-from mbf_costmap_nav.planning.search_grid import GridPlannerParameters, SearchGrid
 from mbf_costmap_nav.plugins import CostmapPlanner
 
 FloatArray = NDArray[np.float64]
 
-UNKNOWN_AS = 252
-"""Cost of the unknown cells that may be driven through, as for the other planners."""
 DEFAULT_RADIUS = 0.5
 """Radius [m] of the tightest curve where neither the parameters nor the robot give one."""
-CELLS_OF_BINS = (2.0, 1.0, 0.5, 0.25)
-"""Sides [cells] of the bins: coarse ones first, for an eighth of the states; then finer ones."""
-STATES_THAT_SHOW = 20_000
-"""After so many states in bins of a cell or less finer ones are not tried: there is no path."""
 
 
 class HybridAStarParameters(PluginParameters):
@@ -72,44 +61,6 @@ class HybridAStarParameters(PluginParameters):
     )
 
 
-@dataclass(frozen=True)
-class _World:
-    """One snapshot and the robot on it: footprint ``samples`` (n, 2) [m], and the cost of ``unknown`` cells."""
-
-    grid: SearchGrid
-    samples: FloatArray
-    unknown: int
-
-    @property
-    def costmap(self) -> Costmap:
-        return self.grid.costmap
-
-    def fits(self, pose: Pose) -> bool:
-        """Whether the whole footprint lies on the map and off lethal cells, the centre off inscribed ones."""
-        cost = pose_cost(self.costmap.cells, self.unknown, self.grid.geometry, self.samples, _planar(pose))
-        return bool(cost >= 0)
-
-    def field(self, source: Pose) -> NDArray[np.float32]:
-        """(n,) cost [cells] of the padded grid's cells from a pose's cell around what blocks the centre."""
-        grid, first = self.grid, self.grid.index(self.grid.cell_of(source))
-        _, g = search(grid.padded, first, -1, 0.0, True, False, grid.token.flag)
-        return g
-
-    def rows(self, field: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(height, width) of a field, without the padding."""
-        return field.reshape(-1, self.grid.padded.stride)[1:-1, 1:-1]
-
-
-@dataclass(frozen=True)
-class _Leg:
-    """Result of the search between two poses (``status`` of the kernel); without poses there is no path."""
-
-    status: int
-    poses: FloatArray
-    cost: float
-    states: int
-
-
 class HybridAStarPlanner(CostmapPlanner):
     """Kinematic planner for car-like robots."""
 
@@ -126,7 +77,7 @@ class HybridAStarPlanner(CostmapPlanner):
         """Plan from the start over the via poses to the goal, each with its heading."""
         check_tolerance(request.dist_tolerance)
         world = self._world(request)
-        legs: list[_Leg] = []
+        legs: list[CarLeg] = []
         failure = _misfit(world, "start", request.start)
         for number, (start, goal) in enumerate(pairwise((request.start, *request.via, request.goal))):
             is_last = number == len(request.via)
@@ -147,14 +98,14 @@ class HybridAStarPlanner(CostmapPlanner):
             message += f", ends {off:.2f} m from the goal (tolerance {request.dist_tolerance:.2f} m)"
         return PlanResult(GetPathOutcome.SUCCESS, message, path, sum(leg.cost for leg in legs))
 
-    def _world(self, request: PlanRequest) -> _World:
-        costmap, may_enter = self.costmap.snapshot(), self.parameters.allow_unknown
-        rules = GridPlannerParameters(cost_factor=self.parameters.cost_factor, allow_unknown=may_enter)
+    def _world(self, request: PlanRequest) -> CarWorld:
+        costmap, p = self.costmap.snapshot(), self.parameters
         samples = FootprintCheck(self.costmap.footprint, costmap.resolution).samples
-        grid = SearchGrid.build(costmap, rules, request.cancel_token)
-        return _World(grid, samples, UNKNOWN_AS if may_enter else LETHAL)
+        return CarWorld.build(
+            costmap, samples, request.cancel_token, cost_factor=p.cost_factor, allow_unknown=p.allow_unknown
+        )
 
-    def _search(self, world: _World, start: Pose, goal: Pose, tolerance: float) -> _Leg | None:
+    def _search(self, world: CarWorld, start: Pose, goal: Pose, tolerance: float) -> CarLeg | None:
         """Search to the goal or, if it is unreachable, to a reachable place within the tolerance; None without one."""
         grid, wanted, from_start = world.grid, goal, world.field(start)
         if not world.fits(goal) or math.isinf(from_start[grid.index(grid.cell_of(goal))]):
@@ -162,42 +113,23 @@ class HybridAStarPlanner(CostmapPlanner):
             if end is None:
                 return None
             goal = Pose((*world.costmap.cell_to_world(*end), goal.z), goal.orientation, goal.frame_id, goal.stamp)
-        to_goal = Target(_planar(goal), world.rows(world.field(goal)))
-        to_start = Target(_planar(start), world.rows(from_start))
-        ground = ground_of(world.costmap.cells, world.unknown, grid.geometry, world.samples)
-        states = made = 0
-        for cells in CELLS_OF_BINS:
-            if cells < 1.0 and made > STATES_THAT_SHOW:
-                break
-            car = self._car(world.costmap.resolution, cells)
-            status, poses, cost, made = hybrid_search(
-                ground, car, to_goal, to_start, _planar(wanted), tolerance, self.parameters.max_states, grid.token.flag
-            )
-            states += made
-            if status in (FOUND, GAVE_UP, CANCELED):
-                break
-        if status == FOUND:
-            poses, cost = shortened(ground, car, poses, grid.token.flag)
-        return _Leg(status, poses, cost, states)
-
-    def _car(self, resolution: float, cells: float) -> Car:
-        """The kinematic model for the search, with bins of so many cells."""
-        p, radius = self.parameters, self.turning_radius
-        # An arc leaves its bin, and turns by a bin of the headings at least; in fine bins, for tight places, by a part.
-        step = max(1.5 * cells * resolution, min(1.0, cells) * 2.0 * math.pi / HEADINGS * radius)
-        return Car(
-            radius=radius,
-            reversing=p.allow_reversing,
-            cost_factor=p.cost_factor,
-            reverse_factor=p.reverse_penalty,
-            turning_factor=p.turning_penalty,
-            change_cost=p.change_penalty,
-            bin_size=cells * resolution,
-            step=step,
-            pieces=math.ceil(step / resolution - 1e-9),
+        return search_drive(
+            world, self._driving(), start, goal, from_start=from_start, wanted=wanted, tolerance=tolerance
         )
 
-    def _no_path(self, world: _World, start: Pose, goal: Pose, leg: _Leg | None, tolerance: float) -> PlanResult:
+    def _driving(self) -> Driving:
+        p = self.parameters
+        return Driving(
+            radius=self.turning_radius,
+            reversing=p.allow_reversing,
+            cost_factor=p.cost_factor,
+            reverse_penalty=p.reverse_penalty,
+            change_penalty=p.change_penalty,
+            turning_penalty=p.turning_penalty,
+            max_states=p.max_states,
+        )
+
+    def _no_path(self, world: CarWorld, start: Pose, goal: Pose, leg: CarLeg | None, tolerance: float) -> PlanResult:
         """Failure with its cause: the goal is walled off, the car cannot get there, or the search gave up."""
         ends = f"from ({start.x:.2f}, {start.y:.2f}) to ({goal.x:.2f}, {goal.y:.2f})"
         if leg is None and not world.fits(goal):
@@ -212,7 +144,7 @@ class HybridAStarPlanner(CostmapPlanner):
         return PlanResult(GetPathOutcome.NO_PATH_FOUND, f"no drivable path {ends}, all {leg.states} states were tried")
 
 
-def _misfit(world: _World, name: str, pose: Pose, tolerance: float = 0.0) -> PlanResult | None:
+def _misfit(world: CarWorld, name: str, pose: Pose, tolerance: float = 0.0) -> PlanResult | None:
     """Why nothing can be planned to or from a pose, if that is known without a search."""
     problem = off_map(world.costmap, pose, name, tolerance)
     if problem or tolerance > 0.0 or world.fits(pose):
@@ -220,11 +152,6 @@ def _misfit(world: _World, name: str, pose: Pose, tolerance: float = 0.0) -> Pla
     outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
     text = f"the robot does not fit at the {name} ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f} rad)"
     return PlanResult(outcome, f"{text}, centre cost {world.costmap.cost_at(pose.x, pose.y)}")
-
-
-def _planar(pose: Pose) -> FloatArray:
-    """(3,) x, y [m], yaw [rad]."""
-    return np.array([pose.x, pose.y, pose.yaw])
 
 
 def to_path(poses: FloatArray, heights: FloatArray, frame_id: str, stamp: float) -> Path:

@@ -36,6 +36,7 @@ class StraightLinePlanner(GridPlanner):
 
     Parameters: ClassVar[type[PluginParameters]] = StraightLineParameters
     parameters: StraightLineParameters
+    plans_manoeuvres: ClassVar[bool] = False
 
     @property
     def pose_spacing(self) -> float:

@@ -17,16 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.execution.path_tracker import polyline_lengths
-from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry import Path, Pose, quaternion_from_yaw
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.plugins import PlanRequest, PlanResult
 from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.grid.costmap import INSCRIBED, Costmap
 from mbf_costmap_nav.map.layered_costmap import LayeredCostmap
+from mbf_costmap_nav.planning.manoeuvres import Fitted
+from mbf_costmap_nav.planning.path_fitting import PathFitting, shifted_request
 from mbf_costmap_nav.planning.permanent_walls import is_permanently_unreachable
 from mbf_costmap_nav.planning.search_grid import Cell, GridPlannerParameters, SearchGrid, SearchWorkspace
 from mbf_costmap_nav.plugins import CostmapContext, CostmapPlanner
+
+FloatArray = NDArray[np.float64]
 
 NEAR_END = 0.75
 """Points this near [cells] to an exact start or goal are dropped: going there first would be a step back."""
@@ -40,7 +44,7 @@ class Leg:
     path, or when the token was set, there are no points.
     """
 
-    points: NDArray[np.float64]
+    points: FloatArray
     cost: float = 0.0
     reached_goal: bool = True
 
@@ -53,6 +57,8 @@ class GridPlanner(CostmapPlanner):
 
     Parameters: ClassVar[type[PluginParameters]] = GridPlannerParameters
     parameters: GridPlannerParameters
+    plans_manoeuvres: ClassVar[bool] = True
+    """Whether a path may leave what the search has found where the robot's outline does not fit."""
 
     def __init__(self, context: CostmapContext) -> None:
         super().__init__(context)
@@ -71,12 +77,55 @@ class GridPlanner(CostmapPlanner):
         """
 
     def make_plan(self, request: PlanRequest) -> PlanResult:
-        """Plan from the start over the via poses to the goal."""
+        """Plan from the start over the via poses to the goal, and fit the path to the robot's outline."""
         check_tolerance(request.dist_tolerance)
         grid = SearchGrid.build(self.costmap.snapshot(), self.parameters, request.cancel_token, self._workspace)
+        # 1. Do the ends fit?
+        fitting, goal = self._fitting(grid), request.goal
+        if fitting is not None:
+            problem = self._check_start(grid, request.start) or fitting.start_problem(request.start)
+            own_cell = grid.is_blocked(grid.cell_of(goal))  # the search says so, or looks for one near by
+            end = problem or (goal if own_cell else fitting.fitting_goal(request))
+            if isinstance(end, PlanResult):
+                return marked_if_permanent(end, self.costmap, request.start, goal, request.dist_tolerance)
+            goal = end
+        # 2. Search leg by leg.
+        legs = self._search_legs(grid, request if goal is request.goal else shifted_request(request, goal))
+        if isinstance(legs, PlanResult):
+            return legs
+        pieces, cost, reached_goal = legs
+        # 3. Does the outline fit all along?
+        if fitting is None:
+            fitted = [Fitted(piece, np.full(len(piece), np.nan)) for piece in pieces]
+        else:
+            left = 0.0 if goal is not request.goal else request.dist_tolerance
+            answer = fitting.fit(pieces, request.start, goal, left)
+            if request.cancel_token.cancelled:
+                return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
+            if isinstance(answer, PlanResult):
+                return answer
+            fitted = answer
+        # 4. One path of all legs.
+        path = _assemble(fitted, request, goal, grid.costmap.frame_id, self.clock.now())
+        message = f"{len(path)} poses, {path.length:.2f} m"
+        off = math.dist(path.positions[-1][:2], (request.goal.x, request.goal.y))
+        if not reached_goal or off > 1e-9:
+            message += f", ends {off:.2f} m from the goal (tolerance {request.dist_tolerance:.2f} m)"
+        return PlanResult(GetPathOutcome.SUCCESS, message, path, cost)
+
+    def _fitting(self, grid: SearchGrid) -> PathFitting | None:
+        """What asks about the outline; None if nothing is to be asked."""
+        p = self.parameters
+        if not p.check_footprint or len(self.costmap.footprint.vertices) < 3:
+            return None
+        robot = self.min_turning_radius
+        return PathFitting(self.costmap, grid.costmap, p, robot, grid.token, manoeuvres=self.plans_manoeuvres)
+
+    def _search_legs(self, grid: SearchGrid, request: PlanRequest) -> tuple[list[FloatArray], float, bool] | PlanResult:
+        """Points (n, 2) [m] of each leg, their cost, and whether the last one reaches the goal; or a failure."""
         poses = (request.start, *request.via, request.goal)
         failure = self._check_start(grid, request.start)
-        pieces: list[NDArray[np.float64]] = []
+        pieces: list[FloatArray] = []
         cost, reached_goal = 0.0, True
         for number, (start, goal) in enumerate(pairwise(poses)):
             is_last = number == len(poses) - 2
@@ -93,12 +142,7 @@ class GridPlanner(CostmapPlanner):
             piece = _with_exact_ends(grid, leg.points, start, goal if reached_goal else None)
             pieces.append(resample(piece, self.pose_spacing) if self.pose_spacing > 0.0 else piece)
             cost += leg.cost
-        path = _assemble(pieces, request, reached_goal, grid.costmap.frame_id, self.clock.now())
-        message = f"{len(path)} poses, {path.length:.2f} m"
-        if not reached_goal:
-            off = math.dist(path.positions[-1][:2], (request.goal.x, request.goal.y))
-            message += f", ends {off:.2f} m from the goal (tolerance {request.dist_tolerance:.2f} m)"
-        return PlanResult(GetPathOutcome.SUCCESS, message, path, cost)
+        return pieces, cost, reached_goal
 
     def _check_start(self, grid: SearchGrid, start: Pose) -> PlanResult | None:
         cell = grid.costmap.world_to_cell(start.x, start.y)
@@ -164,15 +208,13 @@ def _no_path(grid: SearchGrid, start: Pose, goal: Pose, tolerance: float, name: 
     return PlanResult(GetPathOutcome.NO_PATH_FOUND, text)
 
 
-def _with_exact_ends(
-    grid: SearchGrid, points: NDArray[np.float64], start: Pose, goal: Pose | None
-) -> NDArray[np.float64]:
+def _with_exact_ends(grid: SearchGrid, points: FloatArray, start: Pose, goal: Pose | None) -> FloatArray:
     """Replace the cell centres at the ends by the exact start, and by the exact goal if it was reached."""
     points = _from_exactly(grid, np.array([start.x, start.y]), points)
     return points if goal is None else _from_exactly(grid, np.array([goal.x, goal.y]), points[::-1])[::-1]
 
 
-def _from_exactly(grid: SearchGrid, exact: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _from_exactly(grid: SearchGrid, exact: FloatArray, points: FloatArray) -> FloatArray:
     """Begin with a point of the first point's cell instead of that point, and of what lies as near.
 
     Where the line from there to the rest is blocked, all points are kept: a line within one cell is free.
@@ -184,20 +226,21 @@ def _from_exactly(grid: SearchGrid, exact: NDArray[np.float64], points: NDArray[
     return np.vstack([exact, rest if grid.is_free_line(exact, rest[0]) else points])
 
 
-def heights_along(points: NDArray[np.float64], request: PlanRequest) -> NDArray[np.float64]:
+def heights_along(points: FloatArray, request: PlanRequest) -> FloatArray:
     """Heights [m] of a path on a flat map: interpolated linearly from the start's to the goal's."""
     along = polyline_lengths(points)
     share = along / along[-1] if along[-1] > 0.0 else along
     return np.asarray(request.start.z + share * (request.goal.z - request.start.z))
 
 
-def _assemble(
-    pieces: list[NDArray[np.float64]], request: PlanRequest, reached_goal: bool, frame_id: str, stamp: float
-) -> Path:
-    """Join the legs; inner poses head along the path, the first and the last keep the requested orientations."""
-    points = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
-    path = Path.from_points(np.column_stack([points, heights_along(points, request)]), request.goal.orientation)
+def _assemble(pieces: list[Fitted], request: PlanRequest, goal: Pose, frame_id: str, stamp: float) -> Path:
+    """Join the legs; poses head along the path or as the manoeuvres do, the first and the last one as requested."""
+    points = np.concatenate([pieces[0].points, *(piece.points[1:] for piece in pieces[1:])])
+    yaws = np.concatenate([pieces[0].yaws, *(piece.yaws[1:] for piece in pieces[1:])])
+    path = Path.from_points(np.column_stack([points, heights_along(points, request)]), goal.orientation)
     assert path.orientations is not None
     orientations = path.orientations.copy()
+    for index in np.flatnonzero(~np.isnan(yaws[:-1])).tolist():
+        orientations[index] = quaternion_from_yaw(yaws[index])
     orientations[0] = request.start.orientation
     return Path(path.positions, orientations, frame_id, stamp)

@@ -18,7 +18,16 @@ from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.navigation_map import MapPlugin
-from mbf_abstract.maps.room_to_turn import RoomToTurn, curves_ahead, wider_curves
+from mbf_abstract.maps.queries import PADDED, CellState
+from mbf_abstract.maps.room_to_turn import (
+    SMALL_TURN,
+    RoomToTurn,
+    along_path,
+    curves_ahead,
+    off_course,
+    poses_ahead,
+    wider_curves,
+)
 from mbf_abstract.outcomes import ExePathOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import AbstractController, ControlRequest, ControlResult
@@ -45,6 +54,7 @@ class FollowPathParameters(PluginParameters):
         ge=0.0,
         le=10.0,
     )
+    allow_reversing: bool = parameter(True, "Drive backward where the poses of the path look against its direction.")
     max_path_distance: float = parameter(
         1.0, "Farther from the path than this the path is missed.", unit="m", gt=0.0, le=100.0
     )
@@ -90,6 +100,7 @@ class FollowPath(MapPlugin, AbstractController):
                 self._motions(pose, tracker),
                 p.make_room_dist,
                 lambda motion: self.navigation_map.obstacle_ahead(there, motion, p.check_ahead_time),
+                lambda: self._along_path(pose, tracker, p.look_ahead_dist),
             )
         except TransformError as error:
             return ControlResult(ExePathOutcome.TF_ERROR, str(error))
@@ -111,17 +122,37 @@ class FollowPath(MapPlugin, AbstractController):
         """
         p = self.parameters
         gap, turn = self._from_goal(pose, tracker)
+        backward = self._backward(tracker)
         if tracker.on_last_section and tracker.remaining < 0.5 * MIN_SPEED and gap < MIN_SPEED:
             return [self._turn(turn)]
-        x, y = tracker.point_at(min(tracker.progress + p.look_ahead_dist, tracker.next_cusp)).tolist()
-        bearing, curvature = arc_to(pose, np.array([x, y, pose.z]))
-        if abs(bearing) > p.turn_in_place_angle:
-            return curves_ahead(self._turn(bearing), bearing)
+        bearing, curvature = self._carrot(pose, tracker)
+        error = off_course(bearing, backward)
+        if abs(error) > p.turn_in_place_angle:
+            return curves_ahead(self._turn(error), error, backward)
         left = max(tracker.to_cusp, gap if tracker.on_last_section else 0.0)
         speed = min(p.max_vel_x, p.max_vel_theta / max(abs(curvature), 1e-6), math.sqrt(2.0 * p.decel_lim_x * left))
         speed = max(speed, min(MIN_SPEED, p.max_vel_x))
+        speed = -speed if backward else speed
         turn = max(-p.max_vel_theta, min(speed * curvature, p.max_vel_theta))
         return wider_curves(Twist.planar(vx=speed, wz=turn))
+
+    def _along_path(self, pose: Pose, tracker: PathTracker, reach: float) -> list[Twist]:
+        """Motions that keep to the path, if the outline fits on it over ``reach`` [m]."""
+        backward, check = self._backward(tracker), self.navigation_map.pose_check(PADDED)
+        for x, y, yaw in poses_ahead(tracker, reach, backward).tolist():
+            place = Pose.planar(x, y, yaw, pose.z, pose.frame_id, pose.stamp)
+            if check(self.on_map(place)).state is CellState.LETHAL:
+                return []
+        error = off_course(self._carrot(pose, tracker)[0], backward)
+        return [*along_path(tracker, pose, backward), *([self._turn(error)] if abs(error) > SMALL_TURN else [])]
+
+    def _carrot(self, pose: Pose, tracker: PathTracker) -> tuple[float, float]:
+        """Bearing [rad] of the point ahead on the path, and curvature [1/m] of the arc to it."""
+        x, y = tracker.point_at(min(tracker.progress + self.parameters.look_ahead_dist, tracker.next_cusp)).tolist()
+        return arc_to(pose, np.array([x, y, pose.z]))
+
+    def _backward(self, tracker: PathTracker) -> bool:
+        return self.parameters.allow_reversing and tracker.driving_backward
 
     def _turn(self, angle: float) -> Twist:
         limit = self.parameters.max_vel_theta

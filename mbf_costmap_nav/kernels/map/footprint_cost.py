@@ -78,3 +78,20 @@ def first_collision(
         if cost == 254:
             return i
     return -1
+
+
+@kernel
+def collisions(
+    cells: NDArray[np.uint8],
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    samples: NDArray[np.float64],
+    poses: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Which of the poses (n, 3: x, y, yaw) have a lethal cell under their footprint, (n,)."""
+    touching = np.zeros(poses.shape[0], dtype=np.bool_)
+    for i in range(poses.shape[0]):
+        cost = footprint_cost(cells, resolution, origin_x, origin_y, samples, poses[i, 0], poses[i, 1], poses[i, 2])
+        touching[i] = cost == 254
+    return touching

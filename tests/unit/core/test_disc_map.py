@@ -1,5 +1,6 @@
 """The map-independent questions of a round robot, on a half plane: free on the left, a wall on the right."""
 
+import math
 from contextlib import nullcontext
 
 import numpy as np
@@ -9,6 +10,7 @@ from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.geometry.transform import Transform, TransformError
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.disc_map import DiscMap
+from mbf_abstract.maps.getting_free import getting_free
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.queries import CellState, PlaceAnswer, PlaceQuery
 
@@ -86,3 +88,13 @@ def test_where_nothing_is_free_within_the_tolerance_the_place_itself_is_reported
     answer = queries.find_valid_pose(Pose.planar(0.5, 2.0), 0.9, 0.0)
 
     assert (answer.pose, answer.state) == (None, CellState.LETHAL)
+
+
+def test_a_robot_at_a_wall_gets_away_by_what_leads_from_it():
+    assert getting_free(HalfPlane(), Pose.planar(-0.4, 0.0)) == ("it gets away by backing up 0.1 m")
+    assert getting_free(HalfPlane(), Pose.planar(-0.35, 0.0, math.pi)) == "it gets away by driving on 0.2 m"
+    assert getting_free(HalfPlane(), Pose.planar(-0.4, 0.0, 1.5708)).startswith("it gets away by moving left")
+
+
+def test_inside_of_an_obstacle_nothing_is_promised():
+    assert getting_free(HalfPlane(), Pose.planar(3.0, 0.0)) == "no motion straight on or on the spot gets it away"

@@ -4,8 +4,18 @@ import math
 
 import pytest
 
-from mbf_abstract.geometry import Pose, Twist
-from mbf_abstract.maps.room_to_turn import AHEAD, CREEPING, RoomToTurn, curves_ahead, wider_curves
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.geometry import Path, Pose, Twist
+from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.room_to_turn import (
+    AHEAD,
+    CREEPING,
+    RoomToTurn,
+    along_path,
+    curves_ahead,
+    poses_ahead,
+    wider_curves,
+)
 
 HERE = Pose.planar(0, 0)
 LEFT = Twist.planar(vx=0.4, wz=0.8)
@@ -78,3 +88,48 @@ def test_progress_on_the_path_gives_back_the_distance():
         motion, _ = room.choose(Pose.planar(0.04 * step, 0), 0.04 * step, MOTIONS, 0.1, blocks(turns))
         assert motion == Twist.planar(vx=0.4)
     assert AHEAD < 0.1
+
+
+def test_motions_along_the_path_are_tried_before_those_that_leave_it():
+    along = Twist.planar(CREEPING, wz=0.01)
+    assert RoomToTurn().choose(HERE, 0.0, MOTIONS, 0.5, blocks(lambda motion: motion.wz > 0.5), lambda: [along]) == (
+        along,
+        "",
+    )
+    assert RoomToTurn().choose(HERE, 0.0, MOTIONS, 0.0, blocks(turns), lambda: [along]) == (None, "a wall")
+
+
+def quarter_circle(backward):
+    """A path of radius 0.5 m to the left of where it is driven to, with poses that look along or against it."""
+    angles = [0.02 * step for step in range(79)]
+    points = [(0.5 * math.sin(a), 0.5 - 0.5 * math.cos(a), a) for a in angles]
+    yaws = [a + (math.pi if backward else 0.0) for a in angles]
+    poses = [Pose.planar(x, y, yaw) for (x, y, _), yaw in zip(points, yaws, strict=True)]
+    return PathTracker(Path.from_poses(poses), dimensions=2)
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_a_robot_that_keeps_close_to_its_path_stays_on_it(backward):
+    tracker = quarter_circle(backward)
+    state = [0.0, 0.0, math.pi if backward else 0.0]
+    for _ in range(140):
+        tracker.update(state[:2])
+        nearest = along_path(tracker, Pose.planar(*state), backward)[-1]
+        assert math.copysign(1.0, nearest.vx) == (-1.0 if backward else 1.0)
+        state = arc_poses(tuple(state), nearest.vx, 0.0, nearest.wz, 0.05, 0.05)[-1].tolist()
+        assert abs(math.hypot(state[0], state[1] - 0.5) - 0.5) < 0.01
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_the_poses_ahead_are_those_of_a_robot_on_the_path(backward):
+    tracker = quarter_circle(backward)
+    tracker.update((0.0, 0.0))
+    poses = poses_ahead(tracker, 0.4, backward)
+    assert len(poses) == 9 and poses[-1, :2] == pytest.approx(tracker.point_at(0.4))
+    assert poses[6, 2] == pytest.approx(0.6 + (math.pi if backward else 0.0), abs=0.02)
+    tracker.update(tracker.point_at(tracker.length))
+    assert len(poses_ahead(tracker, 0.4, backward)) == 1
+
+
+def test_a_robot_that_looks_elsewhere_does_not_creep_along_its_path():
+    assert along_path(quarter_circle(False), Pose.planar(0.0, 0.0, 2.0)) == []

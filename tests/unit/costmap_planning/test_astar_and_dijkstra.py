@@ -11,11 +11,13 @@ from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
 from mbf_abstract.time.cancel import CancelToken
+from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.planners.dijkstra import DijkstraPlanner
 from mbf_costmap_nav.planners.straight_line import StraightLinePlanner
 from mbf_costmap_nav.planners.theta_star import ThetaStarPlanner
 
+POINT_ROBOT = Footprint([])
 PLANNERS = [AStarPlanner, DijkstraPlanner, ThetaStarPlanner]
 CODES = {"o": 0, "u": 127, "i": 253, "x": 254, "n": 255}
 # shortest octile length without | with corner cutting, from (1, 1) to (8, 8)
@@ -138,7 +140,9 @@ def test_costs_push_the_path_away(make_plugin):
 def test_f171_nav2_system_test_maps(make_plugin, shared_data, name, cut_corners):
     maps = json.loads((shared_data / "maps" / "nav2_test_costmaps.json").read_text())["maps"]
     cells = np.array([[CODES[c] for c in row] for row in maps[name]], dtype=np.uint8)
-    planner = make_plugin(AStarPlanner, cells, cost_factor=0.0, allow_unknown=False, cut_corners=cut_corners)
+    planner = make_plugin(
+        AStarPlanner, cells, footprint=POINT_ROBOT, cost_factor=0.0, allow_unknown=False, cut_corners=cut_corners
+    )
     result = plan(planner, (1.5, 1.5), (8.5, 8.5))
     assert result.path.length == pytest.approx(F171_LENGTHS[name][cut_corners], abs=1e-4)
 
@@ -192,8 +196,8 @@ def test_theta_star_in_the_open_is_one_straight_line(make_plugin):
 def test_theta_star_is_never_longer_than_the_octile_path(make_plugin, seed):
     cells = np.where(np.random.default_rng(seed).random((40, 40)) < 0.25, 254, 0).astype(np.uint8)
     cells[0, 0] = cells[-1, -1] = 0
-    octile = plan(make_plugin(AStarPlanner, cells), (0.5, 0.5), (39.5, 39.5))
-    theta = plan(make_plugin(ThetaStarPlanner, cells), (0.5, 0.5), (39.5, 39.5))
+    octile = plan(make_plugin(AStarPlanner, cells, footprint=POINT_ROBOT), (0.5, 0.5), (39.5, 39.5))
+    theta = plan(make_plugin(ThetaStarPlanner, cells, footprint=POINT_ROBOT), (0.5, 0.5), (39.5, 39.5))
     assert theta.outcome == octile.outcome
     assert not octile.success or theta.path.length <= octile.path.length + 1e-9
 

@@ -169,7 +169,7 @@ def navfn_plan(make_plugin, shared_data, start, lethal_cost, planner_class=AStar
     cells = np.frombuffer(pixels[-1132 * 1217 :], dtype=np.uint8).reshape(1217, 1132)
     parameters = {"cost_factor": 0.0, "lethal_cost": lethal_cost, "allow_unknown": False}
     return plan(
-        make_plugin(planner_class, cells.copy(), **parameters, **more),
+        make_plugin(planner_class, cells.copy(), footprint=Footprint([]), **parameters, **more),
         (start[0] + 0.5, start[1] + 0.5),
         (350.5, 450.5),
     )

@@ -19,6 +19,7 @@ from mbf_abstract.time.cancel import CancelToken
 from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.controllers.rotation_shim import RotationShimController
 from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
 from mbf_costmap_nav.kernels.map.line_cells import cost_along
 from mbf_costmap_nav.planners.astar import AStarPlanner
 from mbf_costmap_nav.refiners.smoother import SmootherRefiner, curvatures
@@ -69,7 +70,8 @@ def test_no_smoothed_line_crosses_a_lethal_cell_even_without_inflation(make_plug
     cells = np.where(np.random.default_rng(seed).random((40, 40)) < 0.2, 254, 0).astype(np.uint8)
     cells[1:3, 1:3] = cells[37:39, 37:39] = 0
     grid = Costmap(cells, 0.05)
-    plan = make_plugin(AStarPlanner, grid).make_plan(PlanRequest(Pose.planar(0.1, 0.1), Pose.planar(1.9, 1.9)))
+    planner = make_plugin(AStarPlanner, grid, footprint=Footprint([]))
+    plan = planner.make_plan(PlanRequest(Pose.planar(0.1, 0.1), Pose.planar(1.9, 1.9)))
     assume(plan.success)
     smoothed = smooth(make_plugin(SmootherRefiner, grid), plan.path).path
     along = resample(smoothed.positions[:, :2], 0.001)

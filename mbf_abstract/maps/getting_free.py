@@ -1,0 +1,52 @@
+"""How a robot that cannot drive or turn as it would like gets away from where it stands, on any map.
+
+When to use: in the texts of planners that refuse a start, so that a user or an executive knows which recovery helps.
+When not: to move the robot; ``back_up``, ``rotate`` and ``move_away`` do, and check as they go.
+"""
+
+from __future__ import annotations
+
+from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.geometry.arcs import arc_poses
+from mbf_abstract.maps.navigation_map import NavigationMap
+from mbf_abstract.maps.queries import PADDED, CellState
+
+MOTIONS = (
+    ("backing up", Twist.planar(-1.0), "m"),
+    ("driving on", Twist.planar(1.0), "m"),
+    ("turning left", Twist.planar(wz=1.0), "rad"),
+    ("turning right", Twist.planar(wz=-1.0), "rad"),
+)
+SIDEWAYS = (("moving left", Twist.planar(0.0, 1.0), "m"), ("moving right", Twist.planar(0.0, -1.0), "m"))
+"""Named only where nothing else helps: few robots can."""
+DISTANCES = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0)
+"""How far [m or rad] each motion is followed."""
+WORTH_NAMING = 0.3
+"""A robot that touches nothing where it stands gets on only by a motion so far [m or rad]."""
+
+
+def getting_free(navigation_map: NavigationMap, pose: Pose) -> str:
+    """Name the motions that take the robot from ``pose``, in the frame of the map, to where it touches nothing."""
+    ways = _ways(navigation_map, pose, MOTIONS) or _ways(navigation_map, pose, SIDEWAYS)
+    return f"it gets away by {' or '.join(ways)}" if ways else "no motion straight on or on the spot gets it away"
+
+
+def _ways(navigation_map: NavigationMap, pose: Pose, motions: tuple[tuple[str, Twist, str], ...]) -> list[str]:
+    """Texts of the motions that help."""
+    check = navigation_map.pose_check(PADDED)
+    least = WORTH_NAMING if check(pose).state is not CellState.LETHAL else 0.0
+    ways = []
+    for name, motion, unit in motions:
+        for distance in DISTANCES:
+            if navigation_map.obstacle_ahead(pose, motion, distance):
+                break
+            x, y, yaw = arc_poses((pose.x, pose.y, pose.yaw), *_planar(motion), distance, distance)[-1].tolist()
+            there = Pose((x, y, pose.z), Pose.planar(0.0, 0.0, yaw).orientation, pose.frame_id)
+            if distance >= least and check(there).state is not CellState.LETHAL:
+                ways.append(f"{name} {distance:g} {unit}")
+                break
+    return ways
+
+
+def _planar(motion: Twist) -> tuple[float, float, float]:
+    return motion.vx, motion.vy, motion.wz

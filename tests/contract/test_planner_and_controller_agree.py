@@ -1,0 +1,52 @@
+"""What a planner calls a path its controller accepts, on the small random worlds of ``benchmarks/agreement.py``."""
+
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import pytest
+
+from mbf_abstract.plugins import PlanRequest, PluginKind
+
+SOURCE = Path(__file__).resolve().parents[2] / "benchmarks" / "agreement.py"
+SPEC = spec_from_file_location("agreement", SOURCE)
+agreement = sys.modules["agreement"] = module_from_spec(SPEC)
+SPEC.loader.exec_module(agreement)
+
+PLANNED = range(8)
+DRIVEN = {"costmap": [8, 16], "mesh": [1]}
+FOLLOWERS = {"regulated_pure_pursuit", "follow_path", "path_follower"}
+"""Controllers that keep to their path; those that sample motions may leave it, and are only counted."""
+
+
+def every_planner():
+    for backend in agreement.WORLDS:
+        yield from ((backend, name) for name in agreement.installed(backend, PluginKind.PLANNER))
+
+
+def driven_pairs():
+    for backend, seeds in DRIVEN.items():
+        chosen = [pair for pair in agreement.pairs(backend) if pair[1] in FOLLOWERS]
+        yield from ((backend, *pair, seed) for pair in chosen for seed in seeds)
+
+
+@pytest.mark.parametrize(("backend", "planner"), [pytest.param(*one, id=".".join(one)) for one in every_planner()])
+def test_the_outline_fits_at_every_pose_of_a_fresh_plan(backend, planner):
+    paths = 0
+    for seed in PLANNED:
+        world = agreement.WORLDS[backend](seed)
+        if world.ends is None:
+            continue
+        result = world.plugin(PluginKind.PLANNER, planner).make_plan(PlanRequest(*world.ends))
+        if result.success:
+            paths += 1
+            assert world.first_misfit(result.path) == -1, seed
+    assert paths > 0
+
+
+@pytest.mark.parametrize(("backend", "planner", "controller", "seed"), list(driven_pairs()))
+def test_no_plan_is_refused_twice_on_a_map_that_does_not_change(backend, planner, controller, seed):
+    world = agreement.WORLDS[backend](seed)
+    made = world.plugin(PluginKind.PLANNER, planner), world.plugin(PluginKind.CONTROLLER, controller)
+    verdict = agreement.drive(world, *made)
+    assert verdict.agrees, verdict
