@@ -2,8 +2,8 @@
 
 The rule is passive motion safety (Macek, Vasquez, Fraichard, Siegwart 2009): a motion is safe if the robot can stand
 before any contact. Contacts that happen while it stands are not its fault. So a command is followed for a reaction
-time, then the robot brakes; objects keep their velocities until it stands. A robot that is nearer than the margin to an
-object already may move as long as the gap gets no smaller.
+time, then the robot brakes; objects keep their velocities until it stands. While somebody who moves is nearer than the
+margin, or touches it, the robot stands.
 """
 
 from __future__ import annotations
@@ -25,8 +25,6 @@ STEP = 0.1
 """Time [s] between two looks at robot and objects."""
 SAME_STOREY = 1.0
 """Objects whose ground is farther above or below the robot [m] are on another storey."""
-NEARER = 0.005
-"""A gap that gets smaller by less than this [m] counts as kept."""
 
 
 class ContactParameters(ParameterModel):
@@ -131,8 +129,7 @@ def _first_contact(
     places = middles[None] + times[:, None, None] * velocities[None]
     radii = np.array([known.radius for known in objects]) + limits.contact_margin
     gaps = box.gaps(moving, places, radii)
-    present = box.gaps(np.array([start]), middles[None], radii)
-    contact = (gaps < 0.0) & (gaps < present - NEARER)
+    contact = gaps < 0.0
     if not contact.any():
         return None
     return objects[int(np.argmax(contact[int(np.argmax(contact.any(axis=1)))]))]

@@ -52,10 +52,9 @@ def test_who_crosses_in_front_is_let_by():
     assert share_of(AHEAD, moving(0.9, 0.8, 0.0, 0.8)) == 1.0, "it has passed"
 
 
-def test_a_robot_that_is_too_near_already_may_leave_but_not_come_nearer():
+def test_the_robot_stands_while_somebody_passes_within_the_margin():
     beside = moving(0.6, 0.0, 0.0, 0.02)
-    assert share_of(Twist.planar(-0.3), beside) == 1.0
-    assert share_of(Twist.planar(0.3), beside) == 0.0
+    assert share_of(Twist.planar(-0.3), beside) == 0.0 == share_of(Twist.planar(0.3), beside)
 
 
 def test_a_robot_that_is_caught_up_anyway_stands():
@@ -103,7 +102,6 @@ def test_with_the_share_that_is_safe_the_robot_stands_before_any_contact(v, x, y
     pace, dt = 1.0, 0.01
     react = 0.0
     worst = math.inf
-    present = CARRIER.gaps(np.zeros((1, 3)), np.array([[[x, y]]]), np.array([0.25]))[0, 0]
     while pace > 0.0:
         px, py = px + pace * v * dt * math.cos(yaw), py + pace * v * dt * math.sin(yaw)
         yaw, time = yaw + pace * wz * dt, time + dt
@@ -113,8 +111,7 @@ def test_with_the_share_that_is_safe_the_robot_stands_before_any_contact(v, x, y
         place = np.array([[[x + vx * time, y + vy * time]]])
         radii = np.array([0.25])
         gap = CARRIER.gaps(np.array([[px, py, yaw]]), place, radii)[0, 0]
-        if gap < present - 0.05:
-            worst = min(worst, gap)
+        worst = min(worst, gap)
     assert worst > 0.0, f"share {share}: it comes to {worst:.3f} m although {LIMITS.contact_margin} m are kept"
 
 
