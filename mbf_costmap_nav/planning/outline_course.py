@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from mbf_abstract.execution.path_tracker import polyline_lengths
 from mbf_abstract.geometry import normalize_angle
 from mbf_abstract.geometry.arithmetic import arctan2
-from mbf_costmap_nav.control.path_geometry import resample
 from mbf_costmap_nav.grid.costmap import Costmap
 from mbf_costmap_nav.grid.footprint_check import FootprintCheck
 
@@ -50,10 +49,10 @@ class Course:
     @classmethod
     def along(cls, points: FloatArray, spacing: float, start_yaw: float | None, end_yaw: float | None) -> Course:
         """Course on a path of points (k, 2), with poses at most ``spacing`` [m] apart."""
-        places = resample(points, spacing)
-        lengths = polyline_lengths(places)
-        before, behind = (
-            np.column_stack([np.interp(lengths + side, lengths, axis) for axis in places.T]) for side in (-ARM, ARM)
+        given = polyline_lengths(points)
+        lengths = np.linspace(0.0, given[-1], 1 + max(1, math.ceil(given[-1] / spacing - 1e-9)))
+        before, places, behind = (
+            np.column_stack([np.interp(lengths + side, given, axis) for axis in points.T]) for side in (-ARM, 0.0, ARM)
         )
         steps = behind - before
         yaws = arctan2(steps[:, 1], steps[:, 0])
