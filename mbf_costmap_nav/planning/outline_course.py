@@ -50,7 +50,7 @@ class Course:
     def along(cls, points: FloatArray, spacing: float, start_yaw: float | None, end_yaw: float | None) -> Course:
         """Course on a path of points (k, 2), with poses at most ``spacing`` [m] apart."""
         given = polyline_lengths(points)
-        lengths = np.linspace(0.0, given[-1], 1 + max(1, math.ceil(given[-1] / spacing - 1e-9)))
+        lengths = _filled(given, spacing)
         before, places, behind = (
             np.column_stack([np.interp(lengths + side, given, axis) for axis in points.T]) for side in (-ARM, 0.0, ARM)
         )
@@ -95,6 +95,15 @@ class Course:
             return np.zeros((0, 3))
         step = 0.5 * costmap.resolution / max(check.footprint.circumscribed_radius, costmap.resolution)
         return turn_poses(self.poses[index], yaw, step)
+
+
+def _filled(lengths: FloatArray, spacing: float) -> FloatArray:
+    """Lengths (m,) [m] along a path: those given (k,), and between them more, at most ``spacing`` apart."""
+    steps = np.diff(lengths)
+    counts = np.maximum(1, np.ceil(steps / spacing - 1e-9)).astype(np.int64)
+    inner = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    filled = np.repeat(lengths[:-1], counts) + np.repeat(steps / counts, counts) * inner
+    return np.append(filled, lengths[-1])
 
 
 def turn_poses(pose: FloatArray, yaw: float, step: float) -> FloatArray:

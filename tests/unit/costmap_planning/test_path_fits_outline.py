@@ -166,6 +166,13 @@ def test_a_course_looks_along_its_path_and_turns_at_its_ends():
     assert (np.diff(course.lengths) <= 0.1 + 1e-9).all()
 
 
+def test_a_course_passes_every_point_of_its_path():
+    points = np.array([[0.0, 0.0], [0.07, 0.0], [0.07, 0.03], [0.4, 0.03]])
+    course = Course.along(points, 0.05, None, None)
+    assert all((np.hypot(*(course.poses[:, :2] - point).T) < 1e-12).any() for point in points)
+    assert (np.diff(course.lengths) <= 0.05 + 1e-9).all()
+
+
 def test_a_turn_takes_the_shorter_side_in_small_steps():
     poses = turn_poses(np.array([1.0, 2.0, 3.0]), -3.0, 0.05)
     assert poses[-1, 2] == pytest.approx(2.0 * math.pi - 3.0) and (np.diff(poses[:, 2]) <= 0.05 + 1e-9).all()
