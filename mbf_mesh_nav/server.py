@@ -48,7 +48,7 @@ mesh_map:
   mesh_file: {file}
   repair: [duplicate_vertices, zero_area, duplicate_faces, non_manifold, non_manifold_vertices, unreferenced]
   inscribed_radius: 0.3
-  edge_cost_factor: 1.0
+  edge_cost_factor: 1.5
   default_layer: safe
   layers:
     - {{name: border, type: border}}
@@ -60,9 +60,9 @@ mesh_map:
     - {{name: effort, type: weighted_sum, inputs: [steepness, roughness, height_diff]}}
     - {{name: safe, type: max_combination, inputs: [inflation, effort]}}
   border: {{threshold: 0.5}}
-  steepness: {{threshold: 0.7, combination_weight: 0.9}}
-  height_diff: {{threshold: 0.2, height_limit: 1.0, combination_weight: 0.5}}
-  roughness: {{threshold: 3.0, combination_weight: 0.6}}
+  steepness: {{threshold: 0.7, combination_weight: 0.6}}
+  height_diff: {{threshold: 0.2, height_limit: 1.0, combination_weight: 0.25}}
+  roughness: {{threshold: 3.0, combination_weight: 0.4}}
   inflation: {{inscribed_radius: 0.3, inflation_radius: 0.6, lethal_value: .inf}}
 """
 
