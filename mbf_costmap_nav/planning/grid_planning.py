@@ -34,6 +34,8 @@ FloatArray = NDArray[np.float64]
 
 NEAR_END = 0.75
 """Points this near [cells] to an exact start or goal are dropped: going there first would be a step back."""
+DOES_NOT_FIT = (GetPathOutcome.BLOCKED_GOAL, GetPathOutcome.NO_PATH_FOUND)
+"""Outcomes of a path whose end the outline does not fit at, or that it does not fit on."""
 
 
 @dataclass(frozen=True)
@@ -82,13 +84,22 @@ class GridPlanner(CostmapPlanner):
         grid = SearchGrid.build(self.costmap.snapshot(), self.parameters, request.cancel_token, self._workspace)
         # 1. Do the ends fit?
         fitting, goal = self._fitting(grid), request.goal
-        if fitting is not None:
-            problem = self._check_start(grid, request.start) or fitting.start_problem(request.start)
-            own_cell = grid.is_blocked(grid.cell_of(goal))  # the search says so, or looks for one near by
-            end = problem or (goal if own_cell else fitting.fitting_goal(request))
-            if isinstance(end, PlanResult):
-                return marked_if_permanent(end, self.costmap, request.start, goal, request.dist_tolerance)
-            goal = end
+        if fitting is None:
+            return self._plan_to(goal, grid, None, request)
+        problem = self._check_start(grid, request.start) or fitting.start_problem(request.start)
+        blocked_cell = grid.is_blocked(grid.cell_of(goal))  # the search says so, or looks for one near by
+        end = problem or (goal if blocked_cell else fitting.fitting_goal(request))
+        if isinstance(end, PlanResult):
+            return marked_if_permanent(end, self.costmap, request.start, goal, request.dist_tolerance)
+        result = self._plan_to(end, grid, fitting, request)
+        # The cell near by that the search has found may be too near to what blocks the goal for the outline.
+        if blocked_cell and request.dist_tolerance > 0.0 and result.outcome in DOES_NOT_FIT:
+            beside = fitting.fitting_goal(request)
+            return result if isinstance(beside, PlanResult) else self._plan_to(beside, grid, fitting, request)
+        return result
+
+    def _plan_to(self, goal: Pose, grid: SearchGrid, fitting: PathFitting | None, request: PlanRequest) -> PlanResult:
+        """Plan to the request's goal or to a pose within its tolerances."""
         # 2. Search leg by leg.
         legs = self._search_legs(grid, request if goal is request.goal else shifted_request(request, goal))
         if isinstance(legs, PlanResult):

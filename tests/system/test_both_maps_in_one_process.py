@@ -28,9 +28,10 @@ dist_tolerance: 0.6
 global_costmap:
   width: 4.0
   height: 4.0
+  robot_radius: 0.2
   layers: [{name: area, type: keepout}]
   area: {zones: [{name: spot, polygon: SPOT}]}
-local_costmap: {width: 4.0, height: 4.0, layers: [{name: area, type: keepout}], area: {zones: []}}
+local_costmap: {width: 4.0, height: 4.0, robot_radius: 0.2, layers: [{name: area, type: keepout}], area: {zones: []}}
 planners: [{name: shortest, type: dijkstra}]
 """,
 }

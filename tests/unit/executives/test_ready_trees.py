@@ -238,7 +238,7 @@ def test_the_running_node_is_written_to_the_event_log(make_session):
 
 def test_every_plan_of_a_tree_goes_through_its_refiner(make_session):
     session = make_session(plugins={"refiner": ScriptedRefiner})
-    options = replace(OPTIONS, refiner="refiner", second_planner_pause=1.0)
+    options = replace(OPTIONS, refiner="refiner", second_planner_pause=1.0, second_planner_look_ahead=0.0)
     assert run(session, navigation_tree(options)).success
     assert len(session.refiner.requests) == plans(session) > 1
 

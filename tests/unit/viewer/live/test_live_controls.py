@@ -84,7 +84,7 @@ def test_the_chosen_planner_makes_the_plans_of_the_goals_to_come(steered):
     run.at(1.0, lambda: run.controls.choose("cvp", "follower"), lambda: run.controls.go_to(above(5.0, 7.0), DOWN))
 
     assert run.visit_goals().success
-    assert [event.data["plugin"] for event in run.events(EventKind.PLAN)] == ["any_angle", "cvp"]
+    assert [event.data["plugin"] for event in run.events(EventKind.PLAN)] == ["astar", "cvp"]
 
 
 def test_injected_faults_befall_the_sensor_and_the_localisation_and_end(steered):
