@@ -57,6 +57,9 @@ class RemoteRobot:
     def _run(self):
         with suppress(ConnectionClosed):
             self._drive()
+        with suppress(ConnectionClosed):  # sending failed first: what came before the end is still to be read
+            while not self._ended.is_set():
+                self._newest_speed(0.0)
 
     def _drive(self):
         speed = 0.0
