@@ -14,6 +14,7 @@ import json
 import math
 import statistics
 import time
+from abc import ABC, abstractmethod
 from collections import Counter
 from dataclasses import dataclass
 from typing import Any
@@ -106,7 +107,7 @@ def random_boxes(rng: np.random.Generator) -> list[Box]:
     return boxes
 
 
-class World:
+class World(ABC):
     """One floor with its map, and a start and a goal where the robot fits; None as ends if there are none."""
 
     backend: str
@@ -118,21 +119,21 @@ class World:
         self.build(random_boxes(rng))
         self.ends = self._ends(rng)
 
+    @abstractmethod
     def build(self, boxes: list[Box]) -> None:
         """Make the map of a floor with boxes."""
-        raise NotImplementedError
 
+    @abstractmethod
     def plugin(self, kind: PluginKind, name: str) -> Any:
         """Make a plugin on the map, with its defaults."""
-        raise NotImplementedError
 
+    @abstractmethod
     def pose_on(self, x: float, y: float, yaw: float) -> Pose:
         """Pose of a robot that stands on the floor."""
-        raise NotImplementedError
 
+    @abstractmethod
     def fits(self, pose: Pose) -> bool:
         """Whether the outline touches nothing."""
-        raise NotImplementedError
 
     def first_misfit(self, path: Any) -> int:
         """Index of the first pose of a path at which a controller's check finds a collision; -1 if it fits at all."""

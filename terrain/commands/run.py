@@ -101,11 +101,16 @@ def run(
                 options = replace(options, watch=watch, stay=stay)
             result = run_scenario(loaded, options)
     _print_result(result, as_json)
-    replay_page = (folder / "replay.html").resolve()
-    if show and replay_page.is_file():
-        typer.launch(replay_page.as_uri())
+    if show:
+        _open_replay(folder)
     if not result.success:
         raise typer.Exit(FAILURE)
+
+
+def _open_replay(folder: Path) -> None:
+    page = (folder / "replay.html").resolve()
+    if page.is_file():
+        typer.launch(page.as_uri())
 
 
 def scenarios(
