@@ -155,10 +155,9 @@ def replay(
             if gif:
                 live.step("writing the animation")
                 write_animation(folder / "animation.gif", recording)
-    page = (folder / "replay.html").resolve()
-    typer.echo(page)
+    typer.echo((folder / "replay.html").resolve())
     if show:
-        typer.launch(page.as_uri())
+        _open_replay(folder)
 
 
 def compare(

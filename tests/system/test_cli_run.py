@@ -1,7 +1,9 @@
 """``mbf run`` refuses what it cannot run, and drives a real building end to end."""
 
 import json
+import os
 
+import pytest
 import typer
 from typer.testing import CliRunner
 
@@ -57,12 +59,33 @@ def test_a_run_through_a_real_building_reaches_its_goal_and_leaves_all_files(sha
     assert answer["metrics"]["distance_to_goal_m"] < 0.5
 
 
-def test_a_replay_is_made_again_from_the_recording_alone(tmp_path):
+def save_a_short_run(folder):
     shape = RobotShape.of(HUSKY)
     recorder = Recorder("straight", "mesh", shape, Pose.planar(0.0, 0.0), [Pose.planar(1.0, 0.0)])
     for step in range(11):
         recorder.sample(0.1 * step, Pose.planar(0.1 * step, 0.0), Twist.planar(1.0), Twist.planar(1.0))
-    recorder.finish(Verdict(0, "goal reached")).save(tmp_path / "recording.npz")
+    recorder.finish(Verdict(0, "goal reached")).save(folder / "recording.npz")
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # the browser lives on, as it should
+def test_the_replay_is_opened_in_the_browser(tmp_path, monkeypatch):
+    opened, folder = tmp_path / "opened", tmp_path / "run"
+    os.mkfifo(opened)
+    browser = tmp_path / "xdg-open"
+    browser.write_text(f'#!/bin/sh\necho "$1" > {opened}\n')
+    browser.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    folder.mkdir()
+    save_a_short_run(folder)
+
+    result = mbf("replay", folder)
+
+    assert result.exit_code == 0, result.output
+    assert opened.read_text().strip().removeprefix("file://") == str(folder / "replay.html")
+
+
+def test_a_replay_is_made_again_from_the_recording_alone(tmp_path):
+    save_a_short_run(tmp_path)
 
     result = mbf("replay", tmp_path, "--no-open")
 
