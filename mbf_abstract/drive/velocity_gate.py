@@ -113,7 +113,7 @@ class Lease:
             return "the lease is over"
         if self.paused:
             return "the lease is paused"
-        return "the robot's driver has not come back from an earlier command" if self._writer.busy else ""
+        return "the robot's send_command() has not come back from an earlier command" if self._writer.busy else ""
 
     def _limited(self, command: Command) -> Command:
         limited = self._gate.limits.apply(command)
