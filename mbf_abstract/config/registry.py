@@ -115,6 +115,13 @@ class PluginRegistry:
         group_name = _group(group)
         return self._checked(group_name, type_name, self._import(group_name, type_name), base)
 
+    def module_of(self, group: PluginKind | str, type_name: str) -> str:
+        """Return the name of the module that a type's class stands in, also where an adapter wraps the class.
+
+        Raises PluginError as ``load`` does.
+        """
+        return str(getattr(self._import(_group(group), type_name), "__module__", ""))
+
     def reload(self, group: PluginKind | str, type_name: str, base: type | None = None) -> type:
         """Load a type again from its changed source; objects of the old class keep their old code."""
         if (name := self._resolve(_group(group), type_name)) and (_group(group), name) in self._registered:

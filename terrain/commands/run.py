@@ -1,4 +1,4 @@
-"""The commands ``mbf run``, ``scenarios``, ``replay`` and ``compare``, which need the simulator and the viewer."""
+"""The commands ``mbf run``, ``scenarios``, ``replay`` and ``compare``; ``mbf rerun`` is in a module of its own."""
 
 from __future__ import annotations
 
@@ -13,22 +13,25 @@ import typer
 
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
 from mbf_abstract.commands.waiting import waiting
+from terrain.commands.command_line import command_line
+from terrain.commands.new_run import RUNS, new_run_folder
+from terrain.commands.rerun import rerun
 
 if TYPE_CHECKING:
     from terrain.session.runner import RunResult
-
-RUNS = Path("runs")
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the application ``mbf``."""
     app.command("run")(run)
+    app.command("rerun")(rerun)
     app.command("scenarios")(scenarios)
     app.command("replay")(replay)
     app.command("compare")(compare)
 
 
 def run(
+    context: typer.Context,
     scenario: str = typer.Argument(..., help="Name of a shipped scenario (see mbf scenarios), or a YAML file."),
     backend: str = typer.Option("", "--backend", help="Map backend: mesh or costmap; the scenario's own if not given."),
     seed: int = typer.Option(
@@ -83,6 +86,7 @@ def run(
         with LiveLine(show=not (quiet or as_json)) as live:
             options = RunOptions(
                 folder=folder,
+                command=command_line(context),
                 backend=backend or None,
                 seed=seed if seed >= 0 else None,
                 wall_clock=wall_clock,
@@ -201,13 +205,6 @@ def settings_of(texts: list[str], **chosen: str) -> dict[str, str]:
             raise typer.BadParameter(f"{key} is set twice", param_hint="--set")
         settings[key] = value
     return settings
-
-
-def new_run_folder(parent: Path, now: datetime) -> Path:
-    """Return a folder name made of the time that does not exist yet."""
-    stamp = now.strftime("%Y-%m-%d_%H-%M-%S")
-    names = [stamp, *(f"{stamp}_{number}" for number in range(2, 1000))]
-    return next(parent / name for name in names if not (parent / name).exists())
 
 
 def _print_result(result: RunResult, as_json: bool) -> None:

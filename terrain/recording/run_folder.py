@@ -22,7 +22,10 @@ from terrain.recording.recorded_maps import RecordedMesh
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import Recording, RecordingError
 
-RESULTS = ("metrics.json", "timing.json", "recording.npz", "picture.png", "report.html", "replay.html", "run.mcap")
+RESULTS = (
+    *("metrics.json", "timing.json", "recording.npz", "picture.png", "report.html", "replay.html", "run.mcap"),
+    "provenance.yaml",
+)
 PARTS = "recording.parts"
 PERIOD = 2.0  # s of the run in one part; to write one takes about a millisecond
 

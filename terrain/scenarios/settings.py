@@ -2,12 +2,13 @@
 
 ``planner`` and ``controller`` choose the default plugin by its name in the navigation configuration or by its type;
 ``world.`` and a key change the scenario's world; any other key is a dotted path of the configuration, e.g.
-``mesh_map.edge_cost_factor``.
+``mesh_map.edge_cost_factor``. A value that is the path of a file counts from the working folder.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -59,7 +60,8 @@ def apply_settings(text: str, settings: Mapping[str, str]) -> str:
         if key in PLUGIN_LISTS:
             config[PLUGIN_LISTS[key]] = _with_default(config.get(PLUGIN_LISTS[key]) or [], value)
         else:
-            _set(config, key, yaml.safe_load(value))
+            file = Path(value)
+            _set(config, key, str(file.absolute()) if file.suffix and file.is_file() else yaml.safe_load(value))
     return yaml.safe_dump(config, sort_keys=False)
 
 

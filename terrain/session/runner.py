@@ -1,10 +1,11 @@
 """Runs a scenario from start to last goal with ``move_base``, or another executive, and writes what happened.
 
-In the folder: ``events.jsonl``, ``metrics.json``, ``recording.npz``, ``navigation.yaml``, ``versions.json`` and the
-world's map files; the caller may add views of them, see ``RunOptions``. On simulated time the same scenario and seed
-write the same ``events.jsonl``, byte for byte, and the same ``digest`` in ``metrics.json``, which covers poses and
-commands too (see ``terrain.recording.run_digest``), on every CPU with the versions that ``versions.json`` names. The
-wall time of the run is in ``timing.json``.
+In the folder: ``events.jsonl``, ``metrics.json``, ``recording.npz``, all that repeats the run (``scenario.yaml``,
+``navigation.yaml``, ``inputs``, see ``terrain.provenance``), ``provenance.yaml`` and the world's map files; the caller
+may add views of them, see ``RunOptions``. On simulated time the same scenario and seed write the same
+``events.jsonl``, byte for byte, and the same ``digest`` in ``metrics.json``, which covers poses and commands too (see
+``terrain.recording.run_digest``), on every CPU with the versions that ``provenance.yaml`` names. The wall time of the
+run is in ``timing.json``.
 """
 
 from __future__ import annotations
@@ -22,14 +23,15 @@ from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.time.clock import wall_seconds
 from terrain.physics.incidents import IncidentKind
+from terrain.provenance.provenance import write_provenance, write_scenario
 from terrain.recording.metrics import measure
 from terrain.recording.planning_times import PlanningTimes
 from terrain.recording.recording import Recording
 from terrain.recording.run_folder import RecordingParts, clear_results, has_parts
 from terrain.recording.verdict import Verdict, judge
-from terrain.recording.versions import write_versions
 from terrain.recording.whole_files import write_whole
 from terrain.scenarios.scenario import Scenario
+from terrain.scenarios.settings import apply_world_settings
 from terrain.scenarios.world import ScenarioWorld
 from terrain.session.arrival import arrival_tolerance
 from terrain.session.executives import make_executive
@@ -74,6 +76,8 @@ class RunOptions(SessionOptions):
 
     Attributes
     ----------
+    command : str
+        The command line that asked for the run, as it is recorded; empty for a run of a script.
     executive : str
         Who decides on plans, drives and recoveries, a name of ``terrain.session.executives.EXECUTIVES``.
     geodesic : bool
@@ -91,6 +95,7 @@ class RunOptions(SessionOptions):
     """
 
     folder: Path
+    command: str = ""
     executive: str = "move_base"
     geodesic: bool = False
     stay: bool = False
@@ -110,7 +115,6 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     """
     options.folder.mkdir(parents=True, exist_ok=True)
     clear_results(options.folder)
-    write_versions(options.folder)
     log = JsonLinesSink(options.folder / "events.jsonl")
     planning = PlanningTimes()
     session = Session(scenario, replace(options, sinks=(*options.sinks, log, planning)))
@@ -119,6 +123,7 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     )  # fmt: skip
     session.loop.on_tick.append(parts.after_step)
     try:
+        _record_provenance(scenario, session, options)
         for note in session.navigator.server.notes:
             options.on_note(f"note: {note}")
         sequence, wall_time = _drive(session, options)
@@ -143,6 +148,14 @@ def run_scenario(scenario: Scenario, options: RunOptions) -> RunResult:
     for problem in options.write_views(options.folder, recording, metrics):
         options.on_note(problem)
     return RunResult(recording.verdict, options.folder, metrics)
+
+
+def _record_provenance(scenario: Scenario, session: Session, options: RunOptions) -> None:
+    """Write what the run is made of; of a run that is killed, too."""
+    as_asked, _ = apply_world_settings(scenario, options.settings)  # without the noise that the session has added
+    write_scenario(options.folder, as_asked, session.backend, session.seed, session.inputs)
+    server, is_watched = session.navigator.server, options.watch is not RunOptions.watch
+    write_provenance(options.folder, server, options.command, options.executive, options.wall_clock, is_watched)
 
 
 def _drive(session: Session, options: RunOptions) -> tuple[GoalSequence, float]:

@@ -17,7 +17,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.yaml_source import read_yaml
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.goals.handle import AnyGoalHandle
@@ -29,6 +32,7 @@ from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.robot_models import ROBOTS
 from terrain.physics.robots import WheeledRobot
 from terrain.physics.simulation import Simulation
+from terrain.provenance.named_files import InputCopies
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.scenarios.environment import build_environment, with_noise
@@ -56,6 +60,11 @@ class Session(SimulationSession):
         A scenario, the name of a shipped one, or a file.
     options : SessionOptions
 
+    Attributes
+    ----------
+    inputs : InputCopies
+        Copies of the files that the configuration names, in the folder of the session.
+
     Raises
     ------
     ConfigError
@@ -71,6 +80,7 @@ class Session(SimulationSession):
         self._temporary = tempfile.TemporaryDirectory(prefix="mbf_session_")  # removed with the session, used or not
         self.folder = Path(self._temporary.name if options.folder is None else options.folder)
         self.folder.mkdir(parents=True, exist_ok=True)
+        self.inputs = InputCopies(self.folder)
         try:
             options.on_step("building the world")
             self.world, self._obstacles = build_environment(self.scenario, self.folder, self.seed)
@@ -85,7 +95,9 @@ class Session(SimulationSession):
 
     def _wire(self, options: SessionOptions) -> None:
         """Robot and sensors, then the server on their map, then the recorder."""
-        config_file = write_navigation_config(self.scenario, self.backend, self.world, self.folder, options.settings)
+        config_file = write_navigation_config(
+            self.scenario, self.backend, self.world, self.folder, options.settings, self.inputs
+        )
         self.robot, simulation = self._make_simulation()
         delay = CommandDelay(self.world.physics, self.robot.send_command, self.scenario.perturb.command_delay)
         self.recorder = self._make_recorder()
@@ -167,9 +179,17 @@ class Session(SimulationSession):
 
 
 def write_navigation_config(
-    scenario: Scenario, backend: str, world: ScenarioWorld, folder: Path, settings: Mapping[str, str]
+    scenario: Scenario,
+    backend: str,
+    world: ScenarioWorld,
+    folder: Path,
+    settings: Mapping[str, str],
+    inputs: InputCopies,
 ) -> Path:
-    """Write the backend's configuration with the world's files filled in; a run can be planned again from it."""
+    """Write the backend's configuration with the world's files filled in; a run can be planned again from it.
+
+    Files that it names, by paths from its own folder, are copied into ``inputs``.
+    """
     source = scenario.navigation.get(backend)
     if source is None:
         known = ", ".join(scenario.navigation)
@@ -179,4 +199,10 @@ def write_navigation_config(
         text = text.replace(placeholder, file.name)
     target = folder / "navigation.yaml"
     target.write_text(apply_settings(text, settings))
+    document = read_yaml(target, [])  # what is wrong with it is reported when the server reads it
+    if document is not None:
+        written = {file.name for file in world.files.values()}
+        renamed = inputs.renamed(document.data, source.parent, written)
+        if renamed != document.data:
+            target.write_text(yaml.safe_dump(renamed, sort_keys=False))
     return target

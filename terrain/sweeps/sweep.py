@@ -9,16 +9,14 @@ from __future__ import annotations
 import hashlib
 import itertools
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mbf_abstract.config.yaml_source import load_yaml
+from terrain.provenance.named_files import hash_with_named_files, named_files
 from terrain.recording.verdict import Level
 from terrain.scenarios.scenario import Scenario
-
-MAX_NAME = 200  # bytes; a longer text is no file's name
 
 
 @dataclass(frozen=True)
@@ -35,7 +33,8 @@ class SweepRun:
 
     def key(self, scenario_hash: str) -> str:
         """Return the key of this run; a file that a setting names counts with its contents."""
-        files = [_hash_of_file(file).hex()[:16] for file in _named_files(list(self.settings.values()), Path())]
+        named = named_files(list(self.settings.values()), Path())
+        files = [hash_with_named_files(file).hex()[:16] for file in named]
         return "/".join([scenario_hash, str(self.seed), self.variant, *files])
 
 
@@ -46,33 +45,11 @@ def hash_of(scenario: Scenario) -> str:
     """Return a short hash of the contents of a scenario's files, with maps, meshes, images and the files they name."""
     digest = hashlib.sha256(scenario.model_dump_json(exclude={"navigation"}).encode())
     for backend, file in sorted(scenario.navigation.items()):
-        digest.update(backend.encode() + _hash_of_file(file))
+        digest.update(backend.encode() + hash_with_named_files(file))
     world_file: Path | None = getattr(scenario.world, "file", None)
     if world_file is not None:
-        digest.update(_hash_of_file(world_file))
+        digest.update(hash_with_named_files(world_file))
     return digest.hexdigest()[:16]
-
-
-def _hash_of_file(file: Path, above: tuple[Path, ...] = ()) -> bytes:
-    """Hash a file; a YAML file with the files that its texts name, but for those it is named by itself."""
-    digest = hashlib.sha256(file.read_bytes())
-    if file.suffix in (".yaml", ".yml"):
-        above = (*above, file.resolve())
-        for named in _named_files(load_yaml(file).data, file.parent):
-            if named.resolve() not in above:
-                digest.update(_hash_of_file(named, above))
-    return digest.digest()
-
-
-def _named_files(value: Any, folder: Path) -> Iterator[Path]:
-    if isinstance(value, Mapping):
-        value = list(value.values())
-    if isinstance(value, list):
-        for item in value:
-            yield from _named_files(item, folder)
-    elif isinstance(value, str) and 0 < len(value.encode()) < MAX_NAME and "\0" not in value:
-        if (folder / value).is_file():
-            yield folder / value
 
 
 def plan_sweep(seeds: Sequence[int], settings: Mapping[str, Sequence[str]]) -> list[SweepRun]:

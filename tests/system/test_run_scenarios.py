@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from terrain.provenance.provenance import read_provenance
 from terrain.scenarios.scenario import MapWorld, PlanarPose, load_scenario
 from terrain.session.runner import RunOptions, run_scenario
 
@@ -29,7 +30,7 @@ def test_the_robot_arrives_and_leaves_its_results(name, backend, tmp_path):
     assert json.loads((tmp_path / "metrics.json").read_text())["outcome"] == "SUCCESS"
     assert (tmp_path / "events.jsonl").stat().st_size > 0
     assert (tmp_path / "recording.npz").is_file()
-    assert json.loads((tmp_path / "versions.json").read_text())["numpy"] == np.__version__
+    assert read_provenance(tmp_path).versions["numpy"] == np.__version__
 
 
 @pytest.mark.parametrize(("name", "backend"), [("outdoor", "costmap"), ("indoor", "mesh")])

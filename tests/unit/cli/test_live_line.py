@@ -10,7 +10,7 @@ from rich.console import Console
 
 from mbf_abstract.commands.waiting import waiting
 from terrain.commands.live_line import LiveLine, progress_text
-from terrain.commands.run import new_run_folder
+from terrain.commands.new_run import new_run_folder
 from terrain.session.runner import Progress
 
 DRIVING = Progress(time=12.0, wall_time=3.0, distance_left=34.56, speed=0.8, tilt=math.radians(7.0), state="active")

@@ -1,14 +1,11 @@
-"""The versions a run was made with: a scenario and seed give the same drive for equal versions only."""
+"""The versions a run was made with: a scenario and seed give the same drive for equal versions and equal code only."""
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-
-FILE = "versions.json"
 
 DECISIVE = (
     *("mbf-flex", "numpy", "scipy", "numba", "llvmlite", "pybullet", "trimesh", "networkx", "rtree", "h5py", "pillow"),
@@ -26,11 +23,6 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             found[distribution] = "not installed"
     return {**found, "system": f"{platform.system()} {platform.machine()}", "cpu": _cpu(), "cores": str(os.cpu_count())}
-
-
-def write_versions(folder: Path) -> None:
-    """Write ``versions.json`` into the folder of a run."""
-    (folder / FILE).write_text(json.dumps(versions(), indent=2) + "\n", encoding="utf-8")
 
 
 def _cpu() -> str:

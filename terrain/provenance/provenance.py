@@ -1,0 +1,110 @@
+"""What a run was made of: ``provenance.yaml``, and the scenario as it was run, ``scenario.yaml``, in the run's folder.
+
+``scenario.yaml`` holds every value of the scenario, those of ``--set``, ``--map``, ``--seed`` and ``--backend``
+included, and names files of the folder only. So a run can be repeated from its folder alone.
+
+No path of the machine is recorded, and no name of a user or a machine: files are recorded by their path in the folder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import BaseModel
+
+from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.validation import validate
+from mbf_abstract.config.yaml_source import load_yaml
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from terrain.provenance.code import Code, code_of
+from terrain.provenance.named_files import InputCopies, sha256_of, with_named_files
+from terrain.provenance.versions import versions
+from terrain.recording.whole_files import write_whole
+from terrain.scenarios.scenario import Scenario
+
+FILE, SCENARIO = "provenance.yaml", "scenario.yaml"
+NAVIGATION = Path("navigation.yaml")
+
+
+class Provenance(ParameterModel):
+    """What a run was made of and with."""
+
+    command: str = parameter("", "The command line; empty for a run that a script has started.")
+    executive: str = parameter(..., "Who decided on plans, drives and recoveries.")
+    clock: Literal["simulated", "real"] = parameter(..., "Whether time was simulated; only then a run repeats.")
+    live_page: bool = parameter(False, "Whether a page was served, whose commands are not recorded.")
+    versions: dict[str, str] = parameter(..., "Versions of Python and of packages; system and CPU.")
+    code: dict[str, Code] = parameter(..., "Packages of this project and of the plugins.")
+    files: dict[str, str] = parameter(..., "SHA-256 of the scenario and of every file that it needs, by their paths.")
+
+
+def write_scenario(folder: Path, scenario: Scenario, backend: str, seed: int, inputs: InputCopies) -> None:
+    """Write a scenario as it is run, with the configuration that is in the folder; files that it names are copied."""
+    as_run = scenario.model_copy(update={"backend": backend, "seed": seed, "navigation": {backend: NAVIGATION}})
+    write_whole(folder / SCENARIO, yaml.safe_dump(_plain(as_run, inputs), sort_keys=False))
+
+
+def write_provenance(
+    folder: Path, server: AbstractNavigationServer, command: str, executive: str, wall_clock: bool, live_page: bool
+) -> None:
+    """Write ``provenance.yaml`` of a run whose scenario, configuration and maps are in its folder."""
+    files = sorted(file for file in with_named_files(folder / SCENARIO) if file.is_relative_to(folder))
+    provenance = Provenance(
+        command=command,
+        executive=executive,
+        clock="real" if wall_clock else "simulated",
+        live_page=live_page,
+        versions=versions(),
+        code=code_of(server),
+        files={file.relative_to(folder).as_posix(): sha256_of(file) for file in files},
+    )
+    write_whole(folder / FILE, yaml.safe_dump(provenance.model_dump(), sort_keys=False))
+
+
+def read_provenance(folder: Path) -> Provenance:
+    """Read ``provenance.yaml`` of a run's folder.
+
+    Raises
+    ------
+    ConfigError
+        There is none, as in the folder of a run of an older version, or it is damaged; all findings.
+    """
+    file = folder / FILE
+    if not file.is_file():
+        expected = f"the folder of a run, with {FILE}"
+        raise ConfigError([Finding(str(folder), 1, "", expected, "none" if folder.is_dir() else "no folder")])
+    document, findings = load_yaml(file), list[Finding]()
+    provenance = validate(Provenance, document.data, document, (), findings)
+    for name in () if provenance is None else provenance.files:
+        if Path(name).is_absolute() or ".." in Path(name).parts:
+            findings.append(document.finding(("files", name), "a path inside of the folder", repr(name)))
+    if provenance is None or findings:
+        raise ConfigError(findings)
+    return provenance
+
+
+def changed_files(folder: Path, provenance: Provenance) -> list[str]:
+    """Return the recorded files of a folder that are missing, or are not what they were."""
+    return [
+        name
+        for name, sha256 in provenance.files.items()
+        if not (folder / name).is_file() or sha256_of(folder / name) != sha256
+    ]
+
+
+def _plain(value: Any, inputs: InputCopies) -> Any:
+    """Return a value as YAML writes it; a file becomes its copy, but for the configuration that the run writes."""
+    if isinstance(value, BaseModel):
+        return {name: _plain(getattr(value, name), inputs) for name in type(value).model_fields}
+    if isinstance(value, Mapping):
+        return {key: _plain(item, inputs) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item, inputs) for item in value]
+    if isinstance(value, Path):
+        return str(value) if value == NAVIGATION else inputs.copy(value)
+    return value.value if isinstance(value, Enum) else value

@@ -1,0 +1,145 @@
+"""What a run's folder records: the scenario as run, the code, the command line; and what is refused when it is read."""
+
+import subprocess
+
+import pytest
+import typer
+import yaml
+from typer.testing import CliRunner
+
+from mbf_abstract.config.findings import ConfigError
+from terrain.commands.command_line import command_line
+from terrain.provenance.code import commit_of, hash_of_code
+from terrain.provenance.named_files import InputCopies
+from terrain.provenance.provenance import Provenance, changed_files, read_provenance, write_scenario
+from terrain.scenarios.scenario import load_scenario, shipped_scenarios
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_a_scenario_as_run_is_read_back_as_it_was(name, tmp_path):
+    scenario = load_scenario(name)
+    (tmp_path / "navigation.yaml").write_text("backend: mesh")
+
+    write_scenario(tmp_path, scenario, scenario.backend, 7, InputCopies(tmp_path))
+
+    own = {"seed", "navigation"}
+    read = load_scenario(tmp_path / "scenario.yaml")
+    assert read.model_dump(exclude=own) == scenario.model_dump(exclude=own)
+    assert (read.seed, read.navigation) == (7, {scenario.backend: tmp_path / "navigation.yaml"})
+
+
+def recorded_command(*arguments):
+    app, lines = typer.Typer(), []
+
+    @app.command()
+    def run(
+        context: typer.Context,
+        scenario: str,
+        seed: int = typer.Option(-1, "--seed"),
+        settings: list[str] = typer.Option([], "--set"),
+        page: bool = typer.Option(True, "--page/--no-page"),
+    ):
+        lines.append(command_line(context))
+
+    app.command("other")(lambda: None)
+    result = CliRunner().invoke(app, ["run", *arguments])
+    assert result.exit_code == 0, result.output
+    return lines[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["indoor"], "mbf run indoor"),
+        (["--seed", "3", "indoor"], "mbf run indoor --seed 3"),
+        (["a b.yaml", "--no-page"], "mbf run 'a b.yaml' --no-page"),
+        (
+            ["/home/me/lab.yaml", "--set", "a=1", "--set", "b=/home/me/c.ply"],
+            "mbf run lab.yaml --set a=1 --set b=c.ply",
+        ),
+        (["here/lab.yaml"], "mbf run here/lab.yaml"),
+    ],
+)
+def test_the_command_line_is_recorded_without_folders_of_the_machine(arguments, expected):
+    assert recorded_command(*arguments) == expected
+
+
+def package(folder, text="x = 1\n"):
+    (folder / "plugin").mkdir(parents=True)
+    (folder / "plugin" / "__init__.py").write_text(text)
+    (folder / "plugin" / "gains.yaml").write_text("a: 1")
+    return folder / "plugin"
+
+
+def test_the_hash_of_code_is_that_of_its_files_and_not_of_caches(tmp_path):
+    one, two = package(tmp_path / "one"), package(tmp_path / "two")
+    (two / "__pycache__").mkdir()
+    (two / "__pycache__" / "cached.pyc").write_text("anything")
+    (two / ".hidden").write_text("anything")
+    assert hash_of_code(one) == hash_of_code(two)
+
+    (two / "gains.yaml").write_text("a: 2")
+    assert hash_of_code(one) != hash_of_code(two)
+    (two / "gains.yaml").rename(two / "other.yaml")
+    assert len({hash_of_code(place) for place in (one, two, one / "__init__.py")}) == 3
+
+
+def git(folder, *arguments):
+    identity = ("-c", "user.name=a", "-c", "user.email=a@b")
+    done = subprocess.run(["git", "-C", folder, *identity, *arguments], check=True, capture_output=True, text=True)
+    return done.stdout.strip()
+
+
+def test_a_commit_is_that_of_the_repository_that_tracks_the_file(tmp_path):
+    place = package(tmp_path)
+    assert commit_of(place) == ""
+    git(tmp_path, "init", "-q")
+    assert commit_of(place) == "", "an environment in a folder of somebody's repository is no part of that"
+
+    git(tmp_path, "add", "plugin")
+    git(tmp_path, "commit", "-q", "-m", "first")
+
+    assert commit_of(place) == commit_of(place / "gains.yaml") == git(tmp_path, "rev-parse", "HEAD")
+
+
+RECORDED = {
+    "executive": "move_base",
+    "clock": "simulated",
+    "versions": {"python": "3.11"},
+    "code": {"terrain": {"sha256": "0"}},
+    "files": {"scenario.yaml": "1", "inputs/map.png": "2"},
+}
+
+
+def test_files_that_changed_or_are_missing_are_named(tmp_path):
+    (tmp_path / "scenario.yaml").write_text("name: x")
+
+    assert changed_files(tmp_path, Provenance(**RECORDED)) == ["scenario.yaml", "inputs/map.png"]
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "expected"),
+    [
+        ({"clock": "lunar"}, "clock", "'simulated' or 'real'"),
+        ({"files": {"../secret.txt": "1"}}, "files.../secret.txt", "inside of the folder"),
+        ({"files": {"/etc/passwd": "1"}}, "files./etc/passwd", "inside of the folder"),
+        ({"code": {"terrain": {}}}, "code.terrain.sha256", "a value"),
+        ({"colour": "red"}, "colour", "a known key"),
+    ],
+)
+def test_a_damaged_record_is_refused_with_its_key(change, key, expected, tmp_path):
+    (tmp_path / "provenance.yaml").write_text(yaml.safe_dump({**RECORDED, **change}))
+
+    with pytest.raises(ConfigError) as error:
+        read_provenance(tmp_path)
+
+    assert len(error.value.findings) == 1
+    assert error.value.findings[0].key == key
+    assert expected in error.value.findings[0].expected
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match=r"expected the folder of a run, with provenance.yaml, got none"):
+        read_provenance(tmp_path)
+    with pytest.raises(ConfigError, match="no folder"):
+        read_provenance(tmp_path / "nowhere")
