@@ -1,12 +1,29 @@
-"""``mbf check``: list all mistakes of a configuration, without driving."""
+"""``mbf check``: list all mistakes of a configuration, without driving.
+
+Other packages check files of their own, such as scenarios, by an entry point of the group ``mbf.checks``: a function
+``check(file, load)`` that returns ``Checked``, raises ConfigError with all findings, or returns None for a file that it
+does not know.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import typer
 
 from mbf_abstract.commands.reporting import readable_errors
+
+CHECKS_GROUP = "mbf.checks"
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A file without mistakes: what is in it, in a line, and what its user should know."""
+
+    summary: str
+    notes: tuple[str, ...] = ()
 
 
 def register(app: typer.Typer) -> None:
@@ -15,18 +32,33 @@ def register(app: typer.Typer) -> None:
 
 
 def check(
-    config: Path = typer.Argument(..., help="Configuration file."),
-    load: bool = typer.Option(True, "--load/--no-load", help="Also read the map files and construct the plugins."),
+    config: Path = typer.Argument(..., help="Configuration, or a scenario: a file, or the name of a shipped one."),
+    load: bool = typer.Option(
+        True, "--load/--no-load", help="Also build the world, read the map files and construct the plugins."
+    ),
 ) -> None:
-    """Check a configuration: all mistakes at once, exit code 2 if there is any. Prints what was found in its map."""
-    with readable_errors():
-        from mbf_abstract.commands.standing_server import standing_server
-        from mbf_abstract.server.factory import read_config
+    """Check a configuration or a scenario: all mistakes at once, exit code 2 if there is any.
 
-        cls, checked = read_config(config)
-        if load:
-            with standing_server(cls, checked) as server:
-                for note in server.notes:
-                    typer.echo(f"note: {note}")
-    plugins = ", ".join(f"{spec.name} ({spec.type_name})" for spec in checked.plugins) or "none"
-    typer.echo(f"{config}: good; backend {checked.backend}, plugins: {plugins}")
+    Prints what was found in the maps. A scenario is checked with its world and the configurations of all its backends.
+    """
+    with readable_errors():
+        points = sorted(entry_points(group=CHECKS_GROUP), key=lambda point: point.name)
+        answers = (point.load()(config, load) for point in points)
+        checked = next((answer for answer in answers if answer is not None), None) or check_config(config, load)
+    for note in checked.notes:
+        typer.echo(f"note: {note}")
+    typer.echo(f"{config}: good; {checked.summary}")
+
+
+def check_config(file: Path, load: bool) -> Checked:
+    """Check a configuration and, to ``load`` it, its maps and plugins; raises ConfigError with all findings."""
+    from mbf_abstract.commands.standing_server import standing_server
+    from mbf_abstract.server.factory import read_config
+
+    cls, config = read_config(file)
+    notes: tuple[str, ...] = ()
+    if load:
+        with standing_server(cls, config) as server:
+            notes = tuple(server.notes)
+    plugins = ", ".join(f"{spec.name} ({spec.type_name})" for spec in config.plugins) or "none"
+    return Checked(f"backend {config.backend}, plugins: {plugins}", notes)

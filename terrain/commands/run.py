@@ -18,7 +18,10 @@ from terrain.commands.new_run import RUNS, new_run_folder
 from terrain.commands.rerun import rerun
 
 if TYPE_CHECKING:
-    from terrain.session.runner import RunResult
+    from collections.abc import Callable
+
+    from terrain.scenarios.scenario import Scenario
+    from terrain.session.runner import RunOptions, RunResult
 
 
 def register(app: typer.Typer) -> None:
@@ -72,6 +75,8 @@ def run(
     """
     chosen = settings_of(settings, planner=planner, controller=controller)
     with readable_errors():
+        from mbf_abstract.config.findings import ConfigError
+        from mbf_abstract.server.plugin_host import ServerError
         from terrain.commands.live_line import LiveLine
         from terrain.scenarios.on_map import on_map
         from terrain.scenarios.scenario import load_scenario
@@ -79,9 +84,9 @@ def run(
         from terrain.viewer.live.session import LiveSession, ViewOptions
         from terrain.viewer.results import write_results
 
-        loaded = load_scenario(scenario)
-        if map_file is not None:
-            loaded = on_map(loaded, map_file)
+        def on_other_map(loaded: Scenario) -> Scenario:
+            return loaded if map_file is None else on_map(loaded, map_file)
+
         folder = out or new_run_folder(RUNS, datetime.now())
         with LiveLine(show=not (quiet or as_json)) as live:
             options = RunOptions(
@@ -103,12 +108,33 @@ def run(
                     LiveSession, options=page, on_page=lambda at: live.note(f"live view at {at}"), on_note=live.note
                 )
                 options = replace(options, watch=watch, stay=stay)
-            result = run_scenario(loaded, options)
+            try:
+                result = run_scenario(on_other_map(load_scenario(scenario)), options)
+            except (ConfigError, ServerError) as error:
+                raise _all_that_is_wrong(error, scenario, options, on_other_map) from error
     _print_result(result, as_json)
     if show:
         _open_replay(folder)
     if not result.success:
         raise typer.Exit(FAILURE)
+
+
+def _all_that_is_wrong(
+    error: Exception, scenario: str, options: RunOptions, change: Callable[[Scenario], Scenario]
+) -> Exception:
+    """Return what ``mbf check`` finds for the backend of a run that could not begin, or else why it could not."""
+    from mbf_abstract.config.findings import ConfigError
+    from mbf_abstract.config.yaml_source import read_yaml
+    from terrain.scenarios.scenario import scenario_file
+    from terrain.session.scenario_check import check_scenario
+
+    document = read_yaml(scenario_file(scenario), [])
+    if document is None:
+        return error
+    backend = options.backend or document.data.get("backend")
+    chosen = backend if isinstance(backend, str) else None
+    findings = check_scenario(document, chosen, options.seed, options.settings, change=change).findings
+    return ConfigError(findings) if findings else error
 
 
 def _open_replay(folder: Path) -> None:

@@ -83,6 +83,15 @@ class Scenario(ParameterModel):
 
 def load_scenario(name_or_file: str | os.PathLike[str]) -> Scenario:
     """Read a shipped scenario by name, or a file; raises ConfigError with all findings."""
+    document, findings = load_yaml(scenario_file(name_or_file)), list[Finding]()
+    scenario = read_scenario(document, findings)
+    if scenario is None or findings:
+        raise ConfigError(findings)
+    return scenario
+
+
+def scenario_file(name_or_file: str | os.PathLike[str]) -> Path:
+    """Return the file of a shipped scenario, or the file that is named; raises ConfigError for an unknown name."""
     path = Path(name_or_file)
     if path.suffix not in (".yaml", ".yml"):
         path = SHIPPED / f"{name_or_file}.yaml"
@@ -91,15 +100,16 @@ def load_scenario(name_or_file: str | os.PathLike[str]) -> Scenario:
             raise ConfigError(
                 [Finding(str(name_or_file), 1, "", f"a file, or one of {known}", repr(str(name_or_file)))]
             )
-    document = load_yaml(path)
-    findings: list[Finding] = []
+    return path
+
+
+def read_scenario(document: YamlDocument, findings: list[Finding]) -> Scenario | None:
+    """Make a scenario of a document; what is wrong is appended to ``findings``, None if it is no scenario at all."""
     scenario = validate(Scenario, document.data, document, (), findings)
     if scenario is None:
-        raise ConfigError(findings)
+        return None
     scenario = _with_absolute_files(scenario, document.path.parent)
     findings += _find_contradictions(scenario, document)
-    if findings:
-        raise ConfigError(findings)
     return scenario
 
 

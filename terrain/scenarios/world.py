@@ -5,6 +5,7 @@ Every server gets the map it can read from ``terrain.worlds.map_files``, and a c
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -74,13 +75,22 @@ class ScenarioWorld:
         return self.ground if self.grid is None or self.walls is None else free_floor(self.grid)
 
     def pose_of(self, place: Place) -> Pose:
-        """Return the pose on the ground that a place means, upright; raises ConfigError for an unknown name."""
+        """Return the pose on the ground that a place means, upright.
+
+        Raises
+        ------
+        ConfigError
+            The world has no place of this name, or no ground there.
+        """
         if isinstance(place, str):
             if place not in self.places:
                 known = ", ".join(self.places) or "none"
                 raise ConfigError([Finding("scenario", 1, "start or goals", f"a place of the world ({known})", place)])
             return self.places[place]
         z = self.height_at(place.x, place.y) if place.z is None else place.z
+        if not math.isfinite(z):
+            expected, got = "a place on the ground of the world", f"({place.x:g}, {place.y:g})"
+            raise ConfigError([Finding("scenario", 1, "start or goals", expected, got)])
         return Pose.planar(place.x, place.y, place.yaw, z)
 
 

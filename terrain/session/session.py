@@ -41,7 +41,6 @@ from terrain.scenarios.perturbation import draw_disturbance
 from terrain.scenarios.scenario import Scenario, load_scenario
 from terrain.scenarios.sensors import AnyRobot, make_localization, make_proprioceptive_sensors, make_sensors
 from terrain.scenarios.settings import apply_settings, apply_world_settings
-from terrain.scenarios.world import ScenarioWorld
 from terrain.sensors.sensor import Sensor
 from terrain.session.simulation_session import SessionOptions, SimulationSession
 
@@ -95,9 +94,11 @@ class Session(SimulationSession):
 
     def _wire(self, options: SessionOptions) -> None:
         """Robot and sensors, then the server on their map, then the recorder."""
-        config_file = write_navigation_config(
-            self.scenario, self.backend, self.world, self.folder, options.settings, self.inputs
-        )
+        source = self.scenario.navigation.get(self.backend)
+        if source is None:
+            known = ", ".join(self.scenario.navigation)
+            raise ConfigError([Finding(self.scenario.name, 1, "navigation", f"one of {known}", repr(self.backend))])
+        config_file = write_navigation_config(source, self.world.files, self.folder, options.settings, self.inputs)
         self.robot, simulation = self._make_simulation()
         delay = CommandDelay(self.world.physics, self.robot.send_command, self.scenario.perturb.command_delay)
         self.recorder = self._make_recorder()
@@ -179,29 +180,25 @@ class Session(SimulationSession):
 
 
 def write_navigation_config(
-    scenario: Scenario,
-    backend: str,
-    world: ScenarioWorld,
-    folder: Path,
-    settings: Mapping[str, str],
-    inputs: InputCopies,
+    source: Path, maps: Mapping[str, Path], folder: Path, settings: Mapping[str, str], inputs: InputCopies
 ) -> Path:
-    """Write the backend's configuration with the world's files filled in; a run can be planned again from it.
+    """Write a configuration with the world's map files filled in; a run can be planned again from it.
 
-    Files that it names, by paths from its own folder, are copied into ``inputs``.
+    Parameters
+    ----------
+    source : Path
+        The configuration. Files that it names, by paths from its own folder, are copied into ``inputs``.
+    maps : mapping of str to Path
+        Placeholder of the configuration -> map file in ``folder``.
     """
-    source = scenario.navigation.get(backend)
-    if source is None:
-        known = ", ".join(scenario.navigation)
-        raise ConfigError([Finding(scenario.name, 1, "navigation", f"one of {known}", repr(backend))])
     text = source.read_text()
-    for placeholder, file in world.files.items():
+    for placeholder, file in maps.items():
         text = text.replace(placeholder, file.name)
     target = folder / "navigation.yaml"
     target.write_text(apply_settings(text, settings))
     document = read_yaml(target, [])  # what is wrong with it is reported when the server reads it
     if document is not None:
-        written = {file.name for file in world.files.values()}
+        written = {file.name for file in maps.values()}
         renamed = inputs.renamed(document.data, source.parent, written)
         if renamed != document.data:
             target.write_text(yaml.safe_dump(renamed, sort_keys=False))

@@ -1,0 +1,59 @@
+"""What ``mbf check`` knows of scenarios, and of configurations that get their maps from a scenario's world."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mbf_abstract.commands.check import Checked
+from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.yaml_source import YamlDocument, read_yaml
+
+YAML_SUFFIXES = {".yaml", ".yml"}
+OF_SCENARIOS_ONLY = ("world", "navigation")
+PLACEHOLDER = "$WORLD_"
+
+
+def check(file: Path, load: bool) -> Checked | None:
+    """Check a scenario, or a configuration that names ``$WORLD_MESH`` or ``$WORLD_MAP``; None for anything else.
+
+    Raises
+    ------
+    ConfigError
+        All that is wrong with it, its configurations, its world and its plugins.
+    """
+    if file.suffix not in YAML_SUFFIXES:
+        if file.exists():
+            return None
+        from terrain.scenarios.scenario import scenario_file
+
+        file = scenario_file(str(file))
+    document = read_yaml(file, [])
+    if document is None:
+        return None  # whoever reads it next reports why
+    if any(key in document.data for key in OF_SCENARIOS_ONLY):
+        return _check_scenario(document, load)
+    return _check_with_stand_in(file, load) if PLACEHOLDER in file.read_text(encoding="utf-8-sig") else None
+
+
+def _check_scenario(document: YamlDocument, load: bool) -> Checked:
+    from terrain.session.scenario_check import check_scenario
+
+    report = check_scenario(document, load=load)
+    if report.findings or report.scenario is None:
+        raise ConfigError(report.findings)
+    scenario = report.scenario
+    summary = f"world {scenario.world.type}, backends {', '.join(scenario.navigation)}, {len(scenario.goals)} goals"
+    return Checked(summary, report.notes)
+
+
+def _check_with_stand_in(file: Path, load: bool) -> Checked:
+    from mbf_abstract.commands.check import check_config
+    from terrain.session.scenario_check import check_on_level_ground
+
+    checked = check_config(file, load=False)
+    if not load:
+        return checked
+    findings = check_on_level_ground(file)
+    if findings:
+        raise ConfigError(findings)
+    return Checked(checked.summary, ("level ground stands in for the maps that a scenario's world gives",))

@@ -1,0 +1,181 @@
+"""All that is wrong with a scenario, in one list: its file, its configurations, its world, its places, its plugins.
+
+What can be checked is checked, whatever else is wrong: configurations of a scenario with mistakes, plugins of one
+backend where another one's configuration has mistakes.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mbf_abstract.commands.reporting import text_of
+from mbf_abstract.commands.standing_server import standing_server
+from mbf_abstract.config.findings import ConfigError, Finding, KeyPath
+from mbf_abstract.config.yaml_source import YamlDocument
+from mbf_abstract.server.factory import read_config
+from terrain.provenance.named_files import InputCopies
+from terrain.scenarios.environment import build_environment, with_noise
+from terrain.scenarios.noise import MapNoise
+from terrain.scenarios.scenario import Scenario, read_scenario
+from terrain.scenarios.settings import apply_world_settings
+from terrain.scenarios.world import ScenarioWorld
+from terrain.session.session import write_navigation_config
+from terrain.worlds.generate import flat_terrain
+from terrain.worlds.map_files import MapFiles
+
+STAND_IN_SIZE, STAND_IN_SPACING = 20.0, 0.25  # m
+STAND_IN_LETHAL_SLOPE = 30.0  # degrees; nothing of it is steep
+
+Maps = Mapping[str, Path]
+
+
+@dataclass(frozen=True)
+class ScenarioReport:
+    """What a check has found; ``scenario`` is None where the file is none."""
+
+    scenario: Scenario | None
+    findings: tuple[Finding, ...]
+    notes: tuple[str, ...] = ()
+
+
+def check_scenario(
+    document: YamlDocument,
+    backend: str | None = None,
+    seed: int | None = None,
+    settings: Mapping[str, str] | None = None,
+    load: bool = True,
+    change: Callable[[Scenario], Scenario] = lambda scenario: scenario,
+) -> ScenarioReport:
+    """Check a scenario and everything that it names.
+
+    Parameters
+    ----------
+    document : YamlDocument
+        The scenario's file.
+    backend : str, optional
+        Check the configuration of this backend only.
+    seed : int, optional
+        Of the world, instead of the scenario's own.
+    settings : mapping, optional
+        As for a run, see ``terrain.scenarios.settings``.
+    load : bool
+        Also build the world, read the maps and construct the plugins.
+    change : callable
+        What a run makes of the scenario, such as to take it to another map.
+    """
+    findings, notes, rest = list[Finding](), list[str](), dict[str, str]()
+    scenario = read_scenario(document, findings)
+    if scenario is not None and not findings:
+        with _Collecting(findings, document, ("world",)):
+            scenario, rest = apply_world_settings(change(scenario), settings or {})
+    files = _configurations(document) if scenario is None else dict(scenario.navigation)
+    chosen = {name: file for name, file in files.items() if backend in (None, name) and file.is_file()}
+    if backend is not None and files and backend not in files:
+        findings.append(document.finding(("navigation",), f"one of {', '.join(files)}", repr(backend)))
+    good = {name: file for name, file in chosen.items() if _reads_well(file, rest, findings)}
+    if load and scenario is not None and not any(finding.file == str(document.path) for finding in findings):
+        with tempfile.TemporaryDirectory(prefix="mbf_check_") as folder:
+            maps = _check_world(scenario, seed, document, Path(folder), findings)
+            for name, file in good.items() if maps is not None else ():
+                found = _check_server(file, maps or {}, rest, Path(folder), findings)
+                notes += [f"{name}: {note}" for note in found]
+    return ScenarioReport(scenario, tuple(dict.fromkeys(findings)), tuple(notes))
+
+
+def check_on_level_ground(file: Path) -> list[Finding]:
+    """Load a configuration on maps of level ground instead of those of a scenario's world; what is wrong with it."""
+    findings: list[Finding] = []
+    with tempfile.TemporaryDirectory(prefix="mbf_check_") as folder:
+        ground = flat_terrain(STAND_IN_SIZE, STAND_IN_SIZE, STAND_IN_SPACING)
+        files = MapFiles(Path(folder), MapNoise(), np.random.default_rng(0))
+        maps = files.of_terrain(ground, STAND_IN_LETHAL_SLOPE)
+        _check_server(file, maps, {}, Path(folder), findings)
+    return findings
+
+
+def _configurations(document: YamlDocument) -> dict[str, Path]:
+    """Configurations that a file names which is no legal scenario."""
+    named = document.data.get("navigation")
+    pairs = named.items() if isinstance(named, Mapping) else ()
+    return {str(backend): document.path.parent / file for backend, file in pairs if isinstance(file, str)}
+
+
+def _reads_well(file: Path, settings: Mapping[str, str], findings: list[Finding]) -> bool:
+    """Whether a configuration has no mistakes before its map is known; settings are looked at when it is loaded."""
+    if settings:
+        return True
+    with _Collecting(findings, file) as collecting:
+        read_config(file)
+    return not collecting.failed
+
+
+def _check_world(
+    scenario: Scenario, seed: int | None, document: YamlDocument, folder: Path, findings: list[Finding]
+) -> Maps | None:
+    """Build the world and look for start and goals on it; returns its map files."""
+    with _Collecting(findings, document, ("world",)):
+        world, _ = build_environment(with_noise(scenario), folder, scenario.seed if seed is None else seed)
+        try:
+            _check_places(scenario, world, document, findings)
+        finally:
+            world.physics.close()
+        return world.files
+    return None  # not reached unless the world could not be built
+
+
+def _check_places(scenario: Scenario, world: ScenarioWorld, document: YamlDocument, findings: list[Finding]) -> None:
+    places: list[KeyPath] = [("start",), *(("goals", index) for index in range(len(scenario.goals)))]
+    for key, place in zip(places, (scenario.start, *scenario.goals), strict=True):
+        try:
+            world.pose_of(place)
+        except ConfigError as error:
+            findings += [document.finding(key, wrong.expected, wrong.got) for wrong in error.findings]
+
+
+def _check_server(
+    source: Path, maps: Maps, settings: Mapping[str, str], folder: Path, findings: list[Finding]
+) -> list[str]:
+    """Read the maps and construct the plugins of a configuration; returns the notes of its server."""
+    with _Collecting(findings, source) as collecting:
+        file = write_navigation_config(source, maps, folder, settings, InputCopies(folder))
+        collecting.renamed = {
+            str(file): f"{source} (with settings)" if settings else str(source),
+            str(folder): str(source.parent),
+        }
+        with standing_server(*read_config(file)) as server:
+            return list(server.notes)
+    return []
+
+
+class _Collecting:
+    """Turns whatever is raised in its block into findings about a file, or about a key of a document."""
+
+    def __init__(self, findings: list[Finding], where: Path | YamlDocument, key: KeyPath = ()) -> None:
+        self.failed = False
+        self.renamed: Mapping[str, str] = {}
+        self._findings, self._where, self._key = findings, where, key
+
+    def __enter__(self) -> _Collecting:
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
+        if not isinstance(error, Exception):
+            return False
+        self.failed = True
+        self._findings += self._findings_of(error)
+        return True
+
+    def _findings_of(self, error: Exception) -> Iterable[Finding]:
+        if isinstance(error, ConfigError):
+            return [replace(wrong, file=self.renamed.get(wrong.file, wrong.file)) for wrong in error.findings]
+        got = f"{type(error).__name__}: {text_of(error)}"
+        for name, other in self.renamed.items():
+            got = got.replace(name, other)
+        if isinstance(self._where, YamlDocument):
+            return [self._where.finding(self._key, "a world that can be built", got)]
+        return [Finding(str(self._where), 1, "", "a map and plugins that can be built", got)]

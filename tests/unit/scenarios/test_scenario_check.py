@@ -1,0 +1,175 @@
+"""``mbf check`` lists all that is wrong with a scenario at once, and ``mbf run`` the same where it cannot begin."""
+
+import pytest
+import typer
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from mbf_abstract.cli import make_app
+from mbf_abstract.commands.check import check as check_command
+from mbf_abstract.config.yaml_source import load_yaml
+from terrain.commands.check import check
+from terrain.scenarios.scenario import SHIPPED, shipped_scenarios
+from terrain.session.scenario_check import check_scenario
+
+SCENARIO = {
+    "name": "trial",
+    "proves": "Nothing.",
+    "backend": "mesh",
+    "navigation": "{mesh: mesh.yaml, costmap: costmap.yaml}",
+    "world": "{type: generated, size: [6.0, 5.0], spacing: 0.5}",
+    "robot": "turtlebot",
+    "start": "{x: 2.0, y: 2.5}",
+    "goals": "[{x: 3.5, y: 2.5}]",
+}
+MESH = {
+    "backend": "mesh",
+    "planners": "[{name: dijkstra, type: dijkstra}]",
+    "controllers": "[{name: follower, type: path_follower}]",
+    "mesh_map": "{mesh_file: $WORLD_MESH, layers: []}",
+}
+COSTMAP = {
+    "backend": "costmap",
+    "planners": "[{name: dijkstra, type: dijkstra}]",
+    "controllers": "[{name: pursuit, type: regulated_pure_pursuit}]",
+    "global_costmap": "{robot_radius: 0.2, layers: [{name: walls, type: static}], walls: {map_file: $WORLD_MAP}}",
+    "local_costmap": "{rolling_window: true, robot_radius: 0.2, layers: []}",
+}
+MISTAKES = {  # file, key with mistake, its value, key of the finding
+    ("trial.yaml", "colour", "red", "colour"),
+    ("trial.yaml", "time_limit", "long", "time_limit"),
+    ("trial.yaml", "sensors", "[{rate: -1.0}]", "sensors[0].rate"),
+    ("mesh.yaml", "dist_tolerance", "-1.0", "dist_tolerance"),
+    ("mesh.yaml", "planners", "[{name: dijkstra, type: nosuch}]", "planners[0].type"),
+    ("costmap.yaml", "inflation", "{}", "inflation"),
+    (
+        "costmap.yaml",
+        "controllers",
+        "[{name: pursuit, type: regulated_pure_pursuit, speed: 1.0}]",
+        "controllers[0].speed",
+    ),
+}
+
+
+def write(folder, mistakes=()):
+    for name, keys in {"trial.yaml": SCENARIO, "mesh.yaml": MESH, "costmap.yaml": COSTMAP}.items():
+        keys = keys | {key: value for file, key, value, _ in mistakes if file == name}
+        (folder / name).write_text("".join(f"{key}: {value}\n" for key, value in keys.items()))
+    return folder / "trial.yaml"
+
+
+def found(report, folder):
+    return {(finding.file.removeprefix(f"{folder}/"), finding.key) for finding in report.findings}
+
+
+def mbf(*arguments):
+    return CliRunner(env={"COLUMNS": "200"}).invoke(make_app(), [str(argument) for argument in arguments])
+
+
+@settings(max_examples=30)
+@given(mistakes=st.sets(st.sampled_from(sorted(MISTAKES))))
+def test_every_mistake_is_found_whatever_else_is_wrong(mistakes, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("scenario")
+    report = check_scenario(load_yaml(write(folder, mistakes)), load=False)
+
+    assert found(report, folder) == {(file, key) for file, _, _, key in mistakes}
+    assert len(report.findings) == len(mistakes)
+
+
+def test_places_maps_and_plugins_are_checked_in_the_world_together_with_the_rest(tmp_path):
+    mistakes = [
+        ("trial.yaml", "start", "{x: 60.0, y: 2.5}", ""),
+        ("trial.yaml", "goals", "[{x: 3.5, y: 2.5}, hall]", ""),
+        ("mesh.yaml", "dist_tolerance", "-1.0", ""),
+        ("costmap.yaml", "global_costmap", "{layers: [{name: zones, type: keepout}], zones: {mask_file: no.yaml}}", ""),
+    ]
+    scenario = write(tmp_path, mistakes)
+
+    report = check_scenario(load_yaml(scenario))
+
+    expected = {
+        ("trial.yaml", "start"),
+        ("trial.yaml", "goals[1]"),
+        ("mesh.yaml", "dist_tolerance"),
+        ("costmap.yaml", ""),
+    }
+    assert found(report, tmp_path) == expected
+    text = "\n".join(finding.text for finding in report.findings)
+    assert f"{tmp_path}/no.yaml" in text and "mbf_check_" not in text, "files are named as their author knows them"
+    result = mbf("check", scenario)
+    assert result.exit_code == 2
+    assert all(finding.text in result.output for finding in report.findings)
+    assert "4 mistakes found" in result.output
+
+
+def test_a_run_that_cannot_begin_prints_the_findings_of_its_backend(tmp_path):
+    scenario = write(tmp_path, [("trial.yaml", "goals", "[hall, {x: 9.0, y: 9.0}]", ""), *sorted(MISTAKES)[-2:]])
+    of_mesh = [finding for finding in check_scenario(load_yaml(scenario)).findings if "costmap" not in finding.file]
+
+    result = mbf("run", scenario, "--out", tmp_path / "run", "--quiet")
+
+    assert result.exit_code == 2
+    assert len(of_mesh) >= 2 and f"{len(of_mesh)} mistakes found" in result.output
+    assert all(finding.text in result.output for finding in of_mesh)
+
+
+def test_settings_are_checked_with_the_scenario(tmp_path):
+    options = ("--set", "world.size=[3.0, 3.0]", "--set", "planner_patience=soon")
+
+    result = mbf("run", write(tmp_path), *options, "--out", tmp_path / "run", "--quiet")
+
+    assert result.exit_code == 2 and "2 mistakes found" in result.output
+    assert "goals[0]: expected a place on the ground of the world, got (3.5, 2.5)" in result.output
+    assert "mesh.yaml (with settings)" in result.output and "planner_patience" in result.output
+
+
+def test_a_world_that_cannot_be_built_is_a_finding_at_its_key(tmp_path):
+    scenario = write(tmp_path, [("trial.yaml", "world", "{type: heightfield, file: no.tif}", "")])
+
+    report = check_scenario(load_yaml(scenario))
+
+    assert len(report.findings) == 1
+    assert "no.tif" in report.findings[0].text
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_shipped_scenarios_have_no_mistakes(name):
+    assert "backends" in check(SHIPPED / f"{name}.yaml", load=False).summary
+
+
+def test_a_shipped_scenario_is_checked_by_its_name():
+    result = mbf("check", "crowded_corridor", "--no-load")
+
+    assert result.exit_code == 0 and "good; world office, backends costmap" in result.output
+    assert "one of bridge, crater_rim" in mbf("check", "moon").output
+
+
+@pytest.mark.parametrize("name", ["mesh.yaml", "costmap.yaml"])
+def test_a_configuration_for_a_world_is_checked_on_level_ground(name, tmp_path):
+    write(tmp_path)
+
+    result = mbf("check", tmp_path / name)
+
+    assert result.exit_code == 0, result.output
+    assert "level ground stands in for the maps" in result.output
+
+
+def test_its_mistakes_are_found_there(tmp_path):
+    layers = "{mesh_file: $WORLD_MESH, layers: [{name: labels, type: label}], labels: {labels: nowhere}}"
+    write(tmp_path, [("mesh.yaml", "mesh_map", layers, "")])
+
+    result = mbf("check", tmp_path / "mesh.yaml")
+
+    assert result.exit_code == 2 and "1 mistake found" in result.output
+    assert str(tmp_path / "mesh.yaml") in result.output
+
+
+def test_a_check_that_no_package_knows_is_that_of_a_configuration(tmp_path):
+    (tmp_path / "empty.yaml").write_text("")
+    app = typer.Typer()
+    app.command()(check_command)
+
+    result = CliRunner().invoke(app, [str(tmp_path / "empty.yaml")])
+
+    assert result.exit_code == 2 and "an empty file" in result.output
