@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from terrain.scenarios.scenario import Scenario
+    from terrain.session.goal_sequence import GoalSequence
     from terrain.session.runner import RunOptions, RunResult
+    from terrain.session.session import Session
 
 
 def register(app: typer.Typer) -> None:
@@ -82,7 +84,7 @@ def run(
         from terrain.scenarios.scenario import load_scenario
         from terrain.session.runner import RunOptions, run_scenario
         from terrain.viewer.live.session import LiveSession, ViewOptions
-        from terrain.viewer.results import write_results
+        from terrain.viewer.results import write_joint_results, write_results
 
         def on_other_map(loaded: Scenario) -> Scenario:
             return loaded if map_file is None else on_map(loaded, map_file)
@@ -101,12 +103,16 @@ def run(
                 on_note=live.note,
                 executive=executive,
                 write_views=partial(write_results, on_step=live.step),
+                write_joint_views=partial(write_joint_results, on_step=live.step),
             )
             if view:
                 page = ViewOptions(view_host, view_port, view_speed, view_token, view_read_only)
-                watch = partial(
-                    LiveSession, options=page, on_page=lambda at: live.note(f"live view at {at}"), on_note=live.note
-                )
+
+                def watch(session: Session, goals: GoalSequence) -> LiveSession:
+                    _, _, name = session.scenario.name.partition("/")  # of one of several robots
+                    title = f"live view of {name}" if name else "live view"
+                    return LiveSession(session, goals, page, lambda at: live.note(f"{title} at {at}"), live.note)
+
                 options = replace(options, watch=watch, stay=stay)
             try:
                 result = run_scenario(on_other_map(load_scenario(scenario)), options)
@@ -169,22 +175,30 @@ def replay(
     """Write picture, report, replay and MCAP log of a run, also of one that was killed, and open the replay."""
     with readable_errors():
         from terrain.commands.live_line import LiveLine
-        from terrain.recording.run_folder import read_run
+        from terrain.recording.fleet_metrics import judge_together
+        from terrain.recording.run_folder import read_run, robots_of
         from terrain.viewer.logs.rerun_log import write_rrd
         from terrain.viewer.pictures.animation import write_animation
-        from terrain.viewer.results import write_results
+        from terrain.viewer.results import write_joint_results, write_results
 
-        recording, metrics = read_run(folder)
+        recordings = {}
         with LiveLine() as live:
-            problems = write_results(folder, recording, metrics, live.step)
+            problems = []
+            for name in robots_of(folder):
+                own = folder / name
+                recordings[name], metrics = read_run(own)
+                problems += write_results(own, recordings[name], metrics, live.step)
+                if rrd:
+                    live.step("writing the recording for Rerun")
+                    write_rrd(own / "run.rrd", recordings[name])
+                if gif:
+                    live.step("writing the animation")
+                    write_animation(own / "animation.gif", recordings[name])
+            if "" not in recordings:
+                verdict = judge_together({name: recording.verdict for name, recording in recordings.items()})
+                problems += write_joint_results(folder, recordings, verdict, live.step)
             if problems:
-                raise RuntimeError("; ".join(problems))
-            if rrd:
-                live.step("writing the recording for Rerun")
-                write_rrd(folder / "run.rrd", recording)
-            if gif:
-                live.step("writing the animation")
-                write_animation(folder / "animation.gif", recording)
+                raise RuntimeError("; ".join(dict.fromkeys(problems)))
     typer.echo((folder / "replay.html").resolve())
     if show:
         _open_replay(folder)
@@ -245,4 +259,10 @@ def _print_result(result: RunResult, as_json: bool) -> None:
         f"{metrics['path_length_m']:.1f} m in {metrics['time_s']:.1f} s simulated, "
         f"{metrics['wall_time_s']:.1f} s of wall time: {metrics['real_time_factor']:.1f} x real time"
     )
+    if "robots" in metrics:
+        for name, own in metrics["robots"].items():
+            typer.echo(f"  {name}: {own['verdict']}; {own['path_length_m']:.1f} m in {own['time_s']:.1f} s")
+        typer.echo(f"  contacts between robots: {len(metrics['contacts_between_robots'])}")
+        typer.echo(f"results in {result.folder}: replay.html, picture.png, metrics.json, and a folder for each robot")
+        return
     typer.echo(f"results in {result.folder}: replay.html, report.html, picture.png, run.mcap, metrics.json")

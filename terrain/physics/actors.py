@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbf_abstract.geometry import FloatArray, Pose
-from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.geometry.arithmetic import norm, rotated
 from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.motion_sample import Thing
 from terrain.physics.protocols import SimulatedRobot
@@ -23,11 +23,13 @@ from terrain.physics.robot_models import RobotSpec
 from terrain.physics.world import BulletWorld
 from terrain.recording.recording import RobotShape
 from terrain.worlds.surface import Surface, box, cylinder, joined
+from terrain.worlds.upright_solids import UprightSolid
 
 AnyWorld = BulletWorld | KinematicWorld
 
 PERSON_RADIUS: float = 0.25  # m
 PERSON_HEIGHT: float = 1.7  # m
+ROUND = 0.05  # an outline that reaches so much farther than half its width, at most, is a circle
 COURTESY = 0.3  # m; actors that yield keep so far from the robot
 
 
@@ -74,7 +76,7 @@ class RouteWalker:
         How far along the route [m] it is at time 0.
     body : Body
     gives_way : bool
-        Wait as long as the robot it has met is just ahead, instead of pushing it.
+        Wait as long as a robot it has met is just ahead, instead of pushing it.
 
     Attributes
     ----------
@@ -101,7 +103,7 @@ class RouteWalker:
         self.reach = size[0] if len(size) == 2 else 0.5 * math.hypot(size[0], size[1])
         self._waited, self._waits = 0.0, False
         self._gives_way = gives_way
-        self._robot: SimulatedRobot | None = None
+        self._robots: Sequence[SimulatedRobot] = ()
         self.thing, self.size = body.thing, size
         if len(size) == 2:
             radius, height = size
@@ -127,12 +129,12 @@ class RouteWalker:
         yaw, speed = self.pose().yaw, 0.0 if self._waits else self._speed
         return speed * math.cos(yaw), speed * math.sin(yaw)
 
-    def meet(self, robot: SimulatedRobot) -> None:
-        """Give way to this robot from now on."""
-        self._robot = robot if self._gives_way else None
+    def meet(self, robots: Sequence[SimulatedRobot]) -> None:
+        """Give way to these robots from now on."""
+        self._robots = robots if self._gives_way else ()
 
     def _move(self) -> None:
-        self._waits = self._robot is not None and self._is_ahead(self._robot)
+        self._waits = any(map(self._is_ahead, self._robots))
         if self._waits:
             self._waited += self._world.time_step
         self._world.place_body(self.body, self.pose())
@@ -193,11 +195,43 @@ def other_robot(
     """Put in another robot that follows a route: a box as large as the model, drawn with its body and wheels."""
     length, width = np.ptp(spec.footprint_array(), axis=0).tolist()
     size = (length, width, spec.height)
-    body = Body(size, Thing.ROBOT, _robot_looks(spec, size))
+    body = Body(size, Thing.ROBOT, robot_looks(spec, size))
     return RouteWalker(world, route, speed, start, body, gives_way)
 
 
-def _robot_looks(spec: RobotSpec, size: tuple[float, float, float]) -> Surface:
+class Fellow:
+    """A robot that navigates by itself, as the sensors, monitors and recordings of the other robots have it.
+
+    It is an upright cylinder if its outline is round, else a box.
+
+    Parameters
+    ----------
+    robot : SimulatedRobot
+    """
+
+    thing = Thing.ROBOT
+
+    def __init__(self, robot: SimulatedRobot) -> None:
+        self._robot = robot
+        spec, outline = robot.spec, robot.spec.footprint_array()
+        length, width = np.ptp(outline, axis=0).tolist()
+        is_round = 2.0 * spec.circumscribed_radius < (1.0 + ROUND) * min(length, width)
+        self.size: Sequence[float] = (0.5 * length, spec.height) if is_round else (length, width, spec.height)
+        self._middle = np.array([*(0.5 * (outline.min(axis=0) + outline.max(axis=0))), 0.5 * spec.height])
+        self.looks = robot_looks(spec, (length, width, spec.height))
+
+    def pose(self) -> Pose:
+        """Pose of its middle now."""
+        pose = self._robot.pose()
+        x, y, z = (np.asarray(pose.position) + rotated(pose.rotation, self._middle)).tolist()
+        return Pose((x, y, z), pose.orientation, pose.frame_id, pose.stamp)
+
+    def solid(self) -> UprightSolid:
+        """Return the cylinder or box where it is now."""
+        return UprightSolid(self.pose(), self.size, moving=True)
+
+
+def robot_looks(spec: RobotSpec, size: tuple[float, float, float]) -> Surface:
     """A narrower body above the axles, and the wheels, in the frame of the middle of the box of ``size``."""
     length, width, height = size
     radius = spec.wheel_radius

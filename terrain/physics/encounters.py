@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from types import MappingProxyType
 
 from mbf_abstract.geometry import Pose
 from terrain.physics.contact_depth import placed
@@ -19,6 +20,7 @@ WATCHED = 1.0  # m; what is farther from the robot's outline is not looked at
 TOUCHING = 0.05  # m; the nearest thing of a kind that is touched is the one that is touched, if it is as near as this
 GROWTH = 0.05  # m; a gap that has grown so much above its smallest was a near miss
 FORGOTTEN = 1.5  # times the gap of a near miss; beyond that the next approach is a new one
+NOBODY: Mapping[str, Actor] = MappingProxyType({})
 
 
 class Mover(Enum):
@@ -44,9 +46,11 @@ class Surroundings:
     ----------
     spec : RobotSpec
     actors : sequence of Actor
+    fellows : mapping of str to Actor
+        Other robots that navigate, by name.
     """
 
-    def __init__(self, spec: RobotSpec, actors: Sequence[Actor]) -> None:
+    def __init__(self, spec: RobotSpec, actors: Sequence[Actor], fellows: Mapping[str, Actor] = NOBODY) -> None:
         self._spec = spec
         self._outline = spec.footprint_array()
         counts: Counter[str] = Counter()
@@ -54,6 +58,7 @@ class Surroundings:
         for actor in actors:
             counts[actor.thing.value] += 1
             self._actors.append((f"{actor.thing.value} {counts[actor.thing.value]}", actor))
+        self._actors += fellows.items()
         self._last: list[Pose] = []
         self._stamp = -math.inf
 

@@ -9,9 +9,11 @@ turns only as its steered wheels do, so it never drives a tighter curve than its
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from mbf_abstract.drive.robot import Odometry
 from mbf_abstract.geometry import Command, Pose, Twist, normalize_angle
+from terrain.physics.actors import Fellow
 from terrain.physics.drive import STEERING_SPEED, commanded_twist, steering_command
 from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.motion_sample import MotionSample, Thing
@@ -31,6 +33,11 @@ class KinematicRobot:
         Start; only x, y and yaw count.
     command_timeout : float
         It brakes this long [s] after the last command.
+
+    Attributes
+    ----------
+    fellows : sequence of Fellow
+        Other robots in the world, which it can touch.
     """
 
     def __init__(self, world: KinematicWorld, spec: RobotSpec, pose: Pose, command_timeout: float = 0.5) -> None:
@@ -43,6 +50,7 @@ class KinematicRobot:
         self._command: Command = Twist()
         self._command_stamp = world.time
         self._blocked = False
+        self.fellows: Sequence[Fellow] = ()
         self._touched: frozenset[Thing] = frozenset()
         world.robots.append(self)
 
@@ -96,7 +104,8 @@ class KinematicRobot:
 
     def _contact(self, x: float, y: float, yaw: float, gap: float = 0.0) -> tuple[float, frozenset[Thing]]:
         """How deep [m] the robot would lie in walls and other things at a pose, and which it would touch."""
-        return self.world.contact(self._outline, x, y, yaw, self.spec.circumscribed_radius, gap)
+        fellows = [fellow.solid() for fellow in self.fellows]
+        return self.world.contact(self._outline, x, y, yaw, self.spec.circumscribed_radius, gap, fellows)
 
     def place(self, pose: Pose) -> None:
         """Put the robot at the x, y and yaw of ``pose`` at once, at rest."""

@@ -50,6 +50,7 @@ class KinematicWorld:
         self.things: dict[int, Thing] = {}
         self.step_count = 0
         self._before_step: list[Callable[[], None]] = []
+        self._after_step: list[Callable[[], None]] = []
         self._clearance: FloatArray | None = None
         if building is not None:
             distance = ndimage.distance_transform_edt(~building.occupied)
@@ -67,10 +68,16 @@ class KinematicWorld:
         self.step_count += 1
         for robot in self.robots:
             robot.advance(TIME_STEP)
+        for callback in self._after_step:
+            callback()
 
     def before_step(self, callback: Callable[[], None]) -> None:
         """Call ``callback`` before each step: moving actors, faults."""
         self._before_step.append(callback)
+
+    def after_step(self, callback: Callable[[], None]) -> None:
+        """Call ``callback`` after each step: monitors and sensors."""
+        self._after_step.append(callback)
 
     def close(self) -> None:
         """Do nothing; there is nothing to free."""
@@ -110,9 +117,16 @@ class KinematicWorld:
         )
 
     def contact(
-        self, outline: FloatArray, x: float, y: float, yaw: float, reach: float, gap: float = 0.0
+        self,
+        outline: FloatArray,
+        x: float,
+        y: float,
+        yaw: float,
+        reach: float,
+        gap: float = 0.0,
+        fellows: Sequence[UprightSolid] = (),
     ) -> tuple[float, frozenset[Thing]]:
-        """Penetration depth [m] of a robot in walls, obstacles and actors, and which of them it touches.
+        """Penetration depth [m] of a robot in walls, obstacles, actors and robots, and which of them it touches.
 
         Parameters
         ----------
@@ -124,6 +138,8 @@ class KinematicWorld:
             Distance [m] from there to the farthest corner.
         gap : float
             Things nearer than this [m] count as touched, less than a cell of the building.
+        fellows : sequence of UprightSolid
+            The other robots.
 
         Returns
         -------
@@ -131,16 +147,21 @@ class KinematicWorld:
             Below 0 where it touches nothing.
         touched : frozenset of Thing
         """
-        if not self.solids and self.building is None:
+        if not self.solids and not fellows and self.building is None:
             return -math.inf, NOTHING
-        near = [(body, solid) for body, solid in enumerate(self.solids) if solid.distance(x, y) < reach + gap]
+        near = [
+            (solid, self.things.get(body, Thing.WALL))
+            for body, solid in enumerate(self.solids)
+            if solid.distance(x, y) < reach + gap
+        ]
+        near += [(solid, Thing.ROBOT) for solid in fellows if solid.distance(x, y) < reach + gap]
         grid = self.building
         if grid is not None and self._wall_clearance(x, y) > reach + 2.0 * grid.resolution:
             grid = None
         if grid is None and not near:
             return -math.inf, NOTHING
         corners = placed(outline, x, y, yaw)
-        depths = [(solid.depth(corners), self.things.get(body, Thing.WALL)) for body, solid in near]
+        depths = [(solid.depth(corners), thing) for solid, thing in near]
         if grid is not None:
             origin = np.array([grid.origin_x, grid.origin_y])
             depths.append((depth_in_cells(corners, grid.occupied, grid.resolution, origin), Thing.WALL))

@@ -128,7 +128,7 @@ def distance_to_meeting(
 class Person:
     """A person who walks a closed route of straight lines and yields.
 
-    It stands until it has met the robot, at which the run begins.
+    It stands until it has met the robots, at which the run begins.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class Person:
         self.thing, self.size = body.thing, body.size
         self.reach, height = body.size
         self._lift = 0.5 * height
-        self._robot: SimulatedRobot | None = None
+        self._robots: Sequence[SimulatedRobot] = ()
         self._others: Sequence[Walking] = ()
         self._go_to_start()
         self.body = world.add_cylinder(self.pose(), self.reach, height, moving=True)
@@ -177,9 +177,9 @@ class Person:
         """Velocity in the map [m/s]."""
         return self._pace * self._heading[0], self._pace * self._heading[1]
 
-    def meet(self, robot: SimulatedRobot, others: Sequence[Walking] = ()) -> None:
+    def meet(self, robots: Sequence[SimulatedRobot], others: Sequence[Walking] = ()) -> None:
         """Go to the start of the route, and walk and yield from now on."""
-        self._robot, self._others = robot, [other for other in others if other is not self]
+        self._robots, self._others = robots, [other for other in others if other is not self]
         self._go_to_start()
         self._world.place_body(self.body, self.pose())
 
@@ -200,19 +200,19 @@ class Person:
 
     def _move(self) -> None:
         """Decide now and then, and take a step."""
-        if self._robot is None or self._speed == 0.0 or not self._lengths.any():
+        if not self._robots or self._speed == 0.0 or not self._lengths.any():
             return
         if self._steps % max(1, round(PERIOD / self._world.time_step)) == 0:
-            self._decide(self._robot)
+            self._decide()
         self._steps += 1
         step = self._pace * self._world.time_step
         self._x, self._y = self._x + step * self._heading[0], self._y + step * self._heading[1]
         self._world.place_body(self.body, self.pose())
 
-    def _decide(self, robot: SimulatedRobot) -> None:
+    def _decide(self) -> None:
         """Choose direction and speed: what comes nearest to the place on the route where it wants to be."""
         wx, wy = self._wish()
-        circles = self._circles(robot)
+        circles = self._circles()
         best = (HORIZON * HORIZON, 0.0, self._heading)
         for cosine, sine in TURNS:
             direction = (wx * cosine - wy * sine, wx * sine + wy * cosine)
@@ -242,12 +242,14 @@ class Person:
         length = math.hypot(dx, dy)
         return (dx / length, dy / length) if length > 0.0 else (ux, uy)
 
-    def _circles(self, robot: SimulatedRobot) -> list[Circle]:
+    def _circles(self) -> list[Circle]:
         """Offset, velocity and reach of everybody who is not far away."""
-        pose, twist = robot.pose(), robot.velocity()
-        c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-        velocity = (c * twist.vx - s * twist.vy, s * twist.vx + c * twist.vy)
-        seen = [(pose, velocity, robot.spec.circumscribed_radius + COURTESY)]
+        seen = []
+        for robot in self._robots:
+            pose, twist = robot.pose(), robot.velocity()
+            c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+            velocity = (c * twist.vx - s * twist.vy, s * twist.vx + c * twist.vy)
+            seen.append((pose, velocity, robot.spec.circumscribed_radius + COURTESY))
         seen += [(other.pose(), other.velocity(), other.reach + ELBOW_ROOM) for other in self._others]
         circles = []
         for where, its_velocity, reach in seen:

@@ -29,6 +29,9 @@ class SimulatedWorld(Protocol):
     def before_step(self, callback: Callable[[], None]) -> None:
         """Call ``callback`` before each step."""
 
+    def after_step(self, callback: Callable[[], None]) -> None:
+        """Call ``callback`` after each step: monitors and sensors."""
+
 
 class SimulatedRobot(Protocol):
     """A robot in such a world: ``WheeledRobot`` or ``KinematicRobot``."""

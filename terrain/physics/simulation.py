@@ -1,4 +1,4 @@
-"""One simulated world with its robot and sensors, stepped in lockstep by the owner of the clock.
+"""One simulated world with a robot and its sensors, stepped in lockstep by the owner of the clock.
 
 ``advance_to`` is a pure function of the simulation's parts, its seeds and the commands sent: no thread, no
 clock, no global state. In a run, a thread of ``SimClock`` calls it at a steady period; in a test, call it directly.
@@ -18,7 +18,7 @@ from dataclasses import replace
 from typing import Any
 
 from mbf_abstract.geometry import Pose
-from terrain.physics.encounters import Surroundings
+from terrain.physics.encounters import NOBODY, Surroundings
 from terrain.physics.incidents import Incident, IncidentMonitor
 from terrain.physics.protocols import Actor, SimulatedRobot, SimulatedWorld
 from terrain.sensors.sensor import Sensor
@@ -41,6 +41,8 @@ class Simulation:
         By topic; each measures at its own rate, the first time at once.
     actors : sequence of Actor
         What else moves there; encounters with them are incidents.
+    fellows : mapping of str to Actor
+        Other robots that navigate there, by name, with a simulation each: stepping one of them steps the world for all.
 
     Attributes
     ----------
@@ -62,6 +64,7 @@ class Simulation:
         robot: SimulatedRobot,
         sensors: Mapping[str, Sensor[Any]] | None = None,
         actors: Sequence[Actor] = (),
+        fellows: Mapping[str, Actor] = NOBODY,
     ) -> None:
         self.world = world
         self.robot = robot
@@ -71,12 +74,13 @@ class Simulation:
         self.incidents: list[Incident] = []
         self.track: list[Pose] = []
         self.on_incident: list[Callable[[Incident], None]] = []
-        self._surroundings = Surroundings(robot.spec, actors)
+        self._surroundings = Surroundings(robot.spec, actors, fellows)
         self._listeners: list[Listener] = []
         self._monitor_period = self._steps_per(MONITOR_RATE)
         self._schedule = [(name, sensor, self._steps_per(sensor.rate)) for name, sensor in self.sensors.items()]
         self._steps = 0
         self._observe()
+        world.after_step(self._take_step)
 
     @property
     def time(self) -> float:
@@ -91,8 +95,10 @@ class Simulation:
         """Step until the world's time is at least ``time`` [s]; does nothing if it is already."""
         while self.world.time < time - TIME_TOLERANCE:
             self.world.step()
-            self._steps += 1
-            self._observe()
+
+    def _take_step(self) -> None:
+        self._steps += 1
+        self._observe()
 
     def _observe(self) -> None:
         """Take the measurements that are due at this step."""

@@ -71,6 +71,7 @@ class BulletWorld:
         self._static: list[Surface] = []
         self._folder = tempfile.TemporaryDirectory(prefix="mbf_world_")
         self._before_step: list[Callable[[], None]] = []
+        self._after_step: list[Callable[[], None]] = []
         self._closed = False
         self.bullet.setGravity(0, 0, -GRAVITY)
         self.bullet.setPhysicsEngineParameter(
@@ -107,12 +108,18 @@ class BulletWorld:
         """Call ``callback`` before each step: moving actors, motor watchdogs."""
         self._before_step.append(callback)
 
+    def after_step(self, callback: Callable[[], None]) -> None:
+        """Call ``callback`` after each step: monitors and sensors."""
+        self._after_step.append(callback)
+
     def step(self) -> None:
         """Advance by one time step."""
         for callback in self._before_step:
             callback()
         self.bullet.stepSimulation()
         self.step_count += 1
+        for callback in self._after_step:
+            callback()
 
     def add_heightfield(self, terrain: Heightfield) -> int:
         """Put a terrain in as Bullet's own heightfield.

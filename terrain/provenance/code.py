@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from mbf_abstract.config.configuration import Config
@@ -28,9 +28,11 @@ class Code(ParameterModel):
     commit: str = parameter("", "Commit of the git repository that it belongs to; empty if it belongs to none.")
 
 
-def code_of(server: AbstractNavigationServer) -> dict[str, Code]:
-    """Return the packages of a run by name: this project's, and those of the configuration's plugins and layers."""
-    modules = [*OWN_PACKAGES, type(server).__module__, *_modules_of_plugins(server)]
+def code_of(servers: Sequence[AbstractNavigationServer]) -> dict[str, Code]:
+    """Return the packages of a run by name: this project's, and those of the configurations' plugins and layers."""
+    modules = list(OWN_PACKAGES)
+    for server in servers:
+        modules += [type(server).__module__, *_modules_of_plugins(server)]
     packages = sorted({module.partition(".")[0] for module in modules})
     places = {package: place for package in packages if (place := _place_of(package)) is not None}
     return {package: Code(sha256=hash_of_code(place), commit=commit_of(place)) for package, place in places.items()}

@@ -8,7 +8,8 @@ No path of the machine is recorded, and no name of a user or a machine: files ar
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Collection, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import Any, Literal
@@ -43,24 +44,45 @@ class Provenance(ParameterModel):
     files: dict[str, str] = parameter(..., "SHA-256 of the scenario and of every file that it needs, by their paths.")
 
 
-def write_scenario(folder: Path, scenario: Scenario, backend: str, seed: int, inputs: InputCopies) -> None:
-    """Write a scenario as it is run, with the configuration that is in the folder; files that it names are copied."""
-    as_run = scenario.model_copy(update={"backend": backend, "seed": seed, "navigation": {backend: NAVIGATION}})
-    write_whole(folder / SCENARIO, yaml.safe_dump(_plain(as_run, inputs), sort_keys=False))
+def write_scenario(
+    folder: Path, scenario: Scenario, backends: Mapping[str, str], seed: int, inputs: InputCopies
+) -> None:
+    """Write a scenario as it is run, with the configurations that are in the folder; files that it names are copied.
+
+    Parameters
+    ----------
+    backends : mapping of str to str
+        Backend of each robot, by the names of ``robot_scenarios``; its configuration is in the folder of this name.
+    """
+    files = {name: {backend: Path(name) / NAVIGATION} for name, backend in backends.items()}
+    robots = tuple(
+        robot.model_copy(update={"backend": backends[robot.name], "navigation": files[robot.name]})
+        for robot in scenario.robots
+    )
+    first, backend = next(iter(backends.items()))
+    own = {"backend": backend, "seed": seed, "navigation": files[first], "robots": robots}
+    as_run, written = scenario.model_copy(update=own), {file for named in files.values() for file in named.values()}
+    write_whole(folder / SCENARIO, yaml.safe_dump(_plain(as_run, inputs, written), sort_keys=False))
 
 
 def write_provenance(
-    folder: Path, server: AbstractNavigationServer, command: str, executive: str, wall_clock: bool, live_page: bool
+    folder: Path,
+    servers: Sequence[AbstractNavigationServer],
+    command: str,
+    executive: str,
+    wall_clock: bool,
+    live_page: bool,
 ) -> None:
-    """Write ``provenance.yaml`` of a run whose scenario, configuration and maps are in its folder."""
-    files = sorted(file for file in with_named_files(folder / SCENARIO) if file.is_relative_to(folder))
+    """Write ``provenance.yaml`` of a run whose scenario, configurations and maps are in its folder."""
+    named = {Path(os.path.normpath(file)) for file in with_named_files(folder / SCENARIO)}
+    files = sorted(file for file in named if file.is_relative_to(folder))
     provenance = Provenance(
         command=command,
         executive=executive,
         clock="real" if wall_clock else "simulated",
         live_page=live_page,
         versions=versions(),
-        code=code_of(server),
+        code=code_of(servers),
         files={file.relative_to(folder).as_posix(): sha256_of(file) for file in files},
     )
     write_whole(folder / FILE, yaml.safe_dump(provenance.model_dump(), sort_keys=False))
@@ -97,14 +119,14 @@ def changed_files(folder: Path, provenance: Provenance) -> list[str]:
     ]
 
 
-def _plain(value: Any, inputs: InputCopies) -> Any:
-    """Return a value as YAML writes it; a file becomes its copy, but for the configuration that the run writes."""
+def _plain(value: Any, inputs: InputCopies, written: Collection[Path]) -> Any:
+    """Return a value as YAML writes it; a file becomes its copy, but for the configurations that the run writes."""
     if isinstance(value, BaseModel):
-        return {name: _plain(getattr(value, name), inputs) for name in type(value).model_fields}
+        return {name: _plain(getattr(value, name), inputs, written) for name in type(value).model_fields}
     if isinstance(value, Mapping):
-        return {key: _plain(item, inputs) for key, item in value.items()}
+        return {key: _plain(item, inputs, written) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item, inputs) for item in value]
+        return [_plain(item, inputs, written) for item in value]
     if isinstance(value, Path):
-        return str(value) if value == NAVIGATION else inputs.copy(value)
+        return value.as_posix() if value in written else inputs.copy(value)
     return value.value if isinstance(value, Enum) else value

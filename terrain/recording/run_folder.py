@@ -171,6 +171,20 @@ def read_run(folder: Path) -> tuple[Recording, dict[str, Any]]:
     return recording, metrics
 
 
+def robots_of(folder: Path) -> list[str]:
+    """Return the names of the robots that have a recording in a run's folder, sorted; "" for a run with one robot.
+
+    A folder without any recording counts as that of one robot.
+    """
+
+    def is_recorded(of_one: Path) -> bool:
+        return (of_one / "recording.npz").is_file() or has_parts(of_one)
+
+    if is_recorded(folder) or not folder.is_dir():
+        return [""]
+    return sorted(part.name for part in folder.iterdir() if part.is_dir() and is_recorded(part)) or [""]
+
+
 def clear_results(folder: Path) -> None:
     """Remove the results of an earlier run, so that they are not mistaken for new ones."""
     for name in RESULTS:

@@ -10,7 +10,7 @@ import numpy as np
 from terrain.scenarios.actors import add_actors
 from terrain.scenarios.obstacles import add_obstacles
 from terrain.scenarios.places import coordinates
-from terrain.scenarios.scenario import Scenario
+from terrain.scenarios.scenario import Scenario, robot_scenarios
 from terrain.scenarios.world import ScenarioWorld, build_world
 from terrain.worlds.map_files import MapFiles
 from terrain.worlds.surface import Surface
@@ -27,7 +27,8 @@ def build_environment(scenario: Scenario, folder: Path, seed: int) -> tuple[Scen
     obstacles : Surface or None
         The things in the world that are on no map, for pictures.
     """
-    keep_clear = coordinates((scenario.start, *scenario.goals))
+    views = robot_scenarios(scenario).values()
+    keep_clear = coordinates(place for view in views for place in (view.start, *view.goals))
     rng, is_kinematic = np.random.default_rng([seed, WORLD_STREAM]), scenario.physics == "kinematic"
     files = MapFiles(folder, scenario.map, np.random.default_rng([seed, MAP_STREAM]))
     world = build_world(scenario.world, files, rng, keep_clear, 1.0 / scenario.physics_rate, is_kinematic)

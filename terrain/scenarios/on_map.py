@@ -29,8 +29,10 @@ def on_map(scenario: Scenario, file: Path) -> Scenario:
     Raises
     ------
     ConfigError
-        The file is no map, or there is no room for the robot in it.
+        The file is no map, there is no room for the robot in it, or the scenario has several robots.
     """
+    if scenario.robots:
+        raise ConfigError([Finding(scenario.name, 1, "robots", "a scenario with one robot for another map", "several")])
     world = MapWorld(type="map", file=file.resolve())
     corner = read_occupancy(file)
     if max(abs(corner.origin_x), abs(corner.origin_y)) > NEAR_ZERO:

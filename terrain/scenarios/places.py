@@ -22,6 +22,6 @@ class PlanarPose(ParameterModel):
 Place = PlanarPose | str
 
 
-def coordinates(places: Iterable[Place]) -> FloatArray:
+def coordinates(places: Iterable[Place | None]) -> FloatArray:
     """Return (n, 2) x and y [m] of the places that are given by coordinates."""
     return np.array([(place.x, place.y) for place in places if isinstance(place, PlanarPose)]).reshape(-1, 2)

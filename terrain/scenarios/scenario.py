@@ -8,10 +8,12 @@ that the run writes of its world.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
-from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.config.findings import ConfigError, Finding, KeyPath
 from mbf_abstract.config.validation import validate
 from mbf_abstract.config.yaml_source import YamlDocument, load_yaml
 from mbf_abstract.parameters import ParameterModel, parameter
@@ -22,25 +24,12 @@ from terrain.scenarios.noise import LocalizationNoise, MapNoise
 from terrain.scenarios.obstacles import Forest, Obstacle
 from terrain.scenarios.perturbation import Perturbation
 from terrain.scenarios.places import Place, PlanarPose
+from terrain.scenarios.robots import Model, OwnRobot, Sensor
 from terrain.scenarios.world_types import LevelsWorld, MapWorld, TerrainWorld, World
 
 __all__ = ["MapWorld", "Obstacle", "PlanarPose", "Scenario", "Sensor", "load_scenario", "shipped_scenarios"]
 
 SHIPPED = Path(__file__).parent / "library"
-
-
-class Sensor(ParameterModel):
-    """A lidar or depth camera on the robot."""
-
-    name: str = parameter("lidar", "Name of the source, as the map layers call it.")
-    type: Literal["planar", "rings", "depth"] = parameter(
-        "planar", "One horizontal ring, 16 rings, or a depth camera of 70 degrees that looks ahead."
-    )
-    rate: float = parameter(10.0, "Scans a second.", unit="Hz", gt=0.0, le=60.0)
-    rays: int = parameter(360, "Rays of a ring; columns of a camera, which has 3/4 as many rows.", ge=3, le=10_000)
-    max_range: float = parameter(10.0, "Range.", unit="m", gt=0.0)
-    noise: float = parameter(0.01, "Standard deviation of a range.", unit="m", ge=0.0)
-    drop_out: float = parameter(0.0, "Share of rays without an answer.", ge=0.0, lt=1.0)
 
 
 class Scenario(ParameterModel):
@@ -51,9 +40,12 @@ class Scenario(ParameterModel):
     backend: str = parameter(..., "Map backend to use where the command line names none.")
     navigation: dict[str, Path] = parameter(..., "Configuration file of each backend.")
     world: World = parameter(..., "What it takes place in.")
-    robot: Literal["husky", "turtlebot", "car"] = parameter(..., "Model of the robot.")
-    start: Place = parameter(..., "Where the robot starts: x, y, yaw, or the name of a place of the world.")
-    goals: tuple[Place, ...] = parameter(..., "Where it goes, in order.")
+    robot: Model = parameter(..., "Model of the robot.")
+    start: Place | None = parameter(None, "Where the robot starts: x, y, yaw, or the name of a place of the world.")
+    goals: tuple[Place, ...] = parameter((), "Where it goes, in order.")
+    robots: tuple[OwnRobot, ...] = parameter(
+        (), "Several robots instead of one with start and goals, each with a navigation server, on one clock."
+    )
     sensors: tuple[Sensor, ...] = parameter((), "Its lidars and cameras.")
     odometry: Literal["exact", "wheels"] = parameter(
         "exact", "True velocity, or that of the turning wheels; then odom drifts and map -> odom corrects it."
@@ -115,34 +107,87 @@ def read_scenario(document: YamlDocument, findings: list[Finding]) -> Scenario |
 
 def _with_absolute_files(scenario: Scenario, folder: Path) -> Scenario:
     """Let relative files count from the scenario's folder."""
-    navigation = {backend: folder / file for backend, file in scenario.navigation.items()}
+
+    def absolute(files: dict[str, Path]) -> dict[str, Path]:
+        return {backend: folder / file for backend, file in files.items()}
+
     file = getattr(scenario.world, "file", None)
     world = scenario.world if file is None else scenario.world.model_copy(update={"file": folder / file})
-    return scenario.model_copy(update={"navigation": navigation, "world": world})
+    robots = tuple(
+        robot if robot.navigation is None else robot.model_copy(update={"navigation": absolute(robot.navigation)})
+        for robot in scenario.robots
+    )
+    return scenario.model_copy(update={"navigation": absolute(scenario.navigation), "world": world, "robots": robots})
+
+
+def robot_scenarios(scenario: Scenario) -> dict[str, Scenario]:
+    """Return what each robot of a scenario drives, by its name: the scenario with this robot as its only one.
+
+    The one robot of a scenario without ``robots`` has no name, and its scenario is the scenario itself.
+    """
+    if not scenario.robots:
+        return {"": scenario}
+    views = {}
+    for robot in scenario.robots:
+        own = {key: value for key, value in robot if value is not None}
+        own["name"] = f"{scenario.name}/{robot.name}"
+        views[robot.name] = scenario.model_copy(update={**own, "robots": ()})
+    return views
 
 
 def _find_contradictions(scenario: Scenario, document: YamlDocument) -> list[Finding]:
     """Find what is legal key by key and wrong together."""
-    findings = []
-    if not scenario.goals:
-        findings.append(document.finding(("goals",), "at least one goal", "none"))
-    if scenario.backend not in scenario.navigation:
-        known = ", ".join(scenario.navigation) or "none"
-        expected = f"a backend listed under navigation ({known})"
-        findings.append(document.finding(("backend",), expected, scenario.backend))
-    for backend, file in scenario.navigation.items():
-        if not file.is_file():
-            findings.append(document.finding(("navigation", backend), "a configuration file", f"no file {file}"))
+    findings = _find_missing_robots(scenario, document)
+    for number, view in enumerate(robot_scenarios(scenario).values()):
+        findings += _find_contradictions_of(view, document, partial(_keys_of, scenario, number))
     if scenario.physics == "kinematic" and isinstance(scenario.world, LevelsWorld):
         findings.append(document.finding(("physics",), "bullet, for a world with several levels", scenario.physics))
     if scenario.map.spacing is not None and not isinstance(scenario.world, TerrainWorld):
         expected = f"no spacing, which only maps of open ground have (a world of type {scenario.world.type} has none)"
         findings.append(document.finding(("map", "spacing"), expected, f"{scenario.map.spacing:g}"))
+    return list(dict.fromkeys(findings))
+
+
+def _find_missing_robots(scenario: Scenario, document: YamlDocument) -> list[Finding]:
+    """Either one robot with start and goals, or several with names of their own."""
+    findings = []
+    if not scenario.robots:
+        if scenario.start is None:
+            findings.append(document.finding(("start",), "a value", "nothing"))
+        if not scenario.goals:
+            findings.append(document.finding(("goals",), "at least one goal", "none"))
+        return findings
+    for key in ("start", "goals"):
+        if getattr(scenario, key):
+            findings.append(document.finding((key,), "nothing beside robots, which have their own", "a value"))
+    names = [robot.name for robot in scenario.robots]
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            findings.append(document.finding(("robots", number, "name"), "a name of its own", repr(name)))
+    return findings
+
+
+def _keys_of(scenario: Scenario, number: int, *keys: str | int) -> KeyPath:
+    """Where a value of a robot stands: in its own block if it is there, else in the scenario."""
+    is_own = scenario.robots and getattr(scenario.robots[number], str(keys[0])) is not None
+    return ("robots", number, *keys) if is_own else keys
+
+
+def _find_contradictions_of(scenario: Scenario, document: YamlDocument, at: Callable[..., KeyPath]) -> list[Finding]:
+    """Find what is wrong together in what one robot drives; ``at`` returns where a value of it stands."""
+    findings = []
+    if scenario.backend not in scenario.navigation:
+        known = ", ".join(scenario.navigation) or "none"
+        expected = f"a backend listed under navigation ({known})"
+        findings.append(document.finding(at("backend"), expected, scenario.backend))
+    for backend, file in scenario.navigation.items():
+        if not file.is_file():
+            findings.append(document.finding(at("navigation", backend), "a configuration file", f"no file {file}"))
     sensors = [*(sensor.name for sensor in scenario.sensors), *proprioceptive_sensors(scenario), LOCALIZATION]
     for index, fault in enumerate(scenario.faults):
         if isinstance(fault, SensorFault) and fault.sensor not in sensors:
             expected = "one of " + ", ".join(sensors)
-            findings.append(document.finding(("faults", index, "sensor"), expected, repr(fault.sensor)))
+            findings.append(document.finding(at("faults", index, "sensor"), expected, repr(fault.sensor)))
     return findings
 
 
@@ -167,7 +212,8 @@ def copy_scenario(name: str, folder: Path) -> list[Path]:
     known = shipped_scenarios()
     if name not in known:
         raise ConfigError([Finding("scenarios", 1, name, f"one of {', '.join(known)}", repr(name))])
-    files = list(load_yaml(known[name]).data["navigation"].values())
+    data = load_yaml(known[name]).data
+    files = [file for block in (data, *data.get("robots", ())) for file in block.get("navigation", {}).values()]
     copies = {folder / known[name].name: known[name]} | {folder / file: SHIPPED / file for file in files}
     there = [Finding(str(copy), 1, "", "no file, because a copy comes here", "one") for copy in copies if copy.exists()]
     if there:

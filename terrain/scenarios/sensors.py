@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,15 +25,20 @@ from terrain.worlds.upright_solids import SolidRays
 AnyRobot = WheeledRobot | KinematicRobot
 
 
-def make_sensors(
-    sensors: tuple[model.Sensor, ...], robot: AnyRobot, world: ScenarioWorld, seed: int
-) -> dict[str, Lidar]:
-    """Make the lidars of a scenario, by name; each draws its noise from a generator of its own."""
+def ray_casters(world: ScenarioWorld) -> list[RayCaster]:
+    """Return what the lidars of all robots can hit in a world."""
     physics = world.physics
     casters: list[RayCaster] = [StaticRays(*physics.static_surface())]
     if physics.has_moving_bodies:
         casters.append(MovingRays(physics) if isinstance(physics, BulletWorld) else SolidRays(physics.solids))
-    return {sensor.name: _lidar(sensor, robot, casters, seed) for sensor in sensors}
+    return casters
+
+
+def make_sensors(
+    sensors: tuple[model.Sensor, ...], robot: AnyRobot, casters: Sequence[RayCaster], seed: int
+) -> dict[str, Lidar]:
+    """Make the lidars of a robot, by name; each draws its noise from a generator of its own."""
+    return {sensor.name: _lidar(sensor, robot, list(casters), seed) for sensor in sensors}
 
 
 def make_proprioceptive_sensors(scenario: model.Scenario, robot: AnyRobot, seed: int) -> dict[str, Sensor[Any]]:

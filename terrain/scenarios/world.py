@@ -6,7 +6,7 @@ Every server gets the map it can read from ``terrain.worlds.map_files``, and a c
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -61,14 +61,14 @@ class ScenarioWorld:
     places: Mapping[str, Pose] = field(default_factory=dict)
     actors: list[Actor] = field(default_factory=list)
 
-    def introduce(self, robot: SimulatedRobot) -> None:
-        """Make robot, people and other robots known to each other, as far as they yield."""
+    def introduce(self, robots: Sequence[SimulatedRobot]) -> None:
+        """Make the robots that navigate, people and other robots known to each other, as far as they yield."""
         walking = [actor for actor in self.actors if isinstance(actor, RouteWalker | Person)]
         for actor in walking:
             if isinstance(actor, Person):
-                actor.meet(robot, walking)
+                actor.meet(robots, walking)
             else:
-                actor.meet(robot)
+                actor.meet(robots)
 
     def open_surface(self) -> Surface:
         """Return what a robot may drive on: the ground, in a building only its free cells."""

@@ -7,6 +7,7 @@ every drive by lidar (docs/decisions/0013).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -16,7 +17,9 @@ from mbf_abstract.geometry import FloatArray
 from mbf_abstract.geometry.arithmetic import norm
 from terrain.kernels.ray_casting import first_distances
 from terrain.kernels.ray_tree import build_tree
+from terrain.physics.actors import Fellow
 from terrain.physics.world import MOVING, BulletWorld
+from terrain.worlds.upright_solids import SolidRays
 
 
 class RayCaster(Protocol):
@@ -75,3 +78,14 @@ class MovingRays:
             return np.full(len(origins), np.inf)
         hit, points = self._world.cast_rays(origins, origins + max_range * directions, MOVING)
         return np.where(hit, norm(points - origins), np.inf)
+
+
+class FellowRays:
+    """Rays at other robots that navigate, which are boxes to them in every world."""
+
+    def __init__(self, fellows: Sequence[Fellow]) -> None:
+        self._fellows = fellows
+
+    def distances(self, origins: FloatArray, directions: FloatArray, max_range: float) -> FloatArray:
+        """Cast the rays; see ``RayCaster``."""
+        return SolidRays([fellow.solid() for fellow in self._fellows]).distances(origins, directions, max_range)

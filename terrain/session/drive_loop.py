@@ -1,8 +1,8 @@
-"""The thread that steps a simulation on a clock and publishes its poses and scans."""
+"""The thread that steps a simulation on a clock and publishes the poses and scans of its robots."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -121,6 +121,7 @@ class DriveLoop:
         self.on_scan: list[Callable[[RangeScan], None]] = []
         self.on_failure: list[Callable[[], None]] = []
         self.failure: BaseException | None = None
+        self._led: list[DriveLoop] = [self]
         simulation.on_measurement(self._take_measurement)
 
     @property
@@ -128,9 +129,14 @@ class DriveLoop:
         """Time [s] of the clock at which the simulation's time was 0."""
         return self._origin
 
+    def lead(self, others: Iterable[DriveLoop]) -> None:
+        """Serve other robots of the same world, too: after each step, in this order; theirs are not started."""
+        self._led += others
+
     def start(self) -> None:
         """Start the thread."""
-        self._origin = self._robot.time_offset = self._runtime.clock.now()
+        for loop in self._led:
+            loop._origin = loop._robot.time_offset = self._runtime.clock.now()
         self._thread = self._runtime.clock.spawn(self._loop, "simulator", Priority.SIMULATOR)
 
     def stop(self) -> None:
@@ -170,23 +176,28 @@ class DriveLoop:
         try:
             self._step_on()
         except BaseException as error:
-            self.failure = error
-            for listener in self.on_failure:
-                listener()
+            for loop in self._led:
+                loop.failure = error
+                for listener in loop.on_failure:
+                    listener()
 
     def _step_on(self) -> None:
         clock, tick = self._runtime.clock, 0
         while not self._stopped:
             self._simulation.advance_to(clock.now() - self._origin)
-            self.true_pose = self._simulation.robot.pose()
-            self._digest.pose(self.true_pose)
-            self.publish()
-            if tick % self._rates.ticks_per_sample == 0:
-                self._sample()
-            for listener in self.on_tick:
-                listener(self._simulation.time)
+            for loop in self._led:
+                loop._after_step(tick)
             tick += 1
             clock.sleep_until(self._origin + tick * self._rates.period)
+
+    def _after_step(self, tick: int) -> None:
+        self.true_pose = self._simulation.robot.pose()
+        self._digest.pose(self.true_pose)
+        self.publish()
+        if tick % self._rates.ticks_per_sample == 0:
+            self._sample()
+        for listener in self.on_tick:
+            listener(self._simulation.time)
 
     def _sample(self) -> None:
         robot = self._simulation.robot

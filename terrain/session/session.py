@@ -11,9 +11,10 @@ Example
 
 from __future__ import annotations
 
-import tempfile
+import os
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -25,29 +26,57 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.maps.sensing import RangeScan
+from terrain.physics.actors import Fellow
 from terrain.physics.command_delay import CommandDelay
 from terrain.physics.incidents import ANY_COLLISION, COLLISIONS_WITH, Incident
-from terrain.physics.kinematic_robot import KinematicRobot
-from terrain.physics.kinematic_world import KinematicWorld
-from terrain.physics.robot_models import ROBOTS
-from terrain.physics.robots import WheeledRobot
 from terrain.physics.simulation import Simulation
 from terrain.provenance.named_files import InputCopies
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
-from terrain.scenarios.environment import build_environment, with_noise
+from terrain.scenarios.environment import with_noise
 from terrain.scenarios.faults import FaultSchedule
-from terrain.scenarios.perturbation import draw_disturbance
 from terrain.scenarios.scenario import Scenario, load_scenario
 from terrain.scenarios.sensors import AnyRobot, make_localization, make_proprioceptive_sensors, make_sensors
 from terrain.scenarios.settings import apply_settings, apply_world_settings
+from terrain.sensors.rays import FellowRays
 from terrain.sensors.sensor import Sensor
 from terrain.session.simulation_session import SessionOptions, SimulationSession
+from terrain.session.site import Site
 
 __all__ = ["Session", "SessionOptions"]
 
 SCANS_PER_RECORDED = 10
 DEFAULT_OPTIONS = SessionOptions()
+
+
+@dataclass(frozen=True)
+class Member:
+    """One robot of a site.
+
+    Attributes
+    ----------
+    site : Site
+    name : str
+        Its name; the only robot of a site has none.
+    """
+
+    site: Site
+    name: str = ""
+
+    @property
+    def robot(self) -> AnyRobot:
+        """The robot itself."""
+        return self.site.robots[self.name]
+
+    @property
+    def folder(self) -> Path:
+        """Where its configuration and its results are written."""
+        return self.site.folder / self.name
+
+    @cached_property
+    def fellows(self) -> dict[str, Fellow]:
+        """The other robots of the site, by name."""
+        return self.site.fellows_of(self.name)
 
 
 class Session(SimulationSession):
@@ -56,8 +85,10 @@ class Session(SimulationSession):
     Parameters
     ----------
     scenario : Scenario or str
-        A scenario, the name of a shipped one, or a file.
+        A scenario with one robot, the name of a shipped one, or a file.
     options : SessionOptions
+    member : Member, optional
+        Which of several robots in one world it is; without it the session builds the world and closes it.
 
     Attributes
     ----------
@@ -67,43 +98,44 @@ class Session(SimulationSession):
     Raises
     ------
     ConfigError
-        The scenario has no configuration for the backend, or that configuration is wrong; all findings.
+        The scenario has several robots, it has no configuration for the backend, or that is wrong; all findings.
     """
 
-    def __init__(self, scenario: Scenario | str, options: SessionOptions = DEFAULT_OPTIONS) -> None:
+    def __init__(
+        self, scenario: Scenario | str, options: SessionOptions = DEFAULT_OPTIONS, member: Member | None = None
+    ) -> None:
         loaded = load_scenario(scenario) if isinstance(scenario, str) else scenario
+        if loaded.robots:
+            raise ConfigError([Finding(loaded.name, 1, "robots", "one robot; use a FleetSession", "several")])
         asked, settings = apply_world_settings(loaded, options.settings)
         self.scenario = with_noise(asked)
         self.backend = options.backend or self.scenario.backend
         self.seed = self.scenario.seed if options.seed is None else options.seed
-        self._temporary = tempfile.TemporaryDirectory(prefix="mbf_session_")  # removed with the session, used or not
-        self.folder = Path(self._temporary.name if options.folder is None else options.folder)
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self.inputs = InputCopies(self.folder)
+        self._is_alone = member is None
+        self._member = member or Member(Site(self.scenario, options, self.seed, {"": self.seed}))
+        self.site, self.world = self._member.site, self._member.site.world
+        self.folder = self._member.folder
         try:
-            options.on_step("building the world")
-            self.world, self._obstacles = build_environment(self.scenario, self.folder, self.seed)
-        except BaseException:
-            self._temporary.cleanup()
-            raise
-        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self.inputs = InputCopies(self.folder)
             self._wire(replace(options, seed=self.seed, settings=settings))
         except BaseException:
-            self._close_world()
+            self._close_site()
             raise
 
     def _wire(self, options: SessionOptions) -> None:
-        """Robot and sensors, then the server on their map, then the recorder."""
+        """Sensors, then the server on their map, then the recorder."""
         source = self.scenario.navigation.get(self.backend)
         if source is None:
             known = ", ".join(self.scenario.navigation)
             raise ConfigError([Finding(self.scenario.name, 1, "navigation", f"one of {known}", repr(self.backend))])
         config_file = write_navigation_config(source, self.world.files, self.folder, options.settings, self.inputs)
-        self.robot, simulation = self._make_simulation()
+        self.robot = self._member.robot
+        simulation = self._make_simulation()
         delay = CommandDelay(self.world.physics, self.robot.send_command, self.scenario.perturb.command_delay)
         self.recorder = self._make_recorder()
         self._scans = 0
-        super().__init__(simulation, self.localization, config_file, options, delay)
+        super().__init__(simulation, self.localization, config_file, options, delay, self.site.clock)
         self.navigator.server.get_path.listeners.append(self._record_plan)
         self.navigator.server.refine_path.listeners.append(self._record_refined_plan)
         simulation.on_incident.append(self._report_incident)
@@ -120,36 +152,29 @@ class Session(SimulationSession):
     def close(self) -> None:
         """Stop the robot, the server and the simulator."""
         super().close()
-        self._close_world()
+        self._close_site()
 
-    def _close_world(self) -> None:
-        self.world.physics.close()
-        self._temporary.cleanup()
+    def _close_site(self) -> None:
+        if self._is_alone:
+            self.site.close()
 
-    def _make_simulation(self) -> tuple[AnyRobot, Simulation]:
-        spec, physics = ROBOTS[self.scenario.robot], self.world.physics
-        disturbance = draw_disturbance(self.scenario.perturb, self.seed)
-        pose = disturbance.moved(self.scenario.start, self.world.pose_of)
-        robot: AnyRobot
-        if isinstance(physics, KinematicWorld):
-            robot = KinematicRobot(physics, spec, pose)
-        else:
-            robot = WheeledRobot(physics, spec, pose, friction=disturbance.friction, mass_factor=disturbance.mass)
-        robot.settle()
-        self.world.introduce(robot)
+    def _make_simulation(self) -> Simulation:
+        fellows = self._member.fellows
+        rays = [*self.site.rays, FellowRays(list(fellows.values()))] if fellows else self.site.rays
         sensors: dict[str, Sensor[Any]] = {
-            **make_sensors(self.scenario.sensors, robot, self.world, self.seed),
-            **make_proprioceptive_sensors(self.scenario, robot, self.seed),
+            **make_sensors(self.scenario.sensors, self.robot, rays, self.seed),
+            **make_proprioceptive_sensors(self.scenario, self.robot, self.seed),
         }
-        self.localization = make_localization(self.scenario.localization, robot, self.seed)
+        self.localization = make_localization(self.scenario.localization, self.robot, self.seed)
         self.faults = FaultSchedule(self.world.physics, sensors, self.localization, self.scenario.faults)
-        return robot, Simulation(self.world.physics, robot, sensors, self.world.actors)
+        return Simulation(self.world.physics, self.robot, sensors, self.world.actors, fellows)
 
     def _make_recorder(self) -> Recorder:
         shape = RobotShape.of(self.robot.spec)
         recorder = Recorder(self.scenario.name, self.backend, shape, self.robot.pose(), self.goals)
         recorder.ground, recorder.walls = self.world.ground, self.world.walls
-        recorder.obstacles, recorder.actors = self._obstacles, self.world.actors
+        recorder.obstacles = self.site.obstacles
+        recorder.actors = [*self.world.actors, *self._member.fellows.values()]
         return recorder
 
     def _report_incident(self, incident: Incident) -> None:
@@ -189,17 +214,17 @@ def write_navigation_config(
     source : Path
         The configuration. Files that it names, by paths from its own folder, are copied into ``inputs``.
     maps : mapping of str to Path
-        Placeholder of the configuration -> map file in ``folder``.
+        Placeholder of the configuration -> map file.
     """
     text = source.read_text()
+    names = {file: os.path.relpath(file, folder) for file in maps.values()}
     for placeholder, file in maps.items():
-        text = text.replace(placeholder, file.name)
+        text = text.replace(placeholder, names[file])
     target = folder / "navigation.yaml"
     target.write_text(apply_settings(text, settings))
     document = read_yaml(target, [])  # what is wrong with it is reported when the server reads it
     if document is not None:
-        written = {file.name for file in maps.values()}
-        renamed = inputs.renamed(document.data, source.parent, written)
+        renamed = inputs.renamed(document.data, source.parent, set(names.values()))
         if renamed != document.data:
             target.write_text(yaml.safe_dump(renamed, sort_keys=False))
     return target

@@ -12,7 +12,7 @@ from mbf_abstract.events import EventSink
 from mbf_abstract.geometry import Command, Pose
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.session import NavigationSession
-from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.clock import Clock, WallClock
 from mbf_abstract.time.sim_clock import SimClock
 from terrain.physics.simulation import Simulation
 from terrain.recording.run_digest import RunDigest
@@ -69,6 +69,8 @@ class SimulationSession(NavigationSession, ABC):
         Clock, seed (0 if none is given), sinks and ``on_step``; the rest belongs to scenarios.
     send : callable, optional
         Takes the robot's commands instead of its motors.
+    clock : Clock, optional
+        One that is shared, instead of one of its own.
 
     Attributes
     ----------
@@ -92,9 +94,10 @@ class SimulationSession(NavigationSession, ABC):
         config_file: Path,
         options: SessionOptions,
         send: Callable[[Command], None] | None = None,
+        clock: Clock | None = None,
     ) -> None:
         self.simulation = simulation
-        clock = WallClock() if options.wall_clock else SimClock()
+        clock = clock or (WallClock() if options.wall_clock else SimClock())
         self.digest = RunDigest(clock.now)
         super().__init__(clock, [self.digest, *options.sinks], self.max_events)
         robot = ClockedRobot(simulation, send or simulation.robot.send_command, self.digest)

@@ -43,9 +43,11 @@ Job = tuple[Scenario, SweepRun]
 
 def hash_of(scenario: Scenario) -> str:
     """Return a short hash of the contents of a scenario's files, with maps, meshes, images and the files they name."""
-    digest = hashlib.sha256(scenario.model_dump_json(exclude={"navigation"}).encode())
-    for backend, file in sorted(scenario.navigation.items()):
-        digest.update(backend.encode() + hash_with_named_files(file))
+    contents = scenario.model_dump_json(exclude={"navigation": True, "robots": {"__all__": {"navigation"}}})
+    digest = hashlib.sha256(contents.encode())
+    for files in (scenario.navigation, *(robot.navigation or {} for robot in scenario.robots)):
+        for backend, file in sorted(files.items()):
+            digest.update(backend.encode() + hash_with_named_files(file))
     world_file: Path | None = getattr(scenario.world, "file", None)
     if world_file is not None:
         digest.update(hash_with_named_files(world_file))

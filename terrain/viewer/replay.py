@@ -9,19 +9,24 @@ Use ``terrain.viewer.pictures.picture`` where one look is enough.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry import FloatArray
+from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recording import Recording
+from terrain.viewer.pictures.colours import BODY, DRIVEN, FLEET, Colour
 from terrain.viewer.replay_panel import legend_of, with_panel
 from terrain.viewer.scene import (
     ActorModels,
     RobotModel,
+    add_ground,
+    add_marks,
     add_path,
     add_scan,
+    add_solids,
     add_track_piece,
     add_world,
     look_at_route,
@@ -44,51 +49,88 @@ def replay_html(recording: Recording) -> str:
     with page_server(FIRST_PORT) as server:
         look_at_route(server.initial_camera, recording)
         add_world(server.scene, recording)
-        robot = RobotModel(server.scene, recording.robot, pin_height(recording))
-        actors = ActorModels(server.scene, recording.actors)
-        serializer = server.get_scene_serializer()
-        if len(recording.times):
-            _Player(server, serializer, recording, robot, actors).play()
-        page: str = serializer.as_html()
+        player = _Player(server.scene, recording, pin_height(recording), PLAIN)
+        page = _played(server, recording, [player], recording.times)
     return with_panel(page, recording.verdict, recording.events, legend_of(recording))
 
 
-class _Player:
-    """Plays a recording into a serializer, frame by frame."""
+def joint_replay_html(run: JointRecording) -> str:
+    """Return the recordings of several robots as one HTML page; as ``replay_html``."""
+    world, height = run.world, pin_height(run.world)
+    looks = [Looks(name, FLEET[number % len(FLEET)]) for number, name in enumerate(run.robots)]
+    with page_server(FIRST_PORT) as server:
+        look_at_route(server.initial_camera, world)
+        if world.ground is not None:
+            add_ground(server.scene, world.ground)
+        add_solids(server.scene, world)
+        players = []
+        for look, recording in zip(looks, run.robots.values(), strict=True):
+            add_marks(server.scene, recording, height, look.name)
+            players.append(_Player(server.scene, recording, height, look))
+        times = min((recording.times for recording in run.robots.values()), key=len)
+        page = _played(server, world, players, times)
+    return with_panel(page, world.verdict, world.events, [*legend_of(world)[:1], *looks])
 
-    def __init__(
-        self, server: Any, serializer: Any, recording: Recording, robot: RobotModel, actors: ActorModels
-    ) -> None:
-        self._scene = server.scene
-        self._serializer = serializer
+
+class Looks(NamedTuple):
+    """Name and colour of a robot among several; a robot that is alone has no name."""
+
+    name: str
+    colour: Colour
+
+
+PLAIN = Looks("", DRIVEN)
+
+
+def _played(server: Any, world: Recording, players: list[_Player], times: FloatArray) -> str:
+    """Play recordings that were sampled at the same times (n,) [s] into a page."""
+    actors = ActorModels(server.scene, world.actors)
+    serializer = server.get_scene_serializer()
+    frames = frame_indices(times) if len(times) else np.zeros(0, np.intp)
+    piece = max(1, len(frames) // TRACK_PIECES)
+    for number, (index, following) in enumerate(zip(frames, [*frames[1:], *frames[-1:]], strict=True)):
+        actors.place(track.poses[index] for track in world.actors)
+        for player in players:
+            player.show(int(index), extends_track=number % piece == 0 or index == frames[-1])
+        serializer.insert_sleep(float(times[following] - times[index]))
+    if len(times):
+        for player in players:
+            player.show_outcome()
+        serializer.insert_sleep(OUTCOME_TIME)
+    page: str = serializer.as_html()
+    return page
+
+
+class _Player:
+    """Plays one robot's recording into a scene, frame by frame."""
+
+    def __init__(self, scene: Any, recording: Recording, label_height: float, look: Looks) -> None:
+        self._scene = scene
         self._recording = recording
-        self._robot = robot
-        self._actors = actors
-        self._frames = frame_indices(recording.times)
+        self._look = look
+        self._node = f"/{look.name}" if look.name else ""
+        body = look.colour if look.name else BODY
+        self._robot = RobotModel(scene, recording.robot, label_height, f"{self._node}/robot", body)
+        self._angles = wheel_angles(recording.robot, recording.times, recording.twists)
         self._scans = _thinned(recording.scans, MAX_SCANS)
         self._next_path = 0
         self._next_scan = 0
         self._track_from = 0
 
-    def play(self) -> None:
-        recording, frames = self._recording, self._frames
-        angles = wheel_angles(recording.robot, recording.times, recording.twists)
-        piece = max(1, len(frames) // TRACK_PIECES)
-        for number, (index, following) in enumerate(zip(frames, [*frames[1:], frames[-1]], strict=True)):
-            now = float(recording.times[index])
-            self._robot.place(recording.poses[index], angles[index], status_text(recording, int(index)))
-            self._actors.place(track.poses[index] for track in recording.actors)
-            self._show_new_plans(now)
-            self._show_newest_scan(now)
-            if number % piece == 0 or index == frames[-1]:
-                self._extend_track(int(index))
-            self._serializer.insert_sleep(float(recording.times[following]) - now)
-        self._show_outcome()
+    def show(self, index: int, extends_track: bool) -> None:
+        """Show the sample of this index."""
+        recording = self._recording
+        now, text = float(recording.times[index]), f"{self._look.name}  {status_text(recording, index)}".lstrip()
+        self._robot.place(recording.poses[index], self._angles[index], text)
+        self._show_new_plans(now)
+        self._show_newest_scan(now)
+        if extends_track:
+            self._extend_track(index)
 
     def _show_new_plans(self, now: float) -> None:
         paths = self._recording.paths
         while self._next_path < len(paths) and paths[self._next_path][0] <= now:
-            add_path(self._scene, "/plan", paths[self._next_path][1])
+            add_path(self._scene, f"{self._node}/plan", paths[self._next_path][1])
             self._next_path += 1
 
     def _show_newest_scan(self, now: float) -> None:
@@ -97,19 +139,21 @@ class _Player:
             newest = self._scans[self._next_scan][1]
             self._next_scan += 1
         if newest is not None and len(newest):
-            add_scan(self._scene, "/scan", newest[:: max(1, len(newest) // MAX_SCAN_POINTS)])
+            add_scan(self._scene, f"{self._node}/scan", newest[:: max(1, len(newest) // MAX_SCAN_POINTS)])
 
     def _extend_track(self, index: int) -> None:
         points = self._recording.poses[self._track_from : index + 1, :3]
         if len(points) > 1:
-            add_track_piece(self._scene, f"/track/{self._track_from}", points[_corners(points)])
+            add_track_piece(
+                self._scene, f"{self._node}/track/{self._track_from}", points[_corners(points)], self._look.colour
+            )
             self._track_from = index
 
-    def _show_outcome(self) -> None:
+    def show_outcome(self) -> None:
+        """Show the last sample with the verdict."""
         recording = self._recording
-        text = str(recording.verdict)
+        text = f"{self._look.name}  {recording.verdict}".lstrip()
         self._robot.place(recording.poses[-1], np.zeros(len(recording.robot.wheels)), text)
-        self._serializer.insert_sleep(OUTCOME_TIME)
 
 
 def frame_indices(times: FloatArray) -> NDArray[np.intp]:

@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from mbf_abstract.event_values import error_text
+from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recording import Recording
+from terrain.recording.verdict import Verdict
 from terrain.recording.whole_files import write_whole
-from terrain.viewer.pictures.picture import ViewerMissing, picture_png
-from terrain.viewer.replay import replay_html
+from terrain.viewer.pictures.picture import ViewerMissing, joint_picture_png, picture_png
+from terrain.viewer.replay import joint_replay_html, replay_html
 from terrain.viewer.reports.report import report_html
 
 
@@ -31,6 +33,27 @@ def write_results(
         ("writing the replay", "replay.html", lambda file: write_whole(file, replay_html(recording))),
         ("writing the log for Foxglove", "run.mcap", lambda file: _write_log(file, recording)),
     ]
+    return _make_all(folder, makers, on_step)
+
+
+def write_joint_results(
+    folder: Path,
+    recordings: Mapping[str, Recording],
+    verdict: Verdict,
+    on_step: Callable[[str], None] = lambda text: None,
+) -> list[str]:
+    """Write picture.png and replay.html of several robots together; as ``write_results``."""
+    run = JointRecording(recordings, verdict)
+    makers: list[tuple[str, str, Callable[[Path], None]]] = [
+        ("drawing all robots", "picture.png", lambda file: write_whole(file, joint_picture_png(run))),
+        ("writing their replay", "replay.html", lambda file: write_whole(file, joint_replay_html(run))),
+    ]
+    return _make_all(folder, makers, on_step)
+
+
+def _make_all(
+    folder: Path, makers: list[tuple[str, str, Callable[[Path], None]]], on_step: Callable[[str], None]
+) -> list[str]:
     problems: list[str] = []
     for step, name, make in makers:
         on_step(step)

@@ -49,12 +49,22 @@ def add_world(scene: Scene, recording: Recording) -> None:
 
 def add_surroundings(scene: Scene, recording: Recording) -> None:
     """Add what does not move apart from the ground."""
+    add_solids(scene, recording)
+    add_marks(scene, recording, pin_height(recording))
+
+
+def add_solids(scene: Scene, recording: Recording) -> None:
+    """Add light, walls and obstacles."""
     scene.set_up_direction("+z")
     _add_light(scene)
     for name, surface, colour in standing_things(recording):
         _add_solid(scene, f"/{name}", surface, colour)
-    for name, pose, colour in marks(recording):
-        add_pin(scene, f"/{name}", pose, colour, name, pin_height(recording))
+
+
+def add_marks(scene: Scene, recording: Recording, height: float, robot: str = "") -> None:
+    """Add pins at start and goals, with the robot's name where there are several."""
+    for name, pose, colour in marks(recording, robot):
+        add_pin(scene, f"/{name}", pose, colour, name, height)
 
 
 def _add_light(scene: Scene) -> None:
@@ -103,9 +113,9 @@ def add_path(scene: Scene, name: str, points: FloatArray, colour: Colour = PLANN
     return scene.add_line_segments(name, segments, colour, thickness=LINE_WIDTH, thickness_units="screen")
 
 
-def add_track_piece(scene: Scene, name: str, points: FloatArray) -> Any:
+def add_track_piece(scene: Scene, name: str, points: FloatArray, colour: Colour = DRIVEN) -> Any:
     """Add a piece of the driven track, a little above plans, so that it covers them."""
-    return add_path(scene, name, points + np.array([0.0, 0.0, LINE_LIFT]), DRIVEN)
+    return add_path(scene, name, points + np.array([0.0, 0.0, LINE_LIFT]), colour)
 
 
 def add_scan(scene: Scene, name: str, points: FloatArray) -> Any:
@@ -150,22 +160,30 @@ class RobotModel:
     shape : RobotShape
     label_height : float
         Where the label floats [m].
+    node : str
+        Name of its node in the scene.
+    colour : Colour
+        Of its body.
     """
 
-    def __init__(self, scene: Scene, shape: RobotShape, label_height: float) -> None:
+    def __init__(
+        self, scene: Scene, shape: RobotShape, label_height: float, node: str = "/robot", colour: Colour = BODY
+    ) -> None:
         self._shape = shape
-        self._frame = scene.add_frame("/robot", show_axes=False)
+        self._frame = scene.add_frame(node, show_axes=False)
         top = shape.height
-        _add_solid(scene, "/robot/body", robot_body(shape), BODY)
+        _add_solid(scene, f"{node}/body", robot_body(shape), colour)
         forward = np.array([0.6 * shape.footprint[:, 0].max(), 0.0])
         nose = prism(shape.footprint * np.array([0.25, 0.5]) + forward, top, top + 0.03)
-        _add_solid(scene, "/robot/nose", nose, WHEEL)
+        _add_solid(scene, f"{node}/nose", nose, WHEEL)
         width = 0.64 * shape.wheel_radius
-        self._wheels = [_add_wheel(scene, k, wheel, shape, width) for k, wheel in enumerate(shape.wheels)]
+        self._wheels = [
+            _add_wheel(scene, f"{node}/wheel_{k}", wheel, shape, width) for k, wheel in enumerate(shape.wheels)
+        ]
         stick = np.array([[[0.0, 0.0, shape.height], [0.0, 0.0, label_height]]])
-        scene.add_line_segments("/robot/stick", stick, BODY, thickness=LINE_WIDTH, thickness_units="screen")
+        scene.add_line_segments(f"{node}/stick", stick, colour, thickness=LINE_WIDTH, thickness_units="screen")
         place = (0.0, 0.0, 1.05 * label_height)
-        self._label = scene.add_label("/robot/label", "", position=place, anchor="bottom-center")
+        self._label = scene.add_label(f"{node}/label", "", position=place, anchor="bottom-center")
 
     def place(self, pose: FloatArray, wheel_angles: FloatArray, text: str) -> None:
         """Move to a pose (7,) x y z qx qy qz qw, turn the wheels to angles (k,) [rad], write the label."""
@@ -208,14 +226,14 @@ def wheel_angles(shape: RobotShape, times: FloatArray, twists: FloatArray) -> Fl
     return np.asarray(np.cumsum(forward * steps, axis=0) / shape.wheel_radius)
 
 
-def _add_wheel(scene: Scene, index: int, centre: FloatArray, shape: RobotShape, width: float) -> Any:
+def _add_wheel(scene: Scene, node: str, centre: FloatArray, shape: RobotShape, width: float) -> Any:
     """A frame that turns about y, with a drum in it that has a light spoke, so that one sees it turn."""
-    frame = scene.add_frame(f"/robot/wheel_{index}", show_axes=False, position=tuple(centre))
+    frame = scene.add_frame(node, show_axes=False, position=tuple(centre))
     half = np.sqrt(0.5)  # a quarter turn about x lays the drum's axis along y
     scene.add_cylinder(
-        f"/robot/wheel_{index}/drum", shape.wheel_radius, width, color=WHEEL, wxyz=(half, half, 0.0, 0.0),
+        f"{node}/drum", shape.wheel_radius, width, color=WHEEL, wxyz=(half, half, 0.0, 0.0),
         cast_shadow=False, receive_shadow=False,
     )  # fmt: skip
     spoke = (1.5 * shape.wheel_radius, 1.04 * width, 0.3 * shape.wheel_radius)
-    scene.add_box(f"/robot/wheel_{index}/spoke", dimensions=spoke, color=(170, 170, 175), cast_shadow=False)
+    scene.add_box(f"{node}/spoke", dimensions=spoke, color=(170, 170, 175), cast_shadow=False)
     return frame

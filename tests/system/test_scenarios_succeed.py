@@ -6,7 +6,7 @@ import pytest
 from terrain.scenarios.scenario import load_scenario, shipped_scenarios
 from terrain.session.runner import RunOptions, run_scenario
 
-RUN_ELSEWHERE = {"outdoor", "indoor"}  # test_run_scenarios.py
+RUN_ELSEWHERE = {"outdoor", "indoor", "two_couriers"}  # test_run_scenarios.py, test_run_several_robots.py
 
 TIME_TO_NOTICE = 2.0  # s; a second until the map counts as stale, then the robot brakes
 

@@ -209,14 +209,23 @@ def _ctrl_c(end: Callable[[], None]) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.getsignal(signal.SIGINT)
-
-    def handle(number: int, frame: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, before)
-        end()
-
-    signal.signal(signal.SIGINT, handle)
+    handler = _OrderlyEnd(end)
+    signal.signal(signal.SIGINT, handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, handler.before)
+
+
+class _OrderlyEnd:
+    """Handles one Ctrl-C by ending a run, and those of the other robots of a scenario that are watched, too."""
+
+    def __init__(self, end: Callable[[], None]) -> None:
+        self.before = signal.getsignal(signal.SIGINT)
+        self._end = end
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, self.before)
+        self._end()
+        if isinstance(self.before, _OrderlyEnd):
+            self.before(number, frame)

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray, Pose
+from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recording import Recording, StampedPoints
-from terrain.viewer.pictures.colours import ACTORS, DRIVEN, GOAL, LEVELS, PLANNED, START, slope_legend
+from terrain.viewer.pictures.colours import ACTORS, DRIVEN, FLEET, GOAL, LEVELS, PLANNED, START, Colour, slope_legend
 from terrain.viewer.pictures.shading import shaded_triangles
 from terrain.viewer.pictures.shapes import standing_things
 
@@ -41,6 +42,24 @@ def picture_png(recording: Recording) -> bytes:
     _draw_track(axes, recording)
     draw_marks(axes, recording.start, recording.goals)
     _label(axes, recording)
+    return png_bytes(figure)
+
+
+def joint_picture_png(run: JointRecording) -> bytes:
+    """Draw several robots of a run, each in a colour of its own; as ``picture_png``."""
+    world = run.world
+    figure, axes = new_figure(_extent(world))
+    _draw_world(axes, world)
+    _draw_actors(axes, world)
+    for number, (name, recording) in enumerate(run.robots.items()):
+        colour = FLEET[number % len(FLEET)]
+        for _, points in recording.paths[-1:]:
+            axes.plot(points[:, 0], points[:, 1], color=np.array(PLANNED) / 255.0, linewidth=1.0, alpha=0.35, zorder=4)
+        _draw_track(axes, recording, colour, name)
+        draw_marks(axes, recording.start, recording.goals, labelled=number == 0)
+    _label(
+        axes, world, f"{sum(_driven(robot) for robot in run.robots.values()):.1f} m driven by {len(run.robots)} robots"
+    )
     return png_bytes(figure)
 
 
@@ -140,28 +159,40 @@ def _draw_actors(axes: Axes, recording: Recording) -> None:
         axes.plot(*track.poses[-1, :2], marker="o", markersize=6, label=label, **style)
 
 
-def _draw_track(axes: Axes, recording: Recording) -> None:
+def _draw_track(axes: Axes, recording: Recording, colour: Colour = DRIVEN, label: str = "driven track") -> None:
     if len(recording.poses):
-        _line(axes, recording.poses[:, :2], DRIVEN, 1.5, zorder=6, label="driven track")
+        _line(axes, recording.poses[:, :2], colour, 1.5, zorder=6, label=label)
         heading = Pose((0, 0, 0), tuple(recording.poses[-1, 3:].tolist()))
         outline = recording.robot.footprint @ heading.rotation[:2, :2].T + recording.poses[-1, :2]
-        axes.fill(*outline.T, facecolor=np.array(DRIVEN) / 255.0, edgecolor="white", linewidth=0.8, zorder=8)
+        axes.fill(*outline.T, facecolor=np.array(colour) / 255.0, edgecolor="white", linewidth=0.8, zorder=8)
 
 
-def draw_marks(axes: Axes, start: Pose, goals: tuple[Pose, ...]) -> None:
-    """Mark the start by a disc and the goals by stars."""
+def draw_marks(axes: Axes, start: Pose, goals: tuple[Pose, ...], labelled: bool = True) -> None:
+    """Mark the start by a disc and the goals by stars; ``labelled`` if the legend shall name them."""
     mark: dict[str, Any] = {"linestyle": "none", "markeredgecolor": "white", "markeredgewidth": 1.2, "zorder": 9}
-    axes.plot(start.x, start.y, marker="o", markersize=10, color=np.array(START) / 255.0, label="start", **mark)
+    axes.plot(
+        start.x,
+        start.y,
+        marker="o",
+        markersize=10,
+        color=np.array(START) / 255.0,
+        label="start" if labelled else None,
+        **mark,
+    )
     for index, goal in enumerate(goals):
-        label = "goal" if index == 0 else None
+        label = "goal" if index == 0 and labelled else None
         axes.plot(goal.x, goal.y, marker="*", markersize=18, color=np.array(GOAL) / 255.0, label=label, **mark)
 
 
-def _label(axes: Axes, recording: Recording) -> None:
-    length = float(np.linalg.norm(np.diff(recording.poses[:, :3], axis=0), axis=1).sum())
+def _driven(recording: Recording) -> float:
+    """Length of the track [m]."""
+    return float(np.linalg.norm(np.diff(recording.poses[:, :3], axis=0), axis=1).sum())
+
+
+def _label(axes: Axes, recording: Recording, driven: str = "") -> None:
     title = f"{recording.scenario[:MAX_NAME]} · {recording.backend[:MAX_NAME]} · {recording.verdict.title}"
     tilt = np.degrees(recording.tilt).max(initial=0.0)
-    facts = f"{length:.1f} m driven in {recording.duration:.1f} s, tilt up to {tilt:.0f}°"
+    facts = f"{driven or f'{_driven(recording):.1f} m driven'} in {recording.duration:.1f} s, tilt up to {tilt:.0f}°"
     colour = LEVELS[recording.verdict.level]
     axes.set_title(f"{title}\n", loc="left", fontsize=12, fontweight="bold", color=colour, parse_math=False)
     axes.text(0.0, 1.015, facts, transform=axes.transAxes, fontsize=9, color="#444444")

@@ -19,11 +19,13 @@ def standing_things(recording: Recording) -> list[tuple[str, Surface, Colour]]:
     return [(name, surface, colour) for name, surface, colour in things if surface is not None]
 
 
-def marks(recording: Recording) -> list[tuple[str, Pose, Colour]]:
-    """Names, poses and colours of start and goals; several goals are numbered."""
+def marks(recording: Recording, robot: str = "") -> list[tuple[str, Pose, Colour]]:
+    """Names, poses and colours of start and goals; several goals are numbered, and the robot's name goes before."""
     names = ["goal"] if len(recording.goals) == 1 else [f"goal {k}" for k in range(1, len(recording.goals) + 1)]
     goals = [(name, goal, GOAL) for name, goal in zip(names, recording.goals, strict=True)]
-    return [("start", recording.start, START), *goals]
+    return [
+        (f"{robot} {name}".lstrip(), pose, colour) for name, pose, colour in [("start", recording.start, START), *goals]
+    ]
 
 
 def robot_body(shape: RobotShape) -> Surface:

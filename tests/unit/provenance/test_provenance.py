@@ -20,7 +20,7 @@ def test_a_scenario_as_run_is_read_back_as_it_was(name, tmp_path):
     scenario = load_scenario(name)
     (tmp_path / "navigation.yaml").write_text("backend: mesh")
 
-    write_scenario(tmp_path, scenario, scenario.backend, 7, InputCopies(tmp_path))
+    write_scenario(tmp_path, scenario, {"": scenario.backend}, 7, InputCopies(tmp_path))
 
     own = {"seed", "navigation"}
     read = load_scenario(tmp_path / "scenario.yaml")

@@ -28,7 +28,7 @@ def walk(seconds, robot=None, gives_way=True, until=float("inf")):
     world = KinematicWorld()
     walker = RouteWalker(world, ROUTE, 1.0, gives_way=gives_way)
     if robot is not None:
-        walker.meet(robot)
+        walker.meet((robot,))
     while world.time < seconds:
         world.step()
         if world.time >= until:

@@ -51,7 +51,7 @@ def walk(robot, seconds, route=ROUTE, speed=1.0, walls=None, others=()):
     world = KinematicWorld()
     robot.world = world
     person = Person(world, route, speed, walls=walls)
-    person.meet(robot, others)
+    person.meet((robot,), others)
     poses = []
     while world.time < seconds:
         world.step()
@@ -120,7 +120,7 @@ def test_two_who_meet_pass_each_other_on_the_right():
     world = KinematicWorld()
     one, two = Person(world, ROUTE, 1.0), Person(world, ROUTE, 0.8, start=12.0)
     for person in (one, two):
-        person.meet(Machine(FAR), (one, two))
+        person.meet((Machine(FAR),), (one, two))
     beside = []
     while world.time < 9.0:
         world.step()
@@ -184,7 +184,7 @@ def test_a_run_begins_where_the_route_says_however_long_the_robot_settled():
     for _ in range(100):
         world.step()
     assert person.pose().x == 2.0
-    person.meet(Machine(FAR))
+    person.meet((Machine(FAR),))
     assert (person.pose().x, person.velocity()) == (2.0, (0.0, 0.0))
 
 
@@ -198,7 +198,7 @@ def test_people_go_round_other_robots_too(looks):
     world = KinematicWorld()
     other = RouteWalker(world, [[5.0, 0.0]], 0.0, gives_way=looks)
     person = Person(world, ROUTE, 1.0)
-    person.meet(Machine(FAR), (person, other))
+    person.meet((Machine(FAR),), (person, other))
     gaps = []
     while world.time < 10.0:
         world.step()

@@ -25,7 +25,7 @@ from terrain.recording.planning_times import PlanningTimes
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
-from terrain.session.runner import success_by_path_length
+from terrain.session.robot_run import success_by_path_length
 
 
 def straight_run(goals):

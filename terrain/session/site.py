@@ -1,0 +1,121 @@
+"""What the robots of a scenario share: the world, the clock and the folder; and where each of them stands in it."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from mbf_abstract.config.findings import ConfigError, Finding
+from mbf_abstract.time.clock import Clock, WallClock
+from mbf_abstract.time.sim_clock import SimClock
+from terrain.physics.actors import Fellow
+from terrain.physics.contact_depth import placed
+from terrain.physics.kinematic_robot import KinematicRobot
+from terrain.physics.kinematic_world import KinematicWorld
+from terrain.physics.motion_sample import Thing
+from terrain.physics.robot_models import ROBOTS
+from terrain.physics.robots import WheeledRobot
+from terrain.scenarios.environment import build_environment
+from terrain.scenarios.perturbation import draw_disturbance
+from terrain.scenarios.scenario import Scenario, robot_scenarios
+from terrain.scenarios.sensors import AnyRobot, ray_casters
+from terrain.session.simulation_session import SessionOptions
+
+
+class Site:
+    """The world of a scenario with its robots, standing; ``close`` frees it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    options : SessionOptions
+        Folder, clock and ``on_step``.
+    seeds : mapping of str to int
+        Of each robot, which draws from it how its start is disturbed.
+    seed : int
+        Of the world.
+
+    Attributes
+    ----------
+    world : ScenarioWorld
+    obstacles : Surface or None
+        What is on no map, for pictures.
+    clock : Clock
+    folder : Path
+        With the world's map files.
+    robots : dict of str to AnyRobot
+        By the names of ``robot_scenarios``.
+    rays : list of RayCaster
+        What sensors see in the world, beside other robots.
+
+    Raises
+    ------
+    ConfigError
+        A place is unknown, or two robots would stand in one place.
+    """
+
+    def __init__(self, scenario: Scenario, options: SessionOptions, seed: int, seeds: Mapping[str, int]) -> None:
+        self.clock: Clock = WallClock() if options.wall_clock else SimClock()
+        self._temporary = tempfile.TemporaryDirectory(prefix="mbf_session_")  # removed with the site, used or not
+        self.folder = Path(self._temporary.name if options.folder is None else options.folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            options.on_step("building the world")
+            self.world, self.obstacles = build_environment(scenario, self.folder, seed)
+        except BaseException:
+            self._temporary.cleanup()
+            raise
+        try:
+            self._stand_robots(scenario, seeds)
+        except BaseException:
+            self.close()
+            raise
+
+    def _stand_robots(self, scenario: Scenario, seeds: Mapping[str, int]) -> None:
+        self.robots = {name: self._robot(view, seeds[name]) for name, view in robot_scenarios(scenario).items()}
+        _refuse_overlaps(scenario, self.robots)
+        first = next(iter(self.robots.values()))
+        first.settle()  # it is the world that settles
+        for name, robot in self.robots.items():
+            if isinstance(robot, WheeledRobot):
+                self.world.physics.things[robot.body] = Thing.ROBOT
+            else:
+                robot.fellows = list(self.fellows_of(name).values())
+        self.world.introduce(list(self.robots.values()))
+        self.rays = ray_casters(self.world)
+
+    def _robot(self, scenario: Scenario, seed: int) -> AnyRobot:
+        spec, physics = ROBOTS[scenario.robot], self.world.physics
+        disturbance = draw_disturbance(scenario.perturb, seed)
+        assert scenario.start is not None  # of a scenario with one robot
+        pose = disturbance.moved(scenario.start, self.world.pose_of)
+        if isinstance(physics, KinematicWorld):
+            return KinematicRobot(physics, spec, pose)
+        return WheeledRobot(physics, spec, pose, friction=disturbance.friction, mass_factor=disturbance.mass)
+
+    def fellows_of(self, name: str) -> dict[str, Fellow]:
+        """Return the other robots, as the robot of this name meets them, by their names."""
+        return {other: Fellow(robot) for other, robot in self.robots.items() if other != name}
+
+    def close(self) -> None:
+        """Free the world."""
+        self.world.physics.close()
+        self._temporary.cleanup()
+
+
+def _refuse_overlaps(scenario: Scenario, robots: Mapping[str, AnyRobot]) -> None:
+    """Raise ConfigError where the outlines of two robots overlap at their starts."""
+    findings = []
+    names = list(robots)
+    for number, name in enumerate(names):
+        pose = robots[name].pose()
+        corners = placed(robots[name].spec.footprint_array(), pose.x, pose.y, pose.yaw)
+        for other in names[:number]:
+            fellow = Fellow(robots[other]).solid()
+            apart = abs(fellow.pose.z - Fellow(robots[name]).pose().z)
+            if apart < fellow.size[-1] and fellow.gap(corners) == 0.0:
+                key, at = f"robots[{number}].start", f"({pose.x:.2f}, {pose.y:.2f})"
+                findings.append(Finding(scenario.name, 1, key, f"a place that {other!r} does not stand in", at))
+    if findings:
+        raise ConfigError(findings)
