@@ -12,20 +12,26 @@ from terrain.commands.command_line import command_line
 from terrain.provenance.code import commit_of, hash_of_code
 from terrain.provenance.named_files import InputCopies
 from terrain.provenance.provenance import Provenance, changed_files, read_provenance, write_scenario
-from terrain.scenarios.scenario import load_scenario, shipped_scenarios
+from terrain.scenarios.scenario import load_scenario, robot_scenarios, shipped_scenarios
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_a_scenario_as_run_is_read_back_as_it_was(name, tmp_path):
     scenario = load_scenario(name)
-    (tmp_path / "navigation.yaml").write_text("backend: mesh")
+    views = robot_scenarios(scenario)
+    for robot in views:
+        (tmp_path / robot).mkdir(exist_ok=True)
+        (tmp_path / robot / "navigation.yaml").write_text("backend: mesh")
 
-    write_scenario(tmp_path, scenario, {"": scenario.backend}, 7, InputCopies(tmp_path))
+    write_scenario(tmp_path, scenario, {robot: view.backend for robot, view in views.items()}, 7, InputCopies(tmp_path))
 
     own = {"seed", "navigation"}
     read = load_scenario(tmp_path / "scenario.yaml")
-    assert read.model_dump(exclude=own) == scenario.model_dump(exclude=own)
-    assert (read.seed, read.navigation) == (7, {scenario.backend: tmp_path / "navigation.yaml"})
+    assert read.seed == 7
+    assert list(robot_scenarios(read)) == list(views)
+    for robot, as_read in robot_scenarios(read).items():
+        assert as_read.model_dump(exclude=own) == views[robot].model_dump(exclude=own)
+        assert as_read.navigation == {views[robot].backend: tmp_path / robot / "navigation.yaml"}
 
 
 def recorded_command(*arguments):
