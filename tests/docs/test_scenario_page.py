@@ -5,8 +5,9 @@ import shlex
 from pathlib import Path
 
 import pytest
+import yaml
 
-from terrain.scenarios.scenario import SHIPPED, load_scenario
+from terrain.scenarios.scenario import SHIPPED, load_scenario, robot_scenarios
 from terrain.scenarios.settings import apply_world_settings
 from terrain.session.runner import RunOptions, run_scenario
 from terrain.sweeps.command import parse_seeds, parse_settings
@@ -14,10 +15,14 @@ from terrain.sweeps.command import parse_seeds, parse_settings
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "write_a_scenario.md"
 
 
+def blocks_of_the_page():
+    return re.findall(r"```yml\n(.*?)```", PAGE.read_text(), re.DOTALL)
+
+
 @pytest.fixture
 def example(tmp_path):
     """The scenario of the page, as a reader would put it into a file."""
-    (text,) = re.findall(r"```yml\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    text, _ = blocks_of_the_page()
     (tmp_path / "config").symlink_to(SHIPPED / "config")
     (tmp_path / "example.yaml").write_text(text)
     return load_scenario(tmp_path / "example.yaml")
@@ -31,6 +36,15 @@ def test_the_scenario_of_the_page_succeeds(example, tmp_path):
 
 def test_the_scenario_of_the_page_is_read_without_a_finding(example):
     assert (example.odometry, len(example.actors), len(example.faults)) == ("wheels", 1, 2)
+
+
+def test_the_robots_of_the_page_take_the_place_of_one_robot_in_a_shipped_scenario(tmp_path):
+    _, robots = blocks_of_the_page()
+    kept = yaml.safe_load((SHIPPED / "two_couriers.yaml").read_text())
+    (tmp_path / "config").symlink_to(SHIPPED / "config")
+    (tmp_path / "robots.yaml").write_text(yaml.safe_dump(kept | yaml.safe_load(robots)))
+    anna, ben = robot_scenarios(load_scenario(tmp_path / "robots.yaml")).values()
+    assert (anna.robot, anna.start, ben.robot) == ("turtlebot", "reception", "husky")
 
 
 def test_every_setting_of_the_sweep_on_the_page_fits_its_scenario():
