@@ -36,13 +36,18 @@ def check(file: Path, load: bool) -> Checked | None:
 
 
 def _check_scenario(document: YamlDocument, load: bool) -> Checked:
+    from terrain.scenarios.scenario import robot_scenarios
     from terrain.session.scenario_check import check_scenario
 
     report = check_scenario(document, load=load)
     if report.findings or report.scenario is None:
         raise ConfigError(report.findings)
     scenario = report.scenario
-    summary = f"world {scenario.world.type}, backends {', '.join(scenario.navigation)}, {len(scenario.goals)} goals"
+    views = robot_scenarios(scenario).values()
+    backends = dict.fromkeys(backend for view in views for backend in view.navigation)
+    robots = f"{len(views)} robots, " if scenario.robots else ""
+    goals = sum(len(view.goals) for view in views)
+    summary = f"world {scenario.world.type}, backends {', '.join(backends)}, {robots}{goals} goals"
     return Checked(summary, report.notes)
 
 

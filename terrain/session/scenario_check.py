@@ -21,7 +21,8 @@ from mbf_abstract.server.factory import read_config
 from terrain.provenance.named_files import InputCopies
 from terrain.scenarios.environment import build_environment, with_noise
 from terrain.scenarios.noise import MapNoise
-from terrain.scenarios.scenario import Scenario, read_scenario
+from terrain.scenarios.places import Place
+from terrain.scenarios.scenario import Scenario, read_scenario, robot_scenarios
 from terrain.scenarios.settings import apply_world_settings
 from terrain.scenarios.world import ScenarioWorld
 from terrain.session.session import write_navigation_config
@@ -73,15 +74,19 @@ def check_scenario(
     if scenario is not None and not findings:
         with _Collecting(findings, document, ("world",)):
             scenario, rest = apply_world_settings(change(scenario), settings or {})
-    files = _configurations(document) if scenario is None else dict(scenario.navigation)
-    chosen = {name: file for name, file in files.items() if backend in (None, name) and file.is_file()}
-    if backend is not None and files and backend not in files:
-        findings.append(document.finding(("navigation",), f"one of {', '.join(files)}", repr(backend)))
-    good = {name: file for name, file in chosen.items() if _reads_well(file, rest, findings)}
+    files = list(_configurations(document).items())
+    if scenario is not None:
+        views = robot_scenarios(scenario).values()
+        files = list(dict.fromkeys(pair for view in views for pair in view.navigation.items()))
+    chosen = [(name, file) for name, file in files if backend in (None, name) and file.is_file()]
+    known = list(dict.fromkeys(name for name, _ in files))
+    if backend is not None and files and backend not in known:
+        findings.append(document.finding(("navigation",), f"one of {', '.join(known)}", repr(backend)))
+    good = [(name, file) for name, file in chosen if _reads_well(file, rest, findings)]
     if load and scenario is not None and not any(finding.file == str(document.path) for finding in findings):
         with tempfile.TemporaryDirectory(prefix="mbf_check_") as folder:
             maps = _check_world(scenario, seed, document, Path(folder), findings)
-            for name, file in good.items() if maps is not None else ():
+            for name, file in good if maps is not None else ():
                 found = _check_server(file, maps or {}, rest, Path(folder), findings)
                 notes += [f"{name}: {note}" for note in found]
     return ScenarioReport(scenario, tuple(dict.fromkeys(findings)), tuple(notes))
@@ -129,8 +134,14 @@ def _check_world(
 
 
 def _check_places(scenario: Scenario, world: ScenarioWorld, document: YamlDocument, findings: list[Finding]) -> None:
-    places: list[KeyPath] = [("start",), *(("goals", index) for index in range(len(scenario.goals)))]
-    for key, place in zip(places, (scenario.start, *scenario.goals), strict=True):
+    places: list[tuple[KeyPath, Place | None]] = []
+    for number, view in enumerate(robot_scenarios(scenario).values()):
+        block: KeyPath = ("robots", number) if scenario.robots else ()
+        places.append(((*block, "start"), view.start))
+        places += [((*block, "goals", index), goal) for index, goal in enumerate(view.goals)]
+    for key, place in places:
+        if place is None:  # read_scenario has reported it
+            continue
         try:
             world.pose_of(place)
         except ConfigError as error:

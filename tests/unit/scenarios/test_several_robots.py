@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mbf_abstract.config.findings import ConfigError
+from mbf_abstract.config.yaml_source import load_yaml
 from mbf_abstract.geometry import Pose, Twist
 from terrain.physics.actors import Fellow
 from terrain.physics.contact_depth import placed
@@ -24,6 +25,7 @@ from terrain.scenarios.on_map import on_map
 from terrain.scenarios.scenario import load_scenario, robot_scenarios, shipped_scenarios
 from terrain.sensors.rays import FellowRays
 from terrain.session.fleet import FleetSession, seed_of
+from terrain.session.scenario_check import check_scenario
 from terrain.session.session import Session
 from terrain.sweeps.sweep import hash_of
 
@@ -133,6 +135,16 @@ def test_the_configuration_of_one_robot_counts_in_the_hash_of_a_sweep(tmp_path):
     before = hash_of(pair(tmp_path, text))
     (tmp_path / "own.yaml").write_text("backend: mesh\ncontroller_frequency: 10.0\n")
     assert hash_of(pair(tmp_path, text)) != before
+
+
+def test_the_check_of_a_scenario_looks_for_the_places_and_the_configurations_of_each_robot(tmp_path):
+    text = PAIR.replace("robot: husky", "navigation: {mesh: own.yaml}").replace("kitchen", "canteen")
+    (tmp_path / "own.yaml").write_text("backend: meshes\n")
+    (tmp_path / "nav.yaml").write_text("backend: mesh\n")
+    (tmp_path / "pair.yaml").write_text(text)
+    found = check_scenario(load_yaml(tmp_path / "pair.yaml")).findings
+    assert any(finding.key == "robots[1].goals[0]" and "canteen" in finding.got for finding in found)
+    assert any(finding.file.endswith("own.yaml") for finding in found)
 
 
 def test_a_scenario_with_robots_ships():
