@@ -1,17 +1,19 @@
 """The ``get_path`` action: from a start and a target pose to a path in the global frame.
 
-Steps of one goal: check names and frames - start pose - map kept alive - plugin under patience and retries - the path
-is checked and transformed - result. The robot never moves.
+Steps of one goal: check names and frames - start pose - map kept alive - plugin under patience and retries, and the
+``fallback_planner`` where that finds no path - the path is checked and transformed - result. The robot never moves.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from mbf_abstract.actions.action import GoalJob
 from mbf_abstract.actions.plugin_action import PluginAction
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
+from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.plan_check import area_problem, check_path, in_global_frame
 from mbf_abstract.execution.planner import PlannerExecution, PlannerState
 from mbf_abstract.geometry import Pose
@@ -23,6 +25,9 @@ from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, Plugi
 
 Handle = GoalHandle[GetPathGoal, GetPathResult, NoFeedback]
 Job = GoalJob[GetPathGoal, GetPathResult, NoFeedback]
+
+FALLBACK_OUTCOMES = (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_START, GetPathOutcome.BLOCKED_GOAL)
+"""What another planner may know better; one with other limits, or one that can do more."""
 
 
 class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, AbstractPlanner]):
@@ -52,7 +57,7 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         return (GetPathOutcome.INVALID_GOAL, problem) if problem else None
 
     def execute(self, job: Job) -> GetPathResult:
-        """2. to 5.: from the accepted goal to its result, on the slot's thread."""
+        """2. to 4.: from the accepted goal to its result, on the slot's thread."""
         handle, plugin = job.handle, self._plugin(job)
         # 2. Everything the planner sees is in the global frame.
         try:
@@ -60,12 +65,29 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         except (TransformError, RobotStateError) as error:
             return GetPathResult(GetPathOutcome.TF_ERROR, str(error), planner=plugin.name)
         job.report_started(plugin=plugin.name)
-        # 3. Plan, with the map kept alive, under patience and retries.
-        run = self._supervise(job, plugin)
+        # 3. Plan; where there is no path for this planner there may be one for the other.
+        fallback = self._fallback_of(plugin)
+        first = self._plan(job, plugin, request, has_fallback=bool(fallback))
+        if not fallback or first.permanent or first.outcome not in FALLBACK_OUTCOMES or handle.cancel_requested:
+            return first
+        if problem := self._plugins.problem(self.kind, fallback):
+            return replace(first, message=f"{first.message}; fallback_planner: {problem}")
+        second = self._plan(job, self._plugins.get(self.kind, fallback), request)
+        return replace(second, message=f"{fallback}: {second.message}; before, {plugin.name}: {first.message}")
+
+    def _fallback_of(self, plugin: LoadedPlugin[AbstractPlanner]) -> str:
+        """Name of the planner that stands in for this one where that finds no path; empty = none."""
+        name = self.runtime.parameters.fallback_planner
+        return "" if name == plugin.name else name
+
+    def _plan(
+        self, job: Job, plugin: LoadedPlugin[AbstractPlanner], request: PlanRequest, has_fallback: bool = False
+    ) -> GetPathResult:
+        """Plan with the map kept alive, under patience and retries, and judge how it ended."""
+        handle, run = job.handle, self._supervise(job, plugin)
         with run, run.map_in_use():
-            execution = PlannerExecution(run, request, handle.goal.goal_area)
+            execution = PlannerExecution(run, request, handle.goal.goal_area, has_fallback)
             state = execution.execute()
-        # 4. Judge how it ended.
         if run.waited and not run.canceled:
             return GetPathResult(GetPathOutcome.PAT_EXCEEDED, run.waited, planner=plugin.name)
         return self._result(state, execution.last_result, handle, request, plugin.name)
@@ -110,7 +132,7 @@ class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, Abstrac
         return GetPathResult(int(last.outcome), last.message, cost=last.cost, permanent=last.permanent, **fields)
 
     def _found(self, answer: PlanResult, handle: Handle, request: PlanRequest, fields: dict[str, Any]) -> GetPathResult:
-        """5. Check the path of a plugin that reports success."""
+        """4. Check the path of a plugin that reports success."""
         checked = check_path(answer, request, self.runtime, handle.goal.goal_area)
         path = checked.path
         if path is None:

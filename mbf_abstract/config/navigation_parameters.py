@@ -33,6 +33,11 @@ class NavigationParameters(ParameterModel):
     planner_retry_delay: float = parameter(
         0.01, "Pause between two calls of a failing planner or refiner.", unit="s", gt=0.0, le=10.0
     )
+    fallback_planner: str = parameter(
+        "",
+        "Planner that plans where the one of the goal finds no path from or to a place on the map; empty = none. Each "
+        "has planner_patience to itself; only this one is called again after a failure.",
+    )
     plan_end_tolerance: float = parameter(
         0.5, "How far a plan's ends may lie from start and goal, beside the goal's tolerance.", unit="m", ge=0.0
     )

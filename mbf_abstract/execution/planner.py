@@ -14,6 +14,8 @@ A permanent failure (OUT_OF_MAP, INVALID_START, INVALID_GOAL, or any that the pl
 once, with the planner's own code. A success that comes after the patience but before the grace is over still counts.
 Between two calls there is a pause of ``planner_retry_delay``, so that a planner that fails at once does not keep a core
 busy.
+
+A goal whose planner has a *fallback* calls it once, whatever the retries: the retries are the fallback's.
 """
 
 from __future__ import annotations
@@ -45,8 +47,15 @@ class PlannerState(Enum):
 class PlannerExecution:
     """One get_path goal's calls of its planner."""
 
-    def __init__(self, run: PluginRun[AbstractPlanner], request: PlanRequest, area: GoalArea | None = None) -> None:
+    def __init__(
+        self,
+        run: PluginRun[AbstractPlanner],
+        request: PlanRequest,
+        area: GoalArea | None = None,
+        has_fallback: bool = False,
+    ) -> None:
         self._run = run
+        self._has_fallback = has_fallback
         self._runtime = run.runtime
         self._request = request
         self._area = area
@@ -78,7 +87,7 @@ class PlannerExecution:
 
     def _judge(self, result: PlanResult, calls: int) -> PlannerState | None:
         """Whether this result ends the execution, in upstream's order; None = call again."""
-        max_retries = self._runtime.parameters.planner_max_retries
+        max_retries = 0 if self._has_fallback else self._runtime.parameters.planner_max_retries
         if self._run.canceled and not self._run.patience_exceeded:
             return PlannerState.CANCELED
         if result.success:

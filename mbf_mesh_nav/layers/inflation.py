@@ -4,8 +4,9 @@ When to use: below every planner; it keeps the robot's body off what its centre 
 long narrow robot (the inscribed radius is a circle; use ``tilt`` or a footprint check besides).
 Rule of mesh_navigation: ``lethal_value`` at the lethal vertices, ``inscribed_value`` up to the inscribed radius, then
 ``inscribed_value * exp(-cost_scaling_factor (d - inscribed_radius))`` up to the inflation radius, 0 beyond. Deviations:
-isolated lethal vertices are inflated too, and a change of the input repairs the distances instead of starting over. The
-repulsive vectors are not offered; our planners do not steer by them.
+isolated lethal vertices are inflated too, with ``source_cost`` also vertices that are not lethal, and a change of the
+input repairs the distances instead of starting over. The repulsive vectors are not offered; our planners do not steer
+by them.
 Cost: linear in the vertices within the radius; an update in the vertices whose distance changes.
 """
 
@@ -21,6 +22,7 @@ from mbf_abstract.parameters import parameter
 from mbf_mesh_nav.arrays import IntArray
 from mbf_mesh_nav.kernels.layers.inflation import repair_distances, set_fading_costs
 from mbf_mesh_nav.map.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.map.layer_graph import union_of
 
 
 class InflationParameters(LayerParameters, InflationRadii):
@@ -31,6 +33,12 @@ class InflationParameters(LayerParameters, InflationRadii):
     lethal_value: float = parameter(1.0, "Cost of lethal vertices; .inf is the safe choice.", ge=0.0, allow_inf=True)
     inscribed_value: float = parameter(0.99, "Cost up to the inscribed radius.", ge=0.0)
     cost_scaling_factor: float = parameter(1.0, "Rate of the exponential fall-off.", unit="1/m", ge=0.0)
+    source_cost: float = parameter(
+        math.inf,
+        "Vertices of the input whose cost reaches this are inflated like lethal ones, without becoming lethal.",
+        gt=0.0,
+        allow_inf=True,
+    )
 
     @model_validator(mode="after")
     def _reaches_the_robot(self) -> InflationParameters:
@@ -48,12 +56,12 @@ class InflationParameters(LayerParameters, InflationRadii):
 
 
 class InflationLayer(MeshLayer):
-    """Costs by geodesic distance from the lethal vertices of its one input.
+    """Costs by geodesic distance from the sources in its one input: the vertices that are lethal, or costly enough.
 
     Attributes
     ----------
     distances : (V,) float32
-        Geodesic distance [m] to the nearest lethal vertex, inf beyond the inflation radius.
+        Geodesic distance [m] to the nearest source, inf beyond the inflation radius.
     """
 
     Parameters = InflationParameters
@@ -67,22 +75,28 @@ class InflationLayer(MeshLayer):
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Distances from scratch, costs from distances, lethal as the input."""
         self._drop_all()
-        count = self.topology.vertex_count
-        costs, lethal = np.zeros(count, dtype=np.float32), np.zeros(count, dtype=np.bool_)
-        self._repair(np.flatnonzero(self.inputs[0].lethal).astype(np.int32), costs, lethal)
-        return costs, lethal
+        costs = np.zeros(self.topology.vertex_count, dtype=np.float32)
+        self._repair(np.arange(self.topology.vertex_count, dtype=np.int32), costs)
+        return costs, self.inputs[0].lethal.copy()
 
     def update_from_inputs(self, changed: IntArray) -> IntArray:
-        """Repair the distances around the vertices whose lethal flag changed, and the costs."""
-        return np.sort(self._repair(changed, self._costs, self._lethal))
+        """Repair the distances around the vertices that became sources or ceased to be, and the costs."""
+        now = self.inputs[0].lethal[changed]
+        flipped = changed[self._lethal[changed] != now]
+        self._lethal[changed] = now
+        return union_of([np.sort(self._repair(changed, self._costs)), flipped])
 
     def _drop_all(self) -> None:
-        self.distances = np.full(self.topology.vertex_count, np.inf, dtype=np.float32)
-        self._sources = np.full((self.topology.vertex_count, 2), -1, dtype=np.int32)
+        count = self.topology.vertex_count
+        self.distances = np.full(count, np.inf, dtype=np.float32)
+        self._nearest = np.full((count, 2), -1, dtype=np.int32)
+        # Which vertices are sources now, and of which the distances are.
+        self._is_source, self._known_sources = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
 
-    def _repair(self, changed: IntArray, costs: CostArray, known_lethal: LethalArray) -> IntArray:
-        """Bring distances, costs and flags up to date in place; a flag that changed is a change at any cost."""
-        mesh, settings = self.topology, self.parameters
+    def _repair(self, changed: IntArray, costs: CostArray) -> IntArray:
+        """Bring distances and costs up to date in place; a vertex that became a source has changed at any cost."""
+        mesh, settings, source = self.topology, self.parameters, self.inputs[0]
+        self._is_source[changed] = source.lethal[changed] | (source.costs[changed] >= settings.source_cost)
         touched, flips = repair_distances(
             mesh.vertices,
             mesh.faces,
@@ -91,11 +105,11 @@ class InflationLayer(MeshLayer):
             mesh.neighbour_offsets,
             mesh.neighbours,
             settings.inflation_radius,
-            self.inputs[0].lethal,
-            known_lethal,
+            self._is_source,
+            self._known_sources,
             changed,
             self.distances,
-            self._sources,
+            self._nearest,
         )
         return set_fading_costs(
             self.distances,

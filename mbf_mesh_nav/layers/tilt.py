@@ -3,7 +3,9 @@
 When to use: slopes near the robot's limits. It may drive straight up what it must not cross sideways, and it does not
 fall into a ditch narrower than its wheelbase that ``steepness`` forbids. When not: flat floors, tracked or legged
 robots, and meshes coarser than half the footprint. It replaces the guard of the border: where a wheel has no support,
-the heading is not allowed. Planners that know no headings may come with any: let them need all (``needed_headings``).
+the heading is not allowed. Planners that know no headings may come with any. ``preferred_headings`` keeps them to
+ground that allows most: elsewhere the cost is 1, which a planner that looks at headings enters with a higher
+``cost_limit``. ``needed_headings`` closes such ground to all planners.
 Rule: the four wheels stand on the surface, the body takes their plane of least squares (``footprint_settling``); a
 ``rigid`` one stands on three of them, which on a skew ledge is some degrees steeper, and counts the worse stance. A
 heading is allowed if roll, pitch up and pitch down keep their limits, the slope in every direction stays
@@ -45,7 +47,13 @@ class TiltParameters(LayerParameters):
         0.1, "Height of the belly above the ground; .inf = do not check.", unit="m", gt=0.0, allow_inf=True
     )
     needed_headings: float = parameter(
-        0.0, "Least share of headings that must be allowed; 0 = any one, 1 = all of them.", ge=0.0, le=1.0
+        0.0, "Ground that allows a smaller share of headings is lethal; 0 = any one will do, 1 = all.", ge=0.0, le=1.0
+    )
+    preferred_headings: float = parameter(
+        0.0,
+        "Ground that allows a smaller share of headings costs 1; no effect below needed_headings.",
+        ge=0.0,
+        le=1.0,
     )
 
     @model_validator(mode="after")
@@ -80,7 +88,10 @@ class TiltLayer(MeshLayer):
         self.allowed: BoolArray = np.ones(shape, dtype=np.bool_)
 
     def compute(self) -> tuple[CostArray, LethalArray]:
-        """Cost = share of the limits that the best headings use, as many as needed; 1 and lethal where too few can."""
+        """Cost = share of the limits that the best headings use, as many as preferred; 1 where too few are allowed.
+
+        Lethal where fewer are allowed than needed.
+        """
         settings = self.parameters
         self.roll, self.pitch, bump = settle_footprints(
             self.topology.surface,
@@ -91,10 +102,11 @@ class TiltLayer(MeshLayer):
         )
         usage = self._usage()
         self.allowed = (usage <= 1.0) & (bump < settings.ground_clearance)
-        last_needed = max(0, math.ceil(settings.needed_headings * HEADINGS) - 1)
-        ranked = np.partition(np.where(self.allowed, usage, np.inf), last_needed, axis=1)[:, last_needed]
-        lethal = np.isinf(ranked)
-        return np.where(lethal, 1.0, ranked).astype(np.float32), lethal
+        needed = _count_of(settings.needed_headings)
+        last = max(needed, _count_of(settings.preferred_headings)) - 1
+        ranked = np.partition(np.where(self.allowed, usage, np.inf), last, axis=1)[:, last]
+        lethal = np.count_nonzero(self.allowed, axis=1) < needed
+        return np.where(np.isinf(ranked), 1.0, ranked).astype(np.float32), lethal
 
     def _usage(self) -> Float32Array:
         """Greatest ratio (V, 16) of an angle to its limit."""
@@ -115,6 +127,11 @@ class TiltLayer(MeshLayer):
         steady = [math.atan2(lever_arm, height) - settings.tip_over_margin for lever_arm in lever_arms]
         roll, up, down = (max(min(pair), 1e-3) for pair in zip(configured, steady, strict=True))
         return roll, up, down
+
+
+def _count_of(share: float) -> int:
+    """How many headings a share of them is, at least one."""
+    return max(1, math.ceil(share * HEADINGS))
 
 
 def heading_index(yaw: float) -> int:

@@ -43,6 +43,16 @@ def surface_point_at_vertex(mesh_map: MeshMap, vertex: int) -> SurfacePoint:
     return SurfacePoint(face, barycentric, mesh_map.vertices[vertex].copy(), 0.0)
 
 
+def point_of_face(mesh_map: MeshMap, face: int, point: FloatArray) -> SurfacePoint:
+    """Return the surface point at a place in a face that is no wall; its coordinates are those of the plan view."""
+    corners = mesh_map.vertices[mesh_map.faces[face], :2].tolist()
+    areas = []
+    for index in range(3):
+        (ax, ay), (bx, by) = corners[(index + 1) % 3], corners[(index + 2) % 3]
+        areas.append((bx - ax) * (float(point[1]) - ay) - (by - ay) * (float(point[0]) - ax))
+    return SurfacePoint(face, np.array(areas) / math.fsum(areas), point, 0.0)
+
+
 def corner_distances(
     mesh_map: MeshMap, blocked: BoolArray, point: SurfacePoint, snapshot: MeshSnapshot | None = None
 ) -> tuple[IntArray, Float32Array]:

@@ -3,9 +3,10 @@
 Strengths: knows the direction of slopes (limits for roll and pitch, per heading) and the turns of the path; with a
 ``tilt`` layer it uses the footprint settled on the surface, without one the vertex normals. The limits hold all along
 the path, at the headings really driven; turns on the spot are looked at every 22.5 degrees. Known failure: drives along
-edges only, so headings are those of the mesh (six to eight of 16 on regular grids), and the path zigzags in between;
-a cost of roll or turning too high for the map makes it slow. Cost: up to 16 x the states of ``mesh.astar``, about
-320 bytes a vertex while planning; meant for meshes below 300 k vertices.
+edges and, with a ``tilt`` layer, straight across pairs of faces, so headings are those of the mesh (twelve on regular
+grids, six without a layer), and the path zigzags in between; it never drives backward; a cost of roll or turning too
+high for the map makes it slow. Cost: up to 16 x the states of ``mesh.astar``, about 350 bytes a vertex while planning;
+meant for meshes below 300 k vertices.
 """
 
 from __future__ import annotations
@@ -14,19 +15,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from mbf_abstract.geometry.arithmetic import arctan2
 from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import PlanResult
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, IntArray
 from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for
 from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors
-from mbf_mesh_nav.kernels.search.heading_astar import HEADING_STEP, HEADINGS, search_with_heading
+from mbf_mesh_nav.kernels.search.heading_astar import HEADINGS, search_with_heading
 from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.plugins import MeshContext
+from mbf_mesh_nav.search.drive_graph import DriveGraph
 from mbf_mesh_nav.search.end_stretches import EndStretches, headings_within
 from mbf_mesh_nav.search.heading_limits import FootprintLimits, HeadingLimits, NormalLimits
 from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, Leg, LegQuery, straight_leg
+from mbf_mesh_nav.search.straight_line import line_over_ground
 from mbf_mesh_nav.search.surface_planner import SurfacePlanner, SurfacePlannerParameters
 
 CANCELLED = -2
@@ -59,10 +61,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         super().__init__(context)
         mesh_map = self.mesh_map
         self._refuse_other_layers(self.parameters.tilt_layer)
-        starts = np.repeat(np.arange(len(mesh_map.vertices)), np.diff(mesh_map.neighbour_offsets))
-        steps = mesh_map.vertices[mesh_map.neighbours] - mesh_map.vertices[starts]
-        headings = np.rint(arctan2(steps[:, 1], steps[:, 0]) / HEADING_STEP).astype(np.int64)
-        self._edge_headings = (headings % HEADINGS).astype(np.uint8)
+        self._graph = DriveGraph(mesh_map.topology)
 
     def _refuse_other_layers(self, name: str) -> None:
         """A layer that was named on purpose, but is none of tilts, would leave slopes to the defaults unnoticed."""
@@ -77,7 +76,7 @@ class HeadingAStarPlanner(SurfacePlanner):
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Search from the start's corners, with the robot's heading, to the goal's corners."""
         mesh_map, limits = self.mesh_map, self._current_limits()
-        stretches = EndStretches(mesh_map, limits, query, self.parameters.turning_cost)
+        stretches = EndStretches(mesh_map, limits, query, self.parameters.turning_cost, self._graph)
         if query.start.face == query.goal.face and stretches.may_drive_straight():
             return straight_leg(mesh_map, query)
         best, cost, _, predecessors = self._search(query, limits, stretches.from_start(), stretches.to_goal())
@@ -85,15 +84,19 @@ class HeadingAStarPlanner(SurfacePlanner):
             self._tilt_at_ends = self._describe_ends(query, limits)
             return None
         chain = follow_predecessors(predecessors, best)[::-1] // HEADINGS
-        positions = np.concatenate([[query.start.point], mesh_map.vertices[chain], [query.goal.point]])
-        ends = mesh_map.face_normals[[query.start.face]], mesh_map.face_normals[[query.goal.face]]
-        normals = np.concatenate([ends[0], mesh_map.vertex_normals[chain], ends[1]])
+        begin, end = query.start, query.goal
+        first = line_over_ground(mesh_map.topology, begin.face, begin.point, mesh_map.vertices[chain[0]])
+        assert first is not None  # the search begins at the ends of such lines
+        positions, normals = self._graph.along(chain)
+        positions = np.concatenate([[begin.point], first.points[1:-1], positions, [end.point]])
+        faces = np.array([begin.face, *first.faces[1:]], dtype=np.int32)
+        normals = np.concatenate([mesh_map.face_normals[faces], normals, mesh_map.face_normals[[end.face]]])
         return Leg(positions, normals, cost)
 
     def reach(self, query: LegQuery) -> Float32Array | None:
         """As for every planner; here to where the robot may also turn to a heading asked for at the goal."""
         limits = self._current_limits()
-        from_start = EndStretches(self.mesh_map, limits, query, self.parameters.turning_cost).from_start()
+        from_start = EndStretches(self.mesh_map, limits, query, self.parameters.turning_cost, self._graph).from_start()
         best, _, distances, _ = self._search(query, limits, from_start, (NO_TARGETS, NO_OFFSETS, NO_TARGETS))
         if best == CANCELLED:
             return None
@@ -121,8 +124,8 @@ class HeadingAStarPlanner(SurfacePlanner):
         distances[seeds] = offsets
         best, cost = search_with_heading(
             mesh_map.topology.surface,
-            query.snapshot.edge_weights,
-            self._edge_headings,
+            self._graph.moves,
+            self._graph.weights(query.snapshot, query.blocked),
             query.blocked,
             limits.allowed,
             limits.roll,
@@ -133,7 +136,7 @@ class HeadingAStarPlanner(SurfacePlanner):
             seeds,
             *to_goal,
             query.goal.point,
-            limits.edges,
+            limits.known,
             limits.chassis,
             scratch_for(len(mesh_map.vertices)),
             query.cancel_flag,
@@ -161,11 +164,11 @@ class HeadingAStarPlanner(SurfacePlanner):
         layer = self.mesh_map.layers.get(self.parameters.tilt_layer)
         if isinstance(layer, TiltLayer):
             if not isinstance(self._limits, FootprintLimits) or self._limits.allowed is not layer.allowed:
-                self._limits = FootprintLimits(self.mesh_map, layer)
+                self._limits = FootprintLimits(self.mesh_map, layer, self._graph)
             return self._limits
         angles = self.parameters.max_roll, self.parameters.max_pitch
         if not isinstance(self._limits, NormalLimits) or self._limits.angles != angles:
-            self._limits = NormalLimits(self.mesh_map, *angles)
+            self._limits = NormalLimits(self.mesh_map, *angles, self._graph)
         return self._limits
 
 

@@ -2,6 +2,8 @@
 
 A stretch is driven straight, so the robot turns to it, drives it with that heading and turns again; all of that has to
 keep the tilt's limits, as on the path between. Where the robot stands beyond them already, it may leave as it stands.
+A robot near a corner of its face would have to turn to it for a stretch of some centimetres, which a rut may not allow.
+So a first stretch may also lead beyond: to all vertices that two moves from the corner lead to.
 """
 
 from __future__ import annotations
@@ -16,9 +18,17 @@ from mbf_mesh_nav.kernels.search.heading_astar import HEADING_STEP, HEADINGS
 from mbf_mesh_nav.layers.tilt import heading_index
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.locate import SurfacePoint
-from mbf_mesh_nav.mesh.surface_point import corner_distances, passes_blocked_corner
+from mbf_mesh_nav.mesh.surface_point import (
+    corner_distances,
+    nearest_corner,
+    passes_blocked_corner,
+    point_of_face,
+)
+from mbf_mesh_nav.search.drive_graph import DriveGraph
 from mbf_mesh_nav.search.heading_limits import HeadingLimits
 from mbf_mesh_nav.search.leg_search import LegQuery
+from mbf_mesh_nav.search.path_cost import cost_along
+from mbf_mesh_nav.search.straight_line import StraightLine, line_over_ground
 
 AT_ONE_PLACE = 1e-6
 """Start and goal this near [m], or a corner and one of them, have no direction between them."""
@@ -36,10 +46,14 @@ class EndStretches:
     ----------
     turning_cost : float
         Extra length [m] per rad turned.
+    graph : DriveGraph
+        Of the moves that say how far a first stretch may lead.
     """
 
-    def __init__(self, mesh_map: MeshMap, limits: HeadingLimits, query: LegQuery, turning_cost: float) -> None:
-        self._mesh_map, self._limits, self._query = mesh_map, limits, query
+    def __init__(
+        self, mesh_map: MeshMap, limits: HeadingLimits, query: LegQuery, turning_cost: float, graph: DriveGraph
+    ) -> None:
+        self._mesh_map, self._limits, self._query, self._graph = mesh_map, limits, query, graph
         self._turn_cost = turning_cost * HEADING_STEP
         self._bearable = max(1.0, self._use(query.start, query.start_pose))
         self._goal_headings = headings_within(query.goal_pose, query.angle_tolerance)
@@ -59,7 +73,46 @@ class EndStretches:
             turn = 0 if heading is None else shortest_turn(heading, driven)
             if use <= self._bearable and self._may_turn(query.start, query.start_pose, driven - turn, turn):
                 corners.append((corner * HEADINGS + driven, offset + self._turn_cost * abs(turn)))
-        return _columns(corners)
+        return _columns([*corners, *self._beyond_corners(heading)])
+
+    def _beyond_corners(self, heading: int | None) -> list[tuple[int, float]]:
+        """States at the ends of lines over the ground, up to two moves from the nearest corner, and their costs [m].
+
+        None for limits that know faces but no footprint, and none along a line that comes nearest to a blocked vertex.
+        """
+        query, mesh_map, states = self._query, self._mesh_map, []
+        if not self._limits.knows_footprint:
+            return []
+        near = self._graph.ends_from(np.array([nearest_corner(mesh_map, query.start)]))
+        for end in np.setdiff1d(self._graph.ends_from(near), mesh_map.faces[query.start.face]).tolist():
+            place = mesh_map.vertices[end]
+            line = line_over_ground(mesh_map.topology, query.start.face, query.start.point, place)
+            if line is None or query.blocked[end] or self._passes_blocked(line):
+                continue
+            driven = heading_towards(query.start.point, place)
+            turn = 0 if heading is None else shortest_turn(heading, driven)
+            if self._may_turn(query.start, query.start_pose, driven - turn, turn) and self._may_drive(line):
+                cost = cost_along(mesh_map, query.snapshot, line.points, line.faces[[0, *range(len(line.faces))]])
+                states.append((end * HEADINGS + driven, cost + self._turn_cost * abs(turn)))
+        return states
+
+    def _passes_blocked(self, line: StraightLine) -> bool:
+        """Whether a blocked corner is the nearest of its face anywhere on a line."""
+        mesh_map = self._mesh_map
+        for face, begin, end in zip(line.faces.tolist(), line.points[:-1], line.points[1:], strict=True):
+            blocked = self._query.blocked[mesh_map.faces[face]]
+            if not blocked.any():
+                continue
+            first, last = (point_of_face(mesh_map, face, point) for point in (begin, end))
+            at_ends = blocked[[np.argmax(first.barycentric), np.argmax(last.barycentric)]].any()
+            if at_ends or passes_blocked_corner(first, last, blocked):
+                return True
+        return False
+
+    def _may_drive(self, line: StraightLine) -> bool:
+        """Whether a line from the start keeps the limits, or what the robot bears where it stands."""
+        pieces = zip(line.faces.tolist(), line.points[:-1], line.points[1:], strict=True)
+        return all(self._limits.driving(face, begin, end, []) <= self._bearable for face, begin, end in pieces)
 
     def to_goal(self) -> tuple[IntArray, Offsets, IntArray]:
         """Vertices (t,) a search ends at, what is left from them to the goal (t,) [m], and which headings (t,)."""

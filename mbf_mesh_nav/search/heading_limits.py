@@ -19,6 +19,7 @@ from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN, HEADI
 from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.locate import SurfacePoint
+from mbf_mesh_nav.search.drive_graph import DriveGraph
 
 NO_CHASSIS = Chassis(1.0, 1.0, False, 1.0, 1.0, 1.0, math.inf)
 
@@ -30,16 +31,19 @@ class HeadingLimits(Protocol):
     ----------
     allowed, roll : (V, 16) bool, (V, 16) float32 [rad]
         Where the robot may stand with which heading, and how it rolls there.
-    edges : (2E,) uint8
-        What is known of each directed edge, see ``kernels.heading_astar``.
+    known : (m,) uint8
+        What is known of each move of a drive graph, see ``kernels.search.heading_astar``.
     chassis : Chassis
-        For edges of which nothing is known.
+        For moves of which nothing is known.
+    knows_footprint : bool
+        Whether the limits hold on lines over several faces, too.
     """
 
     allowed: BoolArray
     roll: Float32Array
-    edges: NDArray[np.uint8]
+    known: NDArray[np.uint8]
     chassis: Chassis
+    knows_footprint: bool
 
     def standing(self, place: SurfacePoint, yaw: float) -> float:
         """Use at a point with a heading [rad]."""
@@ -51,9 +55,11 @@ class HeadingLimits(Protocol):
 class FootprintLimits:
     """Limits of a tilt layer, as they were when this was made."""
 
-    def __init__(self, mesh_map: MeshMap, layer: TiltLayer) -> None:
+    knows_footprint = True
+
+    def __init__(self, mesh_map: MeshMap, layer: TiltLayer, graph: DriveGraph) -> None:
         self.allowed, self.roll = layer.allowed, layer.roll
-        self.edges = np.zeros(len(mesh_map.neighbours), dtype=np.uint8)
+        self.known = np.zeros(len(graph.moves.ends), dtype=np.uint8)
         settings = layer.parameters
         roll, up, down = (math.tan(limit) for limit in layer.limits())
         measures = settings.wheelbase, settings.track, settings.rigid
@@ -78,18 +84,20 @@ class FootprintLimits:
 
 
 class NormalLimits:
-    """Limits [rad] of roll and pitch on the surface's tangent planes."""
+    """Limits [rad] of roll and pitch on the surface's tangent planes; strides are not driven."""
 
     chassis = NO_CHASSIS
+    knows_footprint = False
 
-    def __init__(self, mesh_map: MeshMap, max_roll: float, max_pitch: float) -> None:
+    def __init__(self, mesh_map: MeshMap, max_roll: float, max_pitch: float, graph: DriveGraph) -> None:
         self._mesh_map = mesh_map
         self.angles = max_roll, max_pitch
         headings = np.asarray(np.arange(HEADINGS) * HEADING_STEP, dtype=np.float64)
         self.allowed, self.roll = tilt_of_normals(mesh_map.vertex_normals, headings, max_roll, max_pitch)
-        graph = mesh_map.vertices, mesh_map.neighbour_offsets, mesh_map.neighbours
-        along = slopes_of_edges(*graph, mesh_map.vertex_normals, max_roll, max_pitch)
-        self.edges = np.where(along, np.uint8(DRIVABLE), np.uint8(FORBIDDEN))
+        edges = mesh_map.vertices, mesh_map.neighbour_offsets, mesh_map.neighbours
+        along = slopes_of_edges(*edges, mesh_map.vertex_normals, max_roll, max_pitch)
+        self.known = np.full(len(graph.moves.ends), FORBIDDEN, dtype=np.uint8)
+        self.known[graph.is_edge] = np.where(along, np.uint8(DRIVABLE), np.uint8(FORBIDDEN))
 
     def standing(self, place: SurfacePoint, yaw: float) -> float:
         """See ``HeadingLimits``."""

@@ -136,6 +136,38 @@ def edge_use(surface: Surface, chassis: Chassis, scratch: Scratch, begin: int, e
 
 
 @inner_kernel
+def stride_use(surface: Surface, chassis: Chassis, scratch: Scratch, begin: int, end: int, share: float) -> float:
+    """``greatest_use`` from a vertex to the far corner of the face beyond one of its own; inf where there is none.
+
+    The edge between both faces is crossed at ``share`` of its length.
+    """
+    start, goal = row(surface.vertices, Count(begin)), row(surface.vertices, Count(end))
+    x, y = goal[0] - start[0], goal[1] - start[1]
+    length = math.sqrt(x * x + y * y)
+    for position in range(surface.vertex_face_offsets[begin], surface.vertex_face_offsets[begin + 1]):
+        face = Count(surface.vertex_faces[position])
+        for corner in range(3):
+            if surface.faces[face, corner] != begin:
+                continue
+            left, right = surface.faces[face, (corner + 1) % 3], surface.faces[face, (corner + 2) % 3]
+            beyond = Count(surface.face_neighbours[face, (corner + 1) % 3])
+            if beyond < 0:
+                continue
+            corners = surface.faces[beyond]
+            if corners[0] == end or corners[1] == end or corners[2] == end:
+                a, b = row(surface.vertices, Count(left)), row(surface.vertices, Count(right))
+                crossing = (
+                    a[0] + share * (b[0] - a[0]),
+                    a[1] + share * (b[1] - a[1]),
+                    a[2] + share * (b[2] - a[2]),
+                )
+                first = greatest_use(surface, chassis, scratch, face, start, crossing, x / length, y / length)
+                last = greatest_use(surface, chassis, scratch, beyond, crossing, goal, x / length, y / length)
+                return max(first, last)
+    return np.inf
+
+
+@inner_kernel
 def _leaves_face(surface: Surface, scratch: Scratch, wheel: int, x: float, y: float) -> tuple[float, int]:
     """When (share of the drive) a wheel leaves its face, and over which side; inf if it never does."""
     face = scratch.wheel_faces[wheel]

@@ -1,21 +1,22 @@
 """A* over (vertex, heading): the same hill may be climbed straight up and forbidden sideways.
 
-A state is ``vertex * HEADINGS + heading``. A move turns on the spot to the heading of an edge, over headings that are
-all allowed there, and drives along the edge; it costs the edge's weight, lengthened by the roll it brings, plus the
-turn. Whether the tilt allows an edge at the very heading of the edge, all along it, is found out when a search first
-wants to take it.
+A state is ``vertex * HEADINGS + heading``. The robot turns on the spot to the heading of a move, over headings that
+are all allowed there, and drives the move: along an edge, or straight across two faces. That costs the move's weight,
+lengthened by the roll it brings, plus the turn. Whether the tilt allows a move at its very heading, all along it, is
+found out when a search first wants to take it.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
-from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, Scratch, edge_use
+from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, Scratch, edge_use, stride_use
 from mbf_mesh_nav.kernels.mesh.surface import Surface
 from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL, straight_line_bound
 from mbf_mesh_nav.kernels.search.indexed_heap import push_or_decrease, remove_top, top_item, top_key
@@ -23,14 +24,35 @@ from mbf_mesh_nav.kernels.search.indexed_heap import push_or_decrease, remove_to
 HEADINGS = 16
 HEADING_STEP = 2.0 * math.pi / HEADINGS
 UNKNOWN, DRIVABLE, FORBIDDEN = 0, 1, 2
-"""What is known of a directed edge."""
+"""What is known of a move."""
+
+
+class Moves(NamedTuple):
+    """What can be driven straight from vertex to vertex, m moves in the order of their first vertex.
+
+    Attributes
+    ----------
+    offsets : (V+1,) int32
+        The moves of a vertex begin there.
+    ends : (m,) int32
+        Vertices they lead to.
+    headings : (m,) uint8
+        0 to 15.
+    shares : (m,) float64
+        Where a move crosses the edge between two faces, see ``search.drive_graph``; NaN for one along an edge.
+    """
+
+    offsets: IntArray
+    ends: IntArray
+    headings: NDArray[np.uint8]
+    shares: FloatArray
 
 
 @kernel
 def search_with_heading(
     surface: Surface,
-    edge_weights: Float32Array,
-    edge_headings: NDArray[np.uint8],
+    moves: Moves,
+    weights: Float32Array,
     blocked: BoolArray,
     allowed: BoolArray,
     roll: Float32Array,
@@ -43,7 +65,7 @@ def search_with_heading(
     target_offsets: Float32Array,
     target_headings: IntArray,
     goal: FloatArray,
-    edges: NDArray[np.uint8],
+    known: NDArray[np.uint8],
     chassis: Chassis,
     scratch: Scratch,
     cancel_flag: FlagArray,
@@ -52,10 +74,11 @@ def search_with_heading(
 
     Parameters
     ----------
-    surface, edge_weights, blocked
-        The graph, as in ``dijkstra.SearchGraph``.
-    edge_headings : (2E,) uint8
-        Heading of each directed edge, 0 to 15.
+    surface
+    moves, weights : Moves, (m,) float32 [m]
+        What can be driven, and at what cost.
+    blocked : (V,) bool
+        Vertices that are never entered.
     allowed, roll : (V, 16) bool, (V, 16) float32 [rad]
         Where the robot may stand with which heading, and how it rolls there.
     roll_cost, turning_cost : float
@@ -69,8 +92,8 @@ def search_with_heading(
     target_headings : (t,) int32
         Turning to it at the goal vertex costs, too, and has to be allowed; -1 = any heading will do.
     goal : (3,) float64 [m]
-    edges : (2E,) uint8
-        Whether a directed edge may be driven; what is ``UNKNOWN`` is found out and written here.
+    known : (m,) uint8
+        Whether a move may be driven; what is ``UNKNOWN`` is found out and written here.
     chassis, scratch
         The robot and its limits, and memory, see ``footprint_sweep``.
     cancel_flag : (1,) uint8
@@ -82,7 +105,7 @@ def search_with_heading(
     total : float
         Cost of the path there [m], the rest to the goal and the last turn included.
     """
-    vertices, neighbour_offsets, neighbours = surface.vertices, surface.neighbour_offsets, surface.neighbours
+    vertices = surface.vertices
     state_count = len(distances)
     heap = np.empty(state_count, dtype=np.uint64)
     positions = np.full(state_count, -1, dtype=np.int32)
@@ -105,21 +128,25 @@ def search_with_heading(
                 total = distances[state] + target_offsets[i] + turning_cost * HEADING_STEP * abs(turn)
                 if total < best_total and _may_turn(allowed, vertex, heading, turn):
                     best_state, best_total = state, total
-        for slot in range(neighbour_offsets[vertex], neighbour_offsets[vertex + 1]):
-            neighbour, new_heading = neighbours[slot], Count(edge_headings[slot])
+        for slot in range(moves.offsets[vertex], moves.offsets[vertex + 1]):
+            neighbour, new_heading = moves.ends[slot], Count(moves.headings[slot])
             if blocked[neighbour] or not allowed[neighbour, new_heading]:
                 continue
             turn = _shortest_turn(heading, new_heading)
             if not _may_turn(allowed, vertex, heading, turn):
                 continue
-            drive = edge_weights[slot] * (1.0 + roll_cost * abs(roll[neighbour, new_heading]))
+            drive = weights[slot] * (1.0 + roll_cost * abs(roll[neighbour, new_heading]))
             candidate = np.float32(distances[state] + drive + turning_cost * HEADING_STEP * abs(turn))
             following = neighbour * HEADINGS + new_heading
             if candidate < distances[following]:
-                if edges[slot] == UNKNOWN:
-                    use = edge_use(surface, chassis, scratch, Count(vertex), Count(neighbour))
-                    edges[slot] = DRIVABLE if use <= 1.0 else FORBIDDEN
-                if edges[slot] == FORBIDDEN:
+                if known[slot] == UNKNOWN:
+                    share = moves.shares[slot]
+                    if np.isnan(share):
+                        use = edge_use(surface, chassis, scratch, Count(vertex), Count(neighbour))
+                    else:
+                        use = stride_use(surface, chassis, scratch, Count(vertex), Count(neighbour), share)
+                    known[slot] = DRIVABLE if use <= 1.0 else FORBIDDEN
+                if known[slot] == FORBIDDEN:
                     continue
                 distances[following] = candidate
                 predecessors[following] = state

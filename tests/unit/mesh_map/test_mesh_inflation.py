@@ -203,3 +203,26 @@ def test_a_robot_wider_than_what_the_layers_keep_off_it_is_reported_unless_a_til
     reported = [str(found) for found in mesh_map.report.findings if found.name == "narrow"]
     assert len(reported) == bool(text)
     assert all(text in one for one in reported)
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=20, deadline=None)
+def test_what_costs_enough_is_inflated_like_what_is_lethal_and_does_not_become_so(seed):
+    mesh, rng = bumpy(seed), np.random.default_rng(seed)
+    count = mesh.topology.vertex_count
+    kind = rng.choice(3, count, p=[0.85, 0.1, 0.05])  # free, costly, lethal
+    source, inflation = chain(mesh, kind == 2, source_cost=1.0)
+    for changed in (rng.choice(count, 30, replace=False) for _ in range(4)):
+        moved = source.replace(np.select([kind == 0, kind == 1], [0.3, 1.0], 5.0).astype(np.float32), kind == 2)
+        before = inflation.costs.copy(), inflation.lethal.copy()
+        reported = inflation.update_from_inputs(moved)
+        _, all_lethal = chain(mesh, kind > 0)
+        np.testing.assert_array_equal(inflation.costs, all_lethal.costs)
+        np.testing.assert_array_equal(inflation.lethal, kind == 2)
+        differs = (inflation.costs != before[0]) | (inflation.lethal != before[1])
+        assert set(np.flatnonzero(differs)) <= set(reported.tolist())
+        kind = kind.copy()
+        kind[changed] = rng.choice(3, len(changed))
+    anew, lethal = inflation.compute()
+    np.testing.assert_array_equal(anew, all_lethal.costs)
+    np.testing.assert_array_equal(lethal, source.lethal)

@@ -179,6 +179,17 @@ def test_the_share_of_headings_that_is_needed_decides_what_is_lethal_and_what_it
     assert half.costs[middle] == pytest.approx(worst, abs=1e-4)
 
 
+@pytest.mark.parametrize("share", [0.375, 0.75, 1.0])
+def test_ground_that_allows_fewer_headings_than_preferred_costs_1_and_is_not_lethal(share):
+    heights = np.random.default_rng(3).uniform(0.0, 0.25, (21, 21))
+    mesh = MeshMap.from_heights(heights, 0.2, 0.2)
+    needed, preferred = computed(mesh, needed_headings=share), computed(mesh, preferred_headings=share)
+    np.testing.assert_array_equal(preferred.costs, needed.costs)
+    np.testing.assert_array_equal(preferred.lethal, ~preferred.allowed.any(axis=1))
+    few = needed.lethal & ~preferred.lethal
+    assert few.any() and (preferred.costs[few] == 1.0).all()
+
+
 def test_a_centre_of_mass_beyond_the_wheels_is_refused():
     with pytest.raises(ValueError, match="would tip over on flat ground"):
         TiltLayer.Parameters(wheelbase=0.5, center_of_mass_x=-0.25)

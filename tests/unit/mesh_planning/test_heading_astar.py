@@ -14,6 +14,7 @@ from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for
 from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, HEADING_STEP, HEADINGS, search_with_heading
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner, may_turn_to
+from mbf_mesh_nav.search.drive_graph import DriveGraph
 from mbf_mesh_nav.search.heading_limits import NO_CHASSIS
 
 
@@ -24,7 +25,7 @@ def passed_headings(heading, new):
     return [(heading + np.sign(turn) * k) % 16 for k in range(1, abs(turn) + 1)]
 
 
-def slow_search(mesh_map, edge_headings, allowed, roll, roll_cost, turning_cost, start, target, offset, goal_heading):
+def slow_search(moves, weights, allowed, roll, roll_cost, turning_cost, start, target, offset, goal_heading):
     """The twin: Dijkstra over (vertex, heading) with heapq."""
     best, queue, total = {start: 0.0}, [(0.0, start)], np.inf
     while queue:
@@ -35,12 +36,12 @@ def slow_search(mesh_map, edge_headings, allowed, roll, roll_cost, turning_cost,
             last_turn = passed_headings(heading, goal_heading)
             if all(allowed[vertex, h] for h in last_turn):
                 total = min(total, cost + offset + turning_cost * HEADING_STEP * len(last_turn))
-        for slot in range(mesh_map.neighbour_offsets[vertex], mesh_map.neighbour_offsets[vertex + 1]):
-            other, new = int(mesh_map.neighbours[slot]), int(edge_headings[slot])
+        for slot in range(moves.offsets[vertex], moves.offsets[vertex + 1]):
+            other, new = int(moves.ends[slot]), int(moves.headings[slot])
             passed = passed_headings(heading, new)
             if not allowed[other, new] or not all(allowed[vertex, h] for h in passed):
                 continue
-            drive = mesh_map.neighbour_lengths[slot] * (1 + roll_cost * abs(roll[other, new]))
+            drive = weights[slot] * (1 + roll_cost * abs(roll[other, new]))
             new_cost = cost + drive + turning_cost * HEADING_STEP * len(passed)
             if new_cost < best.get((other, new), np.inf):
                 best[other, new] = new_cost
@@ -50,24 +51,24 @@ def slow_search(mesh_map, edge_headings, allowed, roll, roll_cost, turning_cost,
 
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=15, deadline=None)
-def test_the_search_finds_the_cost_of_the_naive_one(make_plugin, seed):
+def test_the_search_finds_the_cost_of_the_naive_one(seed):
     rng = np.random.default_rng(seed)
     mesh_map = MeshMap.from_heights(rng.uniform(0, 0.2, (6, 6)), 0.5, 0.5)
     count = len(mesh_map.vertices)
     allowed, roll = rng.random((count, 16)) < 0.85, rng.uniform(-0.4, 0.4, (count, 16)).astype(np.float32)
-    headings = make_plugin(HeadingAStarPlanner, mesh_map)._edge_headings
+    graph, blocked = DriveGraph(mesh_map.topology), np.zeros(count, bool)
+    moves, weights = graph.moves, graph.weights(mesh_map.snapshot(), blocked)
     start, target, goal_heading = 0, count - 1, int(rng.integers(16))
     distances, predecessors = np.full(16 * count, np.inf, np.float32), np.full(16 * count, -1, np.int32)
     distances[start * HEADINGS + 2] = 0.0
     state, total = search_with_heading(
-        mesh_map.topology.surface, mesh_map.neighbour_lengths, headings,
-        np.zeros(count, bool), allowed, roll, 0.7, 0.2, distances, predecessors,
+        mesh_map.topology.surface, moves, weights, blocked, allowed, roll, 0.7, 0.2, distances, predecessors,
         np.array([start * HEADINGS + 2], np.int32), np.array([target], np.int32), np.full(1, 0.1, np.float32),
         np.array([goal_heading], np.int32), mesh_map.vertices[target],
-        np.full(len(mesh_map.neighbours), DRIVABLE, np.uint8), NO_CHASSIS, scratch_for(count),
+        np.full(len(weights), DRIVABLE, np.uint8), NO_CHASSIS, scratch_for(count),
         np.zeros(1, np.uint8),
     )  # fmt: skip
-    expected = slow_search(mesh_map, headings, allowed, roll, 0.7, 0.2, (start, 2), target, 0.1, goal_heading)
+    expected = slow_search(moves, weights, allowed, roll, 0.7, 0.2, (start, 2), target, 0.1, goal_heading)
     assert total == pytest.approx(expected, rel=1e-5)
     assert (state < 0) == (expected == np.inf)
 

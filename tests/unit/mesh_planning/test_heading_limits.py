@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE
+from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN
 from mbf_mesh_nav.layers.tilt import TiltLayer, TiltParameters
 from mbf_mesh_nav.map.layer import LayerContext
 from mbf_mesh_nav.map.layer_graph import LayerGraph
@@ -18,6 +18,7 @@ from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.surface_point import passes_blocked_corner
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
+from mbf_mesh_nav.search.drive_graph import DriveGraph
 from mbf_mesh_nav.search.end_stretches import headings_within
 from mbf_mesh_nav.search.heading_limits import FootprintLimits, NormalLimits
 
@@ -79,7 +80,7 @@ def test_no_sample_of_a_path_is_over_the_limits(make_plugin, seed, rigid):
     mesh_map, rng = rough_map(seed, rigid), np.random.default_rng(seed)
     settings_ = mesh_map.layers["tilt"].parameters
     planner = make_plugin(HeadingAStarPlanner, mesh_map, cost_limit=math.inf)
-    limits = FootprintLimits(mesh_map, mesh_map.layers["tilt"])
+    limits = FootprintLimits(mesh_map, mesh_map.layers["tilt"], DriveGraph(mesh_map.topology))
     for _ in range(12):
         ends = rng.uniform(0.7, 4.1, (2, 2))
         heights = 10.0 - mesh_map.locator.cast_rays(np.column_stack([ends, [10.0, 10.0]]), [0.0, 0.0, -1.0])[1]
@@ -102,7 +103,7 @@ def test_no_sample_of_a_path_is_over_the_limits(make_plugin, seed, rigid):
 def test_the_use_of_a_stretch_is_that_of_its_worst_sample(seed, rigid):
     mesh_map, rng = rough_map(seed, rigid), np.random.default_rng(seed)
     layer = mesh_map.layers["tilt"]
-    limits = FootprintLimits(mesh_map, layer)
+    limits = FootprintLimits(mesh_map, layer, DriveGraph(mesh_map.topology))
     for _ in range(10):
         x, y = rng.uniform(0.8, 4.0, 2)
         face = mesh_map.locate_one((x, y, 0.3)).face
@@ -118,7 +119,7 @@ def test_the_use_of_a_stretch_is_that_of_its_worst_sample(seed, rigid):
 def test_standing_at_a_vertex_is_allowed_where_the_layer_says_so():
     mesh_map = rough_map(3)
     layer = mesh_map.layers["tilt"]
-    limits = FootprintLimits(mesh_map, layer)
+    limits = FootprintLimits(mesh_map, layer, DriveGraph(mesh_map.topology))
     inner = np.flatnonzero((np.abs(mesh_map.vertices[:, :2] - 2.4) < 1.6).all(axis=1))[::5]
     for vertex in inner.tolist():
         face = mesh_map.vertex_faces[mesh_map.vertex_face_offsets[vertex]]
@@ -130,7 +131,9 @@ def test_standing_at_a_vertex_is_allowed_where_the_layer_says_so():
 def test_without_a_layer_edges_keep_the_limits_of_the_normals_at_their_own_heading():
     rng = np.random.default_rng(5)
     mesh_map = MeshMap.from_heights(rng.uniform(0.0, 0.15, (12, 12)), 0.3, 0.25)
-    limits = NormalLimits(mesh_map, 0.25, 0.3)
+    graph = DriveGraph(mesh_map.topology)
+    limits = NormalLimits(mesh_map, 0.25, 0.3, graph)
+    known = limits.known[graph.is_edge]
     begins = np.repeat(np.arange(len(mesh_map.vertices)), np.diff(mesh_map.neighbour_offsets))
     for slot, (begin, end) in enumerate(zip(begins, mesh_map.neighbours, strict=True)):
         x, y, _ = mesh_map.vertices[end] - mesh_map.vertices[begin]
@@ -139,7 +142,8 @@ def test_without_a_layer_edges_keep_the_limits_of_the_normals_at_their_own_headi
         pitch = np.arctan2(normals[:, :2] @ [x, y] / math.hypot(x, y), normals[:, 2])
         roll = np.arctan2(normals[:, :2] @ [-y, x] / math.hypot(x, y), normals[:, 2])
         kept = bool((np.abs(roll) <= 0.25).all() and (np.abs(pitch) <= 0.3).all())
-        assert (limits.edges[slot] == DRIVABLE) == kept
+        assert (known[slot] == DRIVABLE) == kept
+    assert (limits.known[~graph.is_edge] == FORBIDDEN).all()
 
 
 def test_a_last_stretch_across_a_flank_is_not_driven(make_plugin):
