@@ -11,7 +11,8 @@ Rates are over the terrains with a route: those where ``benchmarks.reachability`
 limits can get there at all. Its limits are near to those of the maps' tilt layer, so a second rate is over the terrains
 that anybody drove, whatever the judge says, the flat map and the straight line included. Failures are of the planner
 (no plan), of physics (tipped over, stuck, high-centred) or of the controller (the rest), or an error before the start;
-``--replays`` drives one of each class again and keeps all. ``--fresh`` takes seeds and surveys nothing was chosen on.
+``--replays`` drives one of each class again and keeps all. ``--fresh`` takes seeds and surveys nothing was chosen on,
+from 5000 or a later ``--first-seed`` on: what has been looked at is not fresh any more.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ FLAT = {  # the best of five variants of lethal slope, inflation and collision c
 METHODS = {
     "mesh vertex graph": GRAPH,
     "mesh cvp": {"planner": "cvp"},
-    "mesh heading-aware": {"planner": "heading_astar", "mesh_map.tilt.needed_headings": "0.0"},
+    "mesh heading-aware": {"planner": "heading_astar"},
     "mesh dijkstra by slope": SLOPE_ONLY,
     "flat A*": FLAT,
     "straight line": {"planner": "outdoor_evaluation:StraightLinePlanner"},
@@ -219,7 +220,8 @@ def main() -> None:
     counts = (1, 0) if arguments.quick else (16, 10)
     chosen = terrains(arguments.data, arguments.first_seed, *counts)
     if arguments.fresh:
-        chosen = terrains(arguments.data, FRESH_SEED, arguments.fresh, arguments.fresh)
+        first_seed = max(FRESH_SEED, arguments.first_seed)
+        chosen = terrains(arguments.data, first_seed, arguments.fresh, arguments.fresh)
     with tempfile.TemporaryDirectory() as folder:
         with SweepLog(arguments.results or FilePath(folder) / "runs.jsonl") as log:
             rows = evaluate(chosen, methods, arguments.workers, log)
