@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import typer
 
 from mbf_abstract.commands.reporting import readable_errors
+from terrain.commands.command_line import command_line
 
 
 def register(app: typer.Typer) -> None:
@@ -15,6 +17,7 @@ def register(app: typer.Typer) -> None:
 
 
 def sweep(
+    context: typer.Context,
     scenario: str = typer.Argument(..., help="Name of a shipped scenario (see mbf scenarios), or a YAML file."),
     seeds: str = typer.Option("0:10", "--seeds", help="First and one past the last seed, 0:20, or a list, 1,5,9."),
     settings: list[str] = typer.Option(
@@ -24,14 +27,19 @@ def sweep(
     scheduler: str | None = typer.Option(
         None, "--scheduler", help="Address of a Dask scheduler, whose workers are used instead of own processes."
     ),
+    keep: bool = typer.Option(
+        False, "--keep", help="Keep the folder of every run, with its replay, below --out; the page then links to it."
+    ),
     out: Path = typer.Option(..., "--out", help="Folder for the results; runs that it holds are not run again."),
 ) -> None:
-    """Run a scenario with many seeds and variants and put all results into one table."""
+    """Run a scenario with many seeds and variants: tables, medians with their spread, tests, figures.
+
+    With several variants each pair of them is tested seed by seed; p is corrected for the number of tests (Holm).
+    """
     with readable_errors():
         from rich.console import Console
         from rich.markup import escape
         from rich.progress import track
-        from rich.table import Table
 
         from mbf_abstract.event_values import well_formed
         from terrain.commands.verdict_line import TERMINAL_COLOURS
@@ -39,8 +47,9 @@ def sweep(
         from terrain.scenarios.scenario import load_scenario
         from terrain.sweeps.cluster import run_on_cluster
         from terrain.sweeps.log import SweepLog
-        from terrain.sweeps.report import summarise, write_tables
+        from terrain.sweeps.report import write_tables
         from terrain.sweeps.sweep import hash_of, plan_sweep, run_once
+        from terrain.sweeps.terminal_tables import comparison_table, letters_of, summary_table
         from terrain.sweeps.worker_pool import run_in_workers
 
         loaded = load_scenario(scenario)
@@ -50,10 +59,11 @@ def sweep(
             left = [run for run in planned if run.key(hashed) not in log.rows]
             console.print(f"{len(planned)} runs, {len(planned) - len(left)} of them done before")
             jobs = [(loaded, run) for run in left]
+            do = partial(run_once, keep_in=out.resolve() if keep else None, command=command_line(context))
             if scheduler is None:
-                finished = run_in_workers(run_once, jobs, workers)
+                finished = run_in_workers(do, jobs, workers)
             else:
-                finished = run_on_cluster(run_once, jobs, scheduler)
+                finished = run_on_cluster(do, jobs, scheduler)
             for (_, run), metrics in track(
                 finished, escape(well_formed(loaded.name)), len(left), console=console, disable=not console.is_terminal
             ):
@@ -63,12 +73,13 @@ def sweep(
                 console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
             rows = [log.rows[run.key(hashed)] for run in planned]
         files = write_tables(f"{loaded.name}: {loaded.proves}", rows, out)
-        summary = summarise(rows)
-        table = Table("", *(escape(well_formed(line["variant"])) for line in summary))
-        for name in list(summary[0])[1:]:  # a row for each number, so that it fits a narrow terminal
-            table.add_row(name.replace("_", " "), *(str(line[name]) for line in summary))
-        console.print(table)
-        console.print("results in " + ", ".join(map(str, files)), soft_wrap=True, markup=False)
+        for variant, letter in letters_of(rows).items():
+            console.print(f"{letter}  {well_formed(variant) or 'as written'}", markup=False, highlight=False)
+        console.print(summary_table(rows))
+        if (tests := comparison_table(rows)) is not None:
+            console.print(tests)
+        names = ", ".join(file.name for file in files)
+        console.print(f"results in {out}: {names}", soft_wrap=True, markup=False)
 
 
 def parse_seeds(text: str) -> list[int]:

@@ -1,4 +1,9 @@
-"""The tables of a sweep: one csv (and parquet, if pyarrow is installed) with a row per run, one HTML file to read."""
+"""The results of a sweep as files: tables of runs, medians and tests, figures, a table for a paper, a page to read.
+
+``sweep.csv`` (and ``sweep.parquet``, if pyarrow is installed) has a row per run, ``summary.csv`` one per variant and
+metric, ``tests.csv`` one per test of two variants; ``sweep.tex`` is a table for a paper, ``boxplots`` and ``tracks``
+are figures, as PDF and SVG. ``sweep.html`` shows everything, with a link to every run that was kept.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +11,17 @@ import csv
 import html
 import importlib
 import importlib.util
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from statistics import median
 from typing import Any
+from urllib.parse import quote
 
 from terrain.recording.verdict import Level
 from terrain.recording.whole_files import replacing, write_whole
+from terrain.sweeps.figures import write_figures
+from terrain.sweeps.latex import latex_table
+from terrain.sweeps.statistics import METRICS, Row, compare_variants, rate_of, spread_of, values_of
 
 COLUMNS = (
     "variant",
@@ -45,28 +54,88 @@ COLUMNS = (
     "planning_wall_p95_ms",
     "wall_time_s",
     "verdict",
+    "folder",
 )
+TEST_COLUMNS = ("first", "second", "metric", "pairs", "difference", "p", "p_holm")
 STYLE = (
     "body{font:14px sans-serif;margin:2em}table{border-collapse:collapse;margin-bottom:2em}"
     "th,td{border:1px solid #bbb;padding:.2em .6em;text-align:right}td.text{text-align:left}"
     "tr.success{background:#e6f4e9}tr.arrived{background:#fdf3d3}tr.failed{background:#fbe3e0}"
 )
 
-Row = Mapping[str, Any]
+
+TESTS = (
+    "Difference: second minus first, in the median, for success in the share. Success: McNemar's exact test; numbers: "
+    "Wilcoxon's signed-rank test by changes of signs. p_holm is corrected for the number of pairs of variants (Holm)."
+)
 
 
 def write_tables(title: str, rows: Iterable[Row], folder: Path) -> list[Path]:
     """Write all tables of finished runs, sorted by variant and seed; return the files."""
-    table = [_flat(row) for row in sorted(rows, key=lambda row: (row["variant"], row["seed"]))]
-    files = [folder / "sweep.csv", folder / "sweep.html"]
-    with replacing(files[0]) as part, part.open("w", newline="", encoding="utf-8", errors="backslashreplace") as out:
-        writer = csv.DictWriter(out, COLUMNS)
-        writer.writeheader()
-        writer.writerows(table)
-    write_whole(files[1], _page(title, table))
+    ordered = sorted(rows, key=lambda row: (row["variant"], row["seed"]))
+    table, spreads, tests = [_flat(row) for row in ordered], spread_table(ordered), comparison_table(ordered)
+    files = [folder / name for name in ("sweep.csv", "sweep.html", "summary.csv", "tests.csv", "sweep.tex")]
+    for file, columns, lines in (
+        (files[0], COLUMNS, table),
+        (files[2], tuple(spreads[0]) if spreads else (), spreads),
+        (files[3], TEST_COLUMNS, tests),
+    ):
+        _write_csv(file, columns, lines)
+    write_whole(files[4], latex_table(ordered))
+    figures = write_figures(ordered, folder)
+    write_whole(files[1], _page(title, table, spreads, tests, [file for file in figures if file.suffix == ".svg"]))
     if importlib.util.find_spec("pyarrow") is not None:
         files.append(_write_parquet(table, folder / "sweep.parquet"))
-    return files
+    return [*files, *figures]
+
+
+def spread_table(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return a line per variant and metric: successes in percent, or median and quartiles, with the 95 % interval."""
+    lines: list[dict[str, Any]] = []
+    for variant in sorted({row["variant"] for row in rows}):
+        of = [row for row in rows if row["variant"] == variant]
+        rate = rate_of(of)
+        shares = [round(100.0 * share, 1) for share in (rate.share, rate.low, rate.high)]
+        lines.append(_spread_line(variant, "success [%]", rate.count, shares[0], "", "", shares[1], shares[2]))
+        for metric in METRICS:
+            found = spread_of(values_of(of, metric))
+            if found is not None:
+                numbers = (found.median, found.lower_quartile, found.upper_quartile, found.low, found.high)
+                lines.append(_spread_line(variant, metric.title, found.count, *(round(value, 6) for value in numbers)))
+    return lines
+
+
+def _spread_line(variant: str, metric: str, runs: int, *numbers: Any) -> dict[str, Any]:
+    names = ("median", "lower_quartile", "upper_quartile", "low_95", "high_95")
+    return {
+        "variant": variant or "as written",
+        "metric": metric,
+        "runs": runs,
+        **dict(zip(names, numbers, strict=True)),
+    }
+
+
+def comparison_table(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return a line per test of two variants, see ``terrain.sweeps.statistics``."""
+    return [
+        {
+            "first": test.first or "as written",
+            "second": test.second or "as written",
+            "metric": test.metric,
+            "pairs": test.pairs,
+            "difference": round(test.difference, 6),
+            "p": round(test.p, 6),
+            "p_holm": round(test.corrected, 6),
+        }
+        for test in compare_variants(rows)
+    ]
+
+
+def _write_csv(file: Path, columns: Sequence[str], lines: Sequence[Row]) -> None:
+    with replacing(file) as part, part.open("w", newline="", encoding="utf-8", errors="backslashreplace") as out:
+        writer = csv.DictWriter(out, columns)
+        writer.writeheader()
+        writer.writerows(lines)
 
 
 def summarise(rows: Sequence[Row]) -> list[dict[str, Any]]:
@@ -116,22 +185,39 @@ def _write_parquet(table: Sequence[Row], file: Path) -> Path:
     return file
 
 
-def _page(title: str, table: Sequence[Row]) -> str:
-    summary = _html_table(summarise(table)) if table else ""
+def _page(
+    title: str, table: Sequence[Row], spreads: Sequence[Row], tests: Sequence[Row], figures: Sequence[Path]
+) -> str:
+    parts = [_html_table(summarise(table)) if table else ""]
+    parts += [_inline(figure.read_text("utf-8")) for figure in figures]
+    if spreads:
+        parts += ["<h2>Medians, quartiles and 95 % intervals</h2>", _html_table(spreads)]
+    if tests:
+        parts += ["<h2>Tests of two variants, seed by seed</h2>", f"<p>{TESTS}</p>", _html_table(tests)]
+    parts += ["<h2>All runs</h2>", _html_table(table)]
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
-        f"<style>{STYLE}</style><h1>{html.escape(title)}</h1>{summary}{_html_table(table)}</html>\n"
+        f"<style>{STYLE}</style><h1>{html.escape(title)}</h1>{''.join(parts)}</html>\n"
     )
+
+
+def _inline(svg: str) -> str:
+    """A figure as a part of a page."""
+    return f"<div>{svg[svg.index('<svg') :]}</div>"
 
 
 def _html_table(rows: Sequence[Row]) -> str:
     if not rows:
         return "<p>No runs yet.</p>"
     head = "".join(f"<th>{html.escape(name)}</th>" for name in rows[0])
-    body = "".join(f'<tr class="{row.get("level", "")}">{"".join(map(_html_cell, row.values()))}</tr>' for row in rows)
+    lines = ((row.get("level", ""), "".join(map(_html_cell, row, row.values()))) for row in rows)
+    body = "".join(f'<tr class="{level}">{cells}</tr>' for level, cells in lines)
     return f"<table><tr>{head}</tr>{body}</table>"
 
 
-def _html_cell(value: object) -> str:
+def _html_cell(name: str, value: object) -> str:
+    if name == "folder" and value:
+        address = html.escape(quote(f"{value}/replay.html"))
+        return f'<td class="text"><a href="{address}">replay</a></td>'
     text = f"{value:.4g}" if isinstance(value, float) else str(value)
     return f'<td class="{"text" if isinstance(value, str) else ""}">{html.escape(text)}</td>'

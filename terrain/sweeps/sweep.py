@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import re
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from terrain.provenance.named_files import hash_with_named_files, named_files
+from terrain.recording.recording import Recording
 from terrain.recording.verdict import Level
 from terrain.scenarios.scenario import Scenario
 
@@ -31,6 +33,12 @@ class SweepRun:
         """The settings as a text, such as ``backend=mesh planner=cvp``."""
         return " ".join(f"{key}={value}" for key, value in sorted(self.settings.items()))
 
+    @property
+    def folder(self) -> str:
+        """Where the run is kept in the folder of its sweep, such as ``runs/planner=cvp_1a2b3c/seed_4``."""
+        name = re.sub(r"[^\w.=-]+", "_", self.variant)[:MAX_NAME] or "as_written"
+        return f"runs/{name}_{hashlib.sha256(self.variant.encode()).hexdigest()[:6]}/seed_{self.seed}"
+
     def key(self, scenario_hash: str) -> str:
         """Return the key of this run; a file that a setting names counts with its contents."""
         named = named_files(list(self.settings.values()), Path())
@@ -39,6 +47,9 @@ class SweepRun:
 
 
 Job = tuple[Scenario, SweepRun]
+
+MAX_NAME = 60  # characters of a variant in the name of its folder
+MAX_TRACK = 200  # points of a track in the log, for figures
 
 
 def hash_of(scenario: Scenario) -> str:
@@ -60,15 +71,34 @@ def plan_sweep(seeds: Sequence[int], settings: Mapping[str, Sequence[str]]) -> l
     return [SweepRun(seed, variant) for seed in seeds for variant in variants]
 
 
-def run_once(job: Job) -> dict[str, Any]:
-    """Run a scenario and return its metrics; a run that cannot even begin has the outcome of its error."""
+def run_once(job: Job, keep_in: Path | None = None, command: str = "") -> dict[str, Any]:
+    """Run a scenario and return its metrics and its track; one that cannot even begin has the outcome of its error.
+
+    Parameters
+    ----------
+    keep_in : Path, optional
+        Folder of the sweep, if the run's own folder is to be kept in it, with all views; ``folder`` of the result is
+        its path from there.
+    command : str
+        The command line that the run's folder records.
+    """
     from terrain.session.runner import RunOptions, run_scenario
+    from terrain.viewer.results import write_results
 
     scenario, run = job
     settings = dict(run.settings)
     backend = settings.pop("backend", None)
-    with tempfile.TemporaryDirectory(prefix="mbf_sweep_") as folder:
-        options = RunOptions(Path(folder), backend, run.seed, settings=settings, geodesic=True)
+    tracks: list[list[list[float]]] = []
+
+    def write_views(folder: Path, recording: Recording, metrics: Mapping[str, Any]) -> Sequence[str]:
+        tracks.append(thinned_track(recording))
+        return () if keep_in is None else write_results(folder, recording, metrics)
+
+    with tempfile.TemporaryDirectory(prefix="mbf_sweep_") as temporary:
+        folder = Path(temporary) if keep_in is None else keep_in / run.folder
+        options = RunOptions(
+            folder, backend, run.seed, settings=settings, geodesic=True, command=command, write_views=write_views
+        )
         try:
             result = run_scenario(scenario, options)
         except Exception as error:  # one impossible variant must not end the sweep
@@ -81,4 +111,11 @@ def run_once(job: Job) -> dict[str, Any]:
                 "message": message,
                 "spl": 0.0,
             }
-    return result.metrics
+    return {**result.metrics, "track": tracks[0], **({} if keep_in is None else {"folder": run.folder})}
+
+
+def thinned_track(recording: Recording) -> list[list[float]]:
+    """Return x and y [m] of a track, to the millimetre, at no more than ``MAX_TRACK`` samples, the ends among them."""
+    count = len(recording.poses)
+    indices = sorted({round(step * (count - 1) / (MAX_TRACK - 1)) for step in range(MAX_TRACK)}) if count else []
+    return [[round(x, 3), round(y, 3)] for x, y in recording.poses[indices, :2].tolist()]

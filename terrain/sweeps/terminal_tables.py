@@ -1,0 +1,62 @@
+"""The tables of a sweep in a terminal; they fit 80 columns, because variants stand in them by a letter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.box import SIMPLE
+from rich.markup import escape
+from rich.table import Table
+
+from terrain.sweeps.statistics import METRICS, Row, compare_variants, rate_of, spread_of, values_of
+
+SHOWN = ("spl", "time_s", "path_length_m", "clearance_min_m", "planning_wall_median_ms")
+SIGNIFICANT = 0.05
+
+
+def letters_of(rows: Sequence[Row]) -> dict[str, str]:
+    """Return a letter for each variant, A, B, ..., Z, AA, ...; in the order of their names."""
+    names = sorted({row["variant"] for row in rows})
+    return {name: _letter(index) for index, name in enumerate(names)}
+
+
+def _letter(index: int) -> str:
+    before = _letter(index // 26 - 1) if index >= 26 else ""
+    return before + chr(ord("A") + index % 26)
+
+
+def summary_table(rows: Sequence[Row]) -> Table:
+    """Return a table with a line per variant: successes, and medians of the metrics."""
+    metrics = [metric for metric in METRICS if metric.name in SHOWN]
+    table = _table("medians; quartiles and intervals are in sweep.html")
+    for title in ("success", *(metric.title for metric in metrics)):
+        table.add_column(escape(title.replace(" [", "\n[")), justify="right")
+    for variant, letter in letters_of(rows).items():
+        of = [row for row in rows if row["variant"] == variant]
+        spreads = (spread_of(values_of(of, metric)) for metric in metrics)
+        medians = ("-" if spread is None else f"{spread.median:.3g}" for spread in spreads)
+        rate = rate_of(of)
+        table.add_row(letter, f"{rate.successes} of {rate.count}", *medians)
+    return table
+
+
+def comparison_table(rows: Sequence[Row]) -> Table | None:
+    """Return a table of the tests whose corrected p is below 0.05; None where there are no two variants."""
+    tests, letters = compare_variants(rows), letters_of(rows)
+    if not tests:
+        return None
+    clear = [test for test in tests if test.corrected < SIGNIFICANT]
+    table = _table(f"corrected p below {SIGNIFICANT:g}: {len(clear)} of {len(tests)} tests, see tests.csv")
+    table.add_column("metric")
+    for name in ("pairs", "difference", "p (Holm)"):
+        table.add_column(name, justify="right")
+    for test in clear:
+        numbers = (str(test.pairs), f"{test.difference:+.3g}", f"{test.corrected:.2g}")
+        table.add_row(f"{letters[test.second]} - {letters[test.first]}", escape(test.metric), *numbers)
+    return table
+
+
+def _table(title: str) -> Table:
+    table = Table(box=SIMPLE, title=title, title_justify="left")
+    table.add_column("variant")
+    return table

@@ -1,0 +1,192 @@
+"""What a sweep says about its runs: medians, intervals and tests, each tied to its definition written out."""
+
+import itertools
+import re
+import statistics
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.console import Console
+
+from terrain.scenarios.scenario import load_scenario
+from terrain.sweeps.figures import write_figures
+from terrain.sweeps.latex import escaped, latex_table
+from terrain.sweeps.report import write_tables
+from terrain.sweeps.statistics import (
+    METRICS,
+    Comparison,
+    compare_variants,
+    corrected,
+    rate_of,
+    signed_rank_p,
+    spread_of,
+    values_of,
+)
+from terrain.sweeps.sweep import SweepRun, run_once
+from terrain.sweeps.terminal_tables import comparison_table, summary_table
+
+NUMBERS = st.lists(st.integers(-6, 6), min_size=1, max_size=7)
+
+
+def row(seed, variant="a", success=True, **numbers):
+    level = "success" if success else "failed"
+    values = {"time_s": 10.0 + seed, "path_length_m": 20.0, "spl": 0.9 if success else 0.0, **numbers}
+    track = [[0.0, 0.0], [float(seed), 1.0]]
+    return {"seed": seed, "variant": variant, "success": success, "level": level, "track": track, **values}
+
+
+def p_of_all_signs(differences):
+    """Wilcoxon's signed-rank test by its definition, zeros ranked with the others (Pratt): every choice of signs."""
+    magnitudes = [abs(difference) for difference in differences]
+    ranks = [
+        sum(m < magnitude for m in magnitudes) + (sum(m == magnitude for m in magnitudes) + 1) / 2
+        for magnitude in magnitudes
+    ]
+    ranked = [rank for rank, magnitude in zip(ranks, magnitudes, strict=True) if magnitude]
+    positive = sum(rank for rank, difference in zip(ranks, differences, strict=True) if difference > 0)
+    middle = sum(ranked) / 2
+    sums = [sum(itertools.compress(ranked, signs)) for signs in itertools.product((0, 1), repeat=len(ranked))]
+    return sum(abs(total - middle) >= abs(positive - middle) - 1e-9 for total in sums) / len(sums)
+
+
+@settings(max_examples=25)
+@given(differences=NUMBERS)
+def test_the_signed_rank_test_is_that_of_all_choices_of_signs(differences):
+    assert signed_rank_p(np.array(differences, dtype=float)) == pytest.approx(p_of_all_signs(differences))
+
+
+@given(ps=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=6))
+def test_holms_correction_rejects_exactly_what_the_stepwise_rule_rejects(ps):
+    found = [test.corrected for test in corrected([Comparison("a", "b", "m", 5, 0.0, p) for p in ps])]
+
+    for level in (0.01, 0.05, 0.3):
+        rejected = 0
+        for number, p in enumerate(sorted(ps)):  # the smallest first, until one is not rejected
+            if p * (len(ps) - number) > level:
+                break
+            rejected += 1
+        assert sum(value <= level for value in found) == rejected or 1.0 <= level
+    assert all(p <= value <= 1.0 for p, value in zip(ps, found, strict=True))
+
+
+@settings(max_examples=20)
+@given(values=st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=9))
+def test_the_median_has_its_quartiles_and_an_interval_that_repeats(values):
+    spread = spread_of(values)
+
+    assert spread == spread_of(values)
+    assert spread.median == pytest.approx(statistics.median(values))
+    assert spread.low <= spread.median + 1e-9 and spread.median <= spread.high + 1e-9
+    assert min(values) <= spread.low and spread.high <= max(values)
+
+
+def test_the_interval_of_the_median_is_that_of_runs_drawn_again():
+    values = [float(number * number) for number in range(25)]
+    rng = np.random.default_rng(5)
+    medians = sorted(statistics.median(rng.choice(values, 25)) for _ in range(4000))
+
+    spread = spread_of(values)
+
+    assert (spread.low, spread.high) == (medians[100], medians[-101])
+
+
+@given(successes=st.integers(0, 30), failures=st.integers(0, 30))
+def test_the_interval_of_a_rate_is_where_the_rate_is_1_96_standard_errors_away(successes, failures):
+    if successes + failures == 0:
+        return
+    n = successes + failures
+    rate = rate_of([row(seed, success=seed < successes) for seed in range(n)])
+
+    assert 0.0 <= rate.low <= rate.share <= rate.high <= 1.0
+    for end in (rate.low, rate.high):
+        if 0.0 < end < 1.0:
+            assert abs(rate.share - end) == pytest.approx(1.96 * (end * (1 - end) / n) ** 0.5, rel=1e-3)
+
+
+def test_success_is_compared_by_the_seeds_in_which_one_of_two_succeeded():
+    rows = [row(seed, "a", success=seed < 3) for seed in range(9)] + [row(seed, "b") for seed in range(1, 9)]
+
+    test = next(test for test in compare_variants(rows) if test.metric == "success")
+
+    assert (test.pairs, test.difference) == (8, 6 / 8)
+    assert test.p == pytest.approx(2 * 0.5**6)
+
+
+def test_numbers_are_compared_on_seeds_in_which_both_succeeded_and_spl_on_all():
+    rows = [row(seed, "a", time_s=10.0) for seed in range(6)]
+    rows += [row(seed, "b", time_s=11.0 + seed, success=seed != 2) for seed in range(6)]
+
+    tests = {test.metric: test for test in compare_variants(rows)}
+
+    assert (tests["time [s]"].pairs, tests["time [s]"].difference) == (5, 4.0)
+    assert tests["SPL"].pairs == 6
+    assert tests["length [m]"].p == 1.0, "no pair differs"
+    assert len(values_of(rows, METRICS[0])) == 12 and len(values_of(rows, METRICS[1])) == 11
+
+
+@settings(max_examples=8)
+@given(
+    names=st.sets(st.text(st.characters(codec="utf-8", exclude_categories=["Cs", "Cc"]), max_size=90), max_size=30),
+    large=st.floats(1e-9, 1e12),
+)
+def test_tables_in_a_terminal_fit_80_columns_whatever_variants_are_called(names, large):
+    rows = [row(seed, name, time_s=large * (1 + number)) for number, name in enumerate(names) for seed in range(2)]
+    console = Console(width=80, file=None)
+
+    for table in (summary_table(rows), comparison_table(rows)):
+        if table is not None:
+            assert console.measure(table).minimum <= 80
+            lines = console.render_lines(table, console.options.update(width=80))
+            assert all("…" not in segment.text for line in lines for segment in line)
+
+
+def test_a_latex_table_has_as_many_cells_in_each_line_and_no_sign_of_latex():
+    table = latex_table([row(0, "planner=a_b & 50%"), row(1, "planner=a_b & 50%"), row(0, r"path\to$x^2~{#}<>")])
+
+    lines = [line for line in table.splitlines() if line.endswith(r"\\")]
+    assert len({len(re.findall(r"(?<!\\)&", line)) for line in lines}) == 1
+    assert r"planner=a\_b \& 50\%" in table and "(10.2--10.8)" in table
+    assert r"\toprule" in table and r"\bottomrule" in table
+
+
+@given(text=st.text(max_size=30))
+def test_escaped_text_has_no_bare_sign_of_latex(text):
+    bare = re.sub(r"\\(text\w+\{\}|[&%$#_{}])", "", escaped(text))
+
+    assert not re.search(r"[&%$#_{}~^\\<>]", bare)
+
+
+def test_all_files_of_a_sweep_are_the_same_bytes_each_time(tmp_path):
+    rows = [row(seed, variant, success=seed > 0) for variant in ("a", "b", "") for seed in range(4)]
+    written = []
+    for folder in (tmp_path / "one", tmp_path / "two"):
+        folder.mkdir()
+        files = write_tables("Trial", rows, folder)
+        written.append({file.name: file.read_bytes() for file in files if file.suffix != ".parquet"})
+
+    assert written[0] == written[1]
+    tables = {"sweep.csv", "sweep.html", "summary.csv", "tests.csv", "sweep.tex"}
+    assert set(written[0]) == tables | {"boxplots.pdf", "boxplots.svg", "tracks.pdf", "tracks.svg"}
+    assert written[0]["sweep.html"].count(b"<svg") == 2
+
+
+def test_runs_without_numbers_have_no_figures(tmp_path):
+    failed = {"seed": 0, "variant": "a", "success": False, "level": "failed"}
+
+    assert write_figures([failed], tmp_path) == []
+
+
+def test_a_kept_run_has_its_folder_and_the_page_links_to_its_replay(tmp_path):
+    scenario = load_scenario("crowded_corridor").model_copy(update={"actors": (), "time_limit": 3.0})
+
+    metrics = run_once((scenario, SweepRun(5, {"planner_patience": "2.0"})), tmp_path, "mbf sweep corridor")
+
+    folder = tmp_path / metrics["folder"]
+    assert re.fullmatch(r"runs/planner_patience=2\.0_\w{6}/seed_5", metrics["folder"])
+    assert {"replay.html", "scenario.yaml", "provenance.yaml"} <= {file.name for file in folder.iterdir()}
+    assert 2 <= len(metrics["track"]) <= 200
+    write_tables("Trial", [{**metrics, "seed": 5, "variant": "planner_patience=2.0"}], tmp_path)
+    link = re.search(r'<a href="([^"]+)">replay</a>', (tmp_path / "sweep.html").read_text())
+    assert link is not None and link[1].endswith("/seed_5/replay.html")
