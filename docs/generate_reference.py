@@ -4,8 +4,8 @@
     python docs/generate_reference.py --check    write nothing; exit code 1 and the names of pages that are out of date
 
 Written are ``configuration.md`` (every parameter of every model), the example plugins (what ``mbf new`` writes), the
-listings in the guides (the text of the example files), the table of metrics in ``verdict.md`` and the table of
-``faults_and_promises.md`` (the docstrings of ``tests/faults``).
+listings in the guides (the text of the example files), the table of metrics in ``verdict.md``, that of a robot's
+keys in ``your_robot.md`` and the table of ``faults_and_promises.md`` (the docstrings of ``tests/faults``).
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ import re
 import sys
 from pathlib import Path
 
-from parameter_tables import configuration_page
+from parameter_tables import configuration_page, parameter_table
 
 from mbf_abstract.commands.new import plugin_source
+from terrain.description.parameters import UrdfRobot
 from terrain.recording.metrics import Metrics
 
 DOCS = Path(__file__).resolve().parent
@@ -39,6 +40,7 @@ EXAMPLES = {
 LISTING = re.compile(r"(<!-- listing: (?P<file>\S+) -->\n)(?:```python\n.*?\n```\n)?", re.DOTALL)
 TABLE = re.compile(r"(<!-- table: tests/faults -->\n)(?:\|.*\n)*")
 METRICS = re.compile(r"(<!-- table: metrics -->\n)(?:\|.*\n)*")
+ROBOT = re.compile(r"(<!-- table: robot -->\n)(?:\|.*\n)*")
 METRIC = re.compile(r"^(?P<names>\w[\w, ]*) : .*\n(?P<text>(?: {4}.*\n?)+)", re.MULTILINE)
 FAULT_ROW = re.compile(r"Fault table, rows? (?P<rows>[\d, and]+)[^:]*: (?P<text>.+)", re.DOTALL)
 
@@ -52,6 +54,7 @@ def generate() -> dict[Path, str]:
         if page not in texts:
             text = LISTING.sub(lambda match: _listing(match, texts), page.read_text(encoding="utf-8"))
             text = TABLE.sub(lambda match: match[1] + fault_table(), text)
+            text = ROBOT.sub(lambda match: match[1] + parameter_table(UrdfRobot, dynamic=False), text)
             texts[page] = METRICS.sub(lambda match: match[1] + metrics_table(), text)
     return texts
 

@@ -96,7 +96,10 @@ def describe_range(field: FieldInfo) -> str:
 def _findings_of(
     model: type[ParameterModel], block: object, errors: list[ErrorDetails], document: YamlDocument, key_path: KeyPath
 ) -> list[Finding]:
-    """One finding per key: the alternatives of a union, which pydantic reports one by one, are joined by "or"."""
+    """One finding per key: the alternatives of a union, which pydantic reports one by one, are joined by "or".
+
+    What is wrong inside one alternative goes before that the whole is no other one.
+    """
     found: dict[KeyPath, Finding] = {}
     for error in errors:
         loc = _location_in_data(block, error)
@@ -106,7 +109,8 @@ def _findings_of(
             expected = f"{earlier.expected} or {finding.expected}"
             finding = document.finding((*key_path, *loc), expected, finding.got, finding.hint)
         found[loc] = finding
-    return list(found.values())
+    inside = {loc[:length] for loc in found for length in range(1, len(loc))}
+    return [finding for loc, finding in found.items() if loc not in inside]
 
 
 def _finding_of(
@@ -114,7 +118,7 @@ def _finding_of(
 ) -> Finding:
     path = (*key_path, *loc)
     if error["type"] == "extra_forbidden":
-        known = list(_model_at(model, loc[:-1]).model_fields)
+        known = _keys_at(model, loc[:-1])
         return document.finding(path, "a known key", repr(loc[-1]), _key_hint(str(loc[-1]), known))
     got = "nothing" if error["type"] == "missing" else describe_value(error["input"])
     return document.finding(path, _expected(model, error, loc), got)
@@ -142,16 +146,14 @@ def _key_hint(key: str, known: list[str]) -> str:
 
 
 def _location_in_data(block: object, error: ErrorDetails) -> KeyPath:
-    """Return the part of pydantic's location that exists in the data; the rest names alternatives of a union."""
+    """Return pydantic's location without the parts that name alternatives of a union, which are not in the data."""
     loc: KeyPath = ()
     for part in error["loc"]:
         known = range(len(block)) if isinstance(block, list) else block if isinstance(block, dict) else ()
-        inside = part in known
-        if not inside:
-            return (*loc, part) if error["type"] == "missing" else loc
-        loc = (*loc, part)
-        block = block[part]  # type: ignore[index]
-    return loc
+        if part in known:
+            loc = (*loc, part)
+            block = block[part]  # type: ignore[index]
+    return (*loc, error["loc"][-1]) if error["type"] == "missing" else loc
 
 
 def _field_at(model: type[BaseModel], loc: KeyPath) -> FieldInfo | None:
@@ -165,16 +167,22 @@ def _field_at(model: type[BaseModel], loc: KeyPath) -> FieldInfo | None:
     return field
 
 
-def _model_at(model: type[BaseModel], loc: KeyPath) -> type[BaseModel]:
+def _keys_at(model: type[BaseModel], loc: KeyPath) -> list[str]:
+    """Keys of the block at a location, those of all alternatives if there are several."""
     field = _field_at(model, loc)
-    return (_inner_model(field.annotation) if field is not None else None) or model
+    models = [] if field is None else _models_in(field.annotation)
+    return list(dict.fromkeys(key for found in models or [model] for key in found.model_fields))
 
 
 def _inner_model(annotation: Any) -> type[BaseModel] | None:
+    return next(iter(_models_in(annotation)), None)
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
     arguments = get_args(annotation)  # for Python 3.10 tuple[float, float] is a type, too
     if not arguments and isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((found for arg in arguments if (found := _inner_model(arg))), None)
+        return [annotation]
+    return [found for arg in arguments for found in _models_in(arg)]
 
 
 def _with_absolute_paths(model: type[BaseModel], data: object, folder: Path) -> object:

@@ -10,7 +10,7 @@ from mbf_abstract.config.yaml_source import YamlDocument, read_yaml
 
 YAML_SUFFIXES = {".yaml", ".yml"}
 OF_SCENARIOS_ONLY = ("world", "navigation")
-PLACEHOLDER = "$WORLD_"
+PLACEHOLDER, OF_A_ROBOT = "$WORLD_", "$ROBOT_"
 
 
 def check(file: Path, load: bool) -> Checked | None:
@@ -32,7 +32,10 @@ def check(file: Path, load: bool) -> Checked | None:
         return None  # whoever reads it next reports why
     if any(key in document.data for key in OF_SCENARIOS_ONLY):
         return _check_scenario(document, load)
-    return _check_with_stand_in(file, load) if PLACEHOLDER in file.read_text(encoding="utf-8-sig") else None
+    text = file.read_text(encoding="utf-8-sig")
+    if OF_A_ROBOT in text:
+        return _check_with_stand_in_robot(file)
+    return _check_with_stand_in(file, load) if PLACEHOLDER in text else None
 
 
 def _check_scenario(document: YamlDocument, load: bool) -> Checked:
@@ -62,3 +65,13 @@ def _check_with_stand_in(file: Path, load: bool) -> Checked:
     if findings:
         raise ConfigError(findings)
     return Checked(checked.summary, ("level ground stands in for the maps that a scenario's world gives",))
+
+
+def _check_with_stand_in_robot(file: Path) -> Checked:
+    """Check a configuration that takes the numbers of a robot, which are not known without a scenario."""
+    from terrain.session.scenario_check import check_on_level_ground
+
+    findings = check_on_level_ground(file)
+    if findings:
+        raise ConfigError(findings)
+    return Checked("good for a Husky", ("a Husky on level ground stands in for the robot and world of a scenario",))

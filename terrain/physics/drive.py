@@ -89,7 +89,8 @@ def commanded_twist(spec: RobotSpec, command: Command) -> Twist:
         return Twist.planar(speed, 0.0, speed * math.tan(angle) / spec.wheelbase)
     if spec.drive is Drive.ACKERMANN:
         return commanded_twist(spec, AckermannCommand(command.vx, steering_angle(spec, command)))
-    return Twist.planar(_clip(command.vx, spec.max_speed), 0.0, _clip(command.wz, spec.max_yaw_rate))
+    sideways = _clip(command.vy, spec.max_speed) if spec.drive is Drive.HOLONOMIC else 0.0
+    return Twist.planar(_clip(command.vx, spec.max_speed), sideways, _clip(command.wz, spec.max_yaw_rate))
 
 
 def twist_from_wheels(spec: RobotSpec, left: float, right: float, steering: float = 0.0) -> Twist:

@@ -46,7 +46,7 @@ class KinematicRobot:
         self.command_timeout = command_timeout
         self._outline = spec.footprint_array()
         self._x, self._y, self._yaw = pose.x, pose.y, pose.yaw
-        self._vx = self._wz = self._steering = 0.0
+        self._vx = self._vy = self._wz = self._steering = 0.0
         self._command: Command = Twist()
         self._command_stamp = world.time
         self._blocked = False
@@ -66,10 +66,14 @@ class KinematicRobot:
         middle = self._yaw + 0.5 * self._wz * seconds
         step = self._vx * seconds * self._level_share(middle)
         x, y = self._x + step * math.cos(middle), self._y + step * math.sin(middle)
+        if self._vy != 0.0:
+            left = middle + 0.5 * math.pi
+            side = self._vy * seconds * self._level_share(left)
+            x, y = x + side * math.cos(left), y + side * math.sin(left)
         yaw = normalize_angle(self._yaw + self._wz * seconds)
         self._blocked = not self._can_stand(x, y, yaw)
         if self._blocked:
-            self._vx = self._wz = 0.0
+            self._vx = self._vy = self._wz = 0.0
         else:
             self._x, self._y, self._yaw = x, y, yaw
 
@@ -77,6 +81,7 @@ class KinematicRobot:
         """Bring speed and yaw rate nearer to the command; those of a car are tied by the angle of its wheels."""
         spec, wanted = self.spec, commanded_twist(self.spec, self._command)
         self._vx = _approach(self._vx, wanted.vx, spec.max_acceleration * seconds)
+        self._vy = _approach(self._vy, wanted.vy, spec.max_acceleration * seconds)
         if spec.drive is Drive.ACKERMANN:
             angle = steering_command(spec, self._command)
             self._steering = _approach(self._steering, angle, STEERING_SPEED * seconds)
@@ -110,7 +115,7 @@ class KinematicRobot:
     def place(self, pose: Pose) -> None:
         """Put the robot at the x, y and yaw of ``pose`` at once, at rest."""
         self._x, self._y, self._yaw = pose.x, pose.y, pose.yaw
-        self._vx = self._wz = self._steering = 0.0
+        self._vx = self._vy = self._wz = self._steering = 0.0
 
     def settle(self) -> None:
         """Do nothing; without gravity there is nothing to settle."""
@@ -121,7 +126,7 @@ class KinematicRobot:
 
     def velocity(self) -> Twist:
         """Ground truth of the velocity, in base_link."""
-        return Twist.planar(self._vx, 0.0, self._wz)
+        return Twist.planar(self._vx, self._vy, self._wz)
 
     def rolling_velocity(self) -> Twist:
         """Return the velocity: these wheels never slip."""

@@ -27,6 +27,7 @@ class Drive(Enum):
     SKID_STEER = "skid_steer"
     DIFFERENTIAL = "differential"
     ACKERMANN = "ackermann"
+    HOLONOMIC = "holonomic"
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,10 @@ class RobotSpec:
         Limit of each driven wheel [N m].
     lidar_position : tuple of 3 floats
         Of the scanner in base_link [m].
+    wheel_positions : tuple of (float, float, float)
+        Centres of the wheels in base_link [m]; empty where track and wheelbase say it.
+    file : Path, optional
+        URDF of the body, of a robot that does not ship.
     """
 
     name: str
@@ -77,11 +82,13 @@ class RobotSpec:
     max_steering_angle: float = 0.0
     track_multiplier: float = 1.0
     wheel_friction: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    wheel_positions: tuple[tuple[float, float, float], ...] = ()
+    file: Path | None = None
 
     @property
     def urdf(self) -> Path:
         """File of the body."""
-        return URDF_FOLDER / f"{self.name}.urdf"
+        return self.file or URDF_FOLDER / f"{self.name}.urdf"
 
     @cached_property
     def circumscribed_radius(self) -> float:

@@ -63,6 +63,7 @@ class WheeledRobot:
     ) -> None:
         self.world = world
         self.spec = spec
+        self.friction = friction
         self.command_timeout = command_timeout
         self._bullet: Any = world.bullet
         self._command: Command = STANDSTILL
@@ -72,7 +73,10 @@ class WheeledRobot:
         drop = max(0.05, 1.5 * spec.wheel_radius) * pose.rotation[:, 2]
         with quiet_native_output():
             self.body: int = self._bullet.loadURDF(
-                str(spec.urdf), basePosition=(np.array(pose.position) + drop).tolist(), baseOrientation=pose.orientation
+                str(spec.urdf),
+                basePosition=(np.array(pose.position) + drop).tolist(),
+                baseOrientation=pose.orientation,
+                flags=0 if spec.file is None else self._bullet.URDF_USE_INERTIA_FROM_FILE,
             )
         self._joints = self._read_joints()
         self._driven = [self._joints[name] for name in (*spec.left_wheels, *spec.right_wheels)]
@@ -206,13 +210,17 @@ class WheeledRobot:
     def rolling_velocity(self) -> Twist:
         """Motion of the base if the wheels did not slip."""
         left, right, steering, _ = self.wheel_state()
+        return self._rolling(left, right, steering)
+
+    def _rolling(self, left: float, right: float, steering: float) -> Twist:
+        """Motion of the base that belongs to a state of the wheels."""
         return twist_from_wheels(self.spec, left, right, steering)
 
     def motion_sample(self) -> MotionSample:
         """Return the sample that ``IncidentMonitor`` takes."""
         pose, velocity = self._state()
         left, right, steering, power = self.wheel_state()
-        rolling = twist_from_wheels(self.spec, left, right, steering)
+        rolling = self._rolling(left, right, steering)
         on_ground, touched = self._contacts()
         commanded = commanded_twist(self.spec, self._command)
         return MotionSample(pose, velocity, commanded, rolling, on_ground, touched, power)

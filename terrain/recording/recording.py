@@ -72,6 +72,8 @@ class RobotShape:
 
 def _wheel_positions(spec: RobotSpec) -> FloatArray:
     """Centres (k, 3) of the wheels in base_link, which lies under the rear axle of a car and amidships else."""
+    if spec.wheel_positions or spec.drive is Drive.HOLONOMIC:
+        return np.array(spec.wheel_positions, dtype=np.float64).reshape(-1, 3)
     axles = {
         Drive.ACKERMANN: (0.0, spec.wheelbase),
         Drive.SKID_STEER: (-0.5 * spec.wheelbase, 0.5 * spec.wheelbase),

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
 from mbf_abstract.config.findings import ConfigError, Finding
-from terrain.physics.robot_models import ROBOTS
 from terrain.scenarios.scenario import MapWorld, PlanarPose, Scenario
+from terrain.urdf_robots.robot_choice import spec_of
 from terrain.worlds.occupancy import OccupancyGrid, read_occupancy
 
 MARGIN = 0.15  # m kept free around the robot's outline
@@ -38,7 +38,7 @@ def on_map(scenario: Scenario, file: Path) -> Scenario:
     if max(abs(corner.origin_x), abs(corner.origin_y)) > NEAR_ZERO:
         world = world.model_copy(update={"corner": (0.0, 0.0)})
     grid = world.grid()
-    radius = ROBOTS[scenario.robot].circumscribed_radius + MARGIN
+    radius = spec_of(scenario.robot).circumscribed_radius + MARGIN
     ends = far_apart_places(grid, radius)
     if ends is None:
         finding = Finding(str(file), 1, "", f"free space for a robot of radius {radius:.2f} m", "none")

@@ -11,8 +11,7 @@ from pydantic import field_validator
 from mbf_abstract.parameters import ParameterModel, parameter
 from terrain.scenarios.faults import Fault
 from terrain.scenarios.places import Place
-
-Model = Literal["husky", "turtlebot", "car"]
+from terrain.urdf_robots.robot_choice import RobotChoice
 
 NAME_OF_A_ROBOT = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # also of a folder, and the first part of sources of events
 
@@ -37,7 +36,7 @@ class OwnRobot(ParameterModel):
     name: str = parameter(..., "Its name, and that of its results; letters, digits and _.")
     start: Place = parameter(..., "Where it starts: x, y, yaw, or the name of a place of the world.")
     goals: tuple[Place, ...] = parameter(..., "Where it goes, in order.")
-    robot: Model | None = parameter(None, "Model of the robot.")
+    robot: RobotChoice | None = parameter(None, "Model of the robot.")
     backend: str | None = parameter(None, "Map backend.")
     navigation: dict[str, Path] | None = parameter(None, "Configuration file of each backend.")
     sensors: tuple[Sensor, ...] | None = parameter(None, "Its lidars and cameras.")

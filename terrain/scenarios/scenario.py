@@ -2,7 +2,7 @@
 
 The navigation itself is configured in files of its own, one per backend, so that a scenario does not change when the
 backend does. In those files the texts ``$WORLD_MESH`` and ``$WORLD_MAP`` stand for the mesh and the map_server yaml
-that the run writes of its world.
+that the run writes of its world, and ``$ROBOT_FOOTPRINT`` and others for the robot's numbers.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ from terrain.scenarios.noise import LocalizationNoise, MapNoise
 from terrain.scenarios.obstacles import Forest, Obstacle
 from terrain.scenarios.perturbation import Perturbation
 from terrain.scenarios.places import Place, PlanarPose
-from terrain.scenarios.robots import Model, OwnRobot, Sensor
+from terrain.scenarios.robots import OwnRobot, Sensor
 from terrain.scenarios.world_types import LevelsWorld, MapWorld, TerrainWorld, World
+from terrain.urdf_robots.robot_choice import RobotChoice, find_wrong_robot, is_legged, located
 
 __all__ = ["MapWorld", "Obstacle", "PlanarPose", "Scenario", "Sensor", "load_scenario", "shipped_scenarios"]
 
@@ -40,7 +41,7 @@ class Scenario(ParameterModel):
     backend: str = parameter(..., "Map backend to use where the command line names none.")
     navigation: dict[str, Path] = parameter(..., "Configuration file of each backend.")
     world: World = parameter(..., "What it takes place in.")
-    robot: Model = parameter(..., "Model of the robot.")
+    robot: RobotChoice = parameter(..., "A model that ships, or a robot of your own: my.urdf, or urdf: and more.")
     start: Place | None = parameter(None, "Where the robot starts: x, y, yaw, or the name of a place of the world.")
     goals: tuple[Place, ...] = parameter((), "Where it goes, in order.")
     robots: tuple[OwnRobot, ...] = parameter(
@@ -113,11 +114,13 @@ def _with_absolute_files(scenario: Scenario, folder: Path) -> Scenario:
 
     file = getattr(scenario.world, "file", None)
     world = scenario.world if file is None else scenario.world.model_copy(update={"file": folder / file})
-    robots = tuple(
-        robot if robot.navigation is None else robot.model_copy(update={"navigation": absolute(robot.navigation)})
-        for robot in scenario.robots
-    )
-    return scenario.model_copy(update={"navigation": absolute(scenario.navigation), "world": world, "robots": robots})
+    robots = []
+    for robot in scenario.robots:
+        of_own = {} if robot.navigation is None else {"navigation": absolute(robot.navigation)}
+        choice = robot.robot if robot.robot is None else located(robot.robot, folder)
+        robots.append(robot.model_copy(update={**of_own, "robot": choice}))
+    changes = {"navigation": absolute(scenario.navigation), "world": world, "robots": tuple(robots)}
+    return scenario.model_copy(update={**changes, "robot": located(scenario.robot, folder)})
 
 
 def robot_scenarios(scenario: Scenario) -> dict[str, Scenario]:
@@ -175,7 +178,10 @@ def _keys_of(scenario: Scenario, number: int, *keys: str | int) -> KeyPath:
 
 def _find_contradictions_of(scenario: Scenario, document: YamlDocument, at: Callable[..., KeyPath]) -> list[Finding]:
     """Find what is wrong together in what one robot drives; ``at`` returns where a value of it stands."""
-    findings = []
+    findings = find_wrong_robot(scenario.robot)
+    if not findings and scenario.physics != "kinematic" and is_legged(scenario.robot):
+        expected = "kinematic, for a robot on legs, whose gait is not simulated"
+        findings.append(document.finding(("physics",), expected, scenario.physics))
     if scenario.backend not in scenario.navigation:
         known = ", ".join(scenario.navigation) or "none"
         expected = f"a backend listed under navigation ({known})"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from mbf_abstract.commands.standing_server import standing_server
 from mbf_abstract.config.findings import ConfigError, Finding, KeyPath
 from mbf_abstract.config.yaml_source import YamlDocument
 from mbf_abstract.server.factory import read_config
+from terrain.description.placeholders import fill_in
 from terrain.provenance.named_files import InputCopies
 from terrain.scenarios.environment import build_environment, with_noise
 from terrain.scenarios.noise import MapNoise
@@ -26,11 +28,13 @@ from terrain.scenarios.scenario import Scenario, read_scenario, robot_scenarios
 from terrain.scenarios.settings import apply_world_settings
 from terrain.scenarios.world import ScenarioWorld
 from terrain.session.session import write_navigation_config
+from terrain.urdf_robots.robot_choice import RobotChoice, description_of, notes_on
 from terrain.worlds.generate import flat_terrain
 from terrain.worlds.map_files import MapFiles
 
 STAND_IN_SIZE, STAND_IN_SPACING = 20.0, 0.25  # m
 STAND_IN_LETHAL_SLOPE = 30.0  # degrees; nothing of it is steep
+STAND_IN = "husky"
 
 Maps = Mapping[str, Path]
 
@@ -74,32 +78,34 @@ def check_scenario(
     if scenario is not None and not findings:
         with _Collecting(findings, document, ("world",)):
             scenario, rest = apply_world_settings(change(scenario), settings or {})
-    files = list(_configurations(document).items())
+    files: list[tuple[str, Path, RobotChoice]] = [(*pair, STAND_IN) for pair in _configurations(document).items()]
     if scenario is not None:
         views = robot_scenarios(scenario).values()
-        files = list(dict.fromkeys(pair for view in views for pair in view.navigation.items()))
-    chosen = [(name, file) for name, file in files if backend in (None, name) and file.is_file()]
-    known = list(dict.fromkeys(name for name, _ in files))
+        files = list(dict.fromkeys((*pair, view.robot) for view in views for pair in view.navigation.items()))
+    chosen = [(name, file, robot) for name, file, robot in files if backend in (None, name) and file.is_file()]
+    known = list(dict.fromkeys(name for name, _, _ in files))
     if backend is not None and files and backend not in known:
         findings.append(document.finding(("navigation",), f"one of {', '.join(known)}", repr(backend)))
-    good = [(name, file) for name, file in chosen if _reads_well(file, rest, findings)]
+    if scenario is not None and not findings:
+        notes += [note for view in robot_scenarios(scenario).values() for note in notes_on(view.robot)]
+    good = [(name, file, robot) for name, file, robot in chosen if _reads_well(file, robot, rest, findings)]
     if load and scenario is not None and not any(finding.file == str(document.path) for finding in findings):
         with tempfile.TemporaryDirectory(prefix="mbf_check_") as folder:
             maps = _check_world(scenario, seed, document, Path(folder), findings)
-            for name, file in good if maps is not None else ():
-                found = _check_server(file, maps or {}, rest, Path(folder), findings)
+            for name, file, robot in good if maps is not None else ():
+                found = _check_server(file, robot, maps or {}, rest, Path(folder), findings)
                 notes += [f"{name}: {note}" for note in found]
-    return ScenarioReport(scenario, tuple(dict.fromkeys(findings)), tuple(notes))
+    return ScenarioReport(scenario, tuple(dict.fromkeys(findings)), tuple(dict.fromkeys(notes)))
 
 
 def check_on_level_ground(file: Path) -> list[Finding]:
-    """Load a configuration on maps of level ground instead of those of a scenario's world; what is wrong with it."""
+    """Load a configuration on level ground, with a Husky, instead of a scenario's world and robot; what is wrong."""
     findings: list[Finding] = []
     with tempfile.TemporaryDirectory(prefix="mbf_check_") as folder:
         ground = flat_terrain(STAND_IN_SIZE, STAND_IN_SIZE, STAND_IN_SPACING)
         files = MapFiles(Path(folder), MapNoise(), np.random.default_rng(0))
         maps = files.of_terrain(ground, STAND_IN_LETHAL_SLOPE)
-        _check_server(file, maps, {}, Path(folder), findings)
+        _check_server(file, STAND_IN, maps, {}, Path(folder), findings)
     return findings
 
 
@@ -110,12 +116,17 @@ def _configurations(document: YamlDocument) -> dict[str, Path]:
     return {str(backend): document.path.parent / file for backend, file in pairs if isinstance(file, str)}
 
 
-def _reads_well(file: Path, settings: Mapping[str, str], findings: list[Finding]) -> bool:
-    """Whether a configuration has no mistakes before its map is known; settings are looked at when it is loaded."""
+def _reads_well(file: Path, robot: RobotChoice, settings: Mapping[str, str], findings: list[Finding]) -> bool:
+    """Whether a configuration has no mistakes before its map is known.
+
+    Settings, and keys with numbers of the robot, are looked at when it is loaded.
+    """
     if settings:
         return True
     with _Collecting(findings, file) as collecting:
-        read_config(file)
+        text = file.read_text(encoding="utf-8-sig")
+        if fill_in(text, str(file), partial(description_of, robot)) == text:
+            read_config(file)
     return not collecting.failed
 
 
@@ -149,11 +160,16 @@ def _check_places(scenario: Scenario, world: ScenarioWorld, document: YamlDocume
 
 
 def _check_server(
-    source: Path, maps: Maps, settings: Mapping[str, str], folder: Path, findings: list[Finding]
+    source: Path,
+    robot: RobotChoice,
+    maps: Maps,
+    settings: Mapping[str, str],
+    folder: Path,
+    findings: list[Finding],
 ) -> list[str]:
     """Read the maps and construct the plugins of a configuration; returns the notes of its server."""
     with _Collecting(findings, source) as collecting:
-        file = write_navigation_config(source, maps, folder, settings, InputCopies(folder))
+        file = write_navigation_config(source, robot, maps, folder, settings, InputCopies(folder))
         collecting.renamed = {
             str(file): f"{source} (with settings)" if settings else str(source),
             str(folder): str(source.parent),

@@ -14,7 +14,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from mbf_abstract.events import EventKind
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.maps.sensing import RangeScan
+from terrain.description.placeholders import fill_in
 from terrain.physics.actors import Fellow
 from terrain.physics.command_delay import CommandDelay
 from terrain.physics.incidents import ANY_COLLISION, COLLISIONS_WITH, Incident
@@ -42,6 +43,7 @@ from terrain.sensors.rays import FellowRays
 from terrain.sensors.sensor import Sensor
 from terrain.session.simulation_session import SessionOptions, SimulationSession
 from terrain.session.site import Site
+from terrain.urdf_robots.robot_choice import RobotChoice, description_of
 
 __all__ = ["Session", "SessionOptions"]
 
@@ -129,7 +131,9 @@ class Session(SimulationSession):
         if source is None:
             known = ", ".join(self.scenario.navigation)
             raise ConfigError([Finding(self.scenario.name, 1, "navigation", f"one of {known}", repr(self.backend))])
-        config_file = write_navigation_config(source, self.world.files, self.folder, options.settings, self.inputs)
+        config_file = write_navigation_config(
+            source, self.scenario.robot, self.world.files, self.folder, options.settings, self.inputs
+        )
         self.robot = self._member.robot
         simulation = self._make_simulation()
         delay = CommandDelay(self.world.physics, self.robot.send_command, self.scenario.perturb.command_delay)
@@ -205,14 +209,21 @@ class Session(SimulationSession):
 
 
 def write_navigation_config(
-    source: Path, maps: Mapping[str, Path], folder: Path, settings: Mapping[str, str], inputs: InputCopies
+    source: Path,
+    robot: RobotChoice,
+    maps: Mapping[str, Path],
+    folder: Path,
+    settings: Mapping[str, str],
+    inputs: InputCopies,
 ) -> Path:
-    """Write a configuration with the world's map files filled in; a run can be planned again from it.
+    """Write a configuration with the world's map files and the robot's numbers; a run can be planned again from it.
 
     Parameters
     ----------
     source : Path
         The configuration. Files that it names, by paths from its own folder, are copied into ``inputs``.
+    robot : str or UrdfRobot
+        Whose numbers stand for ``$ROBOT_FOOTPRINT`` and others.
     maps : mapping of str to Path
         Placeholder of the configuration -> map file.
     """
@@ -220,6 +231,7 @@ def write_navigation_config(
     names = {file: os.path.relpath(file, folder) for file in maps.values()}
     for placeholder, file in maps.items():
         text = text.replace(placeholder, names[file])
+    text = fill_in(text, str(source), partial(description_of, robot))
     target = folder / "navigation.yaml"
     target.write_text(apply_settings(text, settings))
     document = read_yaml(target, [])  # what is wrong with it is reported when the server reads it

@@ -14,13 +14,15 @@ from terrain.physics.contact_depth import placed
 from terrain.physics.kinematic_robot import KinematicRobot
 from terrain.physics.kinematic_world import KinematicWorld
 from terrain.physics.motion_sample import Thing
-from terrain.physics.robot_models import ROBOTS
+from terrain.physics.robot_models import Drive
 from terrain.physics.robots import WheeledRobot
 from terrain.scenarios.environment import build_environment
 from terrain.scenarios.perturbation import draw_disturbance
 from terrain.scenarios.scenario import Scenario, robot_scenarios
 from terrain.scenarios.sensors import AnyRobot, ray_casters
 from terrain.session.simulation_session import SessionOptions
+from terrain.urdf_robots.omni_robot import OmniRobot
+from terrain.urdf_robots.robot_choice import simulated_spec, spec_of
 
 
 class Site:
@@ -73,7 +75,7 @@ class Site:
             raise
 
     def _stand_robots(self, scenario: Scenario, seeds: Mapping[str, int]) -> None:
-        self.robots = {name: self._robot(view, seeds[name]) for name, view in robot_scenarios(scenario).items()}
+        self.robots = {name: self._robot(name, view, seeds[name]) for name, view in robot_scenarios(scenario).items()}
         _refuse_overlaps(scenario, self.robots)
         first = next(iter(self.robots.values()))
         first.settle()  # it is the world that settles
@@ -85,14 +87,16 @@ class Site:
         self.world.introduce(list(self.robots.values()))
         self.rays = ray_casters(self.world)
 
-    def _robot(self, scenario: Scenario, seed: int) -> AnyRobot:
-        spec, physics = ROBOTS[scenario.robot], self.world.physics
+    def _robot(self, name: str, scenario: Scenario, seed: int) -> AnyRobot:
+        physics = self.world.physics
         disturbance = draw_disturbance(scenario.perturb, seed)
         assert scenario.start is not None  # of a scenario with one robot
         pose = disturbance.moved(scenario.start, self.world.pose_of)
         if isinstance(physics, KinematicWorld):
-            return KinematicRobot(physics, spec, pose)
-        return WheeledRobot(physics, spec, pose, friction=disturbance.friction, mass_factor=disturbance.mass)
+            return KinematicRobot(physics, spec_of(scenario.robot), pose)
+        spec = simulated_spec(scenario.robot, self.folder, name or "robot")
+        body = OmniRobot if spec.drive is Drive.HOLONOMIC else WheeledRobot
+        return body(physics, spec, pose, friction=disturbance.friction, mass_factor=disturbance.mass)
 
     def fellows_of(self, name: str) -> dict[str, Fellow]:
         """Return the other robots, as the robot of this name meets them, by their names."""

@@ -1,0 +1,73 @@
+"""What a user may state about a robot that has a URDF; all that is not stated is found from it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import field_validator, model_validator
+
+from mbf_abstract.parameters import ParameterModel, parameter
+
+DriveName = Literal["differential", "skid", "ackermann", "omni", "tracked", "legged"]
+Corners = tuple[tuple[float, float], ...]
+
+
+class UrdfRobot(ParameterModel):
+    """A robot described by a URDF. Positions are in ``base_link`` as navigation has it: on the ground, x ahead."""
+
+    urdf: str = parameter(..., "The URDF: a file, or package://NAME/... .")
+    drive: DriveName | None = parameter(None, "How its wheels move it; absent = found from the wheels.")
+    wheels: tuple[str, ...] = parameter((), "Joints of its wheels; empty = found from axes and shapes.")
+    footprint: Literal["auto"] | Corners = parameter(
+        "auto", "Corners of the outline, counter-clockwise; auto = the hull of the collision shapes.", unit="m"
+    )
+    footprint_heights: tuple[float, float] = parameter(
+        (0.0, 100.0), "Heights above the ground between which collision shapes count for the footprint.", unit="m"
+    )
+    footprint_corners: int = parameter(12, "Most corners of a footprint that is found.", ge=4, le=64)
+    height: float | None = parameter(None, "Height above the ground.", unit="m", gt=0.0, le=100.0)
+    mass: float | None = parameter(None, "Of the whole robot; all parts become heavier alike.", unit="kg", gt=0.0)
+    center_of_mass: tuple[float, float, float] | None = parameter(None, "Centre of mass.", unit="m")
+    wheel_radius: float | None = parameter(None, "Of the driven wheels.", unit="m", gt=0.0)
+    wheelbase: float | None = parameter(None, "Distance of the outermost axles.", unit="m", gt=0.0)
+    track: float | None = parameter(None, "Distance of left and right wheels, from middle to middle.", unit="m", gt=0.0)
+    track_multiplier: float | None = parameter(
+        None, "A robot that skids turns as if its track were this much wider.", ge=1.0, le=10.0
+    )
+    ground_clearance: float | None = parameter(None, "Height of the belly above the ground.", unit="m", gt=0.0)
+    max_speed: float | None = parameter(None, "Speed limit.", unit="m/s", gt=0.0, le=100.0)
+    max_yaw_rate: float | None = parameter(None, "Limit of the yaw rate.", unit="rad/s", gt=0.0, le=50.0)
+    max_acceleration: float = parameter(1.5, "Limit; a URDF has none.", unit="m/s^2", gt=0.0, le=100.0)
+    max_yaw_acceleration: float = parameter(4.0, "Limit; a URDF has none.", unit="rad/s^2", gt=0.0, le=100.0)
+    max_steering_angle: float | None = parameter(
+        None, "Of a car, for the wheel in the middle of its axle.", unit="rad", gt=0.0, lt=1.4
+    )
+    motor_torque: float | None = parameter(None, "Limit of each driven wheel.", unit="N m", gt=0.0)
+    max_slope: float = parameter(
+        0.45, "Steepest slope that planning may use, on which wheels still hold.", unit="rad", gt=0.0, lt=1.57
+    )
+    tip_over_margin: float = parameter(0.15, "Angle to keep from tipping over.", unit="rad", ge=0.0, lt=1.57)
+    lidar_position: tuple[float, float, float] | None = parameter(
+        None, "Of the scanner; absent = above the middle, 5 cm over the top.", unit="m"
+    )
+
+    @field_validator("footprint")
+    @classmethod
+    def _footprint_is_convex(cls, value: Literal["auto"] | Corners) -> Literal["auto"] | Corners:
+        if value == "auto":
+            return value
+        ahead = (*value[1:], *value[:1])
+        beyond = (*value[2:], *value[:2])
+        turns = [
+            (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+            for a, b, c in zip(value, ahead, beyond, strict=True)
+        ]
+        if len(value) < 3 or min(turns) <= 0.0:
+            raise ValueError("auto, or at least three corners of a convex outline, counter-clockwise")
+        return value
+
+    @model_validator(mode="after")
+    def _heights_rise(self) -> UrdfRobot:
+        if self.footprint_heights[0] >= self.footprint_heights[1]:
+            raise ValueError("footprint_heights: the lower height first")
+        return self

@@ -1,0 +1,1 @@
+"""Robots that a URDF describes, in scenarios and in the simulated worlds."""
