@@ -62,10 +62,11 @@ def serve(
     with readable_errors():
         from mbf_ros.rosbridge.server import ServerOptions
         from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
+        from mbf_ros.sensor_options import sensors_of
 
         access = _access(host, token)
         server_options = ServerOptions(access, port, tuple(allow_origin), max_message)
-        options = BridgeOptions(server_options, not keep_goals, stamped, _sensors(sensor))
+        options = BridgeOptions(server_options, not keep_goals, stamped, sensors_of(sensor))
         with waiting("reading the configuration") as on_step:
             session, robot = _open(what, backend or None, seed if seed >= 0 else None, on_step)
         with session, serve_session(session, options, robot) as server:
@@ -77,22 +78,6 @@ def _access(host: str, token: bool) -> PageAccess:
     from mbf_abstract.access.page_access import PageAccess, is_loopback
 
     return PageAccess.by_token(host) if token or not is_loopback(host) else PageAccess.open(host)
-
-
-def _sensors(texts: list[str]) -> dict[str, tuple[str, str]]:
-    """Type and source by topic; raises ValueError where a text is no TOPIC:TYPE=SOURCE."""
-    from mbf_ros.rosbridge.topic_robot import SENSORS
-
-    found = {}
-    for text in texts:
-        topic, _, rest = text.partition(":")
-        kind, _, source = rest.partition("=")
-        name = f"sensor_msgs/{kind}"
-        if not topic or not source or name not in SENSORS:
-            kinds = ", ".join(one.partition("/")[2] for one in SENSORS)
-            raise ValueError(f"--sensor must be TOPIC:TYPE=SOURCE with one of the types {kinds}, got {text!r}")
-        found[topic] = (name, source)
-    return found
 
 
 def _open(

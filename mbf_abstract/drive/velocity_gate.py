@@ -175,6 +175,12 @@ class VelocityGate:
             self._events.emit(EventKind.LEASE_GRANTED, "velocity_gate", holder=owner)
             return self._lease
 
+    def ask_stop(self, reason: str) -> None:
+        """Have the watchdog send zero at once, whoever has the lease and keeps it; never waits."""
+        with self._condition:
+            if not self._writer.stands:
+                self._wake_watchdog(reason)
+
     def close(self, reason: str = "server shut down") -> None:
         """Stop the robot for good: revoke the lease, refuse new ones, end the watchdog. Idempotent.
 

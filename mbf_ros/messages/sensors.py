@@ -7,6 +7,7 @@ and a range that is NaN or outside of ``range_min`` to ``range_max`` is no measu
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,6 +117,14 @@ def _scan(
     header = message["header"]
     stamp = context.stamp(header["stamp"]) or received
     return RangeScan.of_rays(source, (0.0, 0.0, 0.0), ends, hits, stamp, context.frame(header["frame_id"]))
+
+
+SENSORS: dict[str, Callable[[Message, MessageContext, str, float], RangeScan]] = {
+    "sensor_msgs/LaserScan": laser_scan_of,
+    "sensor_msgs/PointCloud2": point_cloud_of,
+    "sensor_msgs/Range": range_of,
+}
+"""What makes a scan of a message, by the types that are read."""
 
 
 # ------------------------------------------------------------------------------------------------------ to messages

@@ -16,14 +16,8 @@ from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_ros.messages.geometry import MessageContext, odometry_of, transforms_of
 from mbf_ros.messages.interfaces import Message, MessageError
-from mbf_ros.messages.sensors import laser_scan_of, point_cloud_of, range_of
+from mbf_ros.messages.sensors import SENSORS
 from mbf_ros.rosbridge.topics import TopicTable
-
-SENSORS = {
-    "sensor_msgs/LaserScan": laser_scan_of,
-    "sensor_msgs/PointCloud2": point_cloud_of,
-    "sensor_msgs/Range": range_of,
-}
 
 
 class TopicRobot:
@@ -74,7 +68,7 @@ class TopicRobot:
         take_scan : callable
             Of the server.
         sensors : mapping of str to (str, str)
-            Type of ``SENSORS``, and source in the configuration, by the topics of the sensors.
+            Type of ``sensors.SENSORS``, and source in the configuration, by the topics of the sensors.
         """
 
         def take_odometry(message: Message) -> None:

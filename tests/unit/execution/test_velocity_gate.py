@@ -151,6 +151,17 @@ def test_a_paused_lease_holds_the_robot_until_it_is_resumed(scene):
     assert scene.memory.of_kind(EventKind.COMMAND_DROPPED)[0].data["reason"] == "the lease is paused"
 
 
+def test_a_stop_asked_of_the_gate_comes_at_once_and_leaves_the_lease(scene):
+    lease = scene.gate.acquire("a")
+    scene.gate.ask_stop("nothing moves yet")
+    lease.send(FORWARD)
+    scene.gate.ask_stop("no odometry")
+    scene.clock.sleep(0.01)
+    assert lease.send(FORWARD)
+    assert scene.robot.commands == [(0.0, FORWARD), (0.0, Twist()), (0.01, FORWARD)]
+    assert [event.data["reason"] for event in scene.memory.of_kind(EventKind.ROBOT_STOPPED)] == ["no odometry"]
+
+
 def test_a_closed_gate_stops_the_robot_for_good(scene):
     lease = scene.gate.acquire("a")
     lease.send(FORWARD)

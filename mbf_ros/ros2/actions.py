@@ -1,0 +1,141 @@
+"""An action of ours as an action server of ROS 2.
+
+Goals wait as coroutines of the executor, not on threads. What navigation refuses, or what means nothing, is accepted
+and ends aborted with outcome and text, as a rejected goal of ROS 2 has no result; see decision 0023. Rejected are goals
+beyond ``MAX_GOALS`` and those that come while the node ends. A goal that a newer one has taken over ends aborted with
+the outcome CANCELED: ROS 2 knows a canceled goal only where its client has asked for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from mbf_abstract.goals.goal_types import ActionResult
+from mbf_abstract.goals.handle import AnyGoalHandle, GoalStatus
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
+from mbf_ros.messages import mbf_actions
+from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
+from mbf_ros.messages.geometry import MessageContext
+from mbf_ros.ros2.conversion import fill, interface_class, to_dict
+
+ACTIONS: dict[str, tuple[ActionMapping[Any, Any], int]] = {
+    "get_path": (mbf_actions.GET_PATH, GetPathOutcome.TF_ERROR),
+    "exe_path": (mbf_actions.EXE_PATH, ExePathOutcome.TF_ERROR),
+    "recovery": (mbf_actions.RECOVERY, RecoveryOutcome.TF_ERROR),
+    "move_base": (mbf_actions.MOVE_BASE, MoveBaseOutcome.TF_ERROR),
+}
+"""Mapping, and outcome at a jump of time, by the private names of the actions."""
+MAX_GOALS = 50
+"""How many goals of one action may be unfinished at a time."""
+
+
+class ServedAction:
+    """One action server.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    name : str
+        One of ``ACTIONS``.
+    send : callable
+        Sends a goal of ours.
+    context : callable
+        How stamps and frames relate to ours, now.
+    """
+
+    def __init__(
+        self, node: Any, name: str, send: Callable[[Any], AnyGoalHandle], context: Callable[[], MessageContext]
+    ) -> None:
+        from rclpy.action import ActionServer
+
+        self._node, self._send, self._context = node, send, context
+        self._mapping, self._outcome_of_jump = ACTIONS[name]
+        self._class = interface_class(self._mapping.type)
+        self._goals: dict[bytes, AnyGoalHandle] = {}
+        self._jumps: dict[bytes, str] = {}
+        self._accepted = 0
+        self.closing = False
+        ActionServer(
+            node,
+            self._class,
+            f"~/{name}",
+            execute_callback=self._execute,
+            goal_callback=self._accept,
+            cancel_callback=self._cancel,
+        )
+
+    @property
+    def unfinished(self) -> int:
+        """How many goals have not got their result."""
+        return self._accepted
+
+    def abort_all(self, message: str) -> None:
+        """End all goals with the outcome TF_ERROR."""
+        for key, handle in self._goals.items():
+            self._jumps[key] = message
+            handle.cancel(message)
+
+    # ------------------------------------------------------------------- all of these on the executor's thread
+    def _accept(self, request: Any) -> Any:
+        from rclpy.action import GoalResponse
+
+        if self.closing or self._accepted >= MAX_GOALS:
+            reason = "the node ends" if self.closing else f"{MAX_GOALS} goals are unfinished already"
+            self._node.get_logger().warning(f"{self._mapping.type}: goal rejected: {reason}")
+            return GoalResponse.REJECT
+        self._accepted += 1
+        return GoalResponse.ACCEPT
+
+    def _cancel(self, goal_handle: Any) -> Any:
+        from rclpy.action import CancelResponse
+
+        handle = self._goals.get(bytes(goal_handle.goal_id.uuid))
+        if handle is not None:
+            handle.cancel("canceled by the client")
+        return CancelResponse.ACCEPT
+
+    async def _execute(self, goal_handle: Any) -> Any:
+        """Run one goal; returns the message of its result."""
+        try:
+            result, status = await self._run(goal_handle)
+        except RefusedGoal as error:
+            result, status = self._mapping.refused(error.outcome, str(error)), GoalStatus.REJECTED
+        finally:
+            self._accepted -= 1
+        if status is GoalStatus.SUCCEEDED:
+            goal_handle.succeed()
+        elif status is GoalStatus.CANCELED and goal_handle.is_cancel_requested:
+            goal_handle.canceled()
+        else:
+            goal_handle.abort()
+        return fill(self._class.Result(), self._mapping.result(result, self._context()))
+
+    async def _run(self, goal_handle: Any) -> tuple[ActionResult, GoalStatus]:
+        from rclpy.task import Future
+
+        key = bytes(goal_handle.goal_id.uuid)
+        handle = self._send(self._mapping.goal_of(to_dict(goal_handle.request), self._context()))
+        if goal_handle.is_cancel_requested:  # before this coroutine had its first turn
+            handle.cancel("canceled by the client")
+        self._goals[key] = handle
+        executor = self._node.executor
+        ended = Future(executor=executor)
+        if self._mapping.feedback is not None:
+            handle.add_feedback_callback(lambda feedback: self._publish_feedback(goal_handle, feedback))
+        handle.add_done_callback(lambda done: executor.create_task(ended.set_result, done))
+        try:
+            await ended
+        finally:
+            del self._goals[key]
+        assert handle.result is not None
+        jump = self._jumps.pop(key, "")
+        if jump and handle.status is GoalStatus.CANCELED:
+            return self._mapping.refused(self._outcome_of_jump, jump), GoalStatus.ABORTED
+        return handle.result, handle.status
+
+    def _publish_feedback(self, goal_handle: Any, feedback: Any) -> None:
+        """Publish a feedback, on the thread of callbacks."""
+        assert self._mapping.feedback is not None
+        message = fill(self._class.Feedback(), self._mapping.feedback(feedback, self._context()))
+        goal_handle.publish_feedback(message)

@@ -1,0 +1,87 @@
+"""The commands ``mbf ros2``, a node of ROS 2, and ``mbf ros2-interfaces``, which compiles message packages."""
+
+from __future__ import annotations
+
+import signal
+import sysconfig
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from mbf_abstract.commands.reporting import FAILURE, readable_errors
+from mbf_abstract.commands.waiting import waiting
+
+if TYPE_CHECKING:
+    from mbf_ros.ros2.node import NavigationNode
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the application ``mbf``."""
+    app.command("ros2")(ros2)
+    app.command("ros2-interfaces")(ros2_interfaces)
+
+
+def ros2(
+    config: Path = typer.Argument(..., metavar="CONFIG", help="A navigation file."),
+    sensor: list[str] = typer.Option(
+        ["scan:LaserScan=scan", "points:PointCloud2=points", "range:Range=range"],
+        "--sensor",
+        help="TOPIC:TYPE=SOURCE of a sensor of the robot, with its source in CONFIG; may be repeated.",
+    ),
+    stamped: bool = typer.Option(False, "--stamped", help="Publish cmd_vel as TwistStamped."),
+    max_silence: float = typer.Option(
+        0.0,
+        "--max-silence",
+        min=0.0,
+        help="Time without odometry, transforms or a sensor at which the robot stops, in s; 0 = command_timeout.",
+    ),
+    ros_arguments: list[str] = typer.Argument(
+        None,
+        metavar="[-- ROS ARGUMENTS]",
+        help="As after --ros-args, e.g. -- -r odom:=wheel/odom -p use_sim_time:=true.",
+    ),
+) -> None:
+    """Serve a navigator as the ROS 2 node move_base_flex, until Ctrl-C."""
+    with readable_errors():
+        from mbf_ros.ros2.node import NodeOptions, navigation_node
+        from mbf_ros.sensor_options import sensors_of
+
+        options = NodeOptions(stamped, max_silence or None, sensors_of(sensor), tuple(ros_arguments or ()))
+        with navigation_node(config, options) as node:
+            _wait_for_end(node)
+    if node.failure:
+        typer.echo(f"error: the node has stopped the robot and ended: {node.failure}", err=True)
+        raise typer.Exit(FAILURE)
+
+
+def ros2_interfaces(
+    into: Path = typer.Option(None, "--into", help="Folder for the packages; that of this Python if not given."),
+) -> None:
+    """Compile mbf_msgs and tf2_msgs, which the wheels of ROS 2 lack; needs gcc."""
+    with readable_errors():
+        from mbf_ros.ros2.interfaces.building import build
+        from mbf_ros.ros2.interfaces.definitions import PACKAGES
+
+        for package in PACKAGES:
+            with waiting(f"compiling {package}") as on_step:
+                target = build(package, into or Path(sysconfig.get_paths()["purelib"]), on_step)
+            typer.echo(f"{package}: {target}")
+
+
+def _wait_for_end(node: NavigationNode) -> None:
+    """Wait for Ctrl-C or a fault; SIGTERM ends the program by an exception, see ``server.process_end``."""
+    pressed = threading.Event()
+    before = signal.signal(signal.SIGINT, lambda number, stack: pressed.set())
+    known: str | None = None
+    try:
+        while not pressed.is_set() and not node.wait(0.1):
+            problem = node.problem()
+            if problem and not known:
+                typer.echo(f"waiting for the robot: {problem}")
+            if known != "" and not problem:
+                typer.echo("move_base_flex is ready")
+            known = problem
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,75 @@
+"""The packages mbf_msgs and tf2_msgs as interface files of ROS 2, made of the fields in ``interfaces.txt``.
+
+Names, types and the order of fields are those of the released packages, so both have the same RIHS01 hashes and speak
+to each other. Of tf2_msgs only TFMessage is here, and mbf_msgs has no ``SetTestRobotState``. Constants are not part of
+a hash; those of results are our outcomes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import IntEnum
+
+from mbf_abstract.maps.queries import CellState
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
+from mbf_ros.messages.interfaces import Field, fields_of, known_types
+from mbf_ros.messages.mbf_queries import GLOBAL_COSTMAP, LOCAL_COSTMAP
+
+PACKAGES = ("mbf_msgs", "tf2_msgs")
+PARTS = {"msg": ("",), "srv": ("_Request", "_Response"), "action": ("_Goal", "_Result", "_Feedback")}
+QUESTIONS = ("CheckPoint", "CheckPose", "CheckPath", "FindValidPose")
+COSTMAPS = {"LOCAL_COSTMAP": LOCAL_COSTMAP, "GLOBAL_COSTMAP": GLOBAL_COSTMAP}
+
+
+def _of_enum(enum: type[IntEnum]) -> dict[str, int]:
+    return {one.name: int(one) for one in enum}
+
+
+CONSTANTS: dict[str, tuple[str, Mapping[str, int]]] = {
+    "mbf_msgs/action/GetPath_Result": ("uint32", _of_enum(GetPathOutcome)),
+    "mbf_msgs/action/ExePath_Result": ("uint32", _of_enum(ExePathOutcome)),
+    "mbf_msgs/action/Recovery_Result": ("uint32", _of_enum(RecoveryOutcome)),
+    "mbf_msgs/action/MoveBase_Result": ("uint32", _of_enum(MoveBaseOutcome)),
+    **{f"mbf_msgs/srv/{name}_Request": ("uint8", COSTMAPS) for name in QUESTIONS},
+    **{f"mbf_msgs/srv/{name}_Response": ("uint8", _of_enum(CellState)) for name in QUESTIONS},
+}
+"""Type and values of the constants of a part, by its name."""
+
+
+def interface_files(package: str) -> dict[str, str]:
+    """Return the text of each interface file of a package, by its path in it, e.g. ``action/GetPath.action``."""
+    interfaces = dict.fromkeys(
+        (kind, name.partition("_")[0])
+        for owner, kind, name in (one.split("/") for one in known_types())
+        if owner == package
+    )
+    return {
+        f"{kind}/{name}.{kind}": "---\n".join(_part(f"{package}/{kind}/{name}{part}") for part in PARTS[kind])
+        for kind, name in interfaces
+    }
+
+
+def used_packages(package: str) -> tuple[str, ...]:
+    """Return the names of the other packages that a package needs, also through others, sorted."""
+    found: set[str] = set()
+    todo = [name for name in known_types() if name.startswith(f"{package}/")]
+    while todo:
+        types = {field.type for field in fields_of(todo.pop()) if "/" in field.type}
+        todo += [name for name in types if name.partition("/")[0] not in found]
+        found |= {name.partition("/")[0] for name in types}
+    if any(path.startswith(("action/", "srv/")) for path in interface_files(package)):
+        found |= {"action_msgs", "service_msgs", "unique_identifier_msgs", "builtin_interfaces"}
+    return tuple(sorted(found - {package}))
+
+
+def _part(name: str) -> str:
+    """The lines of one part of an interface; none of a feedback without fields."""
+    kind, constants = CONSTANTS.get(name, ("", {}))
+    fields = fields_of(name) if name in known_types() else ()
+    lines = [f"{kind} {constant} = {value}" for constant, value in constants.items()]
+    return "".join(f"{line}\n" for line in (*lines, *map(_line, fields)))
+
+
+def _line(field: Field) -> str:
+    brackets = "" if field.length is None else f"[{field.length or ''}]"
+    return f"{field.type}{brackets} {field.name}".replace("/msg/", "/")

@@ -1,0 +1,260 @@
+"""The node ``move_base_flex``: a navigator, a robot behind topics, and the actions and services of mbf_msgs.
+
+Everything that comes in is taken by one thread, which never waits: goals are coroutines, questions to the map have
+threads of their own. Where a callback raises, or that thread ends for another reason, the robot is stopped first.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mbf_abstract.config.configuration import Config
+from mbf_abstract.event_values import error_text
+from mbf_abstract.events import EventKind
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
+from mbf_abstract.goals.goal_types import MoveBaseGoal
+from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.server.factory import read_config
+from mbf_abstract.session import NavigationSession
+from mbf_abstract.time.clock import WallClock, unix_seconds
+from mbf_abstract.time.ticker import Ticker
+from mbf_ros.messages.geometry import NANOSECONDS, MessageContext
+from mbf_ros.ros2.actions import ACTIONS, ServedAction
+from mbf_ros.ros2.clock import RosClock, SimulatedRosClock
+from mbf_ros.ros2.conversion import interface_class
+from mbf_ros.ros2.parameters import NodeParameters
+from mbf_ros.ros2.robot import Arrivals, Frames, RosRobot
+from mbf_ros.ros2.services import ServedQueries
+from mbf_ros.ros2.topics import ODOM, CommandTopic, Inputs, Outputs
+
+NODE = "move_base_flex"
+CLOCK = "/clock"
+WATCH_PERIOD = 0.05  # s of real time between two looks at what fails to come
+CALENDAR_PERIOD = 0.1  # s between two looks at the calendar
+TIME_TO_END = 2.0  # s for goals to end, and their results to be sent
+
+
+class RosError(ValueError):
+    """ROS 2 is not installed, or cannot be used; the text says why."""
+
+
+@dataclass(frozen=True)
+class NodeOptions:
+    """How the node is connected.
+
+    Attributes
+    ----------
+    stamped_commands : bool
+        Publish ``cmd_vel`` as TwistStamped instead of Twist.
+    max_silence : float, optional
+        Longest time [s] without odometry, transforms, a sensor or simulated time; that of ``command_timeout`` if None.
+    sensors : mapping of str to (str, str)
+        Type, one of ``messages.sensors.SENSORS``, and source in the configuration, by topic.
+    ros_arguments : sequence of str
+        As after ``--ros-args``: remappings, parameters, log level.
+    """
+
+    stamped_commands: bool = False
+    max_silence: float | None = None
+    sensors: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    ros_arguments: tuple[str, ...] = ()
+
+
+@contextmanager
+def navigation_node(file: Path, options: NodeOptions | None = None) -> Iterator[NavigationNode]:
+    """Serve the navigator of a configuration file as a node of ROS 2.
+
+    Raises
+    ------
+    ConfigError
+        The file is wrong.
+    RosError, MissingInterfaceError
+        ROS 2, or a package of messages, is missing.
+    """
+    try:
+        import rclpy
+        from rclpy.signals import SignalHandlerOptions
+    except ImportError as error:
+        raise RosError(
+            f"rclpy cannot be imported ({error}): source the setup file of your ROS 2, or install the extra 'ros2' "
+            "in an environment of its own, see docs/ros2.md"
+        ) from error
+
+    options = options or NodeOptions()
+    server_class, config = read_config(file)
+    arguments = ["--ros-args", *options.ros_arguments] if options.ros_arguments else []
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    with ExitStack() as closing:
+        closing.callback(rclpy.try_shutdown)
+        node = NavigationNode(options)
+        closing.callback(node.close)
+        node.serve(server_class, config)
+        yield node
+
+
+class NavigationNode:
+    """The node; made by ``navigation_node``.
+
+    Attributes
+    ----------
+    failure : str
+        Why the node has ended by itself; empty while it runs.
+    """
+
+    def __init__(self, options: NodeOptions) -> None:
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
+        self._options = options
+        self.failure = ""
+        self._ending, self._ended = threading.Event(), threading.Event()
+        self._closing = ExitStack()
+        self._real_time = WallClock()
+        self._arrivals = Arrivals(self._real_time.now)
+        self._node: Any = rclpy.create_node(NODE)
+        self._closing.callback(self._node.destroy_node)
+        self._executor: Any = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._thread = self._real_time.spawn(self._spin, "ros executor")
+        self._closing.callback(self._end_executor)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for the end of the node, at most so long; returns whether it has come."""
+        return self._ended.wait(seconds)
+
+    def problem(self) -> str:
+        """What does not come from the robot; empty if all does."""
+        return self._robot.problem()
+
+    def serve(self, server_class: Any, config: Config) -> None:
+        """Make the navigator and everything that is seen of it; waits for ``/clock`` with ``use_sim_time``."""
+        self._frames = Frames(config.parameters.global_frame, config.parameters.robot_frame)
+        self._clock = clock = self._make_clock()
+        self._session = session = NavigationSession(clock)
+        self._closing.callback(session.close)
+        transforms = TransformBuffer(config.parameters.tf_cache_time)
+        commands = CommandTopic(
+            self._node, self._options.stamped_commands, self._frames.robot_frame, clock, self._context
+        )
+        robot = RosRobot(commands.publish, transforms, clock, self._arrivals, self._frames, self._max_silence)
+        self._robot, self._transforms = robot, transforms
+        server = session.serve(server_class, config, robot, transforms)
+        self._closing.callback(commands.wait_until_sent)
+        self._closing.callback(server.runtime.gate.close, "the node ends")
+        NodeParameters(self._node, server)
+        self._open_topics(config)
+        self._actions = [ServedAction(self._node, name, self._send, self._context) for name in ACTIONS]
+        self._closing.callback(self._stop_serving)
+        ServedQueries(self._node, server, self._context)
+        clock.on_jump.append(self._on_jump)
+        watch = Ticker(self._real_time, session.events, self._stop_where_silent, WATCH_PERIOD, "silence watch")
+        self._closing.callback(watch.stop)
+
+    def close(self) -> None:
+        """Stop the robot, end the goals and leave the graph; once."""
+        self._closing.close()
+
+    # ------------------------------------------------------------------------------------------- parts
+    def _context(self) -> MessageContext:
+        return MessageContext(self._frames.global_frame, self._clock.epoch)
+
+    def _max_silence(self) -> float:
+        given = self._options.max_silence
+        return self._session.navigator.server.runtime.parameters.command_timeout if given is None else given
+
+    def _make_clock(self) -> RosClock:
+        if not self._node.get_parameter("use_sim_time").value:
+            from rclpy.clock import Clock, ClockType
+
+            clock = RosClock(unix_seconds())
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self._node.create_timer(CALENDAR_PERIOD, lambda: clock.follow(unix_seconds()), clock=steady)
+            return clock
+        return self._simulated_clock()
+
+    def _simulated_clock(self) -> RosClock:
+        from rclpy.qos import qos_profile_sensor_data
+
+        clocks: list[SimulatedRosClock] = []
+        came = threading.Event()
+
+        def take(message: Any) -> None:
+            ros_time = message.clock.sec + message.clock.nanosec / NANOSECONDS
+            if not clocks:
+                clocks.append(SimulatedRosClock(ros_time))
+            clocks[0].follow(ros_time)
+            self._arrivals.hear(CLOCK)
+            came.set()
+
+        self._node.create_subscription(interface_class("rosgraph_msgs/Clock"), CLOCK, take, qos_profile_sensor_data)
+        while not came.wait(1.0):
+            self._node.get_logger().info(f"use_sim_time: waiting for {CLOCK}", throttle_duration_sec=5.0)
+        return clocks[0]
+
+    def _open_topics(self, config: Config) -> None:
+        navigator = self._session.navigator
+        self._outputs = Outputs(self._node, navigator, self._context)
+        self._closing.callback(self._outputs.close)
+        inputs = Inputs(self._node, self._clock, self._context, self._arrivals)
+        inputs.listen_to_robot(self._robot, self._transforms, config.parameters.use_odometry)
+        inputs.listen_to_sensors(navigator, self._options.sensors)
+        inputs.listen_to_goals(self._send)
+
+    def _send(self, goal: Any) -> AnyGoalHandle:
+        if isinstance(goal, MoveBaseGoal):
+            self._outputs.show_goal(goal)
+        return self._session.navigator.send(goal)
+
+    # ------------------------------------------------------------------------------------------- watching
+    def _stop_where_silent(self) -> None:
+        if problem := self._robot.problem():
+            self._session.navigator.server.runtime.gate.ask_stop(problem)
+
+    def _on_jump(self, difference: float) -> None:
+        """End what was begun before ROS time jumped, and forget where frames were; static ones stay."""
+        text = f"ROS time jumped by {difference:+.3f} s"
+        self._node.get_logger().warning(text)
+        static = [one for one in self._transforms.newest() if one.static]
+        self._transforms.clear()
+        for one in static:
+            self._transforms.set(one)
+        if self._session.navigator.server.config.parameters.use_odometry:
+            self._arrivals.expect(ODOM)
+        for action in self._actions:
+            action.abort_all(text)
+        self._session.navigator.server.cancel_all(text)
+
+    def _spin(self) -> None:
+        """Take what comes, on a thread of its own, until the node ends."""
+        try:
+            while not self._ending.is_set():
+                self._executor.spin_once(timeout_sec=1.0)
+        except BaseException as error:  # a fault of ours: nothing comes in any more
+            self.failure = f"{type(error).__name__}: {error_text(error)}"
+            if hasattr(self, "_session") and hasattr(self._session, "navigator"):
+                self._session.events.emit(EventKind.FAULT, NODE, type=type(error).__name__, message=self.failure)
+                self._session.navigator.server.runtime.gate.close(f"a callback raised {self.failure}")
+        self._ended.set()
+
+    # ------------------------------------------------------------------------------------------- the end
+    def _stop_serving(self) -> None:
+        """Take no more goals, end those that run, and let their results be sent."""
+        for action in self._actions:
+            action.closing = True
+        self._session.navigator.server.runtime.gate.close("the node ends")
+        self._session.navigator.server.cancel_all("the node ends")
+        deadline = self._real_time.now() + TIME_TO_END
+        while any(action.unfinished for action in self._actions) and self._real_time.now() < deadline:
+            if self.wait(WATCH_PERIOD):
+                break
+
+    def _end_executor(self) -> None:
+        self._ending.set()
+        self._executor.wake()
+        self._thread.join(TIME_TO_END)
+        self._executor.shutdown(timeout_sec=TIME_TO_END)

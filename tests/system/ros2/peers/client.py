@@ -1,0 +1,143 @@
+"""A client of the node: each line of stdin is a JSON order, and what comes of it is a JSON line on stdout."""
+
+import json
+import sys
+import threading
+
+import rclpy
+from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import PoseStamped
+from mbf_msgs.action import ExePath, GetPath, MoveBase, Recovery
+from mbf_msgs.srv import CheckPath, CheckPoint, CheckPose, FindValidPose
+from nav_msgs.msg import Path
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.action import ActionClient
+from std_srvs.srv import Empty, Trigger
+
+ACTIONS = {"get_path": GetPath, "exe_path": ExePath, "move_base": MoveBase, "recovery": Recovery}
+SERVICES = {
+    "check_point_cost": CheckPoint,
+    "check_pose_cost": CheckPose,
+    "check_path_cost": CheckPath,
+    "find_valid_pose": FindValidPose,
+    "clear_costmaps": Empty,
+    "pause": Trigger,
+    "resume": Trigger,
+    "cancel_all": Trigger,
+}
+STATUSES = {
+    GoalStatus.STATUS_SUCCEEDED: "succeeded",
+    GoalStatus.STATUS_CANCELED: "canceled",
+    GoalStatus.STATUS_ABORTED: "aborted",
+}
+
+rclpy.init()
+node = rclpy.create_node("client")
+clients = {name: ActionClient(node, kind, f"/move_base_flex/{name}") for name, kind in ACTIONS.items()}
+handles = {}
+
+
+def say(**fields):
+    sys.stdout.write(json.dumps(fields) + "\n")
+    sys.stdout.flush()
+
+
+def pose(x, y, frame="map", w=1.0):
+    stamped = PoseStamped()
+    stamped.header.frame_id = frame
+    stamped.pose.position.x, stamped.pose.position.y = float(x), float(y)  # rclpy would take the bits of an int
+    stamped.pose.orientation.w = float(w)
+    return stamped
+
+
+def send(key, action, target=None, path=None, **fields):
+    goal = ACTIONS[action].Goal(**fields)
+    if target is not None:
+        goal.target_pose = pose(*target)
+    if path is not None:
+        goal.path = Path(poses=[pose(*one) for one in path])
+        goal.path.header.frame_id = "map"
+
+    def feedback(message):
+        say(
+            key=key,
+            what="feedback",
+            dist=message.feedback.dist_to_goal,
+        )
+
+    def accepted(future):
+        handles[key] = future.result()
+        say(key=key, what="accepted" if future.result().accepted else "rejected")
+        if future.result().accepted:
+            future.result().get_result_async().add_done_callback(ended)
+
+    def ended(future):
+        result = future.result().result
+        poses = (
+            [[one.pose.position.x, one.pose.position.y] for one in result.path.poses] if action == "get_path" else []
+        )
+        status = STATUSES[future.result().status]
+        say(key=key, what="result", status=status, outcome=result.outcome, message=result.message, poses=poses)
+
+    clients[action].send_goal_async(goal, feedback_callback=feedback).add_done_callback(accepted)
+
+
+def cancel(key):
+    handles[key].cancel_goal_async()
+
+
+def call(key, service, target=None, path=None, **fields):
+    request = SERVICES[service].Request(**fields)
+    if service == "check_point_cost":
+        stamped = pose(*target)
+        request.point.header, request.point.point = stamped.header, stamped.pose.position
+    elif target is not None:
+        request.pose = pose(*target)
+    if path is not None:
+        request.path.poses = [pose(*one) for one in path]
+    client = node.create_client(SERVICES[service], f"/move_base_flex/{service}")
+    client.wait_for_service()
+
+    def answered(future):
+        names = [name for name in future.result().get_fields_and_field_types() if name in ("state", "cost", "success")]
+        say(key=key, what="answer", **{name: getattr(future.result(), name) for name in names})
+
+    client.call_async(request).add_done_callback(answered)
+
+
+def get(key, names):
+    client = node.create_client(GetParameters, "/move_base_flex/get_parameters")
+    client.wait_for_service()
+
+    def plain(value):
+        if value.type == ParameterType.PARAMETER_STRING_ARRAY:
+            return list(value.string_array_value)
+        return value.double_value if value.type == ParameterType.PARAMETER_DOUBLE else value.string_value
+
+    client.call_async(GetParameters.Request(names=names)).add_done_callback(
+        lambda future: say(key=key, what="values", values=[plain(one) for one in future.result().values])
+    )
+
+
+def put(key, name, value):
+    client = node.create_client(SetParameters, "/move_base_flex/set_parameters")
+    client.wait_for_service()
+    number = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+    request = SetParameters.Request(parameters=[Parameter(name=name, value=number)])
+
+    def answered(future):
+        result = future.result().results[0]
+        say(key=key, what="set", successful=result.successful, reason=result.reason)
+
+    client.call_async(request).add_done_callback(answered)
+
+
+threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+for client in clients.values():
+    client.wait_for_server()
+say(key="", what="ready")
+orders = {"send": send, "cancel": cancel, "call": call, "get": get, "put": put}
+for line in sys.stdin:
+    order = json.loads(line)
+    orders[order.pop("order")](**order)

@@ -1,0 +1,106 @@
+"""A robot as a node of ROS 2: it drives as cmd_vel says and publishes tf, odometry and a scan, and a log on stdout.
+
+It stops by itself when no command has come for ``COMMAND_TIMEOUT``. A line on stdin with the name of a topic, and
+"off" or "on", silences it; "clock 12.5" sets simulated time. Each line of the log is JSON: the real time in seconds,
+and the speed of a command that came.
+"""
+
+import json
+import math
+import sys
+import threading
+import time
+
+import rclpy
+from geometry_msgs.msg import TransformStamped, Twist
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
+from tf2_msgs.msg import TFMessage
+
+PERIOD, COMMAND_TIMEOUT = 0.02, 1.0
+
+
+class Robot(Node):
+    def __init__(self, simulated):
+        super().__init__("robot")
+        self.x = self.y = self.yaw = 0.0
+        self.time = 1000.0
+        self.simulated, self.command, self.commanded = simulated, Twist(), 0.0
+        self.silent = set()
+        self.tf = self.create_publisher(TFMessage, "/tf", 100)
+        self.odom = self.create_publisher(Odometry, "odom", 10)
+        self.scan = self.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
+        self.clock = self.create_publisher(Clock, "/clock", 10)
+        self.create_subscription(Twist, "cmd_vel", self.take, 10)
+        self.create_timer(PERIOD, self.step)
+
+    def take(self, message):
+        self.command, self.commanded = message, time.monotonic()
+        self.log(speed=math.hypot(message.linear.x, message.linear.y) + abs(message.angular.z), x=self.x)
+
+    def log(self, **fields):
+        sys.stdout.write(json.dumps({"at": time.monotonic(), **fields}) + "\n")
+        sys.stdout.flush()
+
+    def stamp(self):
+        if not self.simulated:
+            return self.get_clock().now().to_msg()
+        stamp = Clock().clock
+        stamp.sec, stamp.nanosec = int(self.time), int(self.time % 1.0 * 1e9)
+        return stamp
+
+    def step(self):
+        if time.monotonic() - self.commanded > COMMAND_TIMEOUT:
+            self.command = Twist()
+        turn, speed = self.command.angular.z, self.command.linear.x
+        self.yaw += turn * PERIOD
+        self.x += speed * math.cos(self.yaw) * PERIOD
+        self.y += speed * math.sin(self.yaw) * PERIOD
+        self.time += PERIOD
+        if self.simulated and "clock" not in self.silent:
+            self.clock.publish(Clock(clock=self.stamp()))
+        if "tf" not in self.silent:
+            self.tf.publish(TFMessage(transforms=[self.transform()]))
+        if "odom" not in self.silent:
+            self.odom.publish(self.odometry())
+        if "scan" not in self.silent:
+            self.scan.publish(self.empty_scan())
+
+    def transform(self):
+        transform = TransformStamped(child_frame_id="base_link")
+        transform.header.frame_id, transform.header.stamp = "map", self.stamp()
+        transform.transform.translation.x, transform.transform.translation.y = self.x, self.y
+        transform.transform.rotation.z = math.sin(self.yaw / 2)
+        transform.transform.rotation.w = math.cos(self.yaw / 2)
+        return transform
+
+    def odometry(self):
+        odometry = Odometry(child_frame_id="base_link")
+        odometry.header.frame_id, odometry.header.stamp = "odom", self.stamp()
+        odometry.twist.twist = self.command
+        return odometry
+
+    def empty_scan(self):
+        scan = LaserScan(angle_min=-1.5, angle_max=1.5, angle_increment=0.1, range_min=0.1, range_max=5.0)
+        scan.header.frame_id, scan.header.stamp = "base_link", self.stamp()
+        scan.ranges = [math.inf] * 31
+        return scan
+
+    def listen(self):
+        for line in sys.stdin:
+            topic, value = line.split()
+            if value in ("on", "off"):
+                (self.silent.add if value == "off" else self.silent.discard)(topic)
+            else:
+                self.time = float(value)
+            self.log(done=line.strip())
+
+
+rclpy.init()
+robot = Robot("simulated" in sys.argv)
+threading.Thread(target=robot.listen, daemon=True).start()
+robot.log(ready=True)
+rclpy.spin(robot)

@@ -1,0 +1,88 @@
+"""Our clock on ROS time: it never runs backwards, and waits end when ROS time has come so far."""
+
+import threading
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mbf_ros.ros2.clock import RosClock, SimulatedRosClock
+
+TIMES = st.lists(st.floats(0.0, 1e5), min_size=1, max_size=30)
+
+
+@given(first=st.floats(0.0, 1e5), times=TIMES)
+def test_simulated_time_adds_up_what_passes_forwards(first, times):
+    clock, jumps, elapsed, last = SimulatedRosClock(first), [], 0.0, first
+    clock.on_jump.append(jumps.append)
+    for time in times:
+        clock.follow(time)
+        elapsed, last = elapsed + max(0.0, time - last), time
+        assert abs(clock.now() - elapsed) < 1e-6
+        assert abs(clock.epoch + clock.now() - time) < 1e-6
+    assert len(jumps) == sum(later < earlier for earlier, later in zip([first, *times], times, strict=False))
+
+
+def test_a_wait_ends_when_simulated_time_has_come():
+    clock = SimulatedRosClock(100.0)
+    waits, woken = threading.Event(), []
+
+    def wait():
+        condition = clock.condition()
+        with condition:
+            waits.set()
+            while clock.now() < 2.0:
+                condition.wait(2.0 - clock.now())
+        woken.append(clock.now())
+
+    thread = clock.spawn(wait, "waiter")
+    assert waits.wait(20.0)
+    clock.follow(101.0)
+    assert thread.is_alive()
+    clock.follow(102.5)
+    assert thread.join(20.0)
+    assert woken == [2.5]
+
+
+def test_a_wait_ends_at_a_notification_too():
+    clock = SimulatedRosClock(0.0)
+    condition, waits, answers = clock.condition(), threading.Event(), []
+
+    def wait():
+        with condition:
+            waits.set()
+            answers.append(condition.wait(5.0))
+
+    thread = clock.spawn(wait, "waiter")
+    assert waits.wait(20.0)
+    with condition:
+        condition.notify_all()
+    assert thread.join(20.0)
+    assert answers == [True]
+
+
+def test_a_thread_that_sleeps_wakes_after_simulated_seconds():
+    clock = SimulatedRosClock(0.0)
+    thread = clock.spawn(lambda: clock.sleep(1.0), "sleeper")
+    time = 0.0
+    while not thread.join(0.01):
+        time += 0.1
+        clock.follow(time)
+    assert time > 0.95
+
+
+def test_the_epoch_follows_a_calendar_that_is_set_and_ours_goes_on():
+    clock, jumps = RosClock(1000.0), []
+    clock.on_jump.append(jumps.append)
+    clock.follow(clock.epoch + clock.now() + 0.1)  # corrected
+    assert jumps == []
+    before = clock.now()
+    clock.follow(clock.epoch + clock.now() - 60.0)
+    assert len(jumps) == 1 and abs(jumps[0] + 60.0) < 0.5
+    assert abs(clock.epoch - 940.1) < 0.5 and clock.now() >= before
+
+
+def test_equal_ros_times_stay_equal_while_the_calendar_is_right():
+    clock = RosClock(1000.0)
+    epoch = clock.epoch
+    clock.follow(clock.epoch + clock.now() + 0.001)
+    assert clock.epoch == epoch

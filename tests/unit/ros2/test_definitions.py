@@ -1,0 +1,43 @@
+"""The interface files that are compiled have the fields of ``interfaces.txt``, proved by parsing them."""
+
+from pathlib import Path
+
+import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_ros.ros2.interfaces.definitions import PACKAGES, PARTS, interface_files, used_packages
+
+HASHES = dict(
+    line.split()
+    for line in (Path(__file__).parents[1] / "ros" / "type_hashes.txt").read_text().splitlines()
+    if not line.startswith("#")
+)
+
+
+def parts():
+    """Name and text of each part of each file; a part without fields is left out."""
+    for package in PACKAGES:
+        for path, text in interface_files(package).items():
+            kind, _, name = path.partition(".")[0].partition("/")
+            for part, lines in zip(PARTS[kind], text.split("---\n"), strict=True):
+                if lines:
+                    yield f"{package}/{kind}/{name}{part}", lines
+
+
+@pytest.mark.parametrize(("name", "text"), list(parts()))
+def test_a_part_has_the_hash_of_the_released_package(name, text):
+    store = get_typestore(Stores.ROS2_KILTED)
+    (fields,) = get_types_from_msg(text, name).values()
+    store.fielddefs[name] = fields
+    assert store.hash_rihs01(name) == HASHES[name]
+
+
+def test_the_constants_of_a_result_are_our_outcomes():
+    lines = interface_files("mbf_msgs")["action/GetPath.action"].splitlines()
+    assert [line for line in lines if "=" in line] == [f"uint32 {one.name} = {int(one)}" for one in GetPathOutcome]
+
+
+def test_every_package_that_is_needed_is_named():
+    assert used_packages("tf2_msgs") == ("builtin_interfaces", "geometry_msgs", "std_msgs")
+    assert {"action_msgs", "geometry_msgs", "nav_msgs", "service_msgs"} <= set(used_packages("mbf_msgs"))
