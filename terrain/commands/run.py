@@ -1,4 +1,4 @@
-"""The commands ``mbf run``, ``scenarios``, ``replay`` and ``compare``; ``mbf rerun`` is in a module of its own."""
+"""The commands ``mbf run``, ``scenarios`` and ``replay``; ``rerun`` and ``compare`` are in modules of their own."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from mbf_abstract.commands.reporting import FAILURE, readable_errors
-from mbf_abstract.commands.waiting import waiting
 from terrain.commands.command_line import command_line
+from terrain.commands.compare import compare
 from terrain.commands.new_run import RUNS, new_run_folder
 from terrain.commands.rerun import rerun
 
@@ -202,36 +202,6 @@ def replay(
     typer.echo((folder / "replay.html").resolve())
     if show:
         _open_replay(folder)
-
-
-def compare(
-    left: Path = typer.Argument(..., help="Folder of a run."),
-    right: Path = typer.Argument(..., help="Folder of another run."),
-    out: Path = typer.Option(Path("compare.html"), "--out", help="The page to write."),
-) -> None:
-    """Compare two runs: a table of their metrics in the terminal, and one page with everything."""
-    with readable_errors():
-        from rich.console import Console
-        from rich.markup import escape
-        from rich.table import Table
-
-        from terrain.commands.verdict_line import print_verdict
-        from terrain.recording.run_folder import read_run
-        from terrain.recording.whole_files import write_whole
-        from terrain.viewer.reports.comparison import compare_digests, compare_metrics, comparison_html
-
-        runs = read_run(left), read_run(right)
-        names = (left.name, right.name) if left.name != right.name else (str(left), str(right))
-        table = Table("metric", *map(escape, names), "difference")
-        for name, (recording, _) in zip(names, runs, strict=True):
-            print_verdict(recording.verdict, f"{name}: ")
-        for row in compare_metrics(runs[0][1], runs[1][1]):
-            table.add_row(*map(escape, row))
-        Console().print(table)
-        typer.echo(compare_digests(runs[0][1], runs[1][1]))
-        with waiting("writing the page"):
-            write_whole(out, comparison_html(names, *runs))
-    typer.echo(out.resolve())
 
 
 def settings_of(texts: list[str], **chosen: str) -> dict[str, str]:

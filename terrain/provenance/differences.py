@@ -14,6 +14,7 @@ import numpy as np
 from mbf_abstract.config.findings import ConfigError, Finding
 from terrain.provenance.provenance import Provenance
 from terrain.recording.recording import Recording
+from terrain.recording.run_folder import robots_of
 
 DIGEST = "digest"
 ABSENT = "-"
@@ -104,9 +105,13 @@ def _code(run: Provenance, package: str) -> str:
 
 
 def _parting(before: Path, now: Path) -> str:
-    """The first sample whose pose differs, or the first event, whichever is earlier."""
-    runs = Recording.load(before / "recording.npz"), Recording.load(now / "recording.npz")
-    found = [parting for parting in (_first_other_pose(*runs), _first_other_event(*runs)) if parting is not None]
+    """The first sample whose pose differs, or the first event, whichever is earlier; of several robots the first."""
+    found: list[tuple[float, str]] = []
+    for robot in robots_of(before):
+        runs = Recording.load(before / robot / "recording.npz"), Recording.load(now / robot / "recording.npz")
+        partings = (_first_other_pose(*runs), _first_other_event(*runs))
+        whose = f"{robot}: " if robot else ""
+        found += [(parting[0], whose + parting[1]) for parting in partings if parting is not None]
     if not found:
         return "between two recorded samples, or in commands that moved nothing"
     return min(found)[1]

@@ -11,7 +11,7 @@ import itertools
 import re
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -83,7 +83,7 @@ def run_once(job: Job, keep_in: Path | None = None, command: str = "") -> dict[s
         The command line that the run's folder records.
     """
     from terrain.session.runner import RunOptions, run_scenario
-    from terrain.viewer.results import write_results
+    from terrain.viewer.results import write_joint_results, write_results
 
     scenario, run = job
     settings = dict(run.settings)
@@ -99,6 +99,8 @@ def run_once(job: Job, keep_in: Path | None = None, command: str = "") -> dict[s
         options = RunOptions(
             folder, backend, run.seed, settings=settings, geodesic=True, command=command, write_views=write_views
         )
+        if keep_in is not None:
+            options = replace(options, write_joint_views=write_joint_results)
         try:
             result = run_scenario(scenario, options)
         except Exception as error:  # one impossible variant must not end the sweep

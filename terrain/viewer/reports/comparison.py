@@ -1,8 +1,8 @@
-"""Two runs side by side: one HTML file, made of the parts of the report, and the rows of a table for a terminal."""
+"""Runs side by side: one HTML file, made of the parts of the report, and the rows of a table for a terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -11,47 +11,56 @@ from terrain.viewer.reports import report
 from terrain.viewer.reports.page import beside, cell, page, table
 from terrain.viewer.reports.timeline import timeline_svg
 
-WIDTH = 1700  # pixels
+WIDTH = 850  # pixels of a run's column
 
 Run = tuple[Recording, Mapping[str, Any]]
 
 
-def comparison_html(names: tuple[str, str], left: Run, right: Run) -> str:
+def comparison_html(names: Sequence[str], runs: Sequence[Run]) -> str:
     """Return the page's text: ``names`` identify the runs, a run is its recording and its metrics.
 
     Raises ViewerMissing without matplotlib.
     """
-    runs = (left[0], right[0])
-    heads = [f"<p>{escape(name)}</p>{report.summary(run)}" for name, run in zip(names, runs, strict=True)]
+    recordings, metrics = [run[0] for run in runs], [run[1] for run in runs]
+    heads = [f"<p>{escape(name)}</p>{report.summary(run)}" for name, run in zip(names, recordings, strict=True)]
     parts = [
-        beside(heads[0], heads[1]),
-        beside(*map(report.picture, runs)),
-        f"<h2>Metrics</h2><p>{compare_digests(left[1], right[1])}</p>"
-        + table(("name", *names, "difference"), compare_metrics(left[1], right[1])),
-        "<h2>Over time</h2>" + beside(*(report.plots_svg(run) if len(run.times) else "" for run in runs)),
-        "<h2>Actions and plugins</h2>" + beside(*(timeline_svg(run.events) for run in runs)),
-        "<h2>Results of the goals, in order</h2>" + beside(*map(report.goals_table, runs)),
-        "<h2>Incidents, faults, stops and recoveries</h2>" + beside(*map(report.notable_table, runs)),
+        beside(*heads),
+        beside(*map(report.picture, recordings)),
+        f"<h2>Metrics</h2><p>{escape(compare_digests(names, metrics))}</p>"
+        + table(metrics_header(names), compare_metrics(metrics)),
+        "<h2>Over time</h2>" + beside(*(report.plots_svg(run) if len(run.times) else "" for run in recordings)),
+        "<h2>Actions and plugins</h2>" + beside(*(timeline_svg(run.events) for run in recordings)),
+        "<h2>Results of the goals, in order</h2>" + beside(*map(report.goals_table, recordings)),
+        "<h2>Incidents, faults, stops and recoveries</h2>" + beside(*map(report.notable_table, recordings)),
     ]
-    return page(f"{names[0]} and {names[1]}", parts, WIDTH)
+    return page(" and ".join(names), parts, WIDTH * len(runs))
 
 
-def compare_metrics(left: Mapping[str, Any], right: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Rows of name, left, right and right minus left; a metric that one run lacks is a dash."""
-    names = [*left, *(name for name in right if name not in left)]
-    return [
-        (name, _shown(left, name), _shown(right, name), _difference(left.get(name), right.get(name))) for name in names
-    ]
+def metrics_header(names: Sequence[str]) -> tuple[str, ...]:
+    """Titles of the columns of ``compare_metrics``."""
+    return ("metric", *names, *["difference"] * (len(names) == 2))
 
 
-def compare_digests(left: Mapping[str, Any], right: Mapping[str, Any]) -> str:
-    """Return whether two runs are the same drive, bit for bit; equal numbers in the table do not prove it."""
-    digests = left.get("digest"), right.get("digest")
+def compare_metrics(metrics: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
+    """Rows of name and value in each run, of two runs also second minus first; a metric that a run lacks is a dash."""
+    rows: list[tuple[str, ...]] = []
+    for name in dict.fromkeys(name for run in metrics for name in run):
+        difference = [_difference(*(run.get(name) for run in metrics))] if len(metrics) == 2 else []
+        rows.append((name, *(_shown(run, name) for run in metrics), *difference))
+    return rows
+
+
+def compare_digests(names: Sequence[str], metrics: Sequence[Mapping[str, Any]]) -> str:
+    """Return which runs are the same drive, bit for bit; equal numbers in the table do not prove it."""
+    digests = [run.get("digest") for run in metrics]
     if None in digests:
         return "digest: at least one run has none, so whether they are the same drive is not known"
-    if digests[0] == digests[1]:
-        return "digest: equal; poses, commands and events of the two runs are the same, bit for bit"
-    return "digest: differs; the two runs are not the same drive"
+    named = list(zip(names, digests, strict=True))
+    groups = [[name for name, of in named if of == digest] for digest in dict.fromkeys(digests)]
+    if len(groups) == 1:
+        return "digest: equal; poses, commands and events of the runs are the same, bit for bit"
+    same = "; ".join(", ".join(group) for group in groups if len(group) > 1)
+    return f"digest: differs; {f'only these are the same drive: {same}' if same else 'no two are the same drive'}"
 
 
 def _shown(metrics: Mapping[str, Any], name: str) -> str:

@@ -19,7 +19,8 @@ h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.15em; margin-top: 2
 table { border-collapse: collapse; } td, th { text-align: left; padding: 2px 14px 2px 0; vertical-align: top; }
 th { color: #555; font-weight: 600; border-bottom: 1px solid #ccc; } td:first-child { white-space: nowrap; }
 img { max-width: 100%; height: auto; } svg { width: 100%; height: auto; } summary { color: #555; cursor: pointer; }
-.beside { display: grid; grid-template-columns: 1fr 1fr; gap: 0 2em; align-items: start; } .beside > * { min-width: 0; }
+.beside { display: grid; grid-auto-flow: column; grid-auto-columns: 1fr; gap: 0 2em; align-items: start; }
+.beside > * { min-width: 0; }
 """
 STYLE += "".join(f".{level.value} {{ color: {colour}; }}\n" for level, colour in LEVELS.items())
 
@@ -30,9 +31,9 @@ def page(title: str, parts: Iterable[str], width: int = 1000) -> str:
     return "\n".join(["<!doctype html>", f'<html lang="en"><head>{head}</head><body>', *parts, "</body></html>"])
 
 
-def beside(left: str, right: str) -> str:
-    """Two parts in two columns."""
-    return f'<div class="beside"><div>{left}</div><div>{right}</div></div>'
+def beside(*parts: str) -> str:
+    """Parts in columns of the same width."""
+    return f'<div class="beside">{"".join(f"<div>{part}</div>" for part in parts)}</div>'
 
 
 def table(header: tuple[str, ...], rows: Iterable[tuple[Any, ...]]) -> str:

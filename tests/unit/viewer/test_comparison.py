@@ -1,4 +1,4 @@
-"""Two runs side by side, on a page and in the terminal."""
+"""Runs side by side, on a page and in the terminal."""
 
 import json
 import re
@@ -17,7 +17,7 @@ def compare(*arguments):
 def test_the_page_has_both_runs_in_two_columns_and_needs_nothing_else(hill_recording, office_recording):
     runs = [(run, measure(run).to_json()) for run in (hill_recording, office_recording)]
 
-    page = comparison_html(("first", "second"), *runs)
+    page = comparison_html(("first", "second"), runs)
 
     assert page.count("<img") == 2 and page.count("<svg") == 4
     for text in ("hill on mesh", "office on costmap", "BLOCKED_PATH: a box stands on the path", "<th>second</th>"):
@@ -36,7 +36,7 @@ def test_differences_are_right_minus_left_and_only_of_numbers():
         "limit": None,
     }
 
-    assert compare_metrics(left, right) == [
+    assert compare_metrics([left, right]) == [
         ("time_s", "10", "12.5", "+2.5"),
         ("success", "True", "False", "differs"),
         ("incidents", "none", "collision", "differs"),
@@ -80,3 +80,34 @@ def test_equal_digests_are_one_drive_and_equal_numbers_are_not(hill_recording, t
     assert "digest: equal" in reported("again") and "digest: equal" in (tmp_path / "page.html").read_text()
     assert "digest: differs" in reported("other")
     assert "digest: at least one run has none" in reported("old")
+
+
+def test_any_number_of_runs_is_compared_in_80_columns(hill_recording, office_recording, tmp_path):
+    digests = ("ab", "cd", "ab", "ef")
+    for number, digest in enumerate(digests):
+        folder = tmp_path / f"a_run_with_quite_a_long_name_{number}"
+        folder.mkdir()
+        (hill_recording if digest == "ab" else office_recording).save(folder / "recording.npz")
+        numbers = {"digest": digest * 32, "path_length_m": 20.0 + number, "seed": number}
+        (folder / "metrics.json").write_text(json.dumps(numbers))
+    folders = sorted(tmp_path.iterdir())
+
+    result = CliRunner(env={"COLUMNS": "80"}).invoke(
+        make_app(), ["compare", *map(str, folders), "--out", str(tmp_path / "page.html")]
+    )
+
+    assert result.exit_code == 0, result.output
+    tables = [line for line in result.stdout.splitlines() if line.startswith(("│", "┃", "┏", "└"))]
+    assert tables and max(map(len, tables)) <= 80
+    assert "…" not in result.stdout
+    same = "a_run_with_quite_a_long_name_0, a_run_with_quite_a_long_name_2"
+    assert f"only these are the same drive: {same}" in result.stdout
+    values = [re.split(r"\s*│\s*", line.strip("│ ")) for line in tables]
+    assert ["path_length_m", "20", "21", "22"] in values and ["path_length_m", "23"] in values
+    assert (tmp_path / "page.html").read_text().count("<img") == 4
+
+
+def test_one_run_alone_is_refused(tmp_path):
+    result = compare(tmp_path)
+
+    assert result.exit_code == 2 and "two or more folders" in result.output

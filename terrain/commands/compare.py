@@ -1,0 +1,54 @@
+"""The command ``mbf compare``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import typer
+
+from mbf_abstract.commands.reporting import readable_errors
+from mbf_abstract.commands.waiting import waiting
+
+ABREAST = 3  # runs in one table, so that it fits 80 columns
+
+
+def compare(
+    folders: list[Path] = typer.Argument(..., metavar="DIR DIR...", help="Folders of two or more runs."),
+    out: Path = typer.Option(Path("compare.html"), "--out", help="The page to write."),
+) -> None:
+    """Compare runs: a table of their metrics in the terminal, and one page with everything."""
+    if len(folders) < 2:
+        raise typer.BadParameter("expected two or more folders", param_hint="DIR DIR...")
+    with readable_errors():
+        from rich.console import Console
+        from rich.markup import escape
+        from rich.table import Table
+
+        from terrain.commands.verdict_line import print_verdict
+        from terrain.recording.run_folder import read_run
+        from terrain.recording.whole_files import write_whole
+        from terrain.viewer.reports.comparison import compare_digests, compare_metrics, comparison_html, metrics_header
+
+        runs, names = [read_run(folder) for folder in folders], names_of(folders)
+        for name, (recording, _) in zip(names, runs, strict=True):
+            print_verdict(recording.verdict, f"{name}: ")
+        metrics = [run[1] for run in runs]
+        for first in range(0, len(runs), ABREAST):
+            some = slice(first, first + ABREAST)
+            table = Table()
+            for title in metrics_header(names[some]):
+                table.add_column(escape(title), overflow="fold")
+            for row in compare_metrics(metrics[some]):
+                table.add_row(*map(escape, row))
+            Console().print(table)
+        typer.echo(compare_digests(names, metrics))
+        with waiting("writing the page"):
+            write_whole(out, comparison_html(names, runs))
+    typer.echo(out.resolve())
+
+
+def names_of(folders: Sequence[Path]) -> list[str]:
+    """Return the names of the folders; where two have the same, their whole paths."""
+    names = [folder.name for folder in folders]
+    return names if len(set(names)) == len(names) else [str(folder) for folder in folders]
