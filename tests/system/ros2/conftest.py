@@ -201,13 +201,13 @@ class Trio:
 
     domains = itertools.cycle(range(1 + 5 * (os.getpid() % 20), 6 + 5 * (os.getpid() % 20)))
 
-    def __init__(self, closing, folder, file, *arguments, simulated=False):
+    def __init__(self, closing, folder, file, *arguments, simulated=False, program=("-c", MBF, "ros2")):
         self._closing, self._folder, self._domain = closing, folder, next(self.domains)
         file.write_text(ROBOT)
         ros = ["--", "-p", "use_sim_time:=true"] if simulated else []
         self.robot_arguments = ["simulated"] if simulated else []
         self.robot = self.start(Robot, *self.robot_arguments)
-        self.node = self.start(Peer, "-c", MBF, "ros2", str(file), *arguments, *ros)
+        self.node = self.start(Peer, *program, str(file), *arguments, *ros)
         self.client = self.start(Client)
         self.wait_until_ready()
         self.client.wait("", "ready")

@@ -1,11 +1,13 @@
 """What fails to come, jumps or is killed: the robot is stopped, and the next goal works."""
 
 import signal
+from pathlib import Path
 
 import pytest
 
 from mbf_abstract.outcomes import ExePathOutcome, MoveBaseOutcome
 
+PEERS = Path(__file__).parent / "peers"
 pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
 
 
@@ -57,6 +59,16 @@ def test_zero_is_the_last_command_of_a_node_that_is_ended(start_trio, number, co
     trio.robot.wait_for_speed(lambda speed: speed == 0.0, before)
     assert trio.client.wait(goal, "result")["status"] == "aborted"
     assert trio.node.process.wait(60) == code
+    assert [line["speed"] for line in trio.robot.lines if "speed" in line][-1] == 0.0
+
+
+def test_zero_is_the_last_command_of_a_node_in_which_a_callback_raises(start_trio):
+    trio = start_trio(program=[str(PEERS / "faulty_node.py")])
+    drive(trio, 8.0)
+    before = len(trio.robot.lines)
+    trio.robot.set("fail", "now")
+    trio.robot.wait_for_speed(lambda speed: speed == 0.0, before)
+    assert trio.node.process.wait(60) == 1
     assert [line["speed"] for line in trio.robot.lines if "speed" in line][-1] == 0.0
 
 

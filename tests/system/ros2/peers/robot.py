@@ -1,8 +1,8 @@
 """A robot as a node of ROS 2: it drives as cmd_vel says and publishes tf, odometry and a scan, and a log on stdout.
 
-It stops by itself when no command has come for ``COMMAND_TIMEOUT``. A line on stdin with the name of a topic, and
-"off" or "on", silences it; "clock 12.5" sets simulated time. Each line of the log is JSON: the real time in seconds,
-and the speed of a command that came.
+It stops by itself when no command has come for ``COMMAND_TIMEOUT``. It takes orders on stdin, one a line: the name
+of a topic and "off" or "on" silences it, "clock 12.5" sets simulated time, "fail now" publishes on ``fail``. Each line
+of the log is JSON: the real time in seconds, and the speed of a command that came.
 """
 
 import json
@@ -18,6 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Empty
 from tf2_msgs.msg import TFMessage
 
 PERIOD, COMMAND_TIMEOUT = 0.02, 1.0
@@ -34,6 +35,7 @@ class Robot(Node):
         self.odom = self.create_publisher(Odometry, "odom", 10)
         self.scan = self.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
         self.clock = self.create_publisher(Clock, "/clock", 10)
+        self.fail = self.create_publisher(Empty, "fail", 10)
         self.create_subscription(Twist, "cmd_vel", self.take, 10)
         self.create_timer(PERIOD, self.step)
 
@@ -94,6 +96,8 @@ class Robot(Node):
             topic, value = line.split()
             if value in ("on", "off"):
                 (self.silent.add if value == "off" else self.silent.discard)(topic)
+            elif topic == "fail":
+                self.fail.publish(Empty())
             else:
                 self.time = float(value)
             self.log(done=line.strip())
