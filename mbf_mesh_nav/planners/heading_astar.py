@@ -12,6 +12,7 @@ meant for meshes below 300 k vertices.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -59,9 +60,12 @@ class HeadingAStarPlanner(SurfacePlanner):
 
     def __init__(self, context: MeshContext) -> None:
         super().__init__(context)
-        mesh_map = self.mesh_map
         self._refuse_other_layers(self.parameters.tilt_layer)
-        self._graph = DriveGraph(mesh_map.topology)
+
+    @cached_property
+    def _graph(self) -> DriveGraph:
+        """What can be driven; made for the first plan, for a fallback may never be asked for one."""
+        return DriveGraph(self.mesh_map.topology)
 
     def _refuse_other_layers(self, name: str) -> None:
         """A layer that was named on purpose, but is none of tilts, would leave slopes to the defaults unnoticed."""
