@@ -80,7 +80,7 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
             expected = "a bare map: a configuration has track_unknown_space and allow_unknown for this"
             raise ConfigError([Finding(str(file), 1, "", expected, f"--unknown {unknown} with a configuration")])
         return *read_config(file), []
-    for cls in installed_servers():
+    for cls in installed_servers(file.suffix):
         text = cls.config_for_map(file.resolve(), unknown_is_free=unknown != "lethal")
         if text is not None:
             return *_read_config_text(text), _unknown_note(cls.read_floor(file), unknown)

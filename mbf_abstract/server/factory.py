@@ -18,6 +18,8 @@ from mbf_abstract.maps.view import FloorMap
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.time.clock import Clock
 
+MAP_FILES_GROUP = "mbf.map_files"
+
 
 def server_class(raw: RawConfig, registry: PluginRegistry | None = None) -> type[AbstractNavigationServer]:
     """Find the server class of a configuration's ``backend``; raises ConfigError if there is none.
@@ -41,16 +43,25 @@ def read_config(path: str | os.PathLike[str]) -> tuple[type[AbstractNavigationSe
     return cls, validate_config(raw, cls.config_sections, registry, cls.plugin_declaration, cls.map_names)
 
 
-def installed_servers() -> Iterator[type[AbstractNavigationServer]]:
-    """Server classes of all installed packages, by name; each is imported when its turn comes."""
+def installed_servers(suffix: str = "") -> Iterator[type[AbstractNavigationServer]]:
+    """Server classes of all installed packages; each is imported when its turn comes.
+
+    Parameters
+    ----------
+    suffix : str
+        Of a map file, such as ``.ply``. Servers that an entry point of the group ``mbf.map_files`` names for it come
+        first, so that the others need not be imported; else they come by their names.
+    """
     registry = PluginRegistry()
-    for name in sorted({point.name for point in entry_points(group="mbf.servers")}):
+    servers = {point.name: point.value for point in entry_points(group="mbf.servers")}
+    reading = {point.value for point in entry_points(group=MAP_FILES_GROUP) if f".{point.name}" == suffix.lower()}
+    for name in sorted(servers, key=lambda name: (servers[name] not in reading, name)):
         yield registry.load("servers", name, AbstractNavigationServer)
 
 
 def read_floor(file: Path) -> FloorMap:
     """Read a map file by the first installed server that knows its format; raises ConfigError if it cannot be used."""
-    for cls in installed_servers():
+    for cls in installed_servers(file.suffix):
         floor = cls.read_floor(file)
         if floor is not None:
             return floor
