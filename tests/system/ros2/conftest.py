@@ -87,12 +87,16 @@ def prepared():
 
 
 def _build(folder):
-    run = lambda *command: subprocess.run(command, check=True, env=clean_variables(folder), timeout=900)  # noqa: E731
-    run(sys.executable, "-m", "venv", "--without-pip", str(folder / "venv"))
-    python = str(folder / "venv" / "bin" / "python")
+    variables = clean_variables(folder)
+    venv, python = folder / "venv", str(folder / "venv" / "bin" / "python")
     pip = [sys.executable, "-m", "pip", "--python", python, "--disable-pip-version-check"]
-    run(*pip, "install", "--quiet", "--no-warn-conflicts", *requirements())
-    run(python, "-c", MBF, "ros2-interfaces", "--into", str(folder / "interfaces"))
+    ours = {**os.environ, "PYTHONPATH": variables["PYTHONPATH"]}  # pip may find its index and proxy there
+    for command, environment in (
+        ([sys.executable, "-m", "venv", "--without-pip", str(venv)], ours),
+        ([*pip, "install", "--quiet", "--no-warn-conflicts", *requirements()], ours),
+        ([python, "-c", MBF, "ros2-interfaces", "--into", str(folder / "interfaces")], variables),
+    ):
+        subprocess.run(command, check=True, env=environment, timeout=900)
 
 
 class Peer:
