@@ -1,24 +1,29 @@
 """Files that scenarios, configurations and maps name in their texts: found, hashed, and copied into a run's folder.
 
 A text of a YAML or glTF file names a file if it is the absolute path of one, or its path from the folder that the text
-stands in. Only texts with a suffix count, so that a plugin type is never taken for a file.
+stands in. Only texts with a suffix count, so that a plugin type is never taken for a file. A URDF names its meshes and
+textures, in packages, too.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shutil
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr, unescape
 
 import yaml
 
 from mbf_abstract.config.yaml_source import read_yaml
+from terrain.description.mesh_files import find_file
 
 YAML_SUFFIXES = {".yaml", ".yml"}
-GLTF_SUFFIX = ".gltf"
+GLTF_SUFFIX, URDF_SUFFIX = ".gltf", ".urdf"
+FILE_OF_URDF = re.compile(r"""(filename\s*=\s*)("[^"]*"|'[^']*')""")
 INPUTS = "inputs"
 MAX_NAME = 200  # bytes; a longer text is no file's name
 MAX_GLTF = 64_000_000  # bytes; a larger one holds its numbers itself
@@ -48,12 +53,24 @@ def content_of(file: Path) -> Any:
     if file.suffix.lower() in YAML_SUFFIXES:
         document = read_yaml(file, [])
         return None if document is None else document.data
+    if file.suffix.lower() == URDF_SUFFIX:
+        names = (_unquoted(match[2]) for match in FILE_OF_URDF.finditer(_text_of(file)))
+        return [str(found.absolute()) for name in names if (found := find_file(name, file.parent)) is not None]
     if file.suffix.lower() != GLTF_SUFFIX or file.stat().st_size > MAX_GLTF:
         return None
     try:
         return json.loads(file.read_bytes())
     except (ValueError, RecursionError):
         return None
+
+
+def _text_of(file: Path) -> str:
+    return file.read_text("utf-8", "surrogateescape")
+
+
+def _unquoted(attribute: str) -> str:
+    """Value of an attribute of XML."""
+    return unescape(attribute[1:-1], {"&quot;": '"', "&apos;": "'"})
 
 
 def with_named_files(file: Path) -> list[Path]:
@@ -134,12 +151,20 @@ class InputCopies:
         renamed = self._renamed(content, file.parent, "")
         target = self._folder / name
         self._folder.mkdir(exist_ok=True)
-        if renamed != content:
+        if file.suffix.lower() == URDF_SUFFIX:
+            text = FILE_OF_URDF.sub(lambda match: self._of_urdf(match, file.parent), _text_of(file))
+            target.write_bytes(text.encode("utf-8", "surrogateescape"))
+        elif renamed != content:
             is_gltf = file.suffix.lower() == GLTF_SUFFIX
             target.write_text(json.dumps(renamed) if is_gltf else yaml.safe_dump(renamed, sort_keys=False), "utf-8")
         elif source != target.resolve():  # the same where a run's own scenario is run into its folder
             shutil.copyfile(source, target)
         return name
+
+    def _of_urdf(self, match: re.Match[str], folder: Path) -> str:
+        """Text of a URDF with the copy's name; a file that is not there keeps its name."""
+        found = find_file(_unquoted(match[2]), folder)
+        return match[0] if found is None else f"{match[1]}{quoteattr(self._copied(found))}"
 
     def _free_name(self, file: Path) -> str:
         taken = set(self._names.values())

@@ -129,4 +129,6 @@ def _plain(value: Any, inputs: InputCopies, written: Collection[Path]) -> Any:
         return [_plain(item, inputs, written) for item in value]
     if isinstance(value, Path):
         return value.as_posix() if value in written else inputs.copy(value)
-    return value.value if isinstance(value, Enum) else value
+    if isinstance(value, Enum):
+        return value.value
+    return inputs.renamed(value, Path()) if isinstance(value, str) and Path(value).is_absolute() else value

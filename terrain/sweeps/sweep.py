@@ -59,9 +59,8 @@ def hash_of(scenario: Scenario) -> str:
     for files in (scenario.navigation, *(robot.navigation or {} for robot in scenario.robots)):
         for backend, file in sorted(files.items()):
             digest.update(backend.encode() + hash_with_named_files(file))
-    world_file: Path | None = getattr(scenario.world, "file", None)
-    if world_file is not None:
-        digest.update(hash_with_named_files(world_file))
+    for file in named_files(scenario.model_dump(mode="json", exclude={"navigation"}), Path("/")):
+        digest.update(hash_with_named_files(file))
     return digest.hexdigest()[:16]
 
 

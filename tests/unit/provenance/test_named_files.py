@@ -74,6 +74,26 @@ def test_numbers_of_a_gltf_beside_it_are_copied_with_it(tmp_path):
     assert (copy.parent / "numbers.bin").read_bytes() == b"123"
 
 
+def test_meshes_of_a_urdf_are_copied_with_it(tmp_path):
+    (tmp_path / "my_robot" / "meshes").mkdir(parents=True)
+    (tmp_path / "my_robot" / "urdf").mkdir()
+    (tmp_path / "my_robot" / "meshes" / "a & b.stl").write_text("hull")
+    urdf = tmp_path / "my_robot" / "urdf" / "robot.urdf"
+    beside, packaged, gone = "../meshes/a &amp; b.stl", "package://my_robot/meshes/a &amp; b.stl", "gone.stl"
+    urdf.write_text(f"""<mesh filename="{beside}"/><mesh filename = '{packaged}'/><mesh filename="{gone}"/>""")
+    hashes = [hash_with_named_files(urdf)]
+
+    copy = tmp_path / InputCopies(tmp_path).copy(urdf)
+    (tmp_path / "my_robot" / "meshes" / "a & b.stl").write_text("another hull")
+    hashes.append(hash_with_named_files(urdf))
+
+    own = '"a &amp; b.stl"'
+    assert copy.read_text() == f'<mesh filename={own}/><mesh filename = {own}/><mesh filename="gone.stl"/>'
+    assert [file.name for file in with_named_files(copy)] == ["robot.urdf", "a & b.stl"]
+    assert (copy.parent / "a & b.stl").read_text() == "hull"
+    assert hashes[0] != hashes[1]
+
+
 def test_damaged_files_are_copied_as_they_are(tmp_path):
     for name, text in {"list.yaml": "[1, 2]", "broken.yaml": "a: [", "broken.gltf": "{"}.items():
         (tmp_path / name).write_text(text)

@@ -9,6 +9,8 @@ from typer.testing import CliRunner
 
 from mbf_abstract.config.findings import ConfigError
 from terrain.commands.command_line import command_line
+from terrain.description.parameters import UrdfRobot
+from terrain.physics.robot_models import ROBOTS
 from terrain.provenance.code import commit_of, hash_of_code
 from terrain.provenance.named_files import InputCopies
 from terrain.provenance.provenance import Provenance, changed_files, read_provenance, write_scenario
@@ -32,6 +34,18 @@ def test_a_scenario_as_run_is_read_back_as_it_was(name, tmp_path):
     for robot, as_read in robot_scenarios(read).items():
         assert as_read.model_dump(exclude=own) == views[robot].model_dump(exclude=own)
         assert as_read.navigation == {views[robot].backend: tmp_path / robot / "navigation.yaml"}
+
+
+def test_a_robot_of_a_urdf_is_in_the_folder_with_the_scenario(tmp_path):
+    shipped, folder = load_scenario("indoor"), tmp_path / "run"
+    folder.mkdir()
+    (tmp_path / "mine.urdf").write_text(ROBOTS["turtlebot"].urdf.read_text())
+    robot = UrdfRobot(urdf=str(tmp_path / "mine.urdf"))
+
+    write_scenario(folder, shipped.model_copy(update={"robot": robot}), {"": "mesh"}, 0, InputCopies(folder))
+
+    assert str(tmp_path) not in (folder / "scenario.yaml").read_text()
+    assert (folder / "inputs" / "mine.urdf").read_bytes() == (tmp_path / "mine.urdf").read_bytes()
 
 
 def recorded_command(*arguments):
