@@ -83,7 +83,7 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
     for cls in installed_servers(file.suffix):
         text = cls.config_for_map(file.resolve(), unknown_is_free=unknown != "lethal")
         if text is not None:
-            return *_read_config_text(text), _unknown_note(cls.read_floor(file), unknown)
+            return *read_config_text(text), _unknown_note(cls.read_floor(file), unknown)
     raise ConfigError([Finding(str(file), 1, "", "a format that an installed server reads", repr(file.suffix))])
 
 
@@ -102,7 +102,8 @@ def _is_map_description(file: Path) -> bool:
     return document is not None and "image" in document.data and "backend" not in document.data
 
 
-def _read_config_text(text: str) -> tuple[type[AbstractNavigationServer], Config]:
+def read_config_text(text: str) -> tuple[type[AbstractNavigationServer], Config]:
+    """Read a configuration that is no file; paths in it are absolute."""
     with tempfile.TemporaryDirectory(prefix="mbf_plan_") as folder:
         file = Path(folder) / "default_configuration.yaml"
         file.write_text(text, encoding="utf-8")

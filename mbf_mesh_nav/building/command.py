@@ -1,4 +1,4 @@
-"""``mbf map build``: a map to drive on from point clouds."""
+"""The commands ``mbf map``; ``mbf map build``: a map to drive on from point clouds."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.commands.waiting import waiting
+from mbf_mesh_nav.tiles.command import tile
 
 
 def register(app: typer.Typer) -> None:
@@ -17,6 +18,7 @@ def register(app: typer.Typer) -> None:
     maps = typer.Typer(help="Maps from what a survey measured.", no_args_is_help=True)
     maps.callback()(_group)
     maps.command("build")(build)
+    maps.command("tile")(tile)
     app.add_typer(maps, name="map")
 
 

@@ -26,6 +26,11 @@ class BorderLayer(MeshLayer):
     Parameters = BorderParameters
     parameters: BorderParameters
 
+    @classmethod
+    def reach(cls, parameters: BorderParameters) -> float:
+        """0: the faces around a vertex are all it looks at."""
+        return 0.0
+
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = ``border_cost`` at the border, lethal if that exceeds ``threshold``."""
         costs = np.where(self.topology.border_vertices, self.parameters.border_cost, 0.0).astype(np.float32)

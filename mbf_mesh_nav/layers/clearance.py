@@ -32,6 +32,11 @@ class ClearanceLayer(MeshLayer):
     parameters: ClearanceParameters
     cacheable = True
 
+    @classmethod
+    def reach(cls, parameters: ClearanceParameters) -> float:
+        """The length of the ray."""
+        return parameters.robot_height + parameters.height_inflation
+
     def free_heights(self) -> FloatArray:
         """Free height [m] above every vertex (V,), inf where it is more than the robot and the ramp need."""
         normals = self.topology.vertex_normals

@@ -9,6 +9,8 @@ there, so next to a wall it can run over the whole mesh; ``height_limit`` bounds
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mbf_abstract.parameters import parameter
@@ -41,6 +43,11 @@ class HeightDiffLayer(MeshLayer):
     Parameters = HeightDiffParameters
     parameters: HeightDiffParameters
     cacheable = True
+
+    @classmethod
+    def reach(cls, parameters: HeightDiffParameters) -> float:
+        """From the vertex to the edge of the cylinder; unknown if that has no height."""
+        return math.hypot(parameters.radius, parameters.height_limit)
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = height difference [m], lethal above ``threshold``."""

@@ -72,6 +72,11 @@ class InflationLayer(MeshLayer):
         super().__init__(context)
         self._drop_all()
 
+    @classmethod
+    def reach(cls, parameters: InflationParameters) -> float:
+        """The inflation radius."""
+        return parameters.inflation_radius
+
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Distances from scratch, costs from distances, lethal as the input."""
         self._drop_all()

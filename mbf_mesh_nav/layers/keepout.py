@@ -25,6 +25,11 @@ class KeepoutLayer(MeshLayer):
     Parameters = KeepoutParameters
     parameters: KeepoutParameters
 
+    @classmethod
+    def reach(cls, parameters: KeepoutParameters) -> float:
+        """0: the edges and faces at a vertex are all it looks at."""
+        return 0.0
+
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost 1 and lethal inside any region and at what closes it between vertices, else 0."""
         mesh = self.topology

@@ -46,6 +46,11 @@ class LabelLayer(MeshLayer):
     Parameters = LabelParameters
     parameters: LabelParameters
 
+    @classmethod
+    def reach(cls, parameters: LabelParameters) -> float:
+        """0: the edges and faces at a vertex are all it looks at."""
+        return 0.0
+
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost of the last region that holds the vertex, ``default_cost`` outside."""
         mesh = self.topology

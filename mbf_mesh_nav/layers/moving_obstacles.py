@@ -19,6 +19,7 @@ storeys are other people.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +84,11 @@ class MovingObstaclesLayer(MeshLayer):
     def tracked_objects(self, now: float) -> tuple[TrackedObject, ...]:
         """The objects it follows."""
         return self._objects.objects(now)
+
+    @classmethod
+    def reach(cls, parameters: Any) -> float:
+        """0: without scans it predicts nothing."""
+        return 0.0
 
     def compute(self) -> tuple[CostArray, LethalArray]:
         """The input without the trails, and the predictions."""

@@ -102,6 +102,11 @@ class ObstacleLayer(MeshLayer):
         self._waiting: deque[RangeScan] = deque(maxlen=MAX_WAITING)
         self._hits = Hits.none()
 
+    @classmethod
+    def reach(cls, parameters: ObstacleParameters) -> float:
+        """0: without scans it marks nothing."""
+        return 0.0
+
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost inf and lethal at the corners of the marked faces; drop those of sensors no longer listened to."""
         unheard = [number for number, name in enumerate(self._watches) if not self.listens_to(name)]

@@ -26,6 +26,11 @@ class RidgeLayer(MeshLayer):
     parameters: RidgeParameters
     cacheable = True
 
+    @classmethod
+    def reach(cls, parameters: RidgeParameters) -> float:
+        """The radius of the neighbourhood."""
+        return parameters.radius
+
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = mean tip distance [m], lethal above ``threshold``."""
         mesh = self.topology

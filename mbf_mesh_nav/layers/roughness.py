@@ -26,6 +26,11 @@ class RoughnessLayer(MeshLayer):
     parameters: RoughnessParameters
     cacheable = True
 
+    @classmethod
+    def reach(cls, parameters: RoughnessParameters) -> float:
+        """The radius of the neighbourhood."""
+        return parameters.radius
+
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = roughness [rad], lethal above ``threshold``."""
         mesh = self.topology

@@ -25,6 +25,11 @@ class SteepnessLayer(MeshLayer):
     Parameters = SteepnessParameters
     parameters: SteepnessParameters
 
+    @classmethod
+    def reach(cls, parameters: SteepnessParameters) -> float:
+        """0: the faces around a vertex are all it looks at."""
+        return 0.0
+
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = inclination [rad] from 0 to pi, lethal above ``threshold``."""
         costs = inclinations(self.topology.vertex_normals)

@@ -87,6 +87,11 @@ class TiltLayer(MeshLayer):
         self.pitch: Float32Array = np.zeros(shape, dtype=np.float32)
         self.allowed: BoolArray = np.ones(shape, dtype=np.bool_)
 
+    @classmethod
+    def reach(cls, parameters: TiltParameters) -> float:
+        """From the middle of the robot to its wheels, and as far again for what lies between them."""
+        return parameters.wheelbase + parameters.track
+
     def compute(self) -> tuple[CostArray, LethalArray]:
         """Cost = share of the limits that the best headings use, as many as preferred; 1 where too few are allowed.
 

@@ -7,6 +7,7 @@ starting over after a local change override ``update_from_inputs``; layers fed b
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -91,6 +92,14 @@ class MeshLayer(map_layer.MapLayer):
     def lethal(self) -> LethalArray:
         """Lethal mask (V,) bool in internal numbering, a read-only view."""
         return _read_only(self._lethal)
+
+    @classmethod
+    def reach(cls, parameters: Any) -> float:
+        """How far [m] from a vertex lies whatever its values depend on, besides the faces around it; inf = unknown.
+
+        A map of tiles computes the layers of each tile on the tile and what lies within this distance around it.
+        """
+        return math.inf
 
     @abstractmethod
     def compute(self) -> tuple[CostArray, LethalArray]:

@@ -199,7 +199,7 @@ def build_mesh_map(
     mesh_map = MeshMap(build_topology(mesh), frame_id, report, parameters.inscribed_radius)
     mesh_map.max_turning_slope = parameters.max_turning_slope
     if plan:
-        graph = _compute_layers(mesh_map, plan, parameters.cache_dir)
+        graph = compute_layers(mesh_map, plan, parameters.cache_dir)
         default = parameters.default_layer or parameters.layers[-1].name
         mesh_map.set_layers(graph, default, parameters.edge_cost_factor)
     report.findings += frame_findings(file, parameters.up_axis, parameters.unit)
@@ -247,7 +247,8 @@ def _wrong_inputs(planned: PlannedLayer[MeshLayer]) -> list[str]:
     return [f"layer {entry.name!r} of type {entry.type} takes {wanted} inputs, got {len(entry.reads)}"]
 
 
-def _compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer[MeshLayer]], cache_dir: str) -> LayerGraph:
+def compute_layers(mesh_map: MeshMap, plan: Sequence[PlannedLayer[MeshLayer]], cache_dir: str) -> LayerGraph:
+    """Compute planned layers on a map, or take them from the folder ``cache_dir``; "" = no cache."""
     cache = LayerCache(cache_dir, mesh_map.topology.digest()) if cache_dir else None
     complaint = ""
     layers: dict[str, MeshLayer] = {}

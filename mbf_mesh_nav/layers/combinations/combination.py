@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,11 @@ class CombinationLayer(MeshLayer):
     """Merges any number of inputs vertex by vertex."""
 
     inputs_allowed = (1, 1000)
+
+    @classmethod
+    def reach(cls, parameters: Any) -> float:
+        """0: each vertex is merged by itself."""
+        return 0.0
 
     @abstractmethod
     def combine(self, costs: list[CostArray], weights: list[float]) -> NDArray[np.floating]:

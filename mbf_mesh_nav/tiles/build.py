@@ -1,0 +1,274 @@
+"""Building a tiled map, tile by tile: in any order, by several workers, and on from where a build was ended.
+
+    source = HeightSource(np.load("heights.npy", mmap_mode="r"), 0.5, 0.5)
+    build_tiles(source, Path("island"), TileSettings(mesh_map=parameters, layer_blocks=blocks))
+
+A tile depends on the source and the settings only, so its bytes are the same however it comes about. A tile that is
+there already, with the SHA-256 of the same source and settings in it, is not built again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mbf_abstract.maps.layers.layer_list import PlannedLayer
+from mbf_mesh_nav.map.layer import MeshLayer
+from mbf_mesh_nav.map.map_builder import MeshMapParameters, compute_layers, plan_mesh_layers
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+from mbf_mesh_nav.mesh.topology import build_topology
+from mbf_mesh_nav.tiles.index import INDEX_FILE, CostProfile, TileEntry, TileIndex, read_index, write_index
+from mbf_mesh_nav.tiles.portals import group_shared
+from mbf_mesh_nav.tiles.sources import TilePart, TileSource
+from mbf_mesh_nav.tiles.tile import Tile, TileKey, read_tile, tile_file, write_tile
+from mbf_mesh_nav.tiles.tile_graph import costs_between_portals
+
+PORTALS_OF_A_SIDE = 16
+"""Portals along the side of a tile, unless a length is given."""
+
+
+@dataclass(frozen=True)
+class TileSettings:
+    """What a tiled map is built with.
+
+    Attributes
+    ----------
+    mesh_map : MeshMapParameters
+        Its layers, default layer, edge cost factor and inscribed radius count; the mesh comes from the source.
+    layer_blocks : mapping
+        Layer name -> parameters.
+    profiles : mapping
+        Cost profiles by name; without any, one called "default" with the default layer and the edge cost factor.
+    tile_size, portal_length : float
+        Sides of tiles and of the cubes of portals [m]; a portal length of 0 is a sixteenth of a tile. Shorter portals
+        make the lower bounds closer and the build longer.
+    """
+
+    mesh_map: MeshMapParameters
+    layer_blocks: Mapping[str, Any] = field(default_factory=dict)
+    profiles: Mapping[str, CostProfile] = field(default_factory=dict)
+    tile_size: float = 256.0
+    portal_length: float = 0.0
+    frame_id: str = "map"
+
+    def __post_init__(self) -> None:
+        if not (self.tile_size > 0.0 and 0.0 <= self.portal_length <= self.tile_size):
+            raise ValueError(
+                f"expected a tile size above 0 and a portal length of at most that, "
+                f"got {self.tile_size:g} and {self.portal_length:g} m"
+            )
+
+    @property
+    def cube(self) -> float:
+        """Side of the cubes of portals [m]."""
+        return self.portal_length or self.tile_size / PORTALS_OF_A_SIDE
+
+    def all_profiles(self) -> dict[str, CostProfile]:
+        """The profiles, or the one of the map's own parameters."""
+        return dict(self.profiles) or {"default": CostProfile(edge_cost_factor=self.mesh_map.edge_cost_factor)}
+
+    def digest(self, source: TileSource) -> str:
+        """Hexadecimal SHA-256 of these settings and of a source."""
+        blocks = {name: getattr(block, "model_dump", lambda b=block: b)() for name, block in self.layer_blocks.items()}
+        profiles = {name: one.model_dump() for name, one in self.all_profiles().items()}
+        sizes = [TileIndex.model_fields["version"].default, self.tile_size, self.cube, self.frame_id]
+        text = json.dumps([sizes, self.mesh_map.model_dump(), blocks, profiles], sort_keys=True, default=str)
+        return hashlib.sha256(f"{source.digest()} {text}".encode()).hexdigest()
+
+
+class TileBuilder:
+    """Builds the tiles of one source with one set of settings.
+
+    Raises
+    ------
+    LayerListError
+        The layers are not right, as of ``build_mesh_map``.
+    MeshError
+        A layer has no bound on how far it looks, or there are no layers.
+    """
+
+    def __init__(self, source: TileSource, settings: TileSettings) -> None:
+        self._source, self._settings = source, settings
+        self.build = settings.digest(source)
+        self._plan = plan_mesh_layers(settings.mesh_map, settings.layer_blocks)
+        self.layers = tuple(planned.entry.name for planned in self._plan)
+        if not self._plan:
+            raise MeshError("tiles", ["a tiled map needs at least one layer"])
+        self._reach = reach_of(self._plan)
+        self._profiles = settings.all_profiles()
+        self.default_layer = settings.mesh_map.default_layer or settings.mesh_map.layers[-1].name
+        for name, profile in self._profiles.items():
+            if profile.layer and profile.layer not in self.layers:
+                known = ", ".join(self.layers)
+                raise MeshError("tiles", [f"profile '{name}': expected a layer of {known}, got '{profile.layer}'"])
+
+    def tile(self, key: TileKey) -> Tile | None:
+        """Build a tile; None if there is no face in it."""
+        part = self._source.part(key, self._settings.tile_size, self._reach)
+        return None if part is None else self._from_part(part)
+
+    def _from_part(self, part: TilePart) -> Tile:
+        # 1. The mesh of core and overlap, and its layers as on any map.
+        own = np.arange(len(part.vertices), dtype=np.int32), np.arange(len(part.faces), dtype=np.int32)
+        topology = build_topology(CheckedMesh(part.vertices, part.faces, *own, own[0]))
+        mesh_map = MeshMap(topology, self._settings.frame_id)
+        layers = compute_layers(mesh_map, self._plan, "")
+        # 2. The core comes first, otherwise all keep the order in which neighbours lie close in memory.
+        is_core_face = topology.internal_to_input_faces < part.core_faces
+        is_core = np.zeros(topology.vertex_count, dtype=np.bool_)
+        is_core[topology.faces[is_core_face]] = True
+        order = np.concatenate([np.flatnonzero(is_core), np.flatnonzero(~is_core)])
+        place = np.empty(len(order), dtype=np.int32)
+        place[order] = np.arange(len(order), dtype=np.int32)
+        core = order[: int(is_core.sum())]
+        # 3. The vertex graph of the core.
+        starts = np.repeat(np.arange(topology.vertex_count), np.diff(topology.neighbour_offsets))
+        kept = is_core[starts] & is_core[topology.neighbours]
+        offsets = np.zeros(len(core) + 1, dtype=np.int32)
+        np.cumsum(np.bincount(place[starts[kept]], minlength=len(core)), out=offsets[1:])
+        # 4. Vertices that cores of other tiles have, too, and the portals they form.
+        is_shared = np.zeros(topology.vertex_count, dtype=np.bool_)
+        is_shared[topology.faces[~is_core_face]] = True
+        shared = np.flatnonzero(is_shared[core]).astype(np.int32)
+        vertices = topology.vertices[order]
+        portals, portal_of = group_shared(vertices[shared], self._settings.cube)
+        tile = Tile(
+            vertices=vertices,
+            numbers=part.numbers[topology.internal_to_input[order]],
+            faces=place[np.concatenate([topology.faces[is_core_face], topology.faces[~is_core_face]])],
+            core_faces=np.array([part.core_faces]),
+            normals=topology.vertex_normals[core].astype(np.float32),
+            offsets=offsets,
+            neighbours=place[topology.neighbours[kept]],
+            costs=np.array([layers[name].costs[core] for name in self.layers]),
+            lethal=np.array([layers[name].lethal[core] for name in self.layers]),
+            shared=shared,
+            portals=portals,
+            portal_of=portal_of,
+            portal_costs=np.zeros((0, len(portals), len(portals)), dtype=np.float32),
+            build=np.frombuffer(bytes.fromhex(self.build), dtype=np.uint8),
+        )
+        # 5. What it costs to pass.
+        return replace(tile, portal_costs=np.array([self._passing(tile, one) for one in self._profiles.values()]))
+
+    def _passing(self, tile: Tile, profile: CostProfile) -> np.ndarray[Any, np.dtype[np.float32]]:
+        row = self.layers.index(profile.layer or self.default_layer)
+        return costs_between_portals(tile, tile.costs[row], tile.lethal[row], profile)
+
+
+def build_tiles(
+    source: TileSource,
+    folder: Path,
+    settings: TileSettings,
+    *,
+    workers: int = 1,
+    name: str = "",
+    on_tile: Callable[[int, int], None] = lambda done, total: None,
+) -> TileIndex:
+    """Build a tiled map, or what is missing of it.
+
+    Parameters
+    ----------
+    folder : path
+        Made if it is missing.
+    workers : int
+        Tiles built at the same time, by threads: the kernels do not hold the interpreter's lock.
+    name : str
+        What the index calls the source.
+    on_tile : callable, optional
+        Called with the numbers of finished and of all tiles. What it raises ends the build, which may go on later.
+
+    Raises
+    ------
+    MeshError
+        The folder holds another map, a file cannot be written, the source has no face; as of ``TileBuilder``.
+    """
+    builder = TileBuilder(source, settings)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MeshError(str(folder), [f"cannot be made: {error}"]) from error
+    if (folder / INDEX_FILE).exists() and read_index(folder).build != builder.build:
+        raise MeshError(str(folder), ["holds a map of another source or with other settings; give another folder"])
+    for unfinished in folder.glob(".tile_*.npz"):
+        unfinished.unlink(missing_ok=True)
+    keys = source.keys(settings.tile_size)
+
+    def build(key: TileKey) -> TileEntry | None:
+        return _entry_of(builder, tile_file(folder, key), key)
+
+    entries = []
+    with ThreadPoolExecutor(max_workers=workers) as pool:
+        futures = [pool.submit(build, key) for key in keys]
+        try:
+            for done, future in enumerate(as_completed(futures), start=1):
+                entries.append(future.result())
+                on_tile(done, len(keys))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    found = sorted((entry for entry in entries if entry is not None), key=lambda entry: entry.key)
+    if not found:
+        raise MeshError(name or "tiles", ["there is no face in it"])
+    index = TileIndex(
+        build=builder.build,
+        source=name,
+        frame_id=settings.frame_id,
+        tile_size=settings.tile_size,
+        portal_length=settings.cube,
+        inscribed_radius=settings.mesh_map.inscribed_radius,
+        layers=builder.layers,
+        default_layer=builder.default_layer,
+        profiles=settings.all_profiles(),
+        tiles=tuple(found),
+    )
+    write_index(folder, index)
+    return index
+
+
+def _entry_of(builder: TileBuilder, path: Path, key: TileKey) -> TileEntry | None:
+    """Entry of a tile, which is built unless it is there and sound; None if it has no face."""
+    tile = None
+    if path.exists():
+        try:
+            tile = read_tile(path)
+        except MeshError:
+            pass  # of a disk that was full: built again
+    if tile is None or tile.build.tobytes().hex() != builder.build:
+        tile = builder.tile(key)
+        if tile is None:
+            return None
+        write_tile(path, tile)
+    core = tile.vertices[: tile.core_vertices]
+    box = (*core.min(axis=0).tolist(), *core.max(axis=0).tolist())
+    return TileEntry(
+        key=key, core_vertices=len(core), neighbours=len(tile.neighbours), shared=len(tile.shared), box=box
+    )
+
+
+def reach_of(plan: list[PlannedLayer[MeshLayer]]) -> float:
+    """How far [m] around a vertex lies whatever the values of any layer depend on, through its inputs.
+
+    Raises
+    ------
+    MeshError
+        A layer does not state how far it looks.
+    """
+    reach: dict[str, float] = {}
+    for planned in plan:  # inputs first
+        own = planned.layer_class.reach(planned.parameters)
+        if not np.isfinite(own):
+            layer = f"layer '{planned.entry.name}' of type {planned.entry.type}"
+            hint = "height_diff needs a height_limit for it" if planned.entry.type == "height_diff" else ""
+            raise MeshError("tiles", [f"{layer} does not state how far it looks around a vertex (reach)"], hint)
+        reach[planned.entry.name] = own + max((reach[read] for read in planned.entry.reads), default=0.0)
+    return max(reach.values())

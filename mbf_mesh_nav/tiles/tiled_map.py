@@ -1,0 +1,148 @@
+"""A map of tiles, opened: which tile is where, what is loaded, and what changes.
+
+    tiled = TiledMap(Path("island"), memory=1e9)
+    plan = plan_on_tiles(tiled, start, goal)
+
+Opening reads the index and the portals of all tiles, some hundred bytes for each portal; tiles are read when they are
+needed. All that is loaded keeps to ``memory``.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import replace
+from pathlib import Path
+
+from mbf_mesh_nav.arrays import FloatArray
+from mbf_mesh_nav.map.layer import CostArray, LethalArray
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+from mbf_mesh_nav.tiles.index import read_index
+from mbf_mesh_nav.tiles.places import TilePlace, find_place
+from mbf_mesh_nav.tiles.pool import TilePool
+from mbf_mesh_nav.tiles.portals import PortalGraph, TilePortals, estimated_costs
+from mbf_mesh_nav.tiles.tile import Tile, TileKey, read_tile, read_tile_arrays, tile_file, write_tile
+from mbf_mesh_nav.tiles.tile_graph import TileGraph, costs_between_portals, tile_graph
+
+KEPT_TILES = 4
+"""Tiles of starts and goals that stay loaded besides those of the pool."""
+DEFAULT_MEMORY = 1.5e9
+"""Bytes."""
+
+
+class TiledMap:
+    """A tiled map under one cost profile.
+
+    Parameters
+    ----------
+    folder : path
+    profile : str
+        Name of a cost profile; empty = the map's first.
+    memory : float
+        Bytes that loaded tiles and searches may take.
+
+    Attributes
+    ----------
+    index : TileIndex
+    portals, estimates : PortalGraph
+        With the least costs between any vertices of two portals, and with about what it costs between their middles.
+    pool : TilePool
+
+    Raises
+    ------
+    MeshError
+        The map is not complete or damaged, or ``memory`` does not hold two tiles; the text names file and key.
+    KeyError
+        There is no such profile.
+    """
+
+    def __init__(self, folder: Path, profile: str = "", memory: float = DEFAULT_MEMORY) -> None:
+        self.folder = folder
+        self.index = read_index(folder)
+        self._profile_row, self.profile = self.index.profile(profile)
+        self._layer = self.index.layer_of(self.profile)
+        bounds = {key: self._read_portals(key) for key in self.index.entries}
+        self.portals = PortalGraph(bounds)
+        self.estimates = PortalGraph({key: self._estimated(one) for key, one in bounds.items()})
+        entries = self.index.entries.values()
+        largest = TilePool(entries, 0.0).slot_bytes
+        self.pool = TilePool(entries, memory - KEPT_TILES * largest)
+        if self.pool.slots < min(2, len(self.index.tiles)):
+            least = (KEPT_TILES + 2) * largest / 1e6
+            text = f"its tiles need {least:.3g} MB of memory, allowed are {memory / 1e6:.3g} MB"
+            raise MeshError(str(folder), [text])
+        self._kept: OrderedDict[TileKey, tuple[Tile, TileGraph]] = OrderedDict()
+
+    def tile(self, key: TileKey) -> tuple[Tile, TileGraph]:
+        """A tile and its weights, from memory if it was asked for lately."""
+        if key not in self._kept:
+            self._kept[key] = self._read(key)
+            if len(self._kept) > KEPT_TILES:
+                self._kept.popitem(last=False)
+        self._kept.move_to_end(key)
+        return self._kept[key]
+
+    def hold(self, keys: list[TileKey]) -> None:
+        """Load tiles into the pool."""
+        self.pool.hold(keys, lambda key: self._kept[key] if key in self._kept else self._read(key))
+
+    def find_place(self, position: FloatArray, reach: float) -> TilePlace | None:
+        """The place on the surface nearest to a position (3,) [m], as ``borders.on_surface``; None off the surface."""
+        (x, y, z) = position.tolist()
+        box = (x - reach, y - reach, z - reach, x + reach, y + reach, z + reach)
+        found = (find_place(key, *self.tile(key), position, reach) for key in self.index.tiles_in(box))
+        return min((place for place in found if place is not None), key=lambda place: place.distance, default=None)
+
+    def change_layer(self, key: TileKey, layer: str, costs: CostArray, lethal: LethalArray) -> None:
+        """Put new values (c,) of a layer on a tile's core, on disk and in memory, and what follows for its portals.
+
+        Vertices that the tile shares with others keep the costs that those have for them until they change, too.
+
+        Raises
+        ------
+        MeshError
+            There is no such tile or layer, or the file cannot be written; the old one stays.
+        ValueError
+            The values are not those of the core's vertices.
+        """
+        if key not in self.index.entries or layer not in self.index.layers:
+            raise MeshError(str(self.folder), [f"has no tile {key} with a layer '{layer}'"])
+        tile = read_tile(tile_file(self.folder, key))
+        if costs.shape != (tile.core_vertices,) or lethal.shape != (tile.core_vertices,):
+            expected = (tile.core_vertices,)
+            raise ValueError(f"tile {key} takes values of shape {expected}, got {costs.shape} and {lethal.shape}")
+        row = self.index.layers.index(layer)
+        tile.costs[row], tile.lethal[row] = costs, lethal
+        passing = tile.portal_costs.copy()
+        for place, profile in enumerate(self.index.profiles.values()):
+            if (seen := self.index.layer_of(profile)) == row:
+                passing[place] = costs_between_portals(tile, tile.costs[seen], tile.lethal[seen], profile)
+        write_tile(tile_file(self.folder, key), replace(tile, portal_costs=passing))
+        changed = TilePortals(tile.portals, passing[self._profile_row])
+        self.portals.change(key, changed)
+        self.estimates.change(key, self._estimated(changed))
+        self._kept.pop(key, None)
+        self.pool.drop(key)
+
+    def _estimated(self, bounds: TilePortals) -> TilePortals:
+        length = self.index.portal_length
+        costs = estimated_costs(bounds.costs, bounds.portals, length, self.index.tile_size / length)
+        return TilePortals(bounds.portals, costs)
+
+    def _read(self, key: TileKey) -> tuple[Tile, TileGraph]:
+        path, entry = tile_file(self.folder, key), self.index.entries[key]
+        tile = read_tile(path)
+        found = (tile.core_vertices, len(tile.neighbours), len(tile.shared), len(tile.costs))
+        expected = (entry.core_vertices, entry.neighbours, entry.shared, len(self.index.layers))
+        if found != expected or tile.build.tobytes().hex() != self.index.build:
+            raise MeshError(str(path), ["belongs to another map than the index"])
+        return tile, tile_graph(tile, tile.costs[self._layer], tile.lethal[self._layer], self.profile)
+
+    def _read_portals(self, key: TileKey) -> TilePortals:
+        path = tile_file(self.folder, key)
+        arrays = read_tile_arrays(path, ("portals", "portal_costs"))
+        portals, costs = arrays["portals"], arrays["portal_costs"]
+        count = len(portals)
+        expected = (len(self.index.profiles), count, count)
+        if portals.shape != (count, 3) or costs.shape != expected:
+            raise MeshError(str(path), [f"'portal_costs' has the shape {costs.shape}, expected {expected}"])
+        return TilePortals(portals, costs[self._profile_row])

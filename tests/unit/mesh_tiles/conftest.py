@@ -1,0 +1,32 @@
+"""Makes the small terrains importable; one map of tiles for all tests that only read it."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from tiled_terrains import SPACING, WholeMap, settings, terrain
+
+from mbf_mesh_nav.tiles.build import build_tiles
+from mbf_mesh_nav.tiles.sources import HeightSource
+
+
+@pytest.fixture(scope="session")
+def hills():
+    """Heights of 97 x 97 samples, 48 m a side."""
+    return terrain(97, seed=0)
+
+
+@pytest.fixture(scope="session")
+def whole_hills(hills):
+    return WholeMap(hills)
+
+
+@pytest.fixture(scope="session")
+def tiled_hills(hills, tmp_path_factory):
+    """Folder of the hills in tiles of 12 m; read only."""
+    folder = tmp_path_factory.mktemp("tiles") / "hills"
+    build_tiles(HeightSource(hills, SPACING, SPACING), folder, settings())
+    return folder

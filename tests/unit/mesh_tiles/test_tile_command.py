@@ -1,0 +1,67 @@
+"""``mbf map tile``: files become tiles, and mistakes one error."""
+
+import json
+
+import numpy as np
+import pytest
+from tiled_terrains import SPACING, terrain
+from typer.testing import CliRunner
+
+from mbf_abstract.cli import make_app
+from mbf_mesh_nav.building.map_build import write_map
+from mbf_mesh_nav.files.map_header import MapHeader
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.tiles.index import read_index
+
+
+def run(*arguments):
+    return CliRunner().invoke(make_app(), ["map", "tile", *map(str, arguments)])
+
+
+@pytest.fixture(scope="module")
+def heights(tmp_path_factory):
+    file = tmp_path_factory.mktemp("heights") / "heights.npy"
+    np.save(file, terrain(49, seed=3, walls=3).astype(np.float32))
+    return file
+
+
+def test_heights_and_the_same_ground_as_a_mesh_become_tiles(heights, tmp_path):
+    done = run(heights, "--spacing", SPACING, "--out", tmp_path / "map", "--tile-size", 12, "--json")
+    assert done.exit_code == 0, done.output
+    figures = json.loads(done.stdout)
+    assert figures["tiles"] == 4 and "roughness" in figures["layers"]
+    write_map(tmp_path / "mesh.ply", *heightfield_mesh(np.load(heights), SPACING, SPACING), MapHeader((0, 0, 0), 0, 0))
+    done = run(tmp_path / "mesh.ply", "--out", tmp_path / "of_mesh", "--tile-size", 12)
+    assert done.exit_code == 0, done.output
+    assert f"vertices  {figures['vertices']}" in done.stdout
+    assert read_index(tmp_path / "of_mesh").source == "mesh.ply"
+
+
+def test_the_layers_are_those_of_a_configuration(heights, tmp_path):
+    config = tmp_path / "robot.yaml"
+    config.write_text(
+        "backend: mesh\nmesh_map:\n  layers: [{name: slopes, type: steepness}]\n  slopes: {threshold: 0.9}\n"
+        "  edge_cost_factor: 2.0\n"
+    )
+    out = tmp_path / "map"
+    done = run(heights, "--spacing", SPACING, "--out", out, "--config", config, "--tile-size", 24, "--workers", 2)
+    assert done.exit_code == 0, done.output
+    index = read_index(out)
+    assert index.layers == ("slopes",) and index.profile()[1].edge_cost_factor == 2.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("heights.npy",), "heights.npy: needs a spacing"),
+        (("mesh.ply", "--spacing", "0.5"), "mesh.ply: states its own spacing, got 0.5 m"),
+        (("nothing.tif",), "nothing.tif: there is no such file"),
+        (("map.xyz",), "map.xyz: unknown ending '.xyz'"),
+        (("heights.npy", "--spacing", "0.5", "--tile-size", "1", "--portal-length", "2"), "a portal length of at most"),
+    ],
+)
+def test_a_mistake_is_one_error(heights, tmp_path, arguments, text):
+    source = heights if arguments[0] == "heights.npy" else tmp_path / arguments[0]
+    done = run(source, *arguments[1:], "--out", tmp_path / "map")
+    assert done.exit_code == 2 and text in done.output
+    assert "Traceback" not in done.output
