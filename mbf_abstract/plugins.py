@@ -25,6 +25,7 @@ from mbf_abstract.maps.relaxation import Relaxation
 from mbf_abstract.outcomes import PERMANENT_OUTCOMES, is_success
 from mbf_abstract.parameters import PluginParameters
 from mbf_abstract.time.cancel import CancelToken
+from mbf_abstract.traffic.traffic import Traffic
 
 if TYPE_CHECKING:
     import numpy as np
@@ -63,6 +64,8 @@ class PluginContext:
         a controller may widen limits of its own.
     min_turning_radius : float
         Radius [m] of the robot's tightest curve when the plugin is loaded; 0 = it turns on the spot.
+    traffic : Traffic
+        What other robots with this navigation announce; empty unless the server is connected to some.
     """
 
     name: str
@@ -72,6 +75,7 @@ class PluginContext:
     robot: RobotInformation
     relaxation: Relaxation = field(default_factory=Relaxation, kw_only=True)
     min_turning_radius: float = field(default=0.0, kw_only=True)
+    traffic: Traffic = field(default_factory=Traffic, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,7 @@ class Plugin(ABC):
         self.robot = context.robot
         self.relaxation = context.relaxation
         self.min_turning_radius = context.min_turning_radius
+        self.traffic = context.traffic
 
     def cancel(self) -> bool:
         """Ask the running call to end; return whether the plugin supports this beside its cancel token."""

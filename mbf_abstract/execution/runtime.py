@@ -19,6 +19,7 @@ from mbf_abstract.goals.callbacks import CallbackThread
 from mbf_abstract.maps.relaxation import Relaxation
 from mbf_abstract.plugins import ControlResult, PluginKind
 from mbf_abstract.time.clock import Clock
+from mbf_abstract.traffic.traffic import Traffic
 
 
 class MapHooks(Protocol):
@@ -49,6 +50,8 @@ class Runtime:
     map_hooks: MapHooks
     relaxation: Relaxation = field(default_factory=Relaxation)
     """Slack that recoveries grant for a while."""
+    traffic: Traffic = field(default_factory=Traffic)
+    """What robots with this navigation announce to each other."""
     goal_ids: Iterator[int] = field(default_factory=lambda: count(1))
     """Goal ids, unique in this server."""
     hanging: set[object] = field(default_factory=set)

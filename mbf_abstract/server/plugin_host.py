@@ -127,6 +127,7 @@ class PluginHost(ABC):
             runtime.robot,
             relaxation=runtime.relaxation,
             min_turning_radius=runtime.gate.limits.min_turning_radius,
+            traffic=runtime.traffic,
         )
         instance: Plugin = spec.plugin_class(self.make_context(spec.kind, spec.options, base))
         return LoadedPlugin(spec, instance, runtime)

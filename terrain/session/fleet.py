@@ -1,4 +1,4 @@
-"""Several robots in one world, each with its own navigation server, on one clock.
+"""Several robots in one world, each with its own navigation server, on one clock. They announce where they go.
 
 Example
 -------
@@ -10,17 +10,37 @@ Example
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 
 from mbf_abstract.events import Event, EventSink
+from mbf_abstract.server.announcer import Announcer
 from mbf_abstract.time.clock import Clock
+from mbf_abstract.traffic.traffic import SharedChannel
 from terrain.scenarios.scenario import Scenario, load_scenario, robot_scenarios
 from terrain.scenarios.settings import apply_world_settings
 from terrain.session.session import DEFAULT_OPTIONS, Member, Session, SessionOptions
 from terrain.session.simulation_session import SENSE_FIRST
 from terrain.session.site import Site
+
+ANNOUNCING_PERIOD = 0.5  # s
+TIME_TOLERANCE = 1e-9  # s
+
+
+class Periodically:
+    """Makes a call each ``period`` [s]; called with the time [s]."""
+
+    def __init__(self, period: float, call: Callable[[], None]) -> None:
+        self._period = period
+        self._call = call
+        self._next = 0.0
+
+    def __call__(self, time: float) -> None:
+        """Call if it is due."""
+        if time >= self._next - TIME_TOLERANCE:
+            self._next = time + self._period
+            self._call()
 
 
 class NamedSink:
@@ -87,6 +107,10 @@ class FleetSession:
                 session = Session(view, own, Member(self._site, name))
                 closing.callback(session.close)
                 self.sessions[name] = session
+            channel = SharedChannel()
+            for name, session in self.sessions.items():
+                announcer = Announcer(session.navigator.server, name, channel)
+                session.loop.on_tick.append(Periodically(ANNOUNCING_PERIOD, announcer.announce))
             self._leader, *others = [session.loop for session in self.sessions.values()]
             self._leader.lead(others)
             closing.callback(self._leader.stop)

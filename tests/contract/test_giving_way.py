@@ -12,6 +12,8 @@ from mbf_abstract.plugins import RecoveryRequest
 from mbf_abstract.testing.contract.recovery import RigMotion
 from mbf_abstract.testing.contract.rig import rig
 from mbf_abstract.time.cancel import CancelToken
+from mbf_abstract.traffic.announcement import Announcement
+from mbf_abstract.traffic.traffic import SharedChannel, Traffic
 
 RADIUS = 0.2  # m, of the robot
 START = Pose.planar(4.5, 3.0)
@@ -56,7 +58,7 @@ class Watched(RigMotion):
 def give_way(world):
     """``give_way(lethal, start, track, **parameters)`` -> result, motion with its end and seconds."""
 
-    def run(lethal, start=START, track=(), **parameters):
+    def run(lethal, start=START, track=(), traffic=None, **parameters):
         navigation_map = world.map_of(lethal)
 
         def make_context(base):
@@ -64,6 +66,7 @@ def give_way(world):
 
         with rig(GiveWayRecovery, make_context, GiveWayParameters(**parameters), start) as made:
             made.plugin.robot._track = tuple((x, y, 0.0) for x, y in track)
+            made.plugin.traffic = traffic or Traffic()
             token = CancelToken()
             motion = Watched(made, token, lambda pose: pose)
             x, y = np.meshgrid(np.arange(81) * 0.1, np.arange(61) * 0.1)  # the vertices of the mesh
@@ -138,3 +141,82 @@ def test_it_follows_the_surface_where_the_way_is_not_along_x(give_way):
     result, motion = give_way(lethal, Pose.planar(4.0, 3.0, 0.6))
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
     assert motion.least_gap > RADIUS - 0.05
+
+
+# ---------- among robots that announce their ways
+def announced(name, x_from, x_to, remaining, stamp, cannot_yield=False):
+    """A robot that goes along the corridor; one with a stamp in the future stays where it is for the whole test."""
+    x = np.linspace(x_from, x_to, 20)
+    return Announcement(name, stamp, np.column_stack([x, np.full(20, 3.0), np.zeros(20)]), remaining, cannot_yield)
+
+
+def head_on(remaining, stamp=100.0, channel=None):
+    """Traffic of the robot at ``START``, which has 3 m to go, with another one head on that has ``remaining``."""
+    channel, traffic = channel or SharedChannel(), Traffic()
+    traffic.connect("anna", channel)
+    traffic.announce(announced("", 4.5, 7.5, 3.0, 0.0))
+    channel.publish(announced("ben", 5.3, 0.5, remaining, stamp))
+    return traffic
+
+
+def test_the_robot_that_goes_first_waits_for_the_other_one_and_does_not_move(give_way):
+    result, motion = give_way(bay(2.4, 3.4, True), traffic=head_on(remaining=9.0), longest_wait=4.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS
+    assert "has the right of way over ben; waited 4" in result.message
+    assert all(command.is_stopped() for command in motion.commands)
+
+
+def test_it_waits_no_longer_for_a_robot_that_is_silent(give_way):
+    result, motion = give_way(corridor, traffic=head_on(remaining=9.0, stamp=0.0), longest_wait=60.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS
+    assert 3.0 < motion.seconds < 4.0
+
+
+def test_the_other_one_pulls_out_and_waits_until_the_first_has_passed(give_way):
+    traffic = head_on(remaining=1.0, stamp=20.0)  # heard of until 23 s
+    result, motion = give_way(bay(2.4, 3.4, True), traffic=traffic, longest_wait=60.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert "for ben" in result.message
+    assert 2.4 < motion.end.x < 3.4 and motion.end.y > 3.7
+    assert 22.5 < motion.seconds < 24.0
+    assert not traffic.yields
+
+
+def test_it_does_not_pull_out_to_where_the_first_one_goes(give_way):
+    """The first one turns into the bay behind."""
+    traffic = head_on(remaining=1.0)
+    (own,) = (one for one in traffic._channel.latest() if one.name == "ben")
+    into_the_bay = np.concatenate([own.way[own.way[:, 0] > 2.9], [(2.9, y, 0.0) for y in np.linspace(3.0, 4.6, 9)]])
+    traffic._channel.publish(Announcement("ben", 100.0, into_the_bay, 1.0))
+    result, _ = give_way(bay(2.4, 3.4, True), traffic=traffic, reach=2.5, longest_wait=1.0)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    assert "asks for the right of way over ben" in result.message
+    assert traffic.own.cannot_yield
+
+
+class Pleading(SharedChannel):
+    """The other robot finds at 2 s that it cannot yield."""
+
+    clock = None
+
+    def latest(self):
+        return tuple(
+            announced("ben", 5.3, 0.5, 9.0, 20.0, self.clock.now() > 2.0) if one.name == "ben" else one
+            for one in super().latest()
+        )
+
+
+def test_a_robot_that_waits_pulls_out_as_soon_as_the_other_one_cannot_yield(give_way, monkeypatch):
+    channel = Pleading()
+    traffic = head_on(9.0, channel=channel)
+    recover = GiveWayRecovery.recover
+
+    def with_clock(plugin, request):
+        channel.clock = plugin.clock
+        return recover(plugin, request)
+
+    monkeypatch.setattr(GiveWayRecovery, "recover", with_clock)
+    result, motion = give_way(bay(2.4, 3.4, True), traffic=traffic, longest_wait=60.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert "has pulled out" in result.message
+    assert 2.4 < motion.end.x < 3.4 and motion.end.y > 3.7

@@ -10,6 +10,11 @@ nothing the map knows: back into a bay, around a corner, or a step aside in a ha
 driven slowly, each command checked as in every recovery; afterwards the robot stands for a time that is drawn anew for
 each run. Where there is no such place it ends with IMPASSABLE at once.
 
+Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
+goes first waits until the others are out of its way, the others pull out, also out of the way that the first one has
+announced, and wait until it has passed. Both wait for ``longest_wait`` at most. One that finds no place announces that,
+and then goes first.
+
 The server's ``recovery_patience`` must leave time for the drive and the wait.
 """
 
@@ -36,9 +41,12 @@ from mbf_abstract.maps.recoveries.wait import stand
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
+from mbf_abstract.traffic.announcement import Announcement
+from mbf_abstract.traffic.right_of_way import in_each_others_way, right_of_way
 
 LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
 WAY_SPACING = 0.1  # m
+WAIT_PERIOD = 0.5  # s between two looks at where the other robots are
 LEAVING = 0.3  # m around a robot that touches something
 END_REACHED, HEADING_REACHED = 0.04, 0.05  # m, rad
 
@@ -54,6 +62,9 @@ class GiveWayParameters(GuardedMotionParameters):
     yaw_rate: float = parameter(0.8, "Yaw rate limit.", unit="rad/s", gt=0.0, le=3.0)
     wait: float = parameter(3.0, "How long to stand there, at least.", unit="s", ge=0.0, le=600.0)
     random_extra: float = parameter(3.0, "Stand up to this much longer, by chance.", unit="s", ge=0.0, le=600.0)
+    longest_wait: float = parameter(
+        20.0, "How long to wait for robots that announce where they go, at most.", unit="s", ge=0.0, le=600.0
+    )
 
 
 class GiveWayRecovery(GuardedRecovery):
@@ -63,14 +74,37 @@ class GiveWayRecovery(GuardedRecovery):
     parameters: GiveWayParameters
 
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
-        """Search the place, drive there section by section, and wait."""
+        """Pull out and wait; or only wait, where the right of way is this robot's."""
+        rivals = self._rivals()
+        if rivals and not self._before(rivals):
+            result = self._wait_for(request, rivals, "has the right of way over")
+            rivals = self._rivals()
+            if not result.success or not self._before(rivals):
+                return result
+        self.traffic.yields = True
+        try:
+            return self._pull_out(request, self._before(rivals))
+        finally:
+            self.traffic.yields = False
+
+    def _pull_out(self, request: RecoveryRequest, before: list[Announcement]) -> RecoveryResult:
+        """Search the place, drive there section by section, and wait; ``before`` are the robots that go first."""
         p, begin = self.parameters, request.motion.pose()
-        steps = self._manoeuvre(begin, request)
+        steps = self._manoeuvre(begin, [rival.ahead(p.reach + p.distance) for rival in before], request)
         if request.cancel_token.cancelled:
             return RecoveryResult(RecoveryOutcome.CANCELED, request.cancel_token.reason)
         if steps is None:
-            text = f"no place {p.distance:g} m beside its way within a manoeuvre of {p.reach:g} m"
-            return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
+            return self._without_room(request, before)
+        result = self._drive_along(begin, steps, request)
+        if not result.success:
+            return result
+        place = request.motion.pose()
+        if before:
+            return self._wait_for(request, before, f"has pulled out at ({place.x:.2f}, {place.y:.2f}) for")
+        result = stand(request, p.wait + p.random_extra * float(self.rng.random()))
+        return replace(result, message=f"{result.message} at ({place.x:.2f}, {place.y:.2f}), beside its way")
+
+    def _drive_along(self, begin: Pose, steps: list[Step], request: RecoveryRequest) -> RecoveryResult:
         frame = Transform(begin.position, begin.orientation, begin.frame_id, "begin")
         at: PlanarPose = (0.0, 0.0, 0.0)
         for gear, section in groupby(steps, key=lambda step: step.gear):
@@ -80,15 +114,60 @@ class GiveWayRecovery(GuardedRecovery):
             if not result.success:
                 return result
             at = planned[-1]
-        place = request.motion.pose()
-        seconds = p.wait + p.random_extra * float(self.rng.random())
-        result = stand(request, seconds)
-        return replace(result, message=f"{result.message} at ({place.x:.2f}, {place.y:.2f}), beside its way")
+        return RecoveryResult(RecoveryOutcome.SUCCESS)
+
+    # --------------------------------------------------------------------------------------------- the other robots
+    def _rivals(self) -> list[Announcement]:
+        """Robots that go somewhere and are in this robot's way, as it is in theirs."""
+        own, p = self.traffic.own, self.parameters
+        others = [] if own is None else self.traffic.others(self.clock.now())
+        return [
+            other
+            for other in others
+            if own is not None and other.remaining > 0.0
+            if in_each_others_way(own, other, p.distance, p.reach)
+        ]
+
+    def _before(self, rivals: list[Announcement]) -> list[Announcement]:
+        """Those of the robots that go before this one."""
+        own = self.traffic.own
+        return [rival for rival in rivals if own is not None and not right_of_way(own, rival)]
+
+    def _wait_for(self, request: RecoveryRequest, rivals: list[Announcement], why: str) -> RecoveryResult:
+        """Stand until none of these robots is in the way, or the turn is another's; ``longest_wait`` at most."""
+        names, begun = {rival.name for rival in rivals}, self.clock.now()
+        went_before = {rival.name for rival in self._before(rivals)}
+        while self.clock.now() - begun < self.parameters.longest_wait:
+            result = stand(request, WAIT_PERIOD)
+            if not result.success:
+                return result
+            left = [rival for rival in self._rivals() if rival.name in names]
+            if not left or {rival.name for rival in self._before(left)} - went_before:
+                break
+        text = f"{why} {', '.join(sorted(names))}; waited {self.clock.now() - begun:.1f} s"
+        return RecoveryResult(RecoveryOutcome.SUCCESS, text)
+
+    def _without_room(self, request: RecoveryRequest, before: list[Announcement]) -> RecoveryResult:
+        """Announce that there is no place, so that the others yield, and wait for them."""
+        p = self.parameters
+        text = f"no place {p.distance:g} m beside its way within a manoeuvre of {p.reach:g} m"
+        if not before:
+            return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
+        self.traffic.yields = False
+        self.traffic.found_no_room(self.clock.now() + p.longest_wait)
+        result = self._wait_for(request, before, f"{text}; asks for the right of way over")
+        return replace(result, outcome=RecoveryOutcome.IMPASSABLE) if result.success and self._rivals() else result
 
     # -------------------------------------------------------------------------------------------------- the search
-    def _manoeuvre(self, begin: Pose, request: RecoveryRequest) -> list[Step] | None:
-        """Shortest manoeuvre in the plane of the robot at ``begin`` to a place beside its way."""
-        start, way = self.on_map(begin), self._way(begin)
+    def _manoeuvre(self, begin: Pose, ways: list[NDArray[np.float64]], request: RecoveryRequest) -> list[Step] | None:
+        """Shortest manoeuvre in the plane of the robot at ``begin`` to a place beside its way and those of others."""
+        start = self.on_map(begin)
+        heights = [np.full((len(way), 1), begin.z) for way in ways]
+        others = [
+            rotated_back(begin.rotation, np.column_stack([way, height]) - np.asarray(begin.position))[:, :2]
+            for way, height in zip(ways, heights, strict=True)
+        ]
+        way = np.concatenate([self._way(begin), *others])
         frame = Transform(start.position, start.orientation, start.frame_id, "begin")
         check = self.navigation_map.pose_check(PlaceQuery(use_padded_footprint=True))
         touches = check(start).state > CellState.INSCRIBED

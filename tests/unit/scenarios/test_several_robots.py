@@ -8,6 +8,7 @@ import pytest
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.config.yaml_source import load_yaml
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.goals.goal_types import MoveBaseGoal
 from terrain.physics.actors import Fellow
 from terrain.physics.contact_depth import placed
 from terrain.physics.encounters import Mover
@@ -208,6 +209,22 @@ def test_a_lidar_sees_another_robot_where_its_outline_is(spec):
     beyond = np.sum((hits[:, None] - corners) * outward, axis=2).max(axis=1)
     assert len(hits) > 5
     assert np.abs(beyond).max() < 0.02
+
+
+def test_each_robot_of_a_fleet_hears_where_the_others_are_and_where_they_go():
+    with FleetSession("two_couriers") as fleet:
+        anna = fleet.sessions["anna"]
+        anna.navigator.send(MoveBaseGoal(anna.goals[0]))
+        fleet.clock.sleep(2.0)
+        heard = {
+            name: {one.name: one for one in session.navigator.server.runtime.traffic.others(fleet.clock.now())}
+            for name, session in fleet.sessions.items()
+        }
+        place = anna.robot.pose()
+    assert {name: list(others) for name, others in heard.items()} == {"anna": ["ben"], "ben": ["anna"]}
+    assert heard["ben"]["anna"].remaining == pytest.approx(7.5, abs=1.5)
+    assert np.hypot(*(heard["ben"]["anna"].way[0, :2] - (place.x, place.y))) < 0.5
+    assert (heard["anna"]["ben"].remaining, len(heard["anna"]["ben"].way)) == (0.0, 1)
 
 
 # ------------------------------------------------------------------------------------------------- the judgement

@@ -1,0 +1,71 @@
+"""What one robot announces to the others: who and where it is, and where it goes next."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry.arithmetic import norm
+
+SPACING = 0.1
+"""Distance [m] of the points at which two ways are compared."""
+
+
+@dataclass(frozen=True, eq=False)
+class Announcement:
+    """State of one robot at one time, in the global frame that all robots share.
+
+    Attributes
+    ----------
+    name : str
+        Of the robot; no other robot has it.
+    stamp : float
+        Time [s] of all this, on the clock that the robots share.
+    way : (n, 3) float64
+        Where it is, then the path that it wants to follow from there [m]; only where it is if it goes nowhere.
+    remaining : float
+        Length [m] of the way to its goal, of which ``way`` may be the beginning.
+    cannot_yield : bool
+        Whether it has looked for a place to let others pass and has found none.
+    """
+
+    name: str
+    stamp: float
+    way: FloatArray
+    remaining: float
+    cannot_yield: bool = False
+
+    def to_json(self) -> str:
+        """Return it as a JSON object, to be sent; ``from_json`` reads it."""
+        values = vars(self) | {"way": self.way.tolist()}
+        return json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+    @classmethod
+    def from_json(cls, text: str) -> Announcement:
+        """Read what ``to_json`` has written; raises ValueError for anything else."""
+        try:
+            values = json.loads(text)
+            way = np.array(values["way"], dtype=np.float64).reshape(-1, 3)
+            read = cls(
+                str(values["name"]),
+                float(values["stamp"]),
+                way,
+                float(values["remaining"]),
+                bool(values["cannot_yield"]),
+            )
+        except (ValueError, KeyError, TypeError, OverflowError) as error:
+            raise ValueError(f"no announcement of a robot: {type(error).__name__}: {error}") from error
+        if not (read.name and len(way) and np.isfinite(way).all() and math.isfinite(read.stamp + read.remaining)):
+            raise ValueError("no announcement of a robot: it needs a name, a place and finite numbers")
+        return read
+
+    def ahead(self, length: float) -> FloatArray:
+        """Points (n, 2) [m] of its way up to ``length`` [m] from where it is, ``SPACING`` apart, the first included."""
+        steps = norm(np.diff(self.way[:, :2], axis=0))
+        driven = np.concatenate([[0.0], np.cumsum(steps)])
+        at = np.arange(0.0, min(length, float(driven[-1])) + 0.5 * SPACING, SPACING)
+        return np.column_stack([np.interp(at, driven, self.way[:, axis]) for axis in (0, 1)])

@@ -1,0 +1,35 @@
+"""Who of two robots goes first where only one can, by a rule that both compute from what they have announced.
+
+First goes the one that cannot yield; of two that can, or two that cannot, the one that has less way to its goal; of two
+with equally much, the one whose name comes first. The ranks of all robots are in one order, so of any number of robots
+in each other's way exactly one may go before all others, and they never wait for each other in a circle. The rule of
+the road, right before left, would let four robots at a crossing wait for ever.
+
+Driving back makes the way of the one that yields longer, and driving on that of the other one shorter, so the decision
+lasts.
+"""
+
+from __future__ import annotations
+
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.traffic.announcement import Announcement
+
+
+def right_of_way(mine: Announcement, other: Announcement) -> bool:
+    """Whether the robot of ``mine`` goes before the other one.
+
+    Of ``right_of_way(a, b)`` and ``right_of_way(b, a)`` exactly one is true. Raises ValueError for one name.
+    """
+    if mine.name == other.name:
+        raise ValueError(f"two robots announce the name {mine.name!r}")
+    return _rank(mine) < _rank(other)
+
+
+def _rank(robot: Announcement) -> tuple[bool, float, str]:
+    return not robot.cannot_yield, robot.remaining, robot.name
+
+
+def in_each_others_way(mine: Announcement, other: Announcement, distance: float, length: float) -> bool:
+    """Whether the ways of two robots over the next ``length`` [m] come nearer than ``distance`` [m]; symmetric."""
+    a, b = mine.ahead(length), other.ahead(length)
+    return bool(norm(a[:, None] - b).min() < distance)

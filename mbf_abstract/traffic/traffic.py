@@ -1,0 +1,87 @@
+"""The announcements of the robots, as one of them knows them, and the channel that carries them.
+
+A server has an empty ``Traffic``. ``connect`` gives it the robot's name and a channel: ``SharedChannel`` for robots in
+one process, or one of your own, such as a ROS topic that carries ``Announcement.to_json``. An ``Announcer`` publishes
+where the robot is and where it goes.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import replace
+from typing import Protocol
+
+from mbf_abstract.traffic.announcement import Announcement
+
+MAX_AGE = 3.0
+"""Older announcements [s] do not count: that robot is switched off, or out of reach."""
+
+
+class Channel(Protocol):
+    """Carries announcements between robots; both methods are called on any thread, and do not wait."""
+
+    def publish(self, announcement: Announcement) -> None:
+        """Send the newest announcement of one robot to all others."""
+
+    def latest(self) -> tuple[Announcement, ...]:
+        """Return the newest announcement of each robot that has sent one."""
+
+
+class SharedChannel:
+    """A channel for robots in one process."""
+
+    def __init__(self) -> None:
+        self._latest: dict[str, Announcement] = {}
+        self._lock = threading.Lock()
+
+    def publish(self, announcement: Announcement) -> None:
+        """Keep the newest announcement of a robot."""
+        with self._lock:
+            self._latest[announcement.name] = announcement
+
+    def latest(self) -> tuple[Announcement, ...]:
+        """Return the newest announcement of each robot, in the order of their names."""
+        with self._lock:
+            return tuple(self._latest[name] for name in sorted(self._latest))
+
+
+class Traffic:
+    """What one robot wants and what it knows of the others; empty until ``connect`` is called.
+
+    Attributes
+    ----------
+    own : Announcement or None
+        Where the robot is and wants to go.
+    yields : bool
+        Whether it is letting others pass: then it announces where it is, and not where it wants to go.
+    """
+
+    def __init__(self) -> None:
+        self.own: Announcement | None = None
+        self.yields = False
+        self._name = ""
+        self._channel: Channel | None = None
+        self._no_room_until = -math.inf
+
+    def connect(self, name: str, channel: Channel) -> None:
+        """Announce under a name of its own, on a channel."""
+        self._name, self._channel = name, channel
+
+    def announce(self, announcement: Announcement) -> None:
+        """Publish where the robot is; its name, and whether it yields or cannot, are filled in."""
+        if self._channel is not None:
+            no_room = announcement.stamp < self._no_room_until
+            self.own = replace(announcement, name=self._name, cannot_yield=no_room)
+            self._channel.publish(replace(self.own, way=self.own.way[:1]) if self.yields else self.own)
+
+    def found_no_room(self, until: float) -> None:
+        """Announce up to this time [s] that there is no place to let others pass."""
+        self._no_room_until = until
+        if self.own is not None:
+            self.announce(self.own)
+
+    def others(self, now: float) -> tuple[Announcement, ...]:
+        """Return what the other robots have announced in the last seconds, in the order of their names."""
+        latest = () if self._channel is None else self._channel.latest()
+        return tuple(one for one in latest if one.name != self._name and now - one.stamp <= MAX_AGE)

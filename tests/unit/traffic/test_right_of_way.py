@@ -1,0 +1,130 @@
+"""Announcements of robots, and the right of way between them: one of two goes first, and never all wait for another."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mbf_abstract.traffic.announcement import SPACING, Announcement
+from mbf_abstract.traffic.right_of_way import in_each_others_way, right_of_way
+from mbf_abstract.traffic.traffic import MAX_AGE, SharedChannel, Traffic
+
+coordinates = st.floats(-20.0, 20.0, width=32)
+ways = st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=8).map(
+    lambda points: np.column_stack([np.array(points), np.zeros(len(points))])
+)
+announcements = st.builds(
+    Announcement,
+    name=st.sampled_from(["anna", "ben", "carla", "dora", "emil"]),
+    stamp=st.floats(0.0, 1e4),
+    way=ways,
+    remaining=st.integers(0, 3).map(float),
+    cannot_yield=st.booleans(),
+)
+fleets = st.lists(announcements, min_size=2, max_size=5, unique_by=lambda one: one.name)
+
+
+@given(fleets)
+def test_of_two_robots_exactly_one_goes_first_whoever_of_them_computes_it(fleet):
+    for a, b in itertools.permutations(fleet, 2):
+        as_sent = Announcement.from_json(a.to_json()), Announcement.from_json(b.to_json())
+        assert right_of_way(a, b) is not right_of_way(b, a)
+        assert right_of_way(*as_sent) is right_of_way(a, b)
+
+
+@given(fleets)
+def test_of_any_number_of_robots_exactly_one_goes_before_all_others(fleet):
+    firsts = [a for a in fleet if all(right_of_way(a, b) for b in fleet if b is not a)]
+    assert len(firsts) == 1
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ({"name": "zoe", "cannot_yield": True, "remaining": 9.0}, {"name": "ben", "remaining": 1.0}),
+        ({"name": "zoe", "remaining": 1.0}, {"name": "ben", "remaining": 1.01}),
+        ({"name": "anna", "remaining": 1.0}, {"name": "ben", "remaining": 1.0}),
+    ],
+    ids=["one that cannot yield", "then the one with less way left", "then by name"],
+)
+def test_first_goes(first, second):
+    base = Announcement("", 0.0, np.zeros((1, 3)), 5.0)
+    assert right_of_way(replace(base, **first), replace(base, **second))
+
+
+def test_two_robots_of_one_name_are_refused():
+    one = Announcement("anna", 0.0, np.zeros((1, 3)), 5.0)
+    with pytest.raises(ValueError, match="'anna'"):
+        right_of_way(one, one)
+
+
+def naive_gap(a, b, length):
+    """Least distance of two ways by their corners, cut off and sampled finely."""
+
+    def points(way):
+        cut, left = [way[0, :2]], length
+        for p, q in itertools.pairwise(way[:, :2]):
+            step = math.dist(p, q)
+            share = min(1.0, left / step) if step > 0.0 else 1.0
+            cut += [p + s * share * (q - p) for s in np.linspace(0.0, 1.0, 200)]
+            left -= share * step
+            if left <= 1e-9:
+                break
+        return np.array(cut)
+
+    mine, others = points(a.way), points(b.way)
+    return min(float(np.hypot(*(others - p).T).min()) for p in mine)
+
+
+@given(announcements, announcements, st.floats(0.5, 6.0))
+def test_ways_are_in_each_others_way_where_they_come_near_and_that_is_mutual(a, b, length):
+    gap = naive_gap(a, b, length)
+    assert in_each_others_way(a, b, gap + 2.0 * SPACING, length)
+    assert gap <= 2.0 * SPACING or not in_each_others_way(a, b, gap - 2.0 * SPACING, length)
+    assert in_each_others_way(a, b, 1.0, length) is in_each_others_way(b, a, 1.0, length)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"name":"a","stamp":0,"way":[],"remaining":0,"cannot_yield":false}', "9" * 400, "null"]
+)
+def test_what_is_no_announcement_is_refused(text):
+    with pytest.raises(ValueError, match="no announcement"):
+        Announcement.from_json(text)
+
+
+def state(stamp, *places):
+    return Announcement("", stamp, np.array([(x, 0.0, 0.0) for x in places]), 3.0)
+
+
+def test_robots_know_what_the_others_have_announced_lately_and_not_themselves():
+    channel, anna, ben = SharedChannel(), Traffic(), Traffic()
+    anna.connect("anna", channel)
+    ben.connect("ben", channel)
+    anna.announce(state(10.0, 0.0, 3.0))
+    ben.announce(state(10.5, 5.0))
+    assert [one.name for one in anna.others(10.5)] == ["ben"]
+    assert [one.name for one in ben.others(10.0 + MAX_AGE)] == ["anna"]
+    assert ben.others(10.1 + MAX_AGE) == ()
+
+
+def test_a_robot_without_a_channel_announces_nothing():
+    alone = Traffic()
+    alone.announce(state(0.0, 1.0))
+    assert (alone.own, alone.others(0.0)) == (None, ())
+
+
+def test_one_that_lets_others_pass_announces_only_where_it_is_and_one_without_room_says_so_for_a_while():
+    channel, anna = SharedChannel(), Traffic()
+    anna.connect("anna", channel)
+    anna.yields = True
+    anna.announce(state(1.0, 0.0, 3.0))
+    assert len(channel.latest()[0].way) == 1
+    assert len(anna.own.way) == 2
+    anna.found_no_room(until=5.0)
+    assert channel.latest()[0].cannot_yield
+    anna.announce(state(5.0, 0.0))
+    assert not channel.latest()[0].cannot_yield
