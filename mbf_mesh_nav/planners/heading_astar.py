@@ -4,8 +4,9 @@ Strengths: knows the direction of slopes (limits for roll and pitch, per heading
 ``tilt`` layer it uses the footprint settled on the surface, without one the vertex normals. The limits hold all along
 the path, at the headings really driven; turns on the spot are looked at every 22.5 degrees. Known failure: drives along
 edges and, with a ``tilt`` layer, straight across pairs of faces, so headings are those of the mesh (twelve on regular
-grids, six without a layer), and the path zigzags in between; it never drives backward; a cost of roll or turning too
-high for the map makes it slow. Cost: up to 16 x the states of ``mesh.astar``, about 350 bytes a vertex while planning;
+grids, six without a layer), and the path zigzags in between; it never drives backward; a cost of turning too high for
+the map makes it slow, because the bound that guides the search knows the roll but not the turns. Cost: some ten times
+``mesh.astar`` on open terrain, up to 16 x its states around large obstacles, about 500 bytes a vertex while planning;
 meant for meshes below 300 k vertices.
 """
 
@@ -18,22 +19,17 @@ import numpy as np
 
 from mbf_abstract.parameters import parameter
 from mbf_abstract.plugins import PlanResult
-from mbf_mesh_nav.arrays import BoolArray, Float32Array, IntArray
-from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for
-from mbf_mesh_nav.kernels.search.dijkstra import follow_predecessors
-from mbf_mesh_nav.kernels.search.heading_astar import HEADINGS, search_with_heading
+from mbf_mesh_nav.arrays import BoolArray, Float32Array
+from mbf_mesh_nav.kernels.search.heading_astar import HEADINGS
 from mbf_mesh_nav.layers.tilt import TiltLayer
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.plugins import MeshContext
-from mbf_mesh_nav.search.drive_graph import DriveGraph
 from mbf_mesh_nav.search.end_stretches import EndStretches, headings_within
 from mbf_mesh_nav.search.heading_limits import FootprintLimits, HeadingLimits, NormalLimits
-from mbf_mesh_nav.search.leg_search import NO_OFFSETS, NO_TARGETS, Leg, LegQuery, straight_leg
+from mbf_mesh_nav.search.heading_search import HeadingSearch, PricedHeadings
+from mbf_mesh_nav.search.leg_search import Leg, LegQuery, straight_leg
 from mbf_mesh_nav.search.straight_line import line_over_ground
 from mbf_mesh_nav.search.surface_planner import SurfacePlanner, SurfacePlannerParameters
-
-CANCELLED = -2
-"""What ``search_with_heading`` answers instead of a state."""
 
 
 class HeadingAStarParameters(SurfacePlannerParameters):
@@ -63,9 +59,9 @@ class HeadingAStarPlanner(SurfacePlanner):
         self._refuse_other_layers(self.parameters.tilt_layer)
 
     @cached_property
-    def _graph(self) -> DriveGraph:
-        """What can be driven; made for the first plan, for a fallback may never be asked for one."""
-        return DriveGraph(self.mesh_map.topology)
+    def _search(self) -> HeadingSearch:
+        """With what can be driven; made for the first plan, for a fallback may never be asked for one."""
+        return HeadingSearch(self.mesh_map)
 
     def _refuse_other_layers(self, name: str) -> None:
         """A layer that was named on purpose, but is none of tilts, would leave slopes to the defaults unnoticed."""
@@ -80,31 +76,36 @@ class HeadingAStarPlanner(SurfacePlanner):
     def find_leg(self, query: LegQuery) -> Leg | None:
         """Search from the start's corners, with the robot's heading, to the goal's corners."""
         mesh_map, limits = self.mesh_map, self._current_limits()
-        stretches = EndStretches(mesh_map, limits, query, self.parameters.turning_cost, self._graph)
+        stretches = EndStretches(mesh_map, limits, query, self.parameters.turning_cost, self._search.graph)
         if query.start.face == query.goal.face and stretches.may_drive_straight():
             return straight_leg(mesh_map, query)
-        best, cost, _, predecessors = self._search(query, limits, stretches.from_start(), stretches.to_goal())
-        if best < 0:
+        ends = stretches.from_start(), stretches.to_goal()
+        found = self._search.cheapest_path(query, limits, self._costs(), *ends)
+        if found is None:
             self._tilt_at_ends = self._describe_ends(query, limits)
             return None
-        chain = follow_predecessors(predecessors, best)[::-1] // HEADINGS
+        chain, cost = found
         begin, end = query.start, query.goal
         first = line_over_ground(mesh_map.topology, begin.face, begin.point, mesh_map.vertices[chain[0]])
         assert first is not None  # the search begins at the ends of such lines
-        positions, normals = self._graph.along(chain)
+        positions, normals = self._search.graph.along(chain)
         positions = np.concatenate([[begin.point], first.points[1:-1], positions, [end.point]])
         faces = np.array([begin.face, *first.faces[1:]], dtype=np.int32)
         normals = np.concatenate([mesh_map.face_normals[faces], normals, mesh_map.face_normals[[end.face]]])
         return Leg(positions, normals, cost)
 
     def reach(self, query: LegQuery) -> Float32Array | None:
-        """As for every planner; here to where the robot may also turn to a heading asked for at the goal."""
+        """As for every planner; here to where the robot may also turn to a heading asked for at the goal.
+
+        Moves that no search has looked at yet count as drivable.
+        """
         limits = self._current_limits()
-        from_start = EndStretches(self.mesh_map, limits, query, self.parameters.turning_cost, self._graph).from_start()
-        best, _, distances, _ = self._search(query, limits, from_start, (NO_TARGETS, NO_OFFSETS, NO_TARGETS))
-        if best == CANCELLED:
+        from_start = EndStretches(
+            self.mesh_map, limits, query, self.parameters.turning_cost, self._search.graph
+        ).from_start()
+        by_heading = self._search.costs_to_states(query, limits, self._costs(), from_start)
+        if by_heading is None:
             return None
-        by_heading = distances.reshape(-1, HEADINGS)
         headings = headings_within(query.goal_pose, query.angle_tolerance)
         if not headings:
             return np.asarray(by_heading.min(axis=1))
@@ -113,39 +114,8 @@ class HeadingAStarPlanner(SurfacePlanner):
             may_turn |= may_turn_to(limits.allowed, heading)
         return np.asarray(np.where(may_turn, by_heading, np.float32(np.inf)).min(axis=1))
 
-    def _search(
-        self,
-        query: LegQuery,
-        limits: HeadingLimits,
-        from_start: tuple[IntArray, Float32Array],
-        to_goal: tuple[IntArray, Float32Array, IntArray],
-    ) -> tuple[int, float, Float32Array, IntArray]:
-        """Run the kernel: best target state, its cost, distances and predecessors (16 V,) of all states it came to."""
-        mesh_map = self.mesh_map
-        distances = np.full(HEADINGS * len(mesh_map.vertices), np.inf, dtype=np.float32)
-        predecessors = np.full(len(distances), -1, dtype=np.int32)
-        seeds, offsets = from_start
-        distances[seeds] = offsets
-        best, cost = search_with_heading(
-            mesh_map.topology.surface,
-            self._graph.moves,
-            self._graph.weights(query.snapshot, query.blocked),
-            query.blocked,
-            limits.allowed,
-            limits.roll,
-            self.parameters.roll_cost,
-            self.parameters.turning_cost,
-            distances,
-            predecessors,
-            seeds,
-            *to_goal,
-            query.goal.point,
-            limits.known,
-            limits.chassis,
-            scratch_for(len(mesh_map.vertices)),
-            query.cancel_flag,
-        )
-        return best, cost, distances, predecessors
+    def _costs(self) -> PricedHeadings:
+        return PricedHeadings(self.parameters.roll_cost, self.parameters.turning_cost)
 
     def _no_path(self, start: SurfacePoint, goal: SurfacePoint, blocked: BoolArray) -> PlanResult:
         """Name the tilt where it, and not a blocked vertex, makes the goal unreachable."""
@@ -168,11 +138,11 @@ class HeadingAStarPlanner(SurfacePlanner):
         layer = self.mesh_map.layers.get(self.parameters.tilt_layer)
         if isinstance(layer, TiltLayer):
             if not isinstance(self._limits, FootprintLimits) or self._limits.allowed is not layer.allowed:
-                self._limits = FootprintLimits(self.mesh_map, layer, self._graph)
+                self._limits = FootprintLimits(self.mesh_map, layer, self._search.graph)
             return self._limits
         angles = self.parameters.max_roll, self.parameters.max_pitch
         if not isinstance(self._limits, NormalLimits) or self._limits.angles != angles:
-            self._limits = NormalLimits(self.mesh_map, *angles, self._graph)
+            self._limits = NormalLimits(self.mesh_map, *angles, self._search.graph)
         return self._limits
 
 

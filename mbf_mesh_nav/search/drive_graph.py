@@ -10,12 +10,16 @@ pulling the path straight would not, and they pay for it at each vertex.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.geometry.arithmetic import arctan2, norm
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from mbf_mesh_nav.kernels.search.goal_bound import Arrivals
 from mbf_mesh_nav.kernels.search.heading_astar import HEADING_STEP, HEADINGS, Moves
+from mbf_mesh_nav.kernels.search.move_weights import weights_of_moves
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.topology import MeshTopology
 
@@ -42,14 +46,22 @@ class DriveGraph:
         self._starts, edges = starts[order], np.arange(len(edge_starts))
         ends = np.concatenate([mesh.neighbours, strides[:, 1]])[order].astype(np.int32)
         no_strides = np.full(len(edges), NO_STRIDE)
-        self._edges = np.concatenate([edges, np.full(len(strides), -1)])[order]
-        self._left, self._right = (np.concatenate([no_strides, side])[order] for side in (left, right))
+        self._edges = np.concatenate([edges, np.full(len(strides), -1)])[order].astype(np.int32)
+        self._left, self._right = (np.concatenate([no_strides, side])[order].astype(np.int32) for side in (left, right))
         offsets = np.concatenate([[0], np.cumsum(np.bincount(starts, minlength=mesh.vertex_count))])
         steps = mesh.vertices[ends] - mesh.vertices[self._starts]
         headings = np.rint(arctan2(steps[:, 1], steps[:, 0]) / HEADING_STEP).astype(np.int64) % HEADINGS
         of_edges = np.full(len(edges), np.nan)
         shares = np.concatenate([of_edges, shares])[order]
         self.moves = Moves(offsets.astype(np.int32), ends, headings.astype(np.uint8), shares)
+
+    @cached_property
+    def arrivals(self) -> Arrivals:
+        """The moves by the vertex they lead to."""
+        order = np.argsort(self.moves.ends, kind="stable").astype(np.int32)
+        counts = np.bincount(self.moves.ends, minlength=self._mesh.vertex_count)
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+        return Arrivals(offsets, self._starts[order].astype(np.int32), order)
 
     @property
     def is_edge(self) -> BoolArray:
@@ -69,25 +81,8 @@ class DriveGraph:
         Edges weigh what they do in the snapshot. Along strides costs are those of their faces; a stride beside a
         ``blocked`` (V,) vertex is infinite.
         """
-        is_edge, weights = self.is_edge, np.empty(len(self._edges), dtype=np.float32)
-        weights[is_edge] = snapshot.edge_weights
-        stride, vertices, costs = ~is_edge, self._mesh.vertices, snapshot.costs
-        start, end, left, right = (
-            of_all[stride] for of_all in (self._starts, self.moves.ends, self._left, self._right)
-        )
-        closed = blocked[start] | blocked[end] | blocked[left] | blocked[right]
-        share = self.moves.shares[stride]
-        crossing, middle = (
-            (1.0 - part) * values[left] + part * values[right]
-            for part, values in ((share[:, None], vertices), (share, np.where(np.isfinite(costs), costs, 0.0)))
-        )
-        total = np.zeros(len(start))
-        for corner in (start, end):
-            at_corner = np.where(closed, 0.0, costs[corner])
-            length = norm(vertices[corner] - crossing)
-            total += length * (1.0 + snapshot.edge_cost_factor * 0.5 * (at_corner + middle))
-        weights[stride] = np.where(closed, np.inf, total)
-        return weights
+        costs = snapshot.edge_weights, snapshot.costs, snapshot.edge_cost_factor
+        return weights_of_moves(self._mesh.vertices, self.moves, self._edges, self._left, self._right, *costs, blocked)
 
     def along(self, chain: IntArray) -> tuple[FloatArray, FloatArray]:
         """Positions and surface normals (n, 3) along moves from vertex to vertex of a chain (k,), on the surface.

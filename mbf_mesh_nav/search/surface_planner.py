@@ -64,7 +64,7 @@ class SurfacePlanner(MeshPlanner):
     def reach(self, query: LegQuery) -> Float32Array | None:
         """Distances (V,) [m] from the query's start to every vertex with a path, inf elsewhere; None: cancelled.
 
-        Here: along the edges of free vertices.
+        Here: along the edges of free vertices. What is finite here and no leg leads to must be inf the next time.
         """
         distances, _, finished = propagate_from(
             self.mesh_map, query.snapshot, query.blocked, query.start, query.cancel_flag
@@ -179,15 +179,18 @@ class SurfacePlanner(MeshPlanner):
         last_pose = (request.start, *request.via)[-1]
         ends = last_pose, request.goal, request.angle_tolerance
         query = LegQuery(start, start, snapshot, blocked, request.cancel_token.flag, *ends)
-        distances = self.reach(query)
-        if distances is None:
-            return None
-        offsets = norm(mesh_map.vertices - np.asarray(request.goal.position))
-        offsets[~np.isfinite(distances)] = np.inf
-        vertex = int(np.argmin(offsets))
-        if offsets[vertex] > request.dist_tolerance:
-            return None
-        return self.find_leg(replace(query, goal=surface_point_at_vertex(mesh_map, vertex)))
+        tried = -1
+        while (distances := self.reach(query)) is not None:
+            offsets = norm(mesh_map.vertices - np.asarray(request.goal.position))
+            offsets[~np.isfinite(distances)] = np.inf
+            vertex = int(np.argmin(offsets))
+            if offsets[vertex] > request.dist_tolerance or vertex == tried:
+                return None
+            leg = self.find_leg(replace(query, goal=surface_point_at_vertex(mesh_map, vertex)))
+            if leg is not None:
+                return leg
+            tried = vertex  # a search may find out what ``reach`` did not know
+        return None
 
     def _assemble(self, legs: list[Leg], goal: Pose, goal_reached_exactly: bool) -> Path:
         positions = np.concatenate([legs[0].positions[:1]] + [leg.positions[1:] for leg in legs])

@@ -3,7 +3,7 @@
 A state is ``vertex * HEADINGS + heading``. The robot turns on the spot to the heading of a move, over headings that
 are all allowed there, and drives the move: along an edge, or straight across two faces. That costs the move's weight,
 lengthened by the roll it brings, plus the turn. Whether the tilt allows a move at its very heading, all along it, is
-found out when a search first wants to take it.
+found out once: when a search wants to take it, or for a path that a search has found.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from mbf_mesh_nav.arrays import BoolArray, FlagArray, Float32Array, FloatArray, 
 from mbf_mesh_nav.kernels.compiled import Count, Index, inner_kernel, kernel
 from mbf_mesh_nav.kernels.layers.footprint_sweep import Chassis, Scratch, edge_use, stride_use
 from mbf_mesh_nav.kernels.mesh.surface import Surface
-from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL, straight_line_bound
+from mbf_mesh_nav.kernels.search.dijkstra import CANCEL_POLL_INTERVAL
+from mbf_mesh_nav.kernels.search.goal_bound import GoalBound, bound_at
 from mbf_mesh_nav.kernels.search.indexed_heap import push_or_decrease, remove_top, top_item, top_key
 
 HEADINGS = 16
@@ -64,10 +65,11 @@ def search_with_heading(
     targets: IntArray,
     target_offsets: Float32Array,
     target_headings: IntArray,
-    goal: FloatArray,
+    bound: GoalBound,
     known: NDArray[np.uint8],
     chassis: Chassis,
     scratch: Scratch,
+    find_out: bool,
     cancel_flag: FlagArray,
 ) -> tuple[int, float]:
     """Relax ``distances`` and ``predecessors`` in place until the best target state is settled.
@@ -91,11 +93,14 @@ def search_with_heading(
         Goal vertices and what is left from them to the goal.
     target_headings : (t,) int32
         Turning to it at the goal vertex costs, too, and has to be allowed; -1 = any heading will do.
-    goal : (3,) float64 [m]
+    bound : GoalBound
+        Of the costs to the goal.
     known : (m,) uint8
-        Whether a move may be driven; what is ``UNKNOWN`` is found out and written here.
+        Whether a move may be driven.
     chassis, scratch
         The robot and its limits, and memory, see ``footprint_sweep``.
+    find_out : bool
+        Whether an ``UNKNOWN`` move is looked at and the answer written to ``known``, or counts as drivable.
     cancel_flag : (1,) uint8
 
     Returns
@@ -105,13 +110,12 @@ def search_with_heading(
     total : float
         Cost of the path there [m], the rest to the goal and the last turn included.
     """
-    vertices = surface.vertices
     state_count = len(distances)
     heap = np.empty(state_count, dtype=np.uint64)
     positions = np.full(state_count, -1, dtype=np.int32)
     size = Count(0)
     for seed in seeds:
-        key = distances[seed] + straight_line_bound(vertices, Index(seed // HEADINGS), goal)
+        key = distances[seed] + bound_at(bound, Index(seed // HEADINGS))
         size = push_or_decrease(heap, positions, size, Index(seed), key)
     best_state, best_total = -1, np.inf
     settled = 0
@@ -139,20 +143,45 @@ def search_with_heading(
             candidate = np.float32(distances[state] + drive + turning_cost * HEADING_STEP * abs(turn))
             following = neighbour * HEADINGS + new_heading
             if candidate < distances[following]:
-                if known[slot] == UNKNOWN:
-                    share = moves.shares[slot]
-                    if np.isnan(share):
-                        use = edge_use(surface, chassis, scratch, Count(vertex), Count(neighbour))
-                    else:
-                        use = stride_use(surface, chassis, scratch, Count(vertex), Count(neighbour), share)
-                    known[slot] = DRIVABLE if use <= 1.0 else FORBIDDEN
+                if find_out and known[slot] == UNKNOWN:
+                    known[slot] = _may_drive(surface, chassis, scratch, vertex, neighbour, moves.shares[slot])
                 if known[slot] == FORBIDDEN:
                     continue
                 distances[following] = candidate
                 predecessors[following] = state
-                key = candidate + straight_line_bound(vertices, Index(neighbour), goal)
+                key = candidate + bound_at(bound, Index(neighbour))
                 size = push_or_decrease(heap, positions, size, Index(following), key)
     return best_state, best_total
+
+
+@kernel
+def find_out_along(
+    surface: Surface, moves: Moves, chain: IntArray, known: NDArray[np.uint8], chassis: Chassis, scratch: Scratch
+) -> bool:
+    """Find out which moves between the vertices ``chain`` (n,) int32 may be driven; return whether all of them may.
+
+    The other arguments are those of ``search_with_heading``.
+    """
+    drivable = True
+    for place in range(len(chain) - 1):
+        vertex, following = chain[place], chain[place + 1]
+        slot = Count(moves.offsets[vertex])
+        while moves.ends[slot] != following:
+            slot += 1
+        if known[slot] == UNKNOWN:
+            known[slot] = _may_drive(surface, chassis, scratch, vertex, following, moves.shares[slot])
+        drivable = drivable and known[slot] == DRIVABLE
+    return drivable
+
+
+@inner_kernel
+def _may_drive(surface: Surface, chassis: Chassis, scratch: Scratch, vertex: int, end: int, share: float) -> int:
+    """``DRIVABLE`` or ``FORBIDDEN``, for the move from a vertex to another."""
+    if np.isnan(share):
+        use = edge_use(surface, chassis, scratch, Count(vertex), Count(end))
+    else:
+        use = stride_use(surface, chassis, scratch, Count(vertex), Count(end), share)
+    return DRIVABLE if use <= 1.0 else FORBIDDEN
 
 
 @inner_kernel

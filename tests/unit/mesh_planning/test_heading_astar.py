@@ -1,21 +1,27 @@
 """Planning with headings: against a naive twin, and on a hill that may be climbed but not traversed."""
 
 import heapq
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
+import scipy.sparse.csgraph
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for
-from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, HEADING_STEP, HEADINGS, search_with_heading
+from mbf_mesh_nav.kernels.compiled import Index, kernel
+from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph, propagate_distances
+from mbf_mesh_nav.kernels.search.goal_bound import GoalBound, bound_at, weights_of_arrivals
+from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN, HEADING_STEP, HEADINGS
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.surface_point import surface_point_at_vertex
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner, may_turn_to
-from mbf_mesh_nav.search.drive_graph import DriveGraph
 from mbf_mesh_nav.search.heading_limits import NO_CHASSIS
+from mbf_mesh_nav.search.heading_search import HeadingSearch, PricedHeadings
+from mbf_mesh_nav.search.leg_search import LegQuery
 
 
 def passed_headings(heading, new):
@@ -25,9 +31,33 @@ def passed_headings(heading, new):
     return [(heading + np.sign(turn) * k) % 16 for k in range(1, abs(turn) + 1)]
 
 
-def slow_search(moves, weights, allowed, roll, roll_cost, turning_cost, start, target, offset, goal_heading):
+@dataclass
+class RandomLimits:
+    """Headings and moves forbidden at random."""
+
+    allowed: np.ndarray
+    roll: np.ndarray
+    known: np.ndarray
+    chassis = NO_CHASSIS
+    knows_footprint = False
+
+    @classmethod
+    def on(cls, search, vertex_count, rng):
+        known = np.where(rng.random(len(search.graph.moves.ends)) < 0.9, DRIVABLE, FORBIDDEN).astype(np.uint8)
+        roll = rng.uniform(-0.4, 0.4, (vertex_count, 16)).astype(np.float32)
+        return cls(rng.random((vertex_count, 16)) < 0.85, roll, known)
+
+
+def query_between(mesh_map, start, goal):
+    ends = (surface_point_at_vertex(mesh_map, vertex) for vertex in (start, goal))
+    snapshot = mesh_map.snapshot()
+    return LegQuery(*ends, snapshot, snapshot.lethal, np.zeros(1, np.uint8))
+
+
+def slow_search(moves, weights, limits, costs, start, target, offset, goal_heading):
     """The twin: Dijkstra over (vertex, heading) with heapq."""
-    best, queue, total = {start: 0.0}, [(0.0, start)], np.inf
+    best, queue, total, allowed = {start: 0.0}, [(0.0, start)], np.inf, limits.allowed
+    turning = costs.turning * HEADING_STEP
     while queue:
         cost, (vertex, heading) = heapq.heappop(queue)
         if cost > best[vertex, heading]:
@@ -35,14 +65,17 @@ def slow_search(moves, weights, allowed, roll, roll_cost, turning_cost, start, t
         if vertex == target:
             last_turn = passed_headings(heading, goal_heading)
             if all(allowed[vertex, h] for h in last_turn):
-                total = min(total, cost + offset + turning_cost * HEADING_STEP * len(last_turn))
+                total = min(total, cost + offset + turning * len(last_turn))
         for slot in range(moves.offsets[vertex], moves.offsets[vertex + 1]):
             other, new = int(moves.ends[slot]), int(moves.headings[slot])
             passed = passed_headings(heading, new)
-            if not allowed[other, new] or not all(allowed[vertex, h] for h in passed):
+            if (
+                limits.known[slot] == FORBIDDEN
+                or not allowed[other, new]
+                or not all(allowed[vertex, h] for h in passed)
+            ):
                 continue
-            drive = weights[slot] * (1 + roll_cost * abs(roll[other, new]))
-            new_cost = cost + drive + turning_cost * HEADING_STEP * len(passed)
+            new_cost = cost + weights[slot] * (1 + costs.roll * abs(limits.roll[other, new])) + turning * len(passed)
             if new_cost < best.get((other, new), np.inf):
                 best[other, new] = new_cost
                 heapq.heappush(queue, (new_cost, (other, new)))
@@ -54,23 +87,56 @@ def slow_search(moves, weights, allowed, roll, roll_cost, turning_cost, start, t
 def test_the_search_finds_the_cost_of_the_naive_one(seed):
     rng = np.random.default_rng(seed)
     mesh_map = MeshMap.from_heights(rng.uniform(0, 0.2, (6, 6)), 0.5, 0.5)
-    count = len(mesh_map.vertices)
-    allowed, roll = rng.random((count, 16)) < 0.85, rng.uniform(-0.4, 0.4, (count, 16)).astype(np.float32)
-    graph, blocked = DriveGraph(mesh_map.topology), np.zeros(count, bool)
-    moves, weights = graph.moves, graph.weights(mesh_map.snapshot(), blocked)
+    search, costs, count = HeadingSearch(mesh_map), PricedHeadings(0.7, 0.2), len(mesh_map.vertices)
+    limits = RandomLimits.on(search, count, rng)
     start, target, goal_heading = 0, count - 1, int(rng.integers(16))
-    distances, predecessors = np.full(16 * count, np.inf, np.float32), np.full(16 * count, -1, np.int32)
-    distances[start * HEADINGS + 2] = 0.0
-    state, total = search_with_heading(
-        mesh_map.topology.surface, moves, weights, blocked, allowed, roll, 0.7, 0.2, distances, predecessors,
-        np.array([start * HEADINGS + 2], np.int32), np.array([target], np.int32), np.full(1, 0.1, np.float32),
-        np.array([goal_heading], np.int32), mesh_map.vertices[target],
-        np.full(len(weights), DRIVABLE, np.uint8), NO_CHASSIS, scratch_for(count),
-        np.zeros(1, np.uint8),
+    query = query_between(mesh_map, start, target)
+    begin = np.array([start * HEADINGS + 2], np.int32), np.zeros(1, np.float32)
+    end = np.array([target], np.int32), np.full(1, 0.1, np.float32), np.array([goal_heading], np.int32)
+    found = search.cheapest_path(query, limits, costs, begin, end)
+    moves, weights = search.graph.moves, search.graph.weights(query.snapshot, query.blocked)
+    expected = slow_search(moves, weights, limits, costs, (start, 2), target, 0.1, goal_heading)
+    assert (found is None) == (expected == np.inf)
+    assert found is None or found[1] == pytest.approx(expected, rel=1e-5)
+
+
+@given(seed=st.integers(0, 10**6), beyond=st.sampled_from([0.0, 0.3]))
+@settings(max_examples=15, deadline=None)
+def test_the_bound_that_guides_the_search_is_never_above_the_costs_without_turns(seed, beyond):
+    rng = np.random.default_rng(seed)
+    mesh_map = MeshMap.from_heights(rng.uniform(0, 0.2, (12, 12)), 0.5, 0.5)
+    search, count = HeadingSearch(mesh_map), len(mesh_map.vertices)
+    limits, moves, arrivals = RandomLimits.on(search, count, rng), search.graph.moves, search.graph.arrivals
+    # 1. The wave as the search spreads it, to a vertex in the middle, so that half of the map lies outside.
+    start, goal = 78, int(rng.integers(12))
+    blocked, weights = np.zeros(count, bool), search.graph.weights(mesh_map.snapshot(), np.zeros(count, bool))
+    limited = limits.allowed, limits.roll, 0.7, limits.known, FORBIDDEN
+    backwards = weights_of_arrivals(arrivals, moves.headings, weights, *limited)
+    distances, ends = np.full(count, np.inf, np.float32), (mesh_map.vertices, *mesh_map.vertices[[start, goal]])
+    distances[goal] = 0.0
+    propagate_distances(
+        SearchGraph(arrivals.offsets, arrivals.origins, backwards, blocked), distances, np.full(count, -1, np.int32),
+        np.array([goal], np.int32), 0.5, np.array([start], np.int32), np.full(1, beyond, np.float32),
+        np.zeros(1, np.uint8), ends[:2],
     )  # fmt: skip
-    expected = slow_search(moves, weights, allowed, roll, 0.7, 0.2, (start, 2), target, 0.1, goal_heading)
-    assert total == pytest.approx(expected, rel=1e-5)
-    assert (state < 0) == (expected == np.inf)
+    found = bounds_of_all(GoalBound(distances, float(distances[start]) + beyond, *ends), count)
+    # 2. The costs of driving each move, by SciPy from everywhere to the goal.
+    begins = np.repeat(np.arange(count), np.diff(moves.offsets))
+    driven = weights * (1 + 0.7 * np.abs(limits.roll[moves.ends, moves.headings]))
+    driven[~limits.allowed[moves.ends, moves.headings] | (limits.known == FORBIDDEN)] = np.inf
+    matrix = scipy.sparse.csr_matrix((driven, (moves.ends, begins)), shape=(count, count))
+    true = scipy.sparse.csgraph.dijkstra(matrix, indices=goal)
+    assert (found <= true).all()
+    if np.isfinite(true[start]):  # from the start on it is as good as the costs themselves
+        assert found[start] == pytest.approx(true[start], rel=1e-4)
+
+
+@kernel
+def bounds_of_all(bound, count):
+    found = np.empty(count, dtype=np.float32)
+    for vertex in range(count):
+        found[vertex] = bound_at(bound, Index(vertex))
+    return found
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """The tilt's limits hold anywhere on a path: against a twin that puts single footprints on the surface by rays."""
 
 import math
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from hypothesis import strategies as st
 from mbf_abstract.geometry import Pose
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import PlanRequest
-from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN
+from mbf_mesh_nav.kernels.layers.footprint_sweep import scratch_for
+from mbf_mesh_nav.kernels.search.heading_astar import DRIVABLE, FORBIDDEN, find_out_along
 from mbf_mesh_nav.layers.tilt import TiltLayer, TiltParameters
 from mbf_mesh_nav.map.layer import LayerContext
 from mbf_mesh_nav.map.layer_graph import LayerGraph
@@ -18,6 +20,7 @@ from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.surface_point import passes_blocked_corner
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
+from mbf_mesh_nav.search import heading_search
 from mbf_mesh_nav.search.drive_graph import DriveGraph
 from mbf_mesh_nav.search.end_stretches import headings_within
 from mbf_mesh_nav.search.heading_limits import FootprintLimits, NormalLimits
@@ -114,6 +117,49 @@ def test_the_use_of_a_stretch_is_that_of_its_worst_sample(seed, rigid):
         use = limits.driving(face, start, end, [])
         assert sampled <= use + ROUNDING
         assert use <= sampled + 0.02  # what may lie between two samples 0.1 mm apart, or comes below the belly's edge
+
+
+@given(seed=st.integers(0, 10**6), rigid=st.booleans())
+@settings(max_examples=10, deadline=None)
+def test_looking_at_moves_last_finds_the_cost_of_looking_at_each(make_plugin, seed, rigid):
+    mesh_map, rng = rough_map(seed, rigid), np.random.default_rng(seed)
+    standing = np.flatnonzero(mesh_map.layers["tilt"].allowed.all(axis=1))
+    assume(len(standing) >= 2)
+    ends = (Pose(tuple(mesh_map.vertices[vertex])) for vertex in rng.choice(standing, 2, replace=False))
+    request = PlanRequest(*ends, angle_tolerance=math.pi)
+    plans, looked_at = [], []
+    for lazy_searches in (heading_search.LAZY_SEARCHES, 0):
+        with mock.patch.object(heading_search, "LAZY_SEARCHES", lazy_searches):
+            planner = make_plugin(HeadingAStarPlanner, mesh_map)
+            plans.append(planner.make_plan(request))
+            looked_at.append(np.count_nonzero(planner._current_limits().known))
+    lazy, careful = plans
+    assert lazy.success == careful.success
+    assert not lazy.success or lazy.cost == pytest.approx(careful.cost, rel=1e-5)
+    assert looked_at[0] <= looked_at[1]
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=8, deadline=None)
+def test_a_tolerance_ends_where_it_does_when_all_moves_are_known_before(make_plugin, seed):
+    mesh_map, rng = rough_map(seed), np.random.default_rng(seed)
+    allowed = mesh_map.layers["tilt"].allowed
+    assume(allowed.all(axis=1).any() and not allowed.any(axis=1).all())
+    careful = make_plugin(HeadingAStarPlanner, mesh_map)
+    limits, scratch = careful._current_limits(), scratch_for(len(mesh_map.vertices))
+    moves = careful._search.graph.moves
+    begins = np.repeat(np.arange(len(mesh_map.vertices)), np.diff(moves.offsets))
+    for move in np.column_stack([begins, moves.ends]).astype(np.int32):
+        find_out_along(mesh_map.topology.surface, moves, move, limits.known, limits.chassis, scratch)
+    for _ in range(6):
+        start = rng.choice(np.flatnonzero(allowed.all(axis=1)))
+        goal = rng.choice(np.flatnonzero(~allowed.any(axis=1)))
+        ends = (Pose(tuple(mesh_map.vertices[vertex])) for vertex in (start, goal))
+        request = PlanRequest(*ends, dist_tolerance=1.0, angle_tolerance=math.pi)
+        results = [planner.make_plan(request) for planner in (make_plugin(HeadingAStarPlanner, mesh_map), careful)]
+        assert results[0].success == results[1].success
+        if results[0].success:
+            np.testing.assert_array_equal(*(result.path.positions[-1] for result in results))
 
 
 def test_standing_at_a_vertex_is_allowed_where_the_layer_says_so():
