@@ -2,7 +2,7 @@
 
 import ast
 from collections import Counter
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import networkx
@@ -59,12 +59,12 @@ def module_of(name):
 MODULES = {module_of(name): name for name in FILES}
 
 
-@lru_cache
+@cache
 def tree_of(name):
     return ast.parse(FILES[name].read_text("utf-8"), name)
 
 
-@lru_cache
+@cache
 def imports(name):
     """Every imported module of a file with its line, wherever it stands, under TYPE_CHECKING too."""
     return list(_imports(tree_of(name)))
@@ -80,7 +80,7 @@ def _imports(tree):
                 yield submodule if submodule in MODULES else node.module, node.lineno
 
 
-@lru_cache
+@cache
 def calls(name):
     """Dotted names of everything that a file calls, with the line."""
     return [(ast.unparse(n.func), n.lineno) for n in ast.walk(tree_of(name)) if isinstance(n, ast.Call)]
