@@ -13,4 +13,4 @@ SOME = ["rubble_field"]
 
 
 def test_drives_are_the_same_to_the_last_bit_elsewhere(here, elsewhere):
-    assert not [drive for drive in here if here[drive] != elsewhere[drive]]
+    assert elsewhere and not [drive for drive in elsewhere if here[drive] != elsewhere[drive]]
