@@ -20,7 +20,7 @@ from terrain.description.mesh_files import find_file, missing_text
 from terrain.description.outline import Corner, as_array, convex_outline, with_few_corners
 from terrain.description.parameters import DriveName, UrdfRobot
 from terrain.description.running_gear import RunningGear, find_running_gear, sides_of, solids_of
-from terrain.description.solids import Placed, points_between
+from terrain.description.solids import Placed
 from terrain.description.stability import Edges, Tipping, clear_angles, seen_from_the_side, tipping
 from terrain.description.urdf import Urdf, link_frames, read_urdf
 
@@ -120,7 +120,7 @@ def describe(stated: UrdfRobot) -> RobotDescription:
         raise ConfigError([Finding(stated.urdf, 1, "urdf", "a file", missing_text(stated.urdf, Path()))])
     urdf = read_urdf(file)
     frames = link_frames(urdf)
-    gear = find_running_gear(urdf, stated.drive, stated.wheels)
+    gear = find_running_gear(urdf, stated.drive, stated.wheels, stated.wheel_radius)
     return _Describer(urdf, stated, frames, gear, _base(gear)).description()
 
 
@@ -154,7 +154,7 @@ class _Describer:
         radius = _mean([wheel.radius for wheel in gear.driven])
         wheelbase, track = self._wheelbase(), self._track()
         steering = self._steering_angle()
-        speed = self._speed(stated.wheel_radius or radius)
+        speed = self._speed(radius)
         standing = gear.drive != "legged"
         if clearance <= 0.0 and standing:
             self.notes.append("its body touches the ground between the wheels: no ground clearance")
@@ -168,13 +168,13 @@ class _Describer:
             ground_clearance=_rounded(stated.ground_clearance or max(clearance, 0.0)),
             mass=_rounded(mass),
             center_of_mass=centre,
-            wheel_radius=_rounded(stated.wheel_radius or radius),
+            wheel_radius=_rounded(radius),
             wheelbase=_rounded(wheelbase),
             track=_rounded(track),
             max_speed=_rounded(speed),
             max_yaw_rate=_rounded(self._yaw_rate(speed, wheelbase, steering)),
             max_steering_angle=steering,
-            motor_torque=_rounded(self._torque(mass, stated.wheel_radius or radius)),
+            motor_torque=_rounded(self._torque(mass, radius)),
             track_multiplier=_rounded(self._track_multiplier(wheelbase, track)),
             contacts=self._contacts(),
             tipping=self._tipping(centre) if standing else None,
@@ -206,7 +206,7 @@ class _Describer:
             return list(self.stated.footprint)
         low, high = self.stated.footprint_heights
         # what lies on the ground begins below it by a rounding error
-        parts = [points_between(solid.points(), low - 1e-6 if low == 0.0 else low, high) for solid in solids]
+        parts = [solid.points_between(low - 1e-6 if low == 0.0 else low, high) for solid in solids]
         outline = convex_outline(np.concatenate(parts))
         if len(outline) < 3:
             got = "none" if not outline else f"{len(outline)} points"
@@ -225,13 +225,19 @@ class _Describer:
         return self.stated.track or found
 
     def _speed(self, radius: float) -> float:
-        limits = [limit for wheel in self.gear.driven if (limit := self.urdf.joints[wheel.joint].velocity)]
         if self.stated.max_speed is not None:
             return self.stated.max_speed
+        limits = self._limits("velocity", [self.urdf.joints[wheel.joint].velocity for wheel in self.gear.driven])
         if limits and radius > 0.0:
             return min(limits) * radius
         self.notes.append(f"max_speed: {USUAL_SPEED:g} m/s is assumed, because the wheels have no limit of velocity")
         return USUAL_SPEED
+
+    def _limits(self, name: str, values: list[float | None]) -> list[float]:
+        """Limits of the driven wheels that are above 0; many files write 0 where there is none."""
+        if 0.0 in values:
+            self.notes.append(f"{name}: a limit of 0 of a driven wheel counts as no limit")
+        return [value for value in values if value]
 
     def _yaw_rate(self, speed: float, wheelbase: float, steering: float) -> float:
         if self.stated.max_yaw_rate is not None:
@@ -257,9 +263,9 @@ class _Describer:
         return self.stated.max_steering_angle or _rounded(found)
 
     def _torque(self, mass: float, radius: float) -> float:
-        efforts = [effort for wheel in self.gear.driven if (effort := self.urdf.joints[wheel.joint].effort)]
         if self.stated.motor_torque is not None or not self.gear.driven:
             return self.stated.motor_torque or 0.0
+        efforts = self._limits("effort", [self.urdf.joints[wheel.joint].effort for wheel in self.gear.driven])
         if efforts:
             return min(efforts)
         found = mass * GRAVITY * radius / len(self.gear.driven)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbf_abstract.geometry import FloatArray
-from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.geometry.arithmetic import norm, rotated
 from terrain.description.running_gear import solids_of
 from terrain.description.urdf import Inertial, Urdf
 
@@ -41,10 +41,10 @@ def mass_of(urdf: Urdf, frames: Mapping[str, FloatArray], links: Collection[str]
         centre = centre + (inertial.mass / total) * frame[:3, 3]
     inertia = np.zeros((3, 3))
     for inertial, frame in parts:
-        T_root, T_turned = frame[:3, :3], inertia_matrix(inertial)
+        rotation = frame[:3, :3]
         offset = frame[:3, 3] - centre
         square = float(norm(offset)) ** 2
-        inertia = inertia + T_root @ T_turned @ T_root.T
+        inertia = inertia + rotated(rotation, rotated(rotation, inertia_matrix(inertial)).T)  # R I R^T
         inertia = inertia + inertial.mass * (square * np.eye(3) - offset[:, None] * offset[None, :])
     return MassPoint(total, centre, inertia)
 
@@ -69,7 +69,7 @@ def is_possible_inertia(inertial: Inertial) -> bool:
     slack = TOLERANCE * half
     a, b, c = half - ixx + slack, half - iyy + slack, half - izz + slack
     minors = (a, b, c, a * b - ixy * ixy, a * c - ixz * ixz, b * c - iyz * iyz)
-    determinant = a * (b * c - iyz * iyz) - ixy * (ixy * c - iyz * ixz) - ixz * (ixy * iyz + b * ixz)
+    determinant = a * (b * c - iyz * iyz) - ixy * (ixy * c + iyz * ixz) - ixz * (ixy * iyz + b * ixz)
     return min(*minors, determinant) >= 0.0
 
 

@@ -46,7 +46,14 @@ def read_hull(name: str, urdf: Path, scale: FloatArray) -> Hull | tuple[str, str
 
 def find_file(name: str, folder: Path) -> Path | None:
     """The file that a name in a URDF means, None if there is none; ``folder`` is where relative paths begin."""
-    return next((place for place in places_of(name, folder) if place.is_file()), None)
+    return next((place for place in places_of(name, folder) if _is_file(place)), None)
+
+
+def _is_file(place: Path) -> bool:
+    try:
+        return place.is_file()
+    except (OSError, ValueError):  # a name that is too long, a folder that may not be read
+        return False
 
 
 def missing_text(name: str, folder: Path) -> str:
@@ -61,7 +68,10 @@ def places_of(name: str, folder: Path) -> list[Path]:
     A package is looked for among the folders above the URDF, in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and among
     the installed Python packages, such as ``pybullet_data``.
     """
-    parts = urlsplit(name)
+    try:
+        parts = urlsplit(name)
+    except ValueError:  # a bracket without its partner, as in package://[robot/a.stl
+        return [folder / name]
     if parts.scheme == "file":
         return [Path(unquote(parts.path))]
     if parts.scheme not in ("package", "model"):

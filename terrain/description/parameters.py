@@ -27,8 +27,8 @@ class UrdfRobot(ParameterModel):
     footprint_corners: int = parameter(12, "Most corners of a footprint that is found.", ge=4, le=64)
     height: float | None = parameter(None, "Height above the ground.", unit="m", gt=0.0, le=100.0)
     mass: float | None = parameter(None, "Of the whole robot; all parts become heavier alike.", unit="kg", gt=0.0)
-    center_of_mass: tuple[float, float, float] | None = parameter(None, "Centre of mass.", unit="m")
-    wheel_radius: float | None = parameter(None, "Of the driven wheels.", unit="m", gt=0.0)
+    center_of_mass: tuple[float, float, float] | None = parameter(None, "Centre of mass, above the ground.", unit="m")
+    wheel_radius: float | None = parameter(None, "Of its wheels, casters apart.", unit="m", gt=0.0)
     wheelbase: float | None = parameter(None, "Distance of the outermost axles.", unit="m", gt=0.0)
     track: float | None = parameter(None, "Distance of left and right wheels, from middle to middle.", unit="m", gt=0.0)
     track_multiplier: float | None = parameter(
@@ -64,6 +64,13 @@ class UrdfRobot(ParameterModel):
         ]
         if len(value) < 3 or min(turns) <= 0.0:
             raise ValueError("auto, or at least three corners of a convex outline, counter-clockwise")
+        return value
+
+    @field_validator("center_of_mass")
+    @classmethod
+    def _mass_is_above_the_ground(cls, value: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
+        if value is not None and not value[2] > 0.0:
+            raise ValueError("x, y, z [m] with z above 0, the ground")
         return value
 
     @model_validator(mode="after")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -124,7 +124,9 @@ def solids_of(urdf: Urdf, frames: Mapping[str, FloatArray], links: Collection[st
     return [shape.within(frames[name]) for name in urdf.links if name in links for shape in urdf.links[name].shapes]
 
 
-def find_running_gear(urdf: Urdf, drive: DriveName | None, named: tuple[str, ...]) -> RunningGear:
+def find_running_gear(
+    urdf: Urdf, drive: DriveName | None, named: tuple[str, ...], radius: float | None = None
+) -> RunningGear:
     """Find wheels and drive of a robot.
 
     Parameters
@@ -133,6 +135,8 @@ def find_running_gear(urdf: Urdf, drive: DriveName | None, named: tuple[str, ...
         The drive where the user states it.
     named : tuple of str
         Joints of the driven and steered wheels where the user names them, else empty.
+    radius : float or None
+        Radius [m] of the wheels where the user states it; the ground is then this far below their axles.
 
     Raises
     ------
@@ -157,6 +161,9 @@ def find_running_gear(urdf: Urdf, drive: DriveName | None, named: tuple[str, ...
     wheels = sorted((wheel for wheel in near if not wheel.is_caster), key=_from_front_left)
     casters = tuple(_caster(urdf, wheel) for wheel in near if wheel.is_caster)
     supports = casters + _fixed_supports(urdf, frames, wheels, casters, ground)
+    if radius is not None and wheels:  # what touches the ground is found from the shapes all the same
+        wheels = [replace(wheel, radius=radius) for wheel in wheels]
+        ground = min(float(wheel.centre[2]) - radius for wheel in wheels)
     if drive is None:
         drive, reason = _guess(urdf, wheels)
     else:

@@ -98,6 +98,11 @@ class Hull:
         """Corners (n, 3) [m]."""
         return self.vertices
 
+    def edges(self) -> NDArray[np.int32]:
+        """Indices (k, 2) of the corners that each edge of a face joins."""
+        edges = self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        return np.unique(np.sort(edges, axis=1), axis=0)
+
 
 Solid = Box | Cylinder | Sphere | Hull
 
@@ -129,27 +134,44 @@ class Placed:
         """Points (n, 3) [m] in the frame whose hull holds it."""
         return np.asarray(rotated(self.T_frame_solid[:3, :3], self.solid.points()) + self.T_frame_solid[:3, 3])
 
+    def points_between(self, low: float, high: float) -> FloatArray:
+        """Points (k, 3) that span the part of ``points`` between two heights [m]."""
+        return points_between(self.points(), low, high, self.solid.edges() if isinstance(self.solid, Hull) else None)
+
     def within(self, T_outer_frame: FloatArray) -> Placed:
         """The solid in an outer frame."""
         return Placed(self.solid, T_outer_frame @ self.T_frame_solid)
 
 
-def points_between(points: FloatArray, low: float, high: float) -> FloatArray:
+def points_between(points: FloatArray, low: float, high: float, edges: NDArray[np.int32] | None = None) -> FloatArray:
     """Points (k, 3) that span the part of a convex body between two heights [m].
 
     Parameters
     ----------
     points : (n, 3) float
         Whose hull the body is.
+    edges : (k, 2) int32, optional
+        Indices of the points that the edges of the hull join. Without them all pairs of points are cut, whose number
+        grows with the square of n.
     """
     kept = [points[(points[:, 2] >= low) & (points[:, 2] <= high)]]
     for height in (low, high):
-        below, above = points[points[:, 2] < height], points[points[:, 2] > height]
-        if len(below) and len(above) and math.isfinite(height):
-            a, b = below[:, None, :], above[None, :, :]
-            share = (height - a[..., 2:]) / (b[..., 2:] - a[..., 2:])
-            kept.append((a + share * (b - a)).reshape(-1, 3))
+        if math.isfinite(height):
+            a, b = _ends_across(points, height, edges)
+            share = (height - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
+            kept.append(a + share * (b - a))
     return np.concatenate(kept)
+
+
+def _ends_across(points: FloatArray, height: float, edges: NDArray[np.int32] | None) -> tuple[FloatArray, FloatArray]:
+    """Ends (k, 3) below and above a height of the edges that cross it."""
+    below, above = points[:, 2] < height, points[:, 2] > height
+    if edges is None:
+        low, high = (np.flatnonzero(side) for side in (below, above))
+        return points[np.repeat(low, len(high))], points[np.tile(high, len(low))]
+    both = np.concatenate([edges, edges[:, ::-1]])
+    rising = both[below[both[:, 0]] & above[both[:, 1]]]
+    return points[rising[:, 0]], points[rising[:, 1]]
 
 
 def _ring_around(radius: float) -> FloatArray:

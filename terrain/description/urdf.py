@@ -232,6 +232,8 @@ class _Reader:
 
     def _limit(self, limit: Element, name: str, key: str) -> float | None:
         value = self.numbers(limit, name, 1, key)
+        if value is not None and value[0] < 0.0 and name in ("effort", "velocity"):
+            self.refuse(limit, f"{key}: {name}", "a number >= 0", f"{value[0]:g}")
         return None if value is None else value[0]
 
     def _axis(self, element: Element, key: str) -> FloatArray:

@@ -95,7 +95,7 @@ class _Body:
         """A wheel with its joint, and the hinge that steers it."""
         robot = self._robot
         name, mass, at = quoteattr(f"{wheel.joint}_wheel"), self._mass(set(wheel.links)).mass, self._centre(wheel)
-        radius, width = robot.stated.wheel_radius or wheel.radius, wheel.width
+        radius, width = wheel.radius, wheel.width
         across = mass * (3.0 * radius * radius + width * width) / 12.0
         inertial = _inertial(mass, np.zeros(3), [across, 0.5 * mass * radius * radius, across])
         shape = f'<cylinder radius="{radius:.9g}" length="{width:.9g}"/>'

@@ -1,6 +1,7 @@
 """Nothing that a robot or an event depends on may be computed by code that differs from CPU to CPU (decision 13)."""
 
 import ast
+import re
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -26,6 +27,7 @@ VECTOR_UNITS = {
     *("exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "power", "float_power", "cbrt"),
     *("tan", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh", "tanh", "arcsinh", "arccosh", "arctanh"),
 }
+TRANSFORM = re.compile(r"T_[a-z]+_[a-z]+")  # of a frame, from another one
 EMBREE, GAUSS = "embreex", {"gaussian_filter", "gaussian_filter1d"}
 
 
@@ -35,7 +37,7 @@ def offences(file):
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.MatMult):
             operands = (node.left, node.right) if isinstance(node, ast.BinOp) else (node.target, node.value)
-            if not any(ast.unparse(operand).startswith("T_") for operand in operands):  # transforms compose by products
+            if not any(TRANSFORM.match(ast.unparse(operand)) for operand in operands):  # they compose by products
                 yield node.lineno, "@"
         elif isinstance(node, ast.Attribute) and node.attr in BLAS and ast.unparse(node.value) in {"np", "numpy"}:
             yield node.lineno, node.attr

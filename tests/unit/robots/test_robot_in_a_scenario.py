@@ -77,6 +77,10 @@ def test_a_text_and_a_block_name_the_same_robot_beside_the_scenario(scenario, tm
         ("huskey", "robot: expected husky, turtlebot, car, a file .urdf, or a block"),
         ("gone.urdf", "urdf: expected a file, got 'gone.urdf'"),
         ("{urdf: my.urdf, drive: hover}", "robot.drive: expected 'differential'"),
+        (
+            "{urdf: my.urdf, center_of_mass: [0.0, 0.0, 0.0]}",
+            "robot.center_of_mass: expected x, y, z [m] with z above 0",
+        ),
         ("{urdf: my.urdf, max_sped: 1.0}", "did you mean 'max_speed'?"),
         ("{urdf: my.urdf, wheels: [front_lefd]}", "did you mean 'front_left'?"),
         ("{urdf: my.urdf, drive: ackermann}", "expected two steered wheels"),
@@ -156,6 +160,14 @@ def test_a_robot_of_others_stands_on_its_wheels_weighs_what_it_should_and_drives
         assert sum(masses) == pytest.approx(description_of(choice).mass, rel=1e-6)
         assert driven(world, made, Twist.planar(0.8)).vx == pytest.approx(0.8, abs=0.03)
         assert made.motion_sample().rolling.vx == pytest.approx(0.8, abs=0.03)
+
+
+def test_a_robot_stands_on_the_ground_with_a_stated_wheel_radius(scenario, tmp_path):
+    scenario("my.urdf")
+    choice = UrdfRobot(urdf=str(tmp_path / "my.urdf"), wheel_radius=0.25)
+    world, made = on_flat_ground(choice, tmp_path)
+    with world:
+        assert abs(made.pose().z) < 0.003
 
 
 def test_the_centre_of_mass_in_bullet_is_that_of_the_description(tmp_path):

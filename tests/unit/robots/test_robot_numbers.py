@@ -105,6 +105,24 @@ def test_motors_limits_of_the_file_become_speed_and_torque(described):
     assert not any("assumed" in note for note in found.notes)
 
 
+def test_a_limit_of_zero_is_no_limit_and_that_is_said(described):
+    wheels = [part.replace("<axis", '<limit effort="0" velocity="0"/><axis') for part in FOUR_WHEELS]
+    found = described(robot(BODY, *wheels))
+    assert found.max_speed == 1.0 and found.motor_torque > 0.0
+    for name in ("velocity", "effort"):
+        assert any(note.startswith(f"{name}: a limit of 0") for note in found.notes)
+
+
+@pytest.mark.parametrize("radius", [0.12, 0.25])
+def test_the_ground_is_a_stated_radius_below_the_wheels(described, radius):
+    ball = link("ball", 0.1, BALL) + joint("ball_mount", "body", "ball", "-0.3 0 -0.15", "fixed")
+    text = robot(BODY, ball, wheel("l", "body", "0.1 0.3 0"), wheel("r", "body", "0.1 -0.3 0"))
+    found = described(text, wheel_radius=radius)
+    assert found.p_root_base.tolist() == [0.1, 0.0, -radius]
+    assert (found.wheel_radius, found.height, found.ground_clearance) == (radius, 0.2 + radius, radius)
+    assert [support.name for support in found.gear.supports] == ["ball"]
+
+
 def test_what_is_assumed_is_said(described):
     notes = described(robot(BODY, *FOUR_WHEELS)).notes
     assert any("max_speed: 1 m/s is assumed" in note for note in notes)

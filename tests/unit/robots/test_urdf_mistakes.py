@@ -41,6 +41,24 @@ MISTAKES = {
         + joint("j", "body", "x", "0 0 0", "fixed"),
         "no package 'no_such_package' is known",
     ),
+    "bracket in a name": (
+        link("x", 1.0, '<geometry><mesh filename="package://[x/a.stl"/></geometry>')
+        + joint("j", "body", "x", "0 0 0", "fixed"),
+        "robot.urdf:1: link x: mesh: expected a mesh file, got 'package://[x/a.stl'",
+    ),
+    "name too long": (
+        link("x", 1.0, f'<geometry><mesh filename="{"a" * 5000}.stl"/></geometry>')
+        + joint("j", "body", "x", "0 0 0", "fixed"),
+        "robot.urdf:1: link x: mesh: expected a mesh file, got 'aaa",
+    ),
+    "negative velocity": (
+        joint("j", "body", "x", "0 0 0", inside='<limit velocity="-2" effort="1"/>') + link("x"),
+        "joint j: velocity: expected a number >= 0, got -2",
+    ),
+    "negative effort": (
+        joint("j", "body", "x", "0 0 0", inside='<limit velocity="2" effort="-1"/>') + link("x"),
+        "joint j: effort: expected a number >= 0, got -1",
+    ),
     "other way round": (
         joint("j", "body", "x", "0 0 0", "revolute", inside='<limit lower="1" upper="-1"/>') + link("x"),
         "joint j: limit: expected lower <= upper",
