@@ -8,7 +8,6 @@ No path of the machine is recorded, and no name of a user or a machine: files ar
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
@@ -74,8 +73,9 @@ def write_provenance(
     live_page: bool,
 ) -> None:
     """Write ``provenance.yaml`` of a run whose scenario, configurations and maps are in its folder."""
-    named = {Path(os.path.normpath(file)) for file in with_named_files(folder / SCENARIO)}
-    files = sorted(file for file in named if file.is_relative_to(folder))
+    place = folder.resolve()  # a mesh of a URDF is named by its absolute path, whatever ``folder`` is
+    named = {file.resolve() for file in with_named_files(folder / SCENARIO)}
+    files = sorted(file for file in named if file.is_relative_to(place))
     provenance = Provenance(
         command=command,
         executive=executive,
@@ -83,7 +83,7 @@ def write_provenance(
         live_page=live_page,
         versions=versions(),
         code=code_of(servers),
-        files={file.relative_to(folder).as_posix(): sha256_of(file) for file in files},
+        files={file.relative_to(place).as_posix(): sha256_of(file) for file in files},
     )
     write_whole(folder / FILE, yaml.safe_dump(provenance.model_dump(), sort_keys=False))
 

@@ -42,7 +42,7 @@ class SweepRun:
     def key(self, scenario_hash: str) -> str:
         """Return the key of this run; a file that a setting names counts with its contents."""
         named = named_files(list(self.settings.values()), Path())
-        files = [hash_with_named_files(file).hex()[:16] for file in named]
+        files = [hash_with_named_files(file).hex()[:16] for file in named.values()]
         return "/".join([scenario_hash, str(self.seed), self.variant, *files])
 
 
@@ -59,7 +59,7 @@ def hash_of(scenario: Scenario) -> str:
     for files in (scenario.navigation, *(robot.navigation or {} for robot in scenario.robots)):
         for backend, file in sorted(files.items()):
             digest.update(backend.encode() + hash_with_named_files(file))
-    for file in named_files(scenario.model_dump(mode="json", exclude={"navigation"}), Path("/")):
+    for file in named_files(scenario.model_dump(mode="json", exclude={"navigation"}), Path("/")).values():
         digest.update(hash_with_named_files(file))
     return digest.hexdigest()[:16]
 
@@ -68,6 +68,14 @@ def plan_sweep(seeds: Sequence[int], settings: Mapping[str, Sequence[str]]) -> l
     """Return every seed with every combination of the settings' values."""
     variants = [dict(zip(settings, values, strict=True)) for values in itertools.product(*settings.values())]
     return [SweepRun(seed, variant) for seed in seeds for variant in variants]
+
+
+def is_done(row: Mapping[str, Any] | None, keep: bool) -> bool:
+    """Whether a run need not be done: it was, and its folder is kept if that is asked for and it has one.
+
+    A run that could not begin has no track and no folder, and would not begin now.
+    """
+    return row is not None and not (keep and "track" in row and "folder" not in row)
 
 
 def run_once(job: Job, keep_in: Path | None = None, command: str = "") -> dict[str, Any]:

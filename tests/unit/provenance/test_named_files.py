@@ -10,6 +10,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from terrain.description.mesh_files import MAX_BYTES
 from terrain.provenance.named_files import InputCopies, hash_with_named_files, with_named_files
 
 NAMES = ("a.yaml", "b.yaml", "c.yaml", "image.png")
@@ -80,7 +81,8 @@ def test_meshes_of_a_urdf_are_copied_with_it(tmp_path):
     (tmp_path / "my_robot" / "meshes" / "a & b.stl").write_text("hull")
     urdf = tmp_path / "my_robot" / "urdf" / "robot.urdf"
     beside, packaged, gone = "../meshes/a &amp; b.stl", "package://my_robot/meshes/a &amp; b.stl", "gone.stl"
-    urdf.write_text(f"""<mesh filename="{beside}"/><mesh filename = '{packaged}'/><mesh filename="{gone}"/>""")
+    text = f"""<r><mesh filename="{beside}"/><mesh filename = '{packaged}'/><mesh filename="{gone}"/></r>"""
+    urdf.write_text(text)
     hashes = [hash_with_named_files(urdf)]
 
     copy = tmp_path / InputCopies(tmp_path).copy(urdf)
@@ -88,14 +90,52 @@ def test_meshes_of_a_urdf_are_copied_with_it(tmp_path):
     hashes.append(hash_with_named_files(urdf))
 
     own = '"a &amp; b.stl"'
-    assert copy.read_text() == f'<mesh filename={own}/><mesh filename = {own}/><mesh filename="gone.stl"/>'
+    assert copy.read_text() == f'<r><mesh filename={own}/><mesh filename = {own}/><mesh filename="gone.stl"/></r>'
     assert [file.name for file in with_named_files(copy)] == ["robot.urdf", "a & b.stl"]
     assert (copy.parent / "a & b.stl").read_text() == "hull"
     assert hashes[0] != hashes[1]
 
 
+def test_a_urdf_lets_no_files_but_meshes_and_textures_be_copied(tmp_path):
+    for name in ("secret.yaml", "plugin.stl", "old.stl", "notes.txt", "body.stl", "skin.png"):
+        (tmp_path / name).write_text(name)
+    (tmp_path / "robot.urdf").write_text(
+        f"""<r><!-- <mesh filename="old.stl"/> --><plugin filename="plugin.stl"/><mesh filename="secret.yaml"/>
+        <mesh filename="file://{tmp_path}/notes.txt"/><mesh filename="skin.png"/><texture filename="body.stl"/>
+        <mesh filename="file://{tmp_path}/body.stl"/><texture filename="skin.png"/></r>"""
+    )
+
+    copy = tmp_path / InputCopies(tmp_path).copy(tmp_path / "robot.urdf")
+
+    assert {file.name for file in copy.parent.iterdir()} == {"robot.urdf", "body.stl", "skin.png"}
+    assert '<mesh filename="body.stl"/><texture filename="skin.png"/>' in copy.read_text()
+
+
+def test_a_mesh_that_is_too_large_to_be_read_is_not_copied(tmp_path):
+    with (tmp_path / "body.stl").open("wb") as file:
+        file.truncate(MAX_BYTES + 1)
+    (tmp_path / "robot.urdf").write_text('<r><mesh filename="body.stl"/></r>')
+
+    assert [file.name for file in with_named_files(tmp_path / "robot.urdf")] == ["robot.urdf"]
+
+
+def test_a_gltf_lets_no_files_but_buffers_and_images_be_copied(tmp_path):
+    for name in ("numbers.bin", "skin.png", "secret.txt", "other.png"):
+        (tmp_path / name).write_text(name)
+    content = {
+        "buffers": [{"uri": "numbers.bin"}, {"uri": "secret.txt"}, {"uri": 5}, "numbers.bin"],
+        "images": [{"uri": "skin.png"}],
+        "extras": {"uri": "other.png"},
+    }
+    (tmp_path / "scene.gltf").write_text(json.dumps(content))
+
+    found = with_named_files(tmp_path / "scene.gltf")
+
+    assert {file.name for file in found} == {"scene.gltf", "numbers.bin", "skin.png"}
+
+
 def test_damaged_files_are_copied_as_they_are(tmp_path):
-    for name, text in {"list.yaml": "[1, 2]", "broken.yaml": "a: [", "broken.gltf": "{"}.items():
+    for name, text in {"list.yaml": "[1, 2]", "broken.yaml": "a: [", "broken.gltf": "{", "broken.urdf": "<r>"}.items():
         (tmp_path / name).write_text(text)
         assert (tmp_path / InputCopies(tmp_path).copy(tmp_path / name)).read_text() == text
 

@@ -1,6 +1,7 @@
 """What a run's folder records: the scenario as run, the code, the command line; and what is refused when it is read."""
 
 import subprocess
+from pathlib import Path
 
 import pytest
 import typer
@@ -13,7 +14,13 @@ from terrain.description.parameters import UrdfRobot
 from terrain.physics.robot_models import ROBOTS
 from terrain.provenance.code import commit_of, hash_of_code
 from terrain.provenance.named_files import InputCopies
-from terrain.provenance.provenance import Provenance, changed_files, read_provenance, write_scenario
+from terrain.provenance.provenance import (
+    Provenance,
+    changed_files,
+    read_provenance,
+    write_provenance,
+    write_scenario,
+)
 from terrain.scenarios.scenario import load_scenario, robot_scenarios, shipped_scenarios
 
 
@@ -46,6 +53,25 @@ def test_a_robot_of_a_urdf_is_in_the_folder_with_the_scenario(tmp_path):
 
     assert str(tmp_path) not in (folder / "scenario.yaml").read_text()
     assert (folder / "inputs" / "mine.urdf").read_bytes() == (tmp_path / "mine.urdf").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["run", "made/../run"])
+def test_meshes_of_a_robot_are_recorded_in_a_relative_folder(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = Path(name)
+    for part in ("made", "run"):
+        (tmp_path / part).mkdir()
+    (tmp_path / "body.stl").write_text("hull")
+    (tmp_path / "mine.urdf").write_text('<robot><mesh filename="body.stl"/></robot>')
+    (folder / "navigation.yaml").write_text("backend: mesh")
+    scenario = load_scenario("indoor").model_copy(update={"robot": UrdfRobot(urdf=str(tmp_path / "mine.urdf"))})
+    write_scenario(folder, scenario, {"": "mesh"}, 0, InputCopies(folder))
+
+    write_provenance(folder, [], "", "move_base", wall_clock=False, live_page=False)
+
+    files = read_provenance(folder).files
+    assert {"scenario.yaml", "navigation.yaml", "inputs/mine.urdf", "inputs/body.stl"} <= files.keys()
+    assert changed_files(folder, read_provenance(folder)) == []
 
 
 def recorded_command(*arguments):
