@@ -30,11 +30,14 @@ def sweep(
     keep: bool = typer.Option(
         False, "--keep", help="Keep the folder of every run, with its replay, below --out; the page then links to it."
     ),
-    out: Path = typer.Option(..., "--out", help="Folder for the results; runs that it holds are not run again."),
+    out: Path = typer.Option(
+        ..., "--out", help="Folder for the results; runs that it holds are not run again, with --keep only if kept."
+    ),
 ) -> None:
     """Run a scenario with many seeds and variants: tables, medians with their spread, tests, figures.
 
-    With several variants each pair of them is tested seed by seed; p is corrected for the number of tests (Holm).
+    With several variants each pair of them is tested seed by seed, in success and in every metric; p is corrected
+    for the number of all these tests (Holm).
     """
     with readable_errors():
         from rich.console import Console
@@ -48,7 +51,7 @@ def sweep(
         from terrain.sweeps.cluster import run_on_cluster
         from terrain.sweeps.log import SweepLog
         from terrain.sweeps.report import write_tables
-        from terrain.sweeps.sweep import hash_of, plan_sweep, run_once
+        from terrain.sweeps.sweep import hash_of, is_done, plan_sweep, run_once
         from terrain.sweeps.terminal_tables import comparison_table, letters_of, summary_table
         from terrain.sweeps.worker_pool import run_in_workers
 
@@ -56,8 +59,10 @@ def sweep(
         planned = plan_sweep(parse_seeds(seeds), parse_settings(settings))
         hashed, console = hash_of(loaded), Console()
         with SweepLog(out / "runs.jsonl") as log:
-            left = [run for run in planned if run.key(hashed) not in log.rows]
+            left = [run for run in planned if not is_done(log.rows.get(run.key(hashed)), keep)]
             console.print(f"{len(planned)} runs, {len(planned) - len(left)} of them done before")
+            for run in left:
+                log.forget(run.key(hashed))
             jobs = [(loaded, run) for run in left]
             do = partial(run_once, keep_in=out.resolve() if keep else None, command=command_line(context))
             if scheduler is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from terrain.sweeps.statistics import METRICS, Row, Spread, rate_of, spread_of, values_of
+from terrain.sweeps.statistics import METRICS, Row, quartiles_of, rate_of, values_of
 
 SPECIAL = {
     **{sign: f"\\{sign}" for sign in "&%$#_{}"},
@@ -27,9 +27,9 @@ def latex_table(rows: Sequence[Row]) -> str:
         r"\midrule",
     ]
     for name, of in runs.items():
-        rate, spreads = rate_of(of), [spread_of(values_of(of, metric)) for metric in shown]
-        first = [escaped(name or "as written"), f"{100 * rate.share:.0f}", *map(_median, spreads)]
-        second = ["", f"({100 * rate.low:.0f}--{100 * rate.high:.0f})", *map(_quartiles, spreads)]
+        rate, columns = rate_of(of), [values_of(of, metric) for metric in shown]
+        first = [escaped(name or "as written"), f"{100 * rate.share:.0f}", *map(_median, columns)]
+        second = ["", f"({100 * rate.low:.0f}--{100 * rate.high:.0f})", *map(_quartiles, columns)]
         lines += [" & ".join(first) + r" \\", " & ".join(second) + r" \\"]
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""])
 
@@ -39,9 +39,12 @@ def escaped(text: str) -> str:
     return "".join(SPECIAL.get(sign, sign) for sign in text)
 
 
-def _median(spread: Spread | None) -> str:
-    return "--" if spread is None else f"{spread.median:.3g}"
+def _median(values: Sequence[float]) -> str:
+    return f"{quartiles_of(values)[1]:.3g}" if values else "--"
 
 
-def _quartiles(spread: Spread | None) -> str:
-    return "" if spread is None else f"({spread.lower_quartile:.3g}--{spread.upper_quartile:.3g})"
+def _quartiles(values: Sequence[float]) -> str:
+    if not values:
+        return ""
+    lower, _, upper = quartiles_of(values)
+    return f"({lower:.3g}--{upper:.3g})"

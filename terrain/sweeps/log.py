@@ -52,7 +52,7 @@ class SweepLog:
             self._file.truncate(whole)
         for number, line in enumerate(content[:whole].split(b"\n")[:-1], start=1):
             row = self._row(line, number)
-            self.rows.setdefault(row["key"], row)
+            self.rows[row["key"]] = row  # a run that was forgotten and done again has two lines
 
     def _row(self, line: bytes, number: int) -> dict[str, Any]:
         expected = "a JSON object with the text 'key'"
@@ -72,6 +72,10 @@ class SweepLog:
         self._file.write(json.dumps(self.rows[key], sort_keys=True).encode() + b"\n")
         self._file.flush()
         os.fsync(self._file.fileno())
+
+    def forget(self, key: str) -> None:
+        """Let a run be appended again; until then its line stays, so that a kill loses nothing."""
+        self.rows.pop(key, None)
 
     def close(self) -> None:
         """Close the file."""

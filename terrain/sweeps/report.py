@@ -66,7 +66,7 @@ STYLE = (
 
 TESTS = (
     "Difference: second minus first, in the median, for success in the share. Success: McNemar's exact test; numbers: "
-    "Wilcoxon's signed-rank test by changes of signs. p_holm is corrected for the number of pairs of variants (Holm)."
+    "Wilcoxon's signed-rank test by changes of signs. p_holm is corrected for the number of all these tests (Holm)."
 )
 
 

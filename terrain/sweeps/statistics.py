@@ -8,7 +8,7 @@ Two variants are compared on the seeds that both have run, pair by pair, because
 noise and traffic. Numbers: Wilcoxon's signed-rank test (1945), which needs no normal distribution and is not led by one
 slow run; its p comes from all changes of the signs, or from ``DRAWS`` seeded ones, which is right for ties and zeros,
 too. Success: McNemar's exact test (1947), a binomial test of the seeds in which only one of the two succeeded. The
-p of one metric are corrected for the number of pairs of variants by Holm's method (1979).
+p of all tests, of every pair of variants in every metric, are corrected together by Holm's method (1979).
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from mbf_abstract.geometry import FloatArray
 Row = Mapping[str, Any]
 
 DRAWS = 9999
+BLOCK = 1_000_000  # numbers that are drawn at a time
 CONFIDENCE = 0.95
 WILSON_Z = 1.959963984540054  # 97.5 % quantile of the normal distribution
 
@@ -104,11 +105,23 @@ def spread_of(values: Sequence[float]) -> Spread | None:
     if not len(values):
         return None
     array = np.asarray(values, dtype=np.float64)
-    rng = np.random.default_rng(len(array))
-    drawn = array[rng.integers(0, len(array), (DRAWS, len(array)))]
-    low, high = np.quantile(np.median(drawn, axis=1), [0.5 - CONFIDENCE / 2.0, 0.5 + CONFIDENCE / 2.0]).tolist()
-    lower, median, upper = np.quantile(array, [0.25, 0.5, 0.75]).tolist()
+    low, high = np.quantile(_drawn_medians(array), [0.5 - CONFIDENCE / 2.0, 0.5 + CONFIDENCE / 2.0]).tolist()
+    lower, median, upper = quartiles_of(values)
     return Spread(len(array), median, lower, upper, low, high)
+
+
+def quartiles_of(values: Sequence[float]) -> tuple[float, float, float]:
+    """Return lower quartile, median and upper quartile of at least one value."""
+    lower, median, upper = np.quantile(np.asarray(values, dtype=np.float64), [0.25, 0.5, 0.75]).tolist()
+    return lower, median, upper
+
+
+def _drawn_medians(array: FloatArray) -> FloatArray:
+    """Medians (DRAWS,) of the values drawn again, in blocks, because all at once can take gigabytes."""
+    rng, rows = np.random.default_rng(len(array)), max(1, BLOCK // len(array))
+    blocks = [min(rows, DRAWS - first) for first in range(0, DRAWS, rows)]
+    drawn = (array[rng.integers(0, len(array), (count, len(array)))] for count in blocks)
+    return np.concatenate([np.median(block, axis=1) for block in drawn])
 
 
 def rate_of(rows: Sequence[Row]) -> Rate:
@@ -126,7 +139,7 @@ def values_of(rows: Sequence[Row], metric: Metric) -> list[float]:
 
 
 def compare_variants(rows: Sequence[Row]) -> list[Comparison]:
-    """Return the tests of every two variants in success and in every metric that both have."""
+    """Return the tests of every two variants in success and in every metric that both have, corrected together."""
     variants = {name: {row["seed"]: row for row in rows if row["variant"] == name} for name in _names(rows)}
     found: list[Comparison] = []
     for first, second in itertools.combinations(variants, 2):
@@ -134,8 +147,7 @@ def compare_variants(rows: Sequence[Row]) -> list[Comparison]:
         pairs = [(variants[first][seed], variants[second][seed]) for seed in seeds]
         if pairs:
             found += [_success(first, second, pairs), *_metrics(first, second, pairs)]
-    of_metrics = [[test for test in found if test.metric == name] for name in dict.fromkeys(t.metric for t in found)]
-    return [test for tests in of_metrics for test in corrected(tests)]
+    return corrected(found)
 
 
 def _names(rows: Sequence[Row]) -> list[str]:

@@ -8,7 +8,7 @@ from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
 
-from terrain.sweeps.statistics import METRICS, Row, compare_variants, rate_of, spread_of, values_of
+from terrain.sweeps.statistics import METRICS, Row, compare_variants, quartiles_of, rate_of, values_of
 
 SHOWN = ("spl", "time_s", "path_length_m", "clearance_min_m", "planning_wall_median_ms")
 SIGNIFICANT = 0.05
@@ -33,8 +33,8 @@ def summary_table(rows: Sequence[Row]) -> Table:
         table.add_column(escape(title.replace(" [", "\n[")), justify="right")
     for variant, letter in letters_of(rows).items():
         of = [row for row in rows if row["variant"] == variant]
-        spreads = (spread_of(values_of(of, metric)) for metric in metrics)
-        medians = ("-" if spread is None else f"{spread.median:.3g}" for spread in spreads)
+        columns = (values_of(of, metric) for metric in metrics)
+        medians = (f"{quartiles_of(values)[1]:.3g}" if values else "-" for values in columns)
         rate = rate_of(of)
         table.add_row(letter, f"{rate.successes} of {rate.count}", *medians)
     return table

@@ -2,7 +2,7 @@
 
 import pytest
 import typer
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
@@ -67,7 +67,8 @@ def mbf(*arguments):
     return CliRunner(env={"COLUMNS": "200"}).invoke(make_app(), [str(argument) for argument in arguments])
 
 
-@settings(max_examples=30)
+@settings(max_examples=6)
+@example(mistakes=MISTAKES)
 @given(mistakes=st.sets(st.sampled_from(sorted(MISTAKES))))
 def test_every_mistake_is_found_whatever_else_is_wrong(mistakes, tmp_path_factory):
     folder = tmp_path_factory.mktemp("scenario")

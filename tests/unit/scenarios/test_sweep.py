@@ -10,7 +10,7 @@ from terrain.scenarios.scenario import MapWorld, load_scenario
 from terrain.sweeps.command import parse_seeds, parse_settings
 from terrain.sweeps.log import SweepLog
 from terrain.sweeps.report import summarise, write_tables
-from terrain.sweeps.sweep import SweepRun, hash_of, plan_sweep
+from terrain.sweeps.sweep import SweepRun, hash_of, is_done, plan_sweep
 
 
 def row(seed, variant="planner=cvp", success=True, **more):
@@ -98,6 +98,31 @@ def test_the_log_keeps_what_it_was_given_over_a_restart(tmp_path):
         log.append("a", {"seed": 2})
     with SweepLog(tmp_path / "runs.jsonl") as log:
         assert log.rows == {"a": {"key": "a", "seed": 1}}
+
+
+def test_a_run_that_is_done_again_is_kept_in_its_place(tmp_path):
+    with SweepLog(tmp_path / "runs.jsonl") as log:
+        log.append("a", {"seed": 1})
+        log.forget("a")
+    with SweepLog(tmp_path / "runs.jsonl") as log:
+        assert list(log.rows) == ["a"], "nothing is lost by a kill before it is done again"
+        log.forget("a")
+        log.append("a", {"seed": 1, "folder": "runs/a"})
+    with SweepLog(tmp_path / "runs.jsonl") as log:
+        assert log.rows == {"a": {"key": "a", "seed": 1, "folder": "runs/a"}}
+
+
+@pytest.mark.parametrize(
+    ("known", "done", "done_and_kept"),
+    [
+        (None, False, False),
+        ({"track": []}, True, False),
+        ({"track": [], "folder": "runs/a"}, True, True),
+        ({"outcome": "ConfigError"}, True, True),
+    ],
+)
+def test_runs_that_were_done_without_their_folders_are_done_again_if_folders_are_to_be_kept(known, done, done_and_kept):
+    assert (is_done(known, keep=False), is_done(known, keep=True)) == (done, done_and_kept)
 
 
 @pytest.mark.parametrize("length", [1, 10, 17])

@@ -3,6 +3,7 @@
 import itertools
 import re
 import statistics
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from terrain.sweeps.figures import write_figures
 from terrain.sweeps.latex import escaped, latex_table
 from terrain.sweeps.report import write_tables
 from terrain.sweeps.statistics import (
+    DRAWS,
     METRICS,
     Comparison,
     compare_variants,
@@ -67,7 +69,7 @@ def test_holms_correction_rejects_exactly_what_the_stepwise_rule_rejects(ps):
             if p * (len(ps) - number) > level:
                 break
             rejected += 1
-        assert sum(value <= level for value in found) == rejected or 1.0 <= level
+        assert sum(value <= level for value in found) == rejected
     assert all(p <= value <= 1.0 for p, value in zip(ps, found, strict=True))
 
 
@@ -112,6 +114,34 @@ def test_success_is_compared_by_the_seeds_in_which_one_of_two_succeeded():
 
     assert (test.pairs, test.difference) == (8, 6 / 8)
     assert test.p == pytest.approx(2 * 0.5**6)
+
+
+@pytest.mark.parametrize("variants", ["ab", "abc"])
+def test_p_is_corrected_for_the_number_of_all_tests_of_a_sweep(variants):
+    rows = [row(seed, name, time_s=10.0 * ord(name) + seed) for name in variants for seed in range(8)]
+
+    tests = compare_variants(rows)
+
+    assert len({test.metric for test in tests}) == 4, "success, SPL, time and length"
+    smallest = min(tests, key=lambda test: test.p)
+    assert 0.0 < smallest.p < 1.0
+    assert smallest.corrected == pytest.approx(min(1.0, len(tests) * smallest.p))
+
+
+def test_the_interval_of_many_runs_takes_little_memory():
+    values = np.arange(1000.0)
+    drawn = values[np.random.default_rng(1000).integers(0, 1000, (DRAWS, 1000))]
+    low, high = np.quantile(np.median(drawn, axis=1), [0.025, 0.975])
+    size = drawn.nbytes
+    del drawn
+
+    tracemalloc.start()
+    spread = spread_of(values)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+
+    assert (spread.low, spread.high) == (pytest.approx(low), pytest.approx(high)), "the same draws as all at once"
+    assert peak < size / 2
 
 
 def test_numbers_are_compared_on_seeds_in_which_both_succeeded_and_spl_on_all():
@@ -178,10 +208,33 @@ def test_runs_without_numbers_have_no_figures(tmp_path):
     assert write_figures([failed], tmp_path) == []
 
 
-def test_a_kept_run_has_its_folder_and_the_page_links_to_its_replay(tmp_path):
-    scenario = load_scenario("crowded_corridor").model_copy(update={"actors": (), "time_limit": 3.0})
+SCENARIO = """
+name: trial
+proves: A few steps.
+backend: costmap
+navigation: {costmap: nav.yaml}
+world: {type: generated, size: [6.0, 5.0], spacing: 0.5}
+physics: kinematic
+robot: turtlebot
+start: {x: 2.0, y: 2.5}
+goals: [{x: 3.5, y: 2.5}]
+time_limit: 1.0
+"""
+NAVIGATION = """
+backend: costmap
+planners: [{name: dijkstra, type: dijkstra}]
+controllers: [{name: pursuit, type: regulated_pure_pursuit}]
+global_costmap: &map {robot_radius: 0.2, layers: [{name: walls, type: static}], walls: {map_file: $WORLD_MAP}}
+local_costmap: *map
+"""
 
-    metrics = run_once((scenario, SweepRun(5, {"planner_patience": "2.0"})), tmp_path, "mbf sweep corridor")
+
+def test_a_kept_run_has_its_folder_and_the_page_links_to_its_replay(tmp_path):
+    (tmp_path / "trial.yaml").write_text(SCENARIO)
+    (tmp_path / "nav.yaml").write_text(NAVIGATION)
+    scenario = load_scenario(tmp_path / "trial.yaml")
+
+    metrics = run_once((scenario, SweepRun(5, {"planner_patience": "2.0"})), tmp_path, "mbf sweep trial.yaml")
 
     folder = tmp_path / metrics["folder"]
     assert re.fullmatch(r"runs/planner_patience=2\.0_\w{6}/seed_5", metrics["folder"])
