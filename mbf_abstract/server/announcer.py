@@ -8,12 +8,15 @@ Example
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mbf_abstract.drive.robot import RobotStateError
-from mbf_abstract.geometry import FloatArray
+from mbf_abstract.execution.path_tracker import PathTracker
+from mbf_abstract.execution.plan_check import path_in_global_frame
 from mbf_abstract.geometry.arithmetic import norm
-from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.traffic import Channel
@@ -27,7 +30,7 @@ DIGITS = 2
 
 
 class Announcer:
-    """Publishes for one server; the path is the newest one that its planners have found.
+    """Publishes for one server: the path that ``exe_path`` follows, and in recoveries the one that it has followed.
 
     Parameters
     ----------
@@ -40,30 +43,38 @@ class Announcer:
 
     def __init__(self, server: AbstractNavigationServer, name: str, channel: Channel) -> None:
         self._server = server
-        self._path: FloatArray = np.zeros((0, 3))
-        self._busy = -IDLE_TIME
+        self._goal_id: int | None = None
+        self._tracker: PathTracker | None = None
+        self._busy = -math.inf
         server.runtime.traffic.connect(name, channel)
-        server.get_path.listeners.append(self._take_plan)
 
     def announce(self) -> None:
         """Publish the present state; does nothing while the robot does not know where it is."""
-        runtime, server = self._server.runtime, self._server
+        runtime = self._server.runtime
         now = runtime.clock.now()
-        if any(action.busy for action in (server.get_path, server.exe_path, server.recovery, server.move_base)):
-            self._busy = now
+        self._take_path(now)
         try:
-            place = np.array([runtime.robot.pose().position])
+            position = runtime.robot.pose().position
         except RobotStateError:
             return
-        path = self._path if now - self._busy < IDLE_TIME else self._path[:0]
-        if len(path):
-            path = path[int(np.argmin(norm(path - place))) :]
-        way = np.concatenate([place, path])
-        driven = np.cumsum(np.concatenate([[0.0], norm(np.diff(way, axis=0))]))
-        near = way[: int(np.searchsorted(driven, LENGTH, side="right"))]
-        runtime.traffic.announce(Announcement("", now, near, round(float(driven[-1]), DIGITS)))
+        way, remaining = np.array([position]), 0.0
+        if self._tracker is not None:
+            self._tracker.update(position)
+            way = np.concatenate([way, self._tracker.ahead(LENGTH)])
+            remaining = float(norm(way[1] - way[0])) + self._tracker.remaining
+        runtime.traffic.announce(Announcement("", now, way, round(remaining, DIGITS)))
 
-    def _take_plan(self, handle: AnyGoalHandle) -> None:
-        path = handle.result.path if handle.result is not None else None
-        if path is not None:
-            self._path = path.positions.copy()
+    def _take_path(self, now: float) -> None:
+        """Keep up with the newest goal of ``exe_path``; without goals that drive, forget its path after a while."""
+        server = self._server
+        goals = server.exe_path.unfinished
+        if goals and goals[-1].id != self._goal_id:
+            self._goal_id = goals[-1].id
+            try:
+                self._tracker = PathTracker(path_in_global_frame(goals[-1].goal.path, server.runtime))
+            except TransformError:
+                self._tracker = None  # exe_path ends with the same error
+        if any(action.busy for action in (server.exe_path, server.recovery, server.move_base)):
+            self._busy = now
+        elif now - self._busy >= IDLE_TIME:
+            self._tracker = None

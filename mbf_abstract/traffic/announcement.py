@@ -24,7 +24,7 @@ class Announcement:
     name : str
         Of the robot; no other robot has it.
     stamp : float
-        Time [s] of all this, on the clock that the robots share.
+        Time [s] of all this, on the clock of this robot; others only see by it whether it has announced anew.
     way : (n, 3) float64
         Where it is, then the path that it wants to follow from there [m]; only where it is if it goes nowhere.
     remaining : float
@@ -57,15 +57,18 @@ class Announcement:
                 float(values["remaining"]),
                 bool(values["cannot_yield"]),
             )
-        except (ValueError, KeyError, TypeError, OverflowError) as error:
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"no announcement of a robot: {type(error).__name__}: {error}") from error
         if not (read.name and len(way) and np.isfinite(way).all() and math.isfinite(read.stamp + read.remaining)):
             raise ValueError("no announcement of a robot: it needs a name, a place and finite numbers")
         return read
 
     def ahead(self, length: float) -> FloatArray:
-        """Points (n, 2) [m] of its way up to ``length`` [m] from where it is, ``SPACING`` apart, the first included."""
-        steps = norm(np.diff(self.way[:, :2], axis=0))
-        driven = np.concatenate([[0.0], np.cumsum(steps)])
+        """Points (n, 2) [m] of ``points_ahead``, seen from above."""
+        return self.points_ahead(length)[:, :2]
+
+    def points_ahead(self, length: float) -> FloatArray:
+        """Points (n, 3) [m] of its way up to ``length`` [m] from where it is, ``SPACING`` apart, the first included."""
+        driven = np.concatenate([[0.0], np.cumsum(norm(np.diff(self.way, axis=0)))])
         at = np.arange(0.0, min(length, float(driven[-1])) + 0.5 * SPACING, SPACING)
-        return np.column_stack([np.interp(at, driven, self.way[:, axis]) for axis in (0, 1)])
+        return np.column_stack([np.interp(at, driven, column) for column in self.way.T])

@@ -30,6 +30,9 @@ def _rank(robot: Announcement) -> tuple[bool, float, str]:
 
 
 def in_each_others_way(mine: Announcement, other: Announcement, distance: float, length: float) -> bool:
-    """Whether the ways of two robots over the next ``length`` [m] come nearer than ``distance`` [m]; symmetric."""
-    a, b = mine.ahead(length), other.ahead(length)
+    """Whether the ways of two robots over the next ``length`` [m] come nearer than ``distance`` [m]; symmetric.
+
+    Heights count: a robot on a bridge is in nobody's way below it.
+    """
+    a, b = mine.points_ahead(length), other.points_ahead(length)
     return bool(norm(a[:, None] - b).min() < distance)

@@ -15,7 +15,7 @@ from typing import Protocol
 from mbf_abstract.traffic.announcement import Announcement
 
 MAX_AGE = 3.0
-"""Older announcements [s] do not count: that robot is switched off, or out of reach."""
+"""A robot that announces nothing new for this long [s] does not count: it is switched off, or out of reach."""
 
 
 class Channel(Protocol):
@@ -63,13 +63,23 @@ class Traffic:
         self._name = ""
         self._channel: Channel | None = None
         self._no_room_until = -math.inf
+        self._seen: dict[str, tuple[float, float]] = {}
+        """By robot: the stamp of its newest announcement, and when this robot has first seen it, on its own clock."""
+        self._lock = threading.Lock()
 
     def connect(self, name: str, channel: Channel) -> None:
         """Announce under a name of its own, on a channel."""
         self._name, self._channel = name, channel
 
     def announce(self, announcement: Announcement) -> None:
-        """Publish where the robot is; its name, and whether it yields or cannot, are filled in."""
+        """Publish where the robot is, and look who else has announced something.
+
+        Its name, and whether it yields or cannot, are filled in.
+        """
+        self._publish(announcement)
+        self.others(announcement.stamp)  # their announcements age, also while no plugin asks for them
+
+    def _publish(self, announcement: Announcement) -> None:
         if self._channel is not None:
             no_room = announcement.stamp < self._no_room_until
             self.own = replace(announcement, name=self._name, cannot_yield=no_room)
@@ -79,9 +89,19 @@ class Traffic:
         """Announce up to this time [s] that there is no place to let others pass."""
         self._no_room_until = until
         if self.own is not None:
-            self.announce(self.own)
+            self._publish(self.own)
 
     def others(self, now: float) -> tuple[Announcement, ...]:
-        """Return what the other robots have announced in the last seconds, in the order of their names."""
-        latest = () if self._channel is None else self._channel.latest()
-        return tuple(one for one in latest if one.name != self._name and now - one.stamp <= MAX_AGE)
+        """Return what the other robots have announced lately, in the order of their names; ``now`` [s] is own time.
+
+        Their stamps are of other clocks: an announcement is as old as the time for which this robot has known it.
+        """
+        with self._lock:
+            latest = () if self._channel is None else self._channel.latest()
+            self._seen = {one.name: self._first_seen(one, now) for one in latest}
+            heard = {name for name, (_, first_seen) in self._seen.items() if now - first_seen <= MAX_AGE}
+        return tuple(one for one in latest if one.name in heard - {self._name})
+
+    def _first_seen(self, announcement: Announcement, now: float) -> tuple[float, float]:
+        seen = self._seen.get(announcement.name)
+        return seen if seen is not None and seen[0] == announcement.stamp else (announcement.stamp, now)

@@ -34,18 +34,21 @@ def run_fleet(scenario: Scenario, options: RunOptions) -> RunResult:
     """
     options.folder.mkdir(parents=True, exist_ok=True)
     clear_results(options.folder)
-    log = JsonLinesSink(options.folder / "events.jsonl")
-    logs = {robot.name: RunLogs(options.folder / robot.name) for robot in scenario.robots}
-    sinks = {name: (*logs[name].sinks, NamedSink(name, log)) for name in logs}
     runs: dict[str, RobotRun] = {}
     with ExitStack() as closing:
+        log = JsonLinesSink(options.folder / "events.jsonl")
         closing.callback(log.close)
+        logs = {robot.name: RunLogs(options.folder / robot.name) for robot in scenario.robots}
+        for own_logs in logs.values():
+            closing.callback(own_logs.close)
+        sinks = {name: (*logs[name].sinks, NamedSink(name, log)) for name in logs}
         fleet = FleetSession(scenario, options, sinks)
+        parts = closing.enter_context(ExitStack())  # ended once the fleet is closed
+        closing.callback(fleet.close)
         for name, session in fleet.sessions.items():
             own = replace(options, on_progress=options.on_progress if not runs else _ignore)
             runs[name] = run = RobotRun(session, own, logs[name])
-            closing.callback(run.end_parts)
-        closing.callback(fleet.close)
+            parts.callback(run.end_parts)
         record_provenance(scenario, fleet.sessions, options)
         try:
             _drive(fleet, runs, options)

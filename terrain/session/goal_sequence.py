@@ -64,7 +64,7 @@ class GoalSequence:
         self.arrivals: list[Arrival] = []
         self._condition = session.clock.condition()
         self._next: AskedGoal | None = None
-        self._ended = False
+        self._end: MoveBaseResult | None = None
         self._deadline = float("inf")
         session.loop.on_tick.append(self._watch_time)
         session.loop.on_failure.append(lambda: self.end("the simulation has failed"))
@@ -74,9 +74,13 @@ class GoalSequence:
         self._deadline = limit = self._session.scenario.time_limit
         result = NO_GOALS
         for goal in self._session.goals:
-            result = self._visit(AskedGoal(goal))
-            if not result.success or self._next is not None or self._ended:
+            if self._next is not None or self._end is not None:
                 break
+            result = self._visit(AskedGoal(goal))
+            if not result.success:
+                break
+        if self._end is not None and self.last_result is None:
+            self.last_result = result = self._end
         while (asked := self._await_goal()) is not None:
             self._session.recorder.goals.append(asked.pose)
             for listener in self.on_goal:
@@ -100,7 +104,7 @@ class GoalSequence:
     def end(self, reason: str) -> None:
         """Cancel the present goal and take no more."""
         with self._condition:
-            self._ended = True
+            self._end = self._end or MoveBaseResult(MoveBaseOutcome.CANCELED, reason)
             self._condition.notify_all()
         self.cancel(reason)
 
@@ -118,11 +122,11 @@ class GoalSequence:
         self._deadline = float("inf")
         with self._condition:
             self.is_waiting = True
-            while self._stay and self._next is None and not self._ended:
+            while self._stay and self._next is None and self._end is None:
                 self._condition.wait()
             self.is_waiting = False
             asked, self._next = self._next, None
-            return None if self._ended else asked
+            return asked if self._end is None else None
 
     def _watch_time(self, time: float) -> None:
         if time >= self._deadline:

@@ -41,6 +41,11 @@ class RunLogs:
         self.planning = PlanningTimes()
         self.sinks: tuple[EventSink, ...] = (JsonLinesSink(folder / "events.jsonl"), self.planning)
 
+    def close(self) -> None:
+        """Close the sinks, also those that no session has taken; idempotent."""
+        for sink in self.sinks:
+            sink.close()
+
 
 class RobotRun:
     """The goals of one robot and what comes of them.

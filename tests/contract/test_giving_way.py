@@ -1,6 +1,7 @@
 """Giving way on each map: into bays, around corners, aside in halls, and nowhere if there is no place for it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -66,6 +67,8 @@ def give_way(world):
 
         with rig(GiveWayRecovery, make_context, GiveWayParameters(**parameters), start) as made:
             made.plugin.robot._track = tuple((x, y, 0.0) for x, y in track)
+            if traffic is not None:
+                traffic._channel.clock = made.clock
             made.plugin.traffic = traffic or Traffic()
             token = CancelToken()
             motion = Watched(made, token, lambda pose: pose)
@@ -144,18 +147,34 @@ def test_it_follows_the_surface_where_the_way_is_not_along_x(give_way):
 
 
 # ---------- among robots that announce their ways
-def announced(name, x_from, x_to, remaining, stamp, cannot_yield=False):
-    """A robot that goes along the corridor; one with a stamp in the future stays where it is for the whole test."""
+def announced(name, x_from, x_to, remaining):
+    """A robot that goes along the corridor."""
     x = np.linspace(x_from, x_to, 20)
-    return Announcement(name, stamp, np.column_stack([x, np.full(20, 3.0), np.zeros(20)]), remaining, cannot_yield)
+    return Announcement(name, 0.0, np.column_stack([x, np.full(20, 3.0), np.zeros(20)]), remaining)
 
 
-def head_on(remaining, stamp=100.0, channel=None):
+class Radio(SharedChannel):
+    """Other robots announce the same anew all the time, up to a time [s]; ``give_way`` sets the clock."""
+
+    clock = None
+
+    def __init__(self, until):
+        super().__init__()
+        self.until = until
+
+    def latest(self):
+        return tuple(one if one.name == "anna" else self.anew(one) for one in super().latest())
+
+    def anew(self, one):
+        return replace(one, stamp=min(self.clock.now(), self.until))
+
+
+def head_on(remaining, channel=None):
     """Traffic of the robot at ``START``, which has 3 m to go, with another one head on that has ``remaining``."""
-    channel, traffic = channel or SharedChannel(), Traffic()
+    channel, traffic = channel or Radio(until=100.0), Traffic()
     traffic.connect("anna", channel)
-    traffic.announce(announced("", 4.5, 7.5, 3.0, 0.0))
-    channel.publish(announced("ben", 5.3, 0.5, remaining, stamp))
+    traffic.announce(announced("", 4.5, 7.5, 3.0))
+    channel.publish(announced("ben", 5.3, 0.5, remaining))
     return traffic
 
 
@@ -167,13 +186,13 @@ def test_the_robot_that_goes_first_waits_for_the_other_one_and_does_not_move(giv
 
 
 def test_it_waits_no_longer_for_a_robot_that_is_silent(give_way):
-    result, motion = give_way(corridor, traffic=head_on(remaining=9.0, stamp=0.0), longest_wait=60.0)
+    result, motion = give_way(corridor, traffic=head_on(9.0, Radio(until=0.0)), longest_wait=60.0)
     assert result.outcome == RecoveryOutcome.SUCCESS
     assert 3.0 < motion.seconds < 4.0
 
 
 def test_the_other_one_pulls_out_and_waits_until_the_first_has_passed(give_way):
-    traffic = head_on(remaining=1.0, stamp=20.0)  # heard of until 23 s
+    traffic = head_on(1.0, Radio(until=20.0))  # heard of until 23 s
     result, motion = give_way(bay(2.4, 3.4, True), traffic=traffic, longest_wait=60.0)
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
     assert "for ben" in result.message
@@ -185,37 +204,24 @@ def test_the_other_one_pulls_out_and_waits_until_the_first_has_passed(give_way):
 def test_it_does_not_pull_out_to_where_the_first_one_goes(give_way):
     """The first one turns into the bay behind."""
     traffic = head_on(remaining=1.0)
-    (own,) = (one for one in traffic._channel.latest() if one.name == "ben")
-    into_the_bay = np.concatenate([own.way[own.way[:, 0] > 2.9], [(2.9, y, 0.0) for y in np.linspace(3.0, 4.6, 9)]])
-    traffic._channel.publish(Announcement("ben", 100.0, into_the_bay, 1.0))
+    along = announced("ben", 5.3, 0.5, 1.0).way
+    into_the_bay = np.concatenate([along[along[:, 0] > 2.9], [(2.9, y, 0.0) for y in np.linspace(3.0, 4.6, 9)]])
+    traffic._channel.publish(Announcement("ben", 0.0, into_the_bay, 1.0))
     result, _ = give_way(bay(2.4, 3.4, True), traffic=traffic, reach=2.5, longest_wait=1.0)
     assert result.outcome == RecoveryOutcome.IMPASSABLE
     assert "asks for the right of way over ben" in result.message
     assert traffic.own.cannot_yield
 
 
-class Pleading(SharedChannel):
+class Pleading(Radio):
     """The other robot finds at 2 s that it cannot yield."""
 
-    clock = None
-
-    def latest(self):
-        return tuple(
-            announced("ben", 5.3, 0.5, 9.0, 20.0, self.clock.now() > 2.0) if one.name == "ben" else one
-            for one in super().latest()
-        )
+    def anew(self, one):
+        return replace(super().anew(one), cannot_yield=self.clock.now() > 2.0)
 
 
-def test_a_robot_that_waits_pulls_out_as_soon_as_the_other_one_cannot_yield(give_way, monkeypatch):
-    channel = Pleading()
-    traffic = head_on(9.0, channel=channel)
-    recover = GiveWayRecovery.recover
-
-    def with_clock(plugin, request):
-        channel.clock = plugin.clock
-        return recover(plugin, request)
-
-    monkeypatch.setattr(GiveWayRecovery, "recover", with_clock)
+def test_a_robot_that_waits_pulls_out_as_soon_as_the_other_one_cannot_yield(give_way):
+    traffic = head_on(9.0, Pleading(until=20.0))
     result, motion = give_way(bay(2.4, 3.4, True), traffic=traffic, longest_wait=60.0)
     assert result.outcome == RecoveryOutcome.SUCCESS, result.message
     assert "has pulled out" in result.message

@@ -1,12 +1,14 @@
 """``robots`` of a scenario: what is legal, and what each robot gets of the scenario and of the world."""
 
 import itertools
+import tempfile
 
 import numpy as np
 import pytest
 
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.config.yaml_source import load_yaml
+from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from terrain.physics.actors import Fellow
@@ -26,6 +28,9 @@ from terrain.scenarios.on_map import on_map
 from terrain.scenarios.scenario import load_scenario, robot_scenarios, shipped_scenarios
 from terrain.sensors.rays import FellowRays
 from terrain.session.fleet import FleetSession, seed_of
+from terrain.session.fleet_run import run_fleet
+from terrain.session.robot_run import RunLogs
+from terrain.session.run_options import RunOptions
 from terrain.session.scenario_check import check_scenario
 from terrain.session.session import Session
 from terrain.sweeps.sweep import hash_of
@@ -114,6 +119,33 @@ def test_two_robots_in_one_place_are_refused_by_name(tmp_path):
     scenario = pair(tmp_path, PAIR.replace("start: {x: 9.0, y: 9.7}", "start: {x: 3.5, y: 9.7}"))
     with pytest.raises(ConfigError, match=r"robots\[1\]\.start: expected a place that 'anna' does not stand in"):
         FleetSession(scenario)
+
+
+def test_a_run_whose_executive_is_unknown_closes_what_it_has_opened(tmp_path, monkeypatch):
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    with pytest.raises(ConfigError, match="executive"):
+        run_fleet(load_scenario("two_couriers"), RunOptions(tmp_path / "run", executive="nobody"))
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_run_that_is_refused_closes_the_logs_of_all_robots(tmp_path, monkeypatch):
+    made = []
+
+    class NotedLogs(RunLogs):
+        def __init__(self, folder):
+            super().__init__(folder)
+            made.append(self)
+
+    monkeypatch.setattr("terrain.session.fleet_run.RunLogs", NotedLogs)
+    scenario = pair(tmp_path, PAIR.replace("start: {x: 9.0, y: 9.7}", "start: {x: 3.5, y: 9.7}"))
+    with pytest.raises(ConfigError, match="does not stand in"):
+        run_fleet(scenario, RunOptions(tmp_path / "run"))
+    assert len(made) == 2
+    for logs in made:
+        with pytest.raises(OSError, match="closed"):
+            logs.sinks[0].write(Event(0.0, EventKind.FAULT, "robot", {}))
 
 
 def test_a_session_of_one_robot_and_another_map_refuse_several_robots(tmp_path):

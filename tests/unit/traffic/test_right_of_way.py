@@ -14,9 +14,8 @@ from mbf_abstract.traffic.right_of_way import in_each_others_way, right_of_way
 from mbf_abstract.traffic.traffic import MAX_AGE, SharedChannel, Traffic
 
 coordinates = st.floats(-20.0, 20.0, width=32)
-ways = st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=8).map(
-    lambda points: np.column_stack([np.array(points), np.zeros(len(points))])
-)
+heights = st.sampled_from([0.0, 0.25, 4.0])  # the ground, a kerb, a bridge
+ways = st.lists(st.tuples(coordinates, coordinates, heights), min_size=1, max_size=8).map(np.array)
 announcements = st.builds(
     Announcement,
     name=st.sampled_from(["anna", "ben", "carla", "dora", "emil"]),
@@ -66,8 +65,8 @@ def naive_gap(a, b, length):
     """Least distance of two ways by their corners, cut off and sampled finely."""
 
     def points(way):
-        cut, left = [way[0, :2]], length
-        for p, q in itertools.pairwise(way[:, :2]):
+        cut, left = [way[0]], length
+        for p, q in itertools.pairwise(way):
             step = math.dist(p, q)
             share = min(1.0, left / step) if step > 0.0 else 1.0
             cut += [p + s * share * (q - p) for s in np.linspace(0.0, 1.0, 200)]
@@ -77,7 +76,7 @@ def naive_gap(a, b, length):
         return np.array(cut)
 
     mine, others = points(a.way), points(b.way)
-    return min(float(np.hypot(*(others - p).T).min()) for p in mine)
+    return min(float(np.sqrt(((others - p) ** 2).sum(axis=1)).min()) for p in mine)
 
 
 @given(announcements, announcements, st.floats(0.5, 6.0))
@@ -89,7 +88,16 @@ def test_ways_are_in_each_others_way_where_they_come_near_and_that_is_mutual(a, 
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"name":"a","stamp":0,"way":[],"remaining":0,"cannot_yield":false}', "9" * 400, "null"]
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"name":"a","stamp":0,"way":[],"remaining":0,"cannot_yield":false}',
+        "9" * 400,
+        "null",
+        pytest.param("[" * 100_000, id="nested too deeply"),
+    ],
 )
 def test_what_is_no_announcement_is_refused(text):
     with pytest.raises(ValueError, match="no announcement"):
@@ -107,8 +115,8 @@ def test_robots_know_what_the_others_have_announced_lately_and_not_themselves():
     anna.announce(state(10.0, 0.0, 3.0))
     ben.announce(state(10.5, 5.0))
     assert [one.name for one in anna.others(10.5)] == ["ben"]
-    assert [one.name for one in ben.others(10.0 + MAX_AGE)] == ["anna"]
-    assert ben.others(10.1 + MAX_AGE) == ()
+    assert [one.name for one in ben.others(10.5 + MAX_AGE)] == ["anna"]  # of whom it has known since 10.5 s
+    assert ben.others(10.6 + MAX_AGE) == ()
 
 
 def test_a_robot_without_a_channel_announces_nothing():
