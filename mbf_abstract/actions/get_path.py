@@ -15,7 +15,7 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.loaded_plugin import LoadedPlugin
 from mbf_abstract.execution.plan_check import area_problem, check_path, in_global_frame
-from mbf_abstract.execution.planner import PlannerExecution, PlannerState
+from mbf_abstract.execution.planner import FALLBACK_OUTCOMES, PlannerExecution, PlannerState
 from mbf_abstract.geometry import Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult, NoFeedback
@@ -25,9 +25,6 @@ from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult, Plugi
 
 Handle = GoalHandle[GetPathGoal, GetPathResult, NoFeedback]
 Job = GoalJob[GetPathGoal, GetPathResult, NoFeedback]
-
-FALLBACK_OUTCOMES = (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_START, GetPathOutcome.BLOCKED_GOAL)
-"""What another planner may know better; one with other limits, or one that can do more."""
 
 
 class GetPathAction(PluginAction[GetPathGoal, GetPathResult, NoFeedback, AbstractPlanner]):

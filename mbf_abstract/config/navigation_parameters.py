@@ -36,7 +36,7 @@ class NavigationParameters(ParameterModel):
     fallback_planner: str = parameter(
         "",
         "Planner that plans where the one of the goal finds no path from or to a place on the map; empty = none. Each "
-        "has planner_patience to itself; only this one is called again after a failure.",
+        "has planner_patience to itself; after such a failure only this one is called again.",
     )
     plan_end_tolerance: float = parameter(
         0.5, "How far a plan's ends may lie from start and goal, beside the goal's tolerance.", unit="m", ge=0.0

@@ -15,7 +15,8 @@ once, with the planner's own code. A success that comes after the patience but b
 Between two calls there is a pause of ``planner_retry_delay``, so that a planner that fails at once does not keep a core
 busy.
 
-A goal whose planner has a *fallback* calls it once, whatever the retries: the retries are the fallback's.
+A goal whose planner has a *fallback* does not call it again after one of ``FALLBACK_OUTCOMES``: the retries are the
+fallback's then. After other failures, which the fallback is not called for, the retries are its own.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.goals.goal_area import GoalArea, plan_to_area
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult
+
+FALLBACK_OUTCOMES = (GetPathOutcome.NO_PATH_FOUND, GetPathOutcome.BLOCKED_START, GetPathOutcome.BLOCKED_GOAL)
+"""What another planner may know better; one with other limits, or one that can do more."""
 
 
 class PlannerState(Enum):
@@ -87,7 +91,8 @@ class PlannerExecution:
 
     def _judge(self, result: PlanResult, calls: int) -> PlannerState | None:
         """Whether this result ends the execution, in upstream's order; None = call again."""
-        max_retries = 0 if self._has_fallback else self._runtime.parameters.planner_max_retries
+        falls_back = self._has_fallback and result.outcome in FALLBACK_OUTCOMES
+        max_retries = 0 if falls_back else self._runtime.parameters.planner_max_retries
         if self._run.canceled and not self._run.patience_exceeded:
             return PlannerState.CANCELED
         if result.success:

@@ -87,7 +87,7 @@ class HeadingAStarPlanner(SurfacePlanner):
         chain, cost = found
         begin, end = query.start, query.goal
         first = line_over_ground(mesh_map.topology, begin.face, begin.point, mesh_map.vertices[chain[0]])
-        assert first is not None  # the search begins at the ends of such lines
+        assert first is not None  # the search begins at corners of the face, or at the ends of such lines
         positions, normals = self._search.graph.along(chain)
         positions = np.concatenate([[begin.point], first.points[1:-1], positions, [end.point]])
         faces = np.array([begin.face, *first.faces[1:]], dtype=np.int32)

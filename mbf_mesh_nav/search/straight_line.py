@@ -31,7 +31,9 @@ def line_over_ground(mesh: MeshTopology, face: int, start: FloatArray, end: Floa
     for _ in range(_MOST_FACES):
         corners = mesh.vertices[mesh.faces[face]]
         share, side = 1.0, -1
-        for index in range(3):
+        # A corner of this face is reached within it, even if by rounding the line leaves across the edge it begins on.
+        is_corner = (corners == end).all(axis=1).any()
+        for index in () if is_corner else range(3):
             across = (corners[(index + 1) % 3] - corners[index])[:2].tolist()
             offset = (start - corners[index])[:2].tolist()
             inside, rate = _cross(across, offset), _cross(across, ahead)

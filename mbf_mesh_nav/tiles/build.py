@@ -4,7 +4,7 @@
     build_tiles(source, Path("island"), TileSettings(mesh_map=parameters, layer_blocks=blocks))
 
 A tile depends on the source and the settings only, so its bytes are the same however it comes about. A tile that is
-there already, with the SHA-256 of the same source and settings in it, is not built again.
+there already, with the SHA-256 of the same source and settings in it, is not built again unless a layer was changed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from mbf_mesh_nav.mesh.topology import build_topology
 from mbf_mesh_nav.tiles.index import INDEX_FILE, CostProfile, TileEntry, TileIndex, read_index, write_index
 from mbf_mesh_nav.tiles.portals import group_shared
 from mbf_mesh_nav.tiles.sources import TilePart, TileSource
-from mbf_mesh_nav.tiles.tile import Tile, TileKey, read_tile, tile_file, write_tile
+from mbf_mesh_nav.tiles.tile import Tile, TileKey, digest_of_layers, read_tile, tile_file, write_tile
 from mbf_mesh_nav.tiles.tile_graph import costs_between_portals
 
 PORTALS_OF_A_SIDE = 16
@@ -77,11 +77,12 @@ class TileSettings:
         return dict(self.profiles) or {"default": CostProfile(edge_cost_factor=self.mesh_map.edge_cost_factor)}
 
     def digest(self, source: TileSource) -> str:
-        """Hexadecimal SHA-256 of these settings and of a source."""
+        """Hexadecimal SHA-256 of a source and of these settings, but for those that say how a mesh is read and kept."""
         blocks = {name: getattr(block, "model_dump", lambda b=block: b)() for name, block in self.layer_blocks.items()}
         profiles = {name: one.model_dump() for name, one in self.all_profiles().items()}
         sizes = [TileIndex.model_fields["version"].default, self.tile_size, self.cube, self.frame_id]
-        text = json.dumps([sizes, self.mesh_map.model_dump(), blocks, profiles], sort_keys=True, default=str)
+        wanted = self.mesh_map.model_dump(include={"layers", "default_layer", "edge_cost_factor", "inscribed_radius"})
+        text = json.dumps([sizes, wanted, blocks, profiles], sort_keys=True, default=str)
         return hashlib.sha256(f"{source.digest()} {text}".encode()).hexdigest()
 
 
@@ -141,6 +142,8 @@ class TileBuilder:
         shared = np.flatnonzero(is_shared[core]).astype(np.int32)
         vertices = topology.vertices[order]
         portals, portal_of = group_shared(vertices[shared], self._settings.cube)
+        costs = np.array([layers[name].costs[core] for name in self.layers])
+        lethal = np.array([layers[name].lethal[core] for name in self.layers])
         tile = Tile(
             vertices=vertices,
             numbers=part.numbers[topology.internal_to_input[order]],
@@ -149,13 +152,14 @@ class TileBuilder:
             normals=topology.vertex_normals[core].astype(np.float32),
             offsets=offsets,
             neighbours=place[topology.neighbours[kept]],
-            costs=np.array([layers[name].costs[core] for name in self.layers]),
-            lethal=np.array([layers[name].lethal[core] for name in self.layers]),
+            costs=costs,
+            lethal=lethal,
             shared=shared,
             portals=portals,
             portal_of=portal_of,
             portal_costs=np.zeros((0, len(portals), len(portals)), dtype=np.float32),
             build=np.frombuffer(bytes.fromhex(self.build), dtype=np.uint8),
+            values=digest_of_layers(costs, lethal),
         )
         # 5. What it costs to pass.
         return replace(tile, portal_costs=np.array([self._passing(tile, one) for one in self._profiles.values()]))
@@ -243,7 +247,7 @@ def _entry_of(builder: TileBuilder, path: Path, key: TileKey) -> TileEntry | Non
             tile = read_tile(path)
         except MeshError:
             pass  # of a disk that was full: built again
-    if tile is None or tile.build.tobytes().hex() != builder.build:
+    if tile is None or tile.build.tobytes().hex() != builder.build or not tile.is_as_built:
         tile = builder.tile(key)
         if tile is None:
             return None

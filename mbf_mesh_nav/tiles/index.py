@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from rtree import index as rtree_index
 
 from mbf_abstract.config.bounded_files import special_file
@@ -37,13 +38,20 @@ class CostProfile(ParameterModel):
 class TileEntry(BaseModel):
     """One tile: its place in the grid, its sizes, and the box around its core."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     key: TileKey
     core_vertices: int = Field(ge=3)
     neighbours: int = Field(ge=6)
     shared: int = Field(ge=0)
     box: Box
+
+    @field_validator("box")
+    @classmethod
+    def _box_is_one(cls, box: Box) -> Box:
+        if any(least > greatest for least, greatest in zip(box[:3], box[3:], strict=True)):
+            raise ValueError("expected least x, y, z and greatest x, y, z")
+        return box
 
 
 class TileIndex(BaseModel):
@@ -59,7 +67,7 @@ class TileIndex(BaseModel):
         In the order of the tiles' portal costs.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     format: Literal["mbf tiles"] = "mbf tiles"
     version: Literal[1] = 1
@@ -73,6 +81,15 @@ class TileIndex(BaseModel):
     default_layer: str
     profiles: dict[str, CostProfile] = Field(min_length=1)
     tiles: tuple[TileEntry, ...] = Field(min_length=1)
+
+    @field_validator("tiles")
+    @classmethod
+    def _keys_are_unique(cls, tiles: tuple[TileEntry, ...]) -> tuple[TileEntry, ...]:
+        keys = Counter(entry.key for entry in tiles)
+        key, times = keys.most_common(1)[0]
+        if times > 1:
+            raise ValueError(f"expected each tile once, {key} is there {times} times")
+        return tiles
 
     def profile(self, name: str = "") -> tuple[int, CostProfile]:
         """Place and values of a profile, the first one without a name; KeyError if there is none of that name."""

@@ -150,25 +150,44 @@ class _Search:
         ends = [(place.key, self._to_portals(place)) for place in (start, goal)]
         self._bounds = _through(tiled.portals, ends)
         self._estimates = _through(tiled.estimates, ends)
+        self._least_estimate = self._find_least_estimate()
 
     def run(self) -> TiledPlan:
         """Widen the corridor until the cost is proven, steady, or nothing more can be opened."""
-        least_estimate, margin = self._least_estimate(), FIRST_MARGIN
-        ranks, narrower = self._estimates, np.inf
+        ranks, margin = self._estimates, FIRST_MARGIN
+        corridor, narrower = self._opened(ranks, self._threshold(margin)), np.inf
         while True:
-            corridor = self._opened(ranks, (1.0 + margin) * least_estimate)
             plan = self._exact(corridor, narrower)
             if self._cancel_flag[0] != 0:
                 return _failure(GetPathOutcome.CANCELED, "")
             proven = plan.cost <= (1.0 + self._tolerance) * plan.least_cost
-            if proven or corridor.is_full or plan.gain <= STEADY:
+            is_last = corridor.is_full or np.isinf(margin)
+            if proven or is_last or plan.gain <= STEADY:
                 return self._described(plan, proven, corridor.is_full)
             # What stands against a proof comes first, if the memory holds it.
             against = np.asarray(self._bounds <= plan.cost / (1.0 + self._tolerance))
             first = np.where(against, np.float32(0.0), self._estimates)
             if np.isfinite(plan.cost) and not self._opened(first, 0.0).is_full:
                 ranks = first
-            narrower, margin = plan.cost, 2.0 * margin + LEAST_WIDENING
+            wider, margin = self._widened(corridor, ranks, margin)
+            # The same corridor again, with no memory for a wider one, is no comparison.
+            narrower = np.inf if np.array_equal(wider.is_open, corridor.is_open) else plan.cost
+            corridor = wider
+
+    def _widened(self, corridor: _Corridor, ranks: Float32Array, margin: float) -> tuple[_Corridor, float]:
+        """The next corridor with other portals than this one, or all that the memory holds, and its margin.
+
+        Margins double, so the threshold passes every rank in the end; an infinite margin opens all that can be reached.
+        """
+        while True:
+            margin = 2.0 * margin + LEAST_WIDENING
+            wider = self._opened(ranks, self._threshold(margin))
+            if wider.is_full or np.isinf(margin) or not np.array_equal(wider.is_open, corridor.is_open):
+                return wider, margin
+
+    def _threshold(self, margin: float) -> float:
+        """Greatest estimate [m] of an open portal; the least one may be 0, where start and goal are in one portal."""
+        return (1.0 + margin) * max(self._least_estimate, self._tiled.index.portal_length)
 
     def _described(self, plan: TiledPlan, proven: bool, is_full: bool) -> TiledPlan:
         """The result with its outcome and message."""
@@ -196,7 +215,7 @@ class _Search:
         seeds = place.corners, place.corner_costs
         return costs_to_portals(seen.graph, tile.shared, tile.portal_of, len(tile.portals), *seeds, seen.threshold_step)
 
-    def _least_estimate(self) -> float:
+    def _find_least_estimate(self) -> float:
         """The least estimate; within one tile the straight line is one, too."""
         least = float(self._estimates.min(initial=np.inf))
         if self._start.key == self._goal.key:

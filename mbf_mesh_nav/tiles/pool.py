@@ -26,6 +26,8 @@ VERTEX_BYTES = 24 + 12 + 4 + 1 + 21
 """Of a vertex: position, normal, offset, blocked, and the lists of a search."""
 EDGE_BYTES = 8
 """Of an edge in one direction: neighbour and weight."""
+MOST_PLACES = 2**31 - 1
+"""Vertices and edges of all slots: what int32 can number."""
 
 
 class TilePool:
@@ -41,7 +43,7 @@ class TilePool:
     Attributes
     ----------
     slots : int
-        Number of tiles that fit.
+        Number of tiles that fit; their vertices and edges are numbered by int32, however much memory there is.
     """
 
     def __init__(self, entries: Iterable[TileEntry], memory: float) -> None:
@@ -49,7 +51,8 @@ class TilePool:
         sizes = [(one.core_vertices + 1, one.neighbours + one.shared) for one in entries]
         self._vertices_of_slot, self._edges_of_slot = (max(column) for column in zip(*sizes, strict=True))
         self.slot_bytes = VERTEX_BYTES * self._vertices_of_slot + EDGE_BYTES * self._edges_of_slot
-        self.slots = max(0, min(int(memory // self.slot_bytes), len(sizes)))
+        most = MOST_PLACES // max(self._vertices_of_slot, self._edges_of_slot)
+        self.slots = max(0, min(int(memory // self.slot_bytes), len(sizes), most))
         vertices, edges = self.slots * self._vertices_of_slot, self.slots * self._edges_of_slot
         # Memory that is not written yet is not taken either.
         self.vertices: FloatArray = np.empty((vertices, 3))

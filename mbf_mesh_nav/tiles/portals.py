@@ -1,9 +1,10 @@
 """Portals between tiles, what it costs at least to pass between them, and the graph they form.
 
 Shared vertices that lie in one cube are one portal: on a grid of cubes that all tiles know, so tiles that share
-vertices agree on portals without knowing each other, and storeys have portals of their own. Between two portals of a
-tile counts the least cost over its core, from any vertex of the one to any of the other; within a portal nothing
-costs.
+vertices agree on portals without knowing each other. Storeys that are less apart than the side of a cube may have a
+portal in common. Between two portals of a tile counts the least cost over its core, from any vertex of the one to any
+of the other; within a portal nothing costs, not even from one storey to another, so bounds are lower there, and paths
+do not change storeys.
 
 Every path is a sequence of stretches within one core each, between shared vertices. So no path costs less than the
 sequence of its portals in this graph: its shortest paths are lower bounds of the exact ones. They are close where

@@ -10,6 +10,7 @@ what its headers promise is compared with its size before anything is read.
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Collection
 from dataclasses import dataclass, fields
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from mbf_abstract.config.bounded_files import ArrayFileError, read_arrays
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.mesh.mesh_report import MeshError
+from mbf_mesh_nav.tiles.tile_arrays import FORMAT, misfit
 
 TileKey = tuple[int, int]
 """Column and row of a tile in the grid of tiles."""
@@ -57,6 +59,8 @@ class Tile:
         Least cost [m] over the core from any vertex of one portal to any of another, inf without a path.
     build : (32,) uint8
         SHA-256 of what the tile was built from.
+    values : (32,) uint8
+        SHA-256 of the layers as they were built; that of ``costs`` and ``lethal`` unless a layer was changed since.
     """
 
     vertices: FloatArray
@@ -73,29 +77,24 @@ class Tile:
     portal_of: IntArray
     portal_costs: Float32Array
     build: NDArray[np.uint8]
+    values: NDArray[np.uint8]
 
     @property
     def core_vertices(self) -> int:
         """Number of vertices of the core."""
         return len(self.normals)
 
+    @property
+    def is_as_built(self) -> bool:
+        """Whether the layers have the values they were built with."""
+        return np.array_equal(self.values, digest_of_layers(self.costs, self.lethal))
 
-TYPES = {
-    "vertices": np.float64,
-    "numbers": np.int64,
-    "faces": np.int32,
-    "core_faces": np.int64,
-    "normals": np.float32,
-    "offsets": np.int32,
-    "neighbours": np.int32,
-    "costs": np.float32,
-    "lethal": np.bool_,
-    "shared": np.int32,
-    "portals": np.int64,
-    "portal_of": np.int32,
-    "portal_costs": np.float32,
-    "build": np.uint8,
-}
+
+def digest_of_layers(costs: Float32Array, lethal: BoolArray) -> NDArray[np.uint8]:
+    """SHA-256 (32,) of the values (L, c) of layers."""
+    digest = hashlib.sha256(costs.tobytes())
+    digest.update(lethal.tobytes())
+    return np.frombuffer(digest.digest(), dtype=np.uint8)
 
 
 def tile_file(folder: Path, key: TileKey) -> Path:
@@ -123,10 +122,7 @@ def read_tile(path: Path) -> Tile:
     MeshError
         The file is missing, damaged or no tile; the text names the array.
     """
-    tile = Tile(**read_tile_arrays(path, TYPES))
-    if wrong := _misfits(tile):
-        raise MeshError(str(path), wrong)
-    return tile
+    return Tile(**read_tile_arrays(path, FORMAT))
 
 
 def read_tile_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
@@ -139,45 +135,6 @@ def read_tile_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[An
         raise MeshError(str(path), [str(error)]) from error
     if missing := [name for name in names if name not in arrays]:
         raise MeshError(str(path), [f"has no array '{missing[0]}'; it is no tile"])
-    wrong = [name for name, values in arrays.items() if values.dtype != TYPES[name]]
-    if wrong:
-        expected, got = np.dtype(TYPES[wrong[0]]), arrays[wrong[0]].dtype
-        raise MeshError(str(path), [f"'{wrong[0]}' holds {got}, expected {expected}"])
+    if wrong := misfit(arrays):
+        raise MeshError(str(path), [wrong])
     return arrays
-
-
-def _misfits(tile: Tile) -> list[str]:
-    """The first array whose shape or content does not fit the others, as a list of one text; [] if all do."""
-    vertices, core, shared, portals = len(tile.vertices), len(tile.normals), len(tile.shared), len(tile.portals)
-    shapes = {
-        "vertices": (vertices, 3),
-        "numbers": (vertices,),
-        "faces": (len(tile.faces), 3),
-        "core_faces": (1,),
-        "normals": (core, 3),
-        "offsets": (core + 1,),
-        "neighbours": (len(tile.neighbours),),
-        "costs": (len(tile.costs), core),
-        "lethal": (len(tile.costs), core),
-        "portals": (portals, 3),
-        "portal_of": (shared,),
-        "portal_costs": (len(tile.portal_costs), portals, portals),
-        "build": (32,),
-    }
-    for name, shape in shapes.items():
-        if getattr(tile, name).shape != shape:
-            return [f"'{name}' has the shape {getattr(tile, name).shape}, expected {shape}"]
-    limits: dict[str, tuple[NDArray[Any], Any]] = {
-        "faces": (tile.faces, vertices),
-        "core_faces": (tile.core_faces, len(tile.faces) + 1),
-        "neighbours": (tile.neighbours, core),
-        "shared": (tile.shared, core),
-        "portal_of": (tile.portal_of, portals),
-    }
-    for name, (values, limit) in limits.items():
-        if len(values) and (values.min() < 0 or values.max() >= limit):
-            return [f"'{name}' holds {values.min()} to {values.max()}, expected 0 to {limit - 1}"]
-    steps = np.diff(tile.offsets)
-    if tile.offsets[0] != 0 or tile.offsets[-1] != len(tile.neighbours) or (len(steps) and steps.min() < 0):
-        return ["'offsets' does not ascend from 0 to the number of neighbours"]
-    return ["'vertices' holds values that are not finite"] if not np.isfinite(tile.vertices).all() else []

@@ -4,7 +4,7 @@
     plan = plan_on_tiles(tiled, start, goal)
 
 Opening reads the index and the portals of all tiles, some hundred bytes for each portal; tiles are read when they are
-needed. All that is loaded keeps to ``memory``.
+needed. Both keep to ``memory``.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections import OrderedDict
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.layer import CostArray, LethalArray
@@ -27,6 +29,8 @@ KEPT_TILES = 4
 """Tiles of starts and goals that stay loaded besides those of the pool."""
 DEFAULT_MEMORY = 1.5e9
 """Bytes."""
+PAIR_BYTES = 2 * (4 + 8)
+"""Of a pair of portals of one tile, as bound and as estimate: its cost, and an edge of the graph of portals."""
 
 
 class TiledMap:
@@ -38,7 +42,7 @@ class TiledMap:
     profile : str
         Name of a cost profile; empty = the map's first.
     memory : float
-        Bytes that loaded tiles and searches may take.
+        Bytes that loaded tiles, searches and the tables of portals may take.
 
     Attributes
     ----------
@@ -46,6 +50,8 @@ class TiledMap:
     portals, estimates : PortalGraph
         With the least costs between any vertices of two portals, and with about what it costs between their middles.
     pool : TilePool
+    table_bytes : int
+        What the tables of portals take of the memory.
 
     Raises
     ------
@@ -65,9 +71,10 @@ class TiledMap:
         self.estimates = PortalGraph({key: self._estimated(one) for key, one in bounds.items()})
         entries = self.index.entries.values()
         largest = TilePool(entries, 0.0).slot_bytes
-        self.pool = TilePool(entries, memory - KEPT_TILES * largest)
+        self.table_bytes = PAIR_BYTES * sum(one.costs.size for one in bounds.values())
+        self.pool = TilePool(entries, memory - self.table_bytes - KEPT_TILES * largest)
         if self.pool.slots < min(2, len(self.index.tiles)):
-            least = (KEPT_TILES + 2) * largest / 1e6
+            least = (self.table_bytes + (KEPT_TILES + 2) * largest) / 1e6
             text = f"its tiles need {least:.3g} MB of memory, allowed are {memory / 1e6:.3g} MB"
             raise MeshError(str(folder), [text])
         self._kept: OrderedDict[TileKey, tuple[Tile, TileGraph]] = OrderedDict()
@@ -86,7 +93,12 @@ class TiledMap:
         self.pool.hold(keys, lambda key: self._kept[key] if key in self._kept else self._read(key))
 
     def find_place(self, position: FloatArray, reach: float) -> TilePlace | None:
-        """The place on the surface nearest to a position (3,) [m], as ``borders.on_surface``; None off the surface."""
+        """The place on the surface nearest to a position (3,) [m], as ``borders.on_surface``; None off the surface.
+
+        Also None for a position that is not finite.
+        """
+        if not np.isfinite(position).all():
+            return None
         (x, y, z) = position.tolist()
         box = (x - reach, y - reach, z - reach, x + reach, y + reach, z + reach)
         found = (find_place(key, *self.tile(key), position, reach) for key in self.index.tiles_in(box))
@@ -95,21 +107,24 @@ class TiledMap:
     def change_layer(self, key: TileKey, layer: str, costs: CostArray, lethal: LethalArray) -> None:
         """Put new values (c,) of a layer on a tile's core, on disk and in memory, and what follows for its portals.
 
-        Vertices that the tile shares with others keep the costs that those have for them until they change, too.
+        Vertices that the tile shares with others keep the costs that those have for them until they change, too. The
+        next build in the folder gives the tile the values of the source again.
 
         Raises
         ------
         MeshError
-            There is no such tile or layer, or the file cannot be written; the old one stays.
+            There is no such tile or layer, its file is not sound, or it cannot be written; the old one stays.
         ValueError
-            The values are not those of the core's vertices.
+            The values are not those of the core's vertices, or costs are negative or not a number.
         """
         if key not in self.index.entries or layer not in self.index.layers:
             raise MeshError(str(self.folder), [f"has no tile {key} with a layer '{layer}'"])
-        tile = read_tile(tile_file(self.folder, key))
+        tile = self._read_tile(key)
         if costs.shape != (tile.core_vertices,) or lethal.shape != (tile.core_vertices,):
             expected = (tile.core_vertices,)
             raise ValueError(f"tile {key} takes values of shape {expected}, got {costs.shape} and {lethal.shape}")
+        if not (costs >= 0.0).all():
+            raise ValueError(f"tile {key} takes costs of at least 0, got some that are negative or not a number")
         row = self.index.layers.index(layer)
         tile.costs[row], tile.lethal[row] = costs, lethal
         passing = tile.portal_costs.copy()
@@ -129,20 +144,24 @@ class TiledMap:
         return TilePortals(bounds.portals, costs)
 
     def _read(self, key: TileKey) -> tuple[Tile, TileGraph]:
+        tile = self._read_tile(key)
+        return tile, tile_graph(tile, tile.costs[self._layer], tile.lethal[self._layer], self.profile)
+
+    def _read_tile(self, key: TileKey) -> Tile:
+        """A sound tile of this map."""
         path, entry = tile_file(self.folder, key), self.index.entries[key]
         tile = read_tile(path)
         found = (tile.core_vertices, len(tile.neighbours), len(tile.shared), len(tile.costs))
         expected = (entry.core_vertices, entry.neighbours, entry.shared, len(self.index.layers))
         if found != expected or tile.build.tobytes().hex() != self.index.build:
             raise MeshError(str(path), ["belongs to another map than the index"])
-        return tile, tile_graph(tile, tile.costs[self._layer], tile.lethal[self._layer], self.profile)
+        return tile
 
     def _read_portals(self, key: TileKey) -> TilePortals:
         path = tile_file(self.folder, key)
         arrays = read_tile_arrays(path, ("portals", "portal_costs"))
         portals, costs = arrays["portals"], arrays["portal_costs"]
-        count = len(portals)
-        expected = (len(self.index.profiles), count, count)
-        if portals.shape != (count, 3) or costs.shape != expected:
+        expected = (len(self.index.profiles), len(portals), len(portals))
+        if costs.shape != expected:
             raise MeshError(str(path), [f"'portal_costs' has the shape {costs.shape}, expected {expected}"])
         return TilePortals(portals, costs[self._profile_row])

@@ -65,6 +65,22 @@ def test_other_failures_are_not_tried_by_the_second(make_pair, outcome):
     assert not session.careful.requests
 
 
+@pytest.mark.parametrize("outcome", [GetPathOutcome.FAILURE, GetPathOutcome.EMPTY_PATH])
+def test_after_other_failures_the_first_is_called_again(make_pair, outcome):
+    session = make_pair(planner_max_retries=-1)
+    session.planner.play(PlanResult(outcome, "something else"), straight_plan)
+    result = session.navigator.send(GetPathGoal(THERE)).wait()
+    assert (result.success, result.planner) == (True, "planner")
+    assert (len(session.planner.requests), len(session.careful.requests)) == (2, 0)
+
+
+def test_a_first_that_finds_no_path_when_called_again_leaves_it_to_the_second(make_pair):
+    session = make_pair(planner_max_retries=-1)
+    session.planner.play(PlanResult(GetPathOutcome.FAILURE, "something else"), NO_PATH)
+    assert session.navigator.send(GetPathGoal(THERE)).wait().planner == "careful"
+    assert (len(session.planner.requests), len(session.careful.requests)) == (2, 1)
+
+
 def test_the_retries_are_those_of_the_second(make_pair):
     session = make_pair(planner_max_retries=-1)
     session.planner.play(NO_PATH)

@@ -13,6 +13,8 @@ from mbf_mesh_nav.layers.tilt import TiltLayer, TiltParameters
 from mbf_mesh_nav.map.layer import LayerContext
 from mbf_mesh_nav.map.layer_graph import LayerGraph
 from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.borders import on_surface
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
 from mbf_mesh_nav.mesh.surface_point import point_of_face
 from mbf_mesh_nav.planners.heading_astar import HeadingAStarPlanner
 from mbf_mesh_nav.search.drive_graph import DriveGraph
@@ -107,6 +109,22 @@ def test_a_line_ends_at_a_border():
     start = mesh_map.locate_one((0.31, 1.22, 0.0))
     beyond = mesh_map.vertices[np.argmin(np.linalg.norm(mesh_map.vertices - [2.1, 1.2, 0.0], axis=1))]
     assert line_over_ground(mesh_map.topology, start.face, start.point, beyond) is None
+
+
+@pytest.mark.parametrize("angle", np.linspace(0.1, 6.1, 7))
+def test_from_a_border_that_is_no_axis_every_corner_of_the_face_is_reached(angle):
+    """Rounding puts the start on either side of the border it is projected to."""
+    grid, faces = heightfield_mesh(np.zeros((4, 4)), 0.5, 0.5)
+    along, inward = (
+        np.array([math.cos(angle), math.sin(angle), 0.0]),
+        np.array([-math.sin(angle), math.cos(angle), 0.0]),
+    )
+    mesh_map = MeshMap.from_arrays(grid[:, :1] * along + grid[:, 1:2] * inward, faces)
+    for part in np.random.default_rng(0).uniform(0.0, 1.5, 20):
+        start = on_surface(mesh_map.topology, mesh_map.locator, part * along - 0.03 * inward, 0.4)
+        for corner in mesh_map.vertices[mesh_map.faces[start.face]]:
+            line = line_over_ground(mesh_map.topology, start.face, start.point, corner)
+            assert line is not None and (line.points[-1] == corner).all()
 
 
 def test_a_path_across_the_faces_is_as_short_as_the_line(make_plugin):

@@ -1,8 +1,11 @@
 """Tiles hold what the whole mesh has, and come out the same however they are built."""
 
-import multiprocessing
-import os
+import shutil
 import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +19,7 @@ from mbf_mesh_nav.tiles.build import build_tiles
 from mbf_mesh_nav.tiles.index import INDEX_FILE, CostProfile, read_index
 from mbf_mesh_nav.tiles.sources import HeightSource, MeshSource
 from mbf_mesh_nav.tiles.tile import read_tile, tile_file
+from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
 
 def tiles_of(folder):
@@ -80,21 +84,34 @@ def test_tiles_have_the_same_bytes_from_one_and_two_workers_and_in_any_order(hil
     assert bytes_of(tmp_path / "backwards") == bytes_of(tiled_hills)
 
 
-def _build_and_die(heights, folder, tiles):
-    def kill(done, total):
-        if done == tiles:
-            os.kill(os.getpid(), signal.SIGKILL)
+BUILD_AND_DIE = """
+import os, signal, sys
+from pathlib import Path
 
-    build_tiles(HeightSource(heights, SPACING, SPACING), folder, settings(), on_tile=kill)
+import numpy as np
+
+heights, folder, last, tests = sys.argv[1:]
+sys.path.insert(0, tests)
+from tiled_terrains import SPACING, settings
+
+from mbf_mesh_nav.tiles.build import build_tiles
+from mbf_mesh_nav.tiles.sources import HeightSource
+
+def kill(done, total):
+    if done == int(last):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+build_tiles(HeightSource(np.load(heights), SPACING, SPACING), Path(folder), settings(), on_tile=kill)
+"""
 
 
 def test_a_build_that_is_killed_twice_goes_on_and_gives_the_same_bytes(hills, tiled_hills, tmp_path):
     folder = tmp_path / "map"
-    for tiles in (2, 5):
-        process = multiprocessing.get_context("fork").Process(target=_build_and_die, args=(hills, folder, tiles))
-        process.start()
-        process.join()
-        assert process.exitcode == -signal.SIGKILL
+    np.save(tmp_path / "heights.npy", hills)
+    for tiles in ("2", "5"):
+        arguments = tmp_path / "heights.npy", folder, tiles, Path(__file__).parent
+        process = subprocess.run([sys.executable, "-c", BUILD_AND_DIE, *map(str, arguments)], timeout=100, check=False)
+        assert process.returncode == -signal.SIGKILL
         with pytest.raises(MeshError, match=r"index.json: is missing; \d+ tiles are there.*goes on when it is started"):
             read_index(folder)
     there = {file.name: file.stat().st_mtime_ns for file in folder.glob("tile_*.npz")}
@@ -113,6 +130,26 @@ def test_a_damaged_tile_is_built_again_and_sound_ones_are_not(hills, tiled_hills
     damaged.write_bytes(damaged.read_bytes()[:1000])
     build_tiles(source, folder, settings())
     assert bytes_of(folder) == bytes_of(tiled_hills)
+
+
+def test_a_tile_whose_layer_was_changed_is_built_again(hills, tiled_hills, tmp_path):
+    folder = shutil.copytree(tiled_hills, tmp_path / "map")
+    tile = read_tile(tile_file(folder, (1, 1)))
+    lethal = np.ones(tile.core_vertices, dtype=np.bool_)
+    TiledMap(folder).change_layer((1, 1), "safe", np.full(len(lethal), np.inf, dtype=np.float32), lethal)
+    assert bytes_of(folder) != bytes_of(tiled_hills)
+    build_tiles(HeightSource(hills, SPACING, SPACING), folder, settings())
+    assert bytes_of(folder) == bytes_of(tiled_hills)
+
+
+def test_how_the_mesh_is_read_and_kept_makes_no_other_map():
+    source, plain = HeightSource(terrain(17, seed=0), SPACING, SPACING), settings()
+    changes = {"mesh_file": "elsewhere/map.ply", "cache_dir": "cache", "max_faces": 10, "repair": ("unused_vertices",)}
+    elsewhere = replace(plain, mesh_map=PARAMETERS.model_copy(update=changes))
+    assert elsewhere.digest(source) == plain.digest(source)
+    for name, value in {"edge_cost_factor": 2.0, "default_layer": "effort", "inscribed_radius": 0.1}.items():
+        other = replace(plain, mesh_map=PARAMETERS.model_copy(update={name: value}))
+        assert other.digest(source) != plain.digest(source), name
 
 
 def test_a_folder_of_another_map_is_refused(hills, tiled_hills):

@@ -57,12 +57,62 @@ def replace_by(name, of_old):
         (put("portal_of", 0, 999), r"'portal_of' holds 0 to 999, expected 0 to \d+"),
         (put("offsets", 3, 10**6), "'offsets' does not ascend"),
         (put("vertices", (0, 1), np.nan), "'vertices' holds values that are not finite"),
+        (put("normals", (0, 1), np.inf), "'normals' holds values that are not finite"),
+        (put("costs", (2, 5), np.nan), "'costs' holds values that are negative or not a number"),
+        (put("portal_costs", (0, 1, 0), -1.0), "'portal_costs' holds values that are negative or not a number"),
+        (put("shared", 1, 0), "'shared' does not ascend"),
+        (put("portals", 0, 10**6), "'portals' does not ascend"),
+        (put("numbers", 0, -1), "'numbers' holds -1 to"),
+        (replace_by("shared", lambda old: old[:, None]), r"'shared' has the shape \(\d+, 1\), expected \(s,\)"),
+        (replace_by("shared", lambda old: old[1:]), r"'portal_of' has the shape \(\d+,\), expected \(\d+,\)"),
+        (replace_by("vertices", lambda old: old[0, 0]), r"'vertices' has the shape \(\), expected \(n, 3\)"),
+        (replace_by("normals", lambda old: old[0, 0]), r"'normals' has the shape \(\), expected \(c, 3\)"),
+        (replace_by("portals", lambda old: old[0, 0]), r"'portals' has the shape \(\), expected \(p, 3\)"),
     ],
 )
 def test_a_damaged_array_of_a_tile_is_refused_by_name(folder, change, reason):
     file = change_tile(folder, change)
     with pytest.raises(MeshError, match=f"tile_1_1.npz: {reason}"):
         read_tile(file)
+
+
+def test_a_core_of_more_vertices_than_there_are_is_refused(folder):
+    """Every shape fits by itself; a kernel would read past the end."""
+
+    def change(arrays):
+        for name in ("vertices", "numbers"):
+            arrays[name] = arrays[name][: len(arrays["normals"]) - 3]
+        arrays["faces"] = arrays["faces"][: arrays["core_faces"][0]] % len(arrays["vertices"])
+
+    file = change_tile(folder, change)
+    with pytest.raises(
+        MeshError, match=r"tile_1_1.npz: 'normals' has \d+ rows, expected at most the \d+ of 'vertices'"
+    ):
+        read_tile(file)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (replace_by("portals", lambda old: old[0, 0]), r"'portals' has the shape \(\), expected \(p, 3\)"),
+        (put("portal_costs", (0, 0, 1), np.nan), "'portal_costs' holds values that are negative or not a number"),
+    ],
+)
+def test_damaged_portals_are_noticed_when_the_map_is_opened(folder, change, reason):
+    change_tile(folder, change)
+    with pytest.raises(MeshError, match=f"tile_1_1.npz: {reason}"):
+        TiledMap(folder)
+
+
+def test_a_layer_is_changed_on_tiles_of_the_map_only_and_to_sound_values(folder):
+    tiled = TiledMap(folder)
+    tile = read_tile(tile_file(folder, KEY))
+    lethal = tile.lethal[0]
+    with pytest.raises(ValueError, match="costs of at least 0, got some that are negative or not a number"):
+        tiled.change_layer(KEY, "safe", np.full_like(tile.costs[0], np.nan), lethal)
+    change_tile(folder, lambda arrays: arrays.update(costs=arrays["costs"][:1], lethal=arrays["lethal"][:1]))
+    with pytest.raises(MeshError, match=r"tile_1_1.npz: belongs to another map than the index"):
+        tiled.change_layer(KEY, "safe", tile.costs[0], lethal)
 
 
 def test_a_tile_that_was_truncated_is_refused(folder):
@@ -114,6 +164,10 @@ def edit(folder, **changes):
     file.write_text(json.dumps(content))
 
 
+def entry(box=(0, 0, 0, 1, 1, 1)):
+    return {"key": [0, 0], "core_vertices": 9, "neighbours": 32, "shared": 0, "box": list(box)}
+
+
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
@@ -124,6 +178,10 @@ def edit(folder, **changes):
         ({"default_layer": "sfae"}, "'default_layer': expected one of border, .*, safe, got 'sfae'"),
         ({"profiles": {"a": {"layer": "x"}}}, "'profiles.a.layer': expected one of border, .* got 'x'"),
         ({"tiles": [{"key": [0, 0]}]}, "'tiles.0.core_vertices': Field required"),
+        ({"tiles": [entry(box=[0, 0, 0, 1, 1, np.nan])]}, "'tiles.0.box.5': Input should be a finite number"),
+        ({"tiles": [entry(box=[0, 2, 0, 1, 1, 1])]}, "'tiles.0.box': .*expected least x, y, z and greatest x, y, z"),
+        ({"tiles": [entry(), entry()]}, r"'tiles': .*expected each tile once, \(0, 0\) is there 2 times"),
+        ({"tile_size": np.inf}, "'tile_size': Input should be a finite number"),
         ({"build": "0"}, "'build': String should match pattern"),
     ],
 )

@@ -12,10 +12,12 @@ from tiled_terrains import PARAMETERS, SPACING, WholeMap, settings, terrain
 
 from mbf_abstract.outcomes import GetPathOutcome
 from mbf_mesh_nav.map.map_builder import MeshLayerEntry, MeshMapParameters
-from mbf_mesh_nav.tiles import planning
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+from mbf_mesh_nav.tiles import planning, pool
 from mbf_mesh_nav.tiles.build import TileSettings, build_tiles
 from mbf_mesh_nav.tiles.index import CostProfile
 from mbf_mesh_nav.tiles.planning import plan_on_tiles
+from mbf_mesh_nav.tiles.pool import TilePool
 from mbf_mesh_nav.tiles.sources import HeightSource, MeshSource
 from mbf_mesh_nav.tiles.tile import read_tile, tile_file
 from mbf_mesh_nav.tiles.tiled_map import KEPT_TILES, TiledMap
@@ -26,8 +28,8 @@ ROUNDING = 1e-5
 
 def open_with_slots(folder, slots):
     """A map whose memory holds so many tiles besides those of start and goal."""
-    size = TiledMap(folder).pool.slot_bytes
-    return TiledMap(folder, memory=(slots + KEPT_TILES + 0.5) * size)
+    tiled = TiledMap(folder)
+    return TiledMap(folder, memory=tiled.table_bytes + (slots + KEPT_TILES + 0.5) * tiled.pool.slot_bytes)
 
 
 def assert_near_exact(plan, exact):
@@ -124,6 +126,27 @@ def test_where_bounds_prove_nothing_a_wider_corridor_is_compared_and_costs_are_w
     assert compared > 2
 
 
+def test_only_a_corridor_with_other_portals_is_compared(tiled_hills, whole_hills, monkeypatch):
+    corridors, exact = [], planning._Search._exact
+    monkeypatch.setattr(planning, "FIRST_MARGIN", 1e-6)
+    monkeypatch.setattr(planning, "LEAST_WIDENING", 0.0)
+    monkeypatch.setattr(planning._Search, "_exact", lambda *args: corridors.append(args[1]) or exact(*args))
+    tiled, compared = open_with_slots(tiled_hills, 8), 0
+    for start, goal in whole_hills.free_places(20, 4).reshape(-1, 2, 3):
+        corridors.clear()
+        if np.isfinite(plan_on_tiles(tiled, start, goal).gain):
+            assert not np.array_equal(corridors[-1].is_open, corridors[-2].is_open)
+            compared += 1
+    assert compared > 2
+
+
+def test_a_map_without_memory_for_a_wider_corridor_compares_nothing(tiled_hills, whole_hills):
+    tiled = open_with_slots(tiled_hills, 3)
+    for start, goal in whole_hills.free_places(20, 4).reshape(-1, 2, 3):
+        plan = plan_on_tiles(tiled, start, goal, tolerance=0.0)
+        assert ("narrower" in plan.message) == (plan.gain <= planning.STEADY and plan.gap > 0.0), plan.message
+
+
 def test_bounds_of_portals_are_those_of_networkx(tiled_hills):
     portals = TiledMap(tiled_hills).portals
     key = (2, 1)
@@ -189,21 +212,54 @@ def test_each_profile_has_plans_of_its_own(hills, whole_hills, tmp_path):
         assert_near_exact(plan_on_tiles(fast, start, goal), whole_fast.cost(start, goal))
 
 
-def test_storeys_are_kept_apart_at_the_borders_of_tiles(tmp_path):
+def build_storeys(folder, portal_length):
+    """Tiles of 10 m of two storeys of 40 by 4 m, 3 m above each other."""
     xs = np.arange(41.0)
     grid = np.array([[x, y, z] for z in (0.0, 3.0) for y in np.arange(5.0) for x in xs])
     corner = np.array([floor * 205 + row * 41 + column for floor in (0, 1) for row in range(4) for column in range(40)])
     faces = np.stack([np.column_stack([corner, corner + 1, corner + 41])] * 2, axis=1)
     faces[:, 1] = np.column_stack([corner + 1, corner + 42, corner + 41])
     parameters = MeshMapParameters(layers=(MeshLayerEntry(name="slope", type="steepness"),))
-    wanted = TileSettings(mesh_map=parameters, tile_size=10.0, portal_length=2.0)
-    build_tiles(MeshSource(grid, faces.reshape(-1, 3).astype(np.int32)), tmp_path / "map", wanted)
-    tiled = TiledMap(tmp_path / "map")
+    wanted = TileSettings(mesh_map=parameters, tile_size=10.0, portal_length=portal_length)
+    build_tiles(MeshSource(grid, faces.reshape(-1, 3).astype(np.int32)), folder, wanted)
+    return TiledMap(folder)
+
+
+def test_storeys_are_kept_apart_at_the_borders_of_tiles(tmp_path):
+    tiled = build_storeys(tmp_path / "map", portal_length=2.0)
     above = plan_on_tiles(tiled, (1.2, 2.0, 3.0), (38.7, 2.0, 3.0))
     assert above.outcome == GetPathOutcome.SUCCESS and (above.positions[:, 2] == 3.0).all()
     assert above.cost == pytest.approx(37.5, rel=0.02)
     between = plan_on_tiles(tiled, (1.2, 2.0, 0.0), (38.7, 2.0, 3.0))
     assert between.outcome == GetPathOutcome.NO_PATH_FOUND and between.message.startswith("no free path from (1.20")
+
+
+def test_a_start_and_a_goal_in_one_portal_of_two_storeys_have_no_path(tmp_path, monkeypatch):
+    corridors, exact = [], planning._Search._exact
+    monkeypatch.setattr(planning._Search, "_exact", lambda *args: corridors.append(args[1]) or exact(*args))
+    tiled = build_storeys(tmp_path / "map", portal_length=10.0)
+    plan = plan_on_tiles(tiled, (10.0, 2.0, 0.0), (10.0, 2.0, 3.0))
+    assert plan.outcome == GetPathOutcome.NO_PATH_FOUND and len(plan.tiles) == 4
+    assert len(corridors) < 5, "the least estimate is next to 0, so a share of it would widen nothing"
+    above = plan_on_tiles(tiled, (1.2, 2.0, 3.0), (38.7, 2.0, 3.0))
+    assert (above.positions[:, 2] == 3.0).all() and above.cost == pytest.approx(37.5, rel=0.02)
+
+
+def test_the_tables_of_portals_are_part_of_the_memory(tiled_hills):
+    tiled = TiledMap(tiled_hills)
+    pairs = sum(len(tiled.portals.portals_of(key)) ** 2 for key in tiled.index.entries)
+    assert tiled.table_bytes == 24 * pairs
+    least = tiled.table_bytes + (KEPT_TILES + 2.1) * tiled.pool.slot_bytes
+    assert TiledMap(tiled_hills, memory=least).pool.slots == 2
+    with pytest.raises(MeshError, match=r"its tiles need .* MB of memory"):
+        TiledMap(tiled_hills, memory=least - tiled.table_bytes)
+
+
+def test_no_more_tiles_are_held_than_int32_can_number(tiled_hills, monkeypatch):
+    entries = list(TiledMap(tiled_hills).index.entries.values())
+    edges = max(entry.neighbours + entry.shared for entry in entries)
+    monkeypatch.setattr(pool, "MOST_PLACES", 3 * edges + 1)
+    assert TilePool(entries, 1e9).slots == 3
 
 
 def test_starts_and_goals_on_borders_and_corners_of_tiles_are_found(tiled_hills, whole_hills):
@@ -217,6 +273,8 @@ def test_starts_and_goals_on_borders_and_corners_of_tiles_are_found(tiled_hills,
 @pytest.mark.parametrize(
     ("start", "goal", "outcome", "text"),
     [
+        ((np.nan, 3.0, 0.0), None, GetPathOutcome.OUT_OF_MAP, "the start .* is not within 0.4 m of the surface"),
+        (None, (20.0, np.inf, 9.0), GetPathOutcome.OUT_OF_MAP, "the goal .* is not within 0.4 m of the surface"),
         ((-5.0, 3.0, 0.0), None, GetPathOutcome.OUT_OF_MAP, "the start .* is not within 0.4 m of the surface"),
         (None, (20.0, 20.0, 90.0), GetPathOutcome.OUT_OF_MAP, "the goal .* is not within 0.4 m of the surface"),
         ((0.0, 20.0), None, GetPathOutcome.BLOCKED_START, r"the start .* is blocked: cost inf \(lethal\)"),
