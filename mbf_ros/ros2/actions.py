@@ -2,15 +2,16 @@
 
 Goals wait as coroutines of the executor, not on threads. What navigation refuses, or what means nothing, is accepted
 and ends aborted with outcome and text, as a rejected goal of ROS 2 has no result; see decision 0023. Rejected are goals
-beyond ``MAX_GOALS`` and those that come while the node ends. A goal that a newer one has taken over ends aborted with
-the outcome CANCELED: ROS 2 knows a canceled goal only where its client has asked for that.
+beyond ``MAX_GOALS`` and those that come before the node is ready or while it ends. A goal that a newer one has taken
+over ends aborted with the outcome CANCELED: ROS 2 knows a canceled goal only where its client has asked for that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
+from mbf_abstract.event_values import error_text
 from mbf_abstract.goals.goal_types import ActionResult
 from mbf_abstract.goals.handle import AnyGoalHandle, GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
@@ -19,13 +20,14 @@ from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
 
-ACTIONS: dict[str, tuple[ActionMapping[Any, Any], int]] = {
-    "get_path": (mbf_actions.GET_PATH, GetPathOutcome.TF_ERROR),
-    "exe_path": (mbf_actions.EXE_PATH, ExePathOutcome.TF_ERROR),
-    "recovery": (mbf_actions.RECOVERY, RecoveryOutcome.TF_ERROR),
-    "move_base": (mbf_actions.MOVE_BASE, MoveBaseOutcome.TF_ERROR),
+Outcomes: TypeAlias = type[GetPathOutcome] | type[ExePathOutcome] | type[RecoveryOutcome] | type[MoveBaseOutcome]
+ACTIONS: dict[str, tuple[ActionMapping[Any, Any], Outcomes]] = {
+    "get_path": (mbf_actions.GET_PATH, GetPathOutcome),
+    "exe_path": (mbf_actions.EXE_PATH, ExePathOutcome),
+    "recovery": (mbf_actions.RECOVERY, RecoveryOutcome),
+    "move_base": (mbf_actions.MOVE_BASE, MoveBaseOutcome),
 }
-"""Mapping, and outcome at a jump of time, by the private names of the actions."""
+"""Mapping and outcomes by the private names of the actions."""
 MAX_GOALS = 50
 """How many goals of one action may be unfinished at a time."""
 
@@ -42,20 +44,35 @@ class ServedAction:
         Sends a goal of ours.
     context : callable
         How stamps and frames relate to ours, now.
+    refusal : callable
+        Why no goals are taken; empty if they are.
+    on_fault : callable
+        Takes an exception that no goal may raise.
+
+    Attributes
+    ----------
+    unfinished : int
+        How many goals have not got their result.
     """
 
     def __init__(
-        self, node: Any, name: str, send: Callable[[Any], AnyGoalHandle], context: Callable[[], MessageContext]
+        self,
+        node: Any,
+        name: str,
+        send: Callable[[Any], AnyGoalHandle],
+        context: Callable[[], MessageContext],
+        refusal: Callable[[], str],
+        on_fault: Callable[[Exception], None],
     ) -> None:
         from rclpy.action import ActionServer
 
         self._node, self._send, self._context = node, send, context
-        self._mapping, self._outcome_of_jump = ACTIONS[name]
+        self._refusal, self._on_fault = refusal, on_fault
+        self._mapping, self._outcomes = ACTIONS[name]
         self._class = interface_class(self._mapping.type)
         self._goals: dict[bytes, AnyGoalHandle] = {}
         self._jumps: dict[bytes, str] = {}
-        self._accepted = 0
-        self.closing = False
+        self.unfinished = 0
         ActionServer(
             node,
             self._class,
@@ -64,11 +81,6 @@ class ServedAction:
             goal_callback=self._accept,
             cancel_callback=self._cancel,
         )
-
-    @property
-    def unfinished(self) -> int:
-        """How many goals have not got their result."""
-        return self._accepted
 
     def abort_all(self, message: str) -> None:
         """End all goals with the outcome TF_ERROR."""
@@ -80,11 +92,11 @@ class ServedAction:
     def _accept(self, request: Any) -> Any:
         from rclpy.action import GoalResponse
 
-        if self.closing or self._accepted >= MAX_GOALS:
-            reason = "the node ends" if self.closing else f"{MAX_GOALS} goals are unfinished already"
+        many = f"{MAX_GOALS} goals are unfinished already" if self.unfinished >= MAX_GOALS else ""
+        if reason := self._refusal() or many:
             self._node.get_logger().warning(f"{self._mapping.type}: goal rejected: {reason}")
             return GoalResponse.REJECT
-        self._accepted += 1
+        self.unfinished += 1
         return GoalResponse.ACCEPT
 
     def _cancel(self, goal_handle: Any) -> Any:
@@ -97,18 +109,33 @@ class ServedAction:
 
     async def _execute(self, goal_handle: Any) -> Any:
         """Run one goal; returns the message of its result."""
-        try:
-            result, status = await self._run(goal_handle)
-        except RefusedGoal as error:
-            result, status = self._mapping.refused(error.outcome, str(error)), GoalStatus.REJECTED
-        finally:
-            self._accepted -= 1
+        message, status = await self._ended(goal_handle)
         if status is GoalStatus.SUCCEEDED:
             goal_handle.succeed()
         elif status is GoalStatus.CANCELED and goal_handle.is_cancel_requested:
             goal_handle.canceled()
         else:
             goal_handle.abort()
+        executor = self._node.executor  # sends the result in a task that comes after the next one
+        executor.create_task(executor.create_task, self._count_down)
+        return message
+
+    def _count_down(self) -> None:
+        self.unfinished -= 1
+
+    async def _ended(self, goal_handle: Any) -> tuple[Any, GoalStatus]:
+        """Run one goal; returns message and status. Of an exception rclpy would make the outcome 0, a success."""
+        try:
+            result, status = await self._run(goal_handle)
+            return self._message(result), status
+        except RefusedGoal as error:
+            return self._message(self._mapping.refused(error.outcome, str(error))), GoalStatus.REJECTED
+        except Exception as error:  # a fault of ours
+            self._on_fault(error)
+            text = f"{type(error).__name__}: {error_text(error)}"
+            return self._message(self._mapping.refused(self._outcomes.INTERNAL_ERROR, text)), GoalStatus.ABORTED
+
+    def _message(self, result: ActionResult) -> Any:
         return fill(self._class.Result(), self._mapping.result(result, self._context()))
 
     async def _run(self, goal_handle: Any) -> tuple[ActionResult, GoalStatus]:
@@ -119,19 +146,22 @@ class ServedAction:
         if goal_handle.is_cancel_requested:  # before this coroutine had its first turn
             handle.cancel("canceled by the client")
         self._goals[key] = handle
-        executor = self._node.executor
-        ended = Future(executor=executor)
-        if self._mapping.feedback is not None:
-            handle.add_feedback_callback(lambda feedback: self._publish_feedback(goal_handle, feedback))
-        handle.add_done_callback(lambda done: executor.create_task(ended.set_result, done))
         try:
+            executor = self._node.executor
+            ended = Future(executor=executor)
+            if self._mapping.feedback is not None:
+                handle.add_feedback_callback(lambda feedback: self._publish_feedback(goal_handle, feedback))
+            handle.add_done_callback(lambda done: executor.create_task(ended.set_result, done))
             await ended
+        except Exception:
+            handle.cancel("the node failed")
+            raise
         finally:
             del self._goals[key]
         assert handle.result is not None
         jump = self._jumps.pop(key, "")
         if jump and handle.status is GoalStatus.CANCELED:
-            return self._mapping.refused(self._outcome_of_jump, jump), GoalStatus.ABORTED
+            return self._mapping.refused(self._outcomes.TF_ERROR, jump), GoalStatus.ABORTED
         return handle.result, handle.status
 
     def _publish_feedback(self, goal_handle: Any, feedback: Any) -> None:

@@ -34,8 +34,6 @@ class RosClock(WallClock):
         Called with the size of a jump [s], negative for one back, after ``epoch`` has changed.
     """
 
-    simulated = False
-
     def __init__(self, ros_time: float) -> None:
         super().__init__()
         self.epoch = ros_time - self.now()
@@ -55,8 +53,6 @@ class RosClock(WallClock):
 
 class SimulatedRosClock(RosClock):
     """Time that passes as ``follow`` is called with it. Waits end when simulated time has come so far."""
-
-    simulated = True
 
     def __init__(self, ros_time: float) -> None:
         self._elapsed, self._ros_time = 0.0, ros_time

@@ -45,7 +45,8 @@ def ros2(
 ) -> None:
     """Serve a navigator as the ROS 2 node move_base_flex, until Ctrl-C."""
     with readable_errors():
-        from mbf_ros.ros2.node import NodeOptions, navigation_node
+        from mbf_ros.ros2.node import navigation_node
+        from mbf_ros.ros2.options import NodeOptions
         from mbf_ros.sensor_options import sensors_of
 
         options = NodeOptions(stamped, max_silence or None, sensors_of(sensor), tuple(ros_arguments or ()))
@@ -72,14 +73,16 @@ def ros2_interfaces(
 
 def _wait_for_end(node: NavigationNode) -> None:
     """Wait for Ctrl-C or a fault; SIGTERM ends the program by an exception, see ``server.process_end``."""
+    from mbf_ros.ros2.node import COMPILING
+
     pressed = threading.Event()
     before = signal.signal(signal.SIGINT, lambda number, stack: pressed.set())
     known: str | None = None
     try:
         while not pressed.is_set() and not node.wait(0.1):
             problem = node.problem()
-            if problem and not known:
-                typer.echo(f"waiting for the robot: {problem}")
+            if problem and (not known or problem == COMPILING != known):
+                typer.echo(f"waiting: {problem}")
             if known != "" and not problem:
                 typer.echo("move_base_flex is ready")
             known = problem

@@ -7,15 +7,16 @@ threads of their own. Where a callback raises, or that thread ends for another r
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventKind
+from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
@@ -27,6 +28,7 @@ from mbf_ros.messages.geometry import NANOSECONDS, MessageContext
 from mbf_ros.ros2.actions import ACTIONS, ServedAction
 from mbf_ros.ros2.clock import RosClock, SimulatedRosClock
 from mbf_ros.ros2.conversion import interface_class
+from mbf_ros.ros2.options import NodeOptions
 from mbf_ros.ros2.parameters import NodeParameters
 from mbf_ros.ros2.robot import Arrivals, Frames, RosRobot
 from mbf_ros.ros2.services import ServedQueries
@@ -34,35 +36,13 @@ from mbf_ros.ros2.topics import ODOM, CommandTopic, Inputs, Outputs
 
 NODE = "move_base_flex"
 CLOCK = "/clock"
+COMPILING = "compiling kernels"
 WATCH_PERIOD = 0.05  # s of real time between two looks at what fails to come
 CALENDAR_PERIOD = 0.1  # s between two looks at the calendar
-TIME_TO_END = 2.0  # s for goals to end, and their results to be sent
 
 
 class RosError(ValueError):
     """ROS 2 is not installed, or cannot be used; the text says why."""
-
-
-@dataclass(frozen=True)
-class NodeOptions:
-    """How the node is connected.
-
-    Attributes
-    ----------
-    stamped_commands : bool
-        Publish ``cmd_vel`` as TwistStamped instead of Twist.
-    max_silence : float, optional
-        Longest time [s] without odometry, transforms, a sensor or simulated time; that of ``command_timeout`` if None.
-    sensors : mapping of str to (str, str)
-        Type, one of ``messages.sensors.SENSORS``, and source in the configuration, by topic.
-    ros_arguments : sequence of str
-        As after ``--ros-args``: remappings, parameters, log level.
-    """
-
-    stamped_commands: bool = False
-    max_silence: float | None = None
-    sensors: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    ros_arguments: tuple[str, ...] = ()
 
 
 @contextmanager
@@ -112,7 +92,7 @@ class NavigationNode:
 
         self._options = options
         self.failure = ""
-        self._ending, self._ended = threading.Event(), threading.Event()
+        self._ending, self._failed, self._ready = threading.Event(), threading.Event(), threading.Event()
         self._closing = ExitStack()
         self._real_time = WallClock()
         self._arrivals = Arrivals(self._real_time.now)
@@ -120,16 +100,17 @@ class NavigationNode:
         self._closing.callback(self._node.destroy_node)
         self._executor: Any = SingleThreadedExecutor()
         self._executor.add_node(self._node)
+        self._spinning = True
         self._thread = self._real_time.spawn(self._spin, "ros executor")
         self._closing.callback(self._end_executor)
 
     def wait(self, seconds: float) -> bool:
-        """Wait for the end of the node, at most so long; returns whether it has come."""
-        return self._ended.wait(seconds)
+        """Wait until the node fails, at most so long; returns whether it has."""
+        return self._failed.wait(seconds)
 
     def problem(self) -> str:
-        """What does not come from the robot; empty if all does."""
-        return self._robot.problem()
+        """What does not come from the robot, or is not ready here; empty if a goal can be driven."""
+        return self._robot.problem() or ("" if self._ready.is_set() else COMPILING)
 
     def serve(self, server_class: Any, config: Config) -> None:
         """Make the navigator and everything that is seen of it; waits for ``/clock`` with ``use_sim_time``."""
@@ -144,16 +125,19 @@ class NavigationNode:
         robot = RosRobot(commands.publish, transforms, clock, self._arrivals, self._frames, self._max_silence)
         self._robot, self._transforms = robot, transforms
         server = session.serve(server_class, config, robot, transforms)
-        self._closing.callback(commands.wait_until_sent)
+        self._closing.callback(commands.wait_until_sent, self._options.time_to_send)
         self._closing.callback(server.runtime.gate.close, "the node ends")
         NodeParameters(self._node, server)
         self._open_topics(config)
-        self._actions = [ServedAction(self._node, name, self._send, self._context) for name in ACTIONS]
+        self._actions = [
+            ServedAction(self._node, name, self._send, self._context, self._refusal, self._fail) for name in ACTIONS
+        ]
         self._closing.callback(self._stop_serving)
         ServedQueries(self._node, server, self._context)
         clock.on_jump.append(self._on_jump)
         watch = Ticker(self._real_time, session.events, self._stop_where_silent, WATCH_PERIOD, "silence watch")
         self._closing.callback(watch.stop)
+        self._real_time.spawn(self._get_ready, "warm up")
 
     def close(self) -> None:
         """Stop the robot, end the goals and leave the graph; once."""
@@ -193,6 +177,8 @@ class NavigationNode:
 
         self._node.create_subscription(interface_class("rosgraph_msgs/Clock"), CLOCK, take, qos_profile_sensor_data)
         while not came.wait(1.0):
+            if self.failure:
+                raise RosError(self.failure)
             self._node.get_logger().info(f"use_sim_time: waiting for {CLOCK}", throttle_duration_sec=5.0)
         return clocks[0]
 
@@ -203,7 +189,27 @@ class NavigationNode:
         inputs = Inputs(self._node, self._clock, self._context, self._arrivals)
         inputs.listen_to_robot(self._robot, self._transforms, config.parameters.use_odometry)
         inputs.listen_to_sensors(navigator, self._options.sensors)
-        inputs.listen_to_goals(self._send)
+        inputs.listen_to_goals(self._send, self._refusal)
+
+    def _get_ready(self) -> None:
+        """Compile all kernels once the robot is heard, then take goals: no goal waits for a compiler."""
+        while self._robot.problem():
+            if self._ending.wait(WATCH_PERIOD):
+                return
+        server = self._session.navigator.server
+        try:
+            start = server.runtime.robot.pose()
+            ahead = Pose.planar(1.0, 0.0, frame_id=self._frames.robot_frame)
+            server.warm_up(start, Transform.from_pose(start, self._frames.robot_frame).apply_to_pose(ahead))
+        except Exception as error:  # of a plugin, or of a robot that fell silent: a goal will say more
+            self._node.get_logger().warning(f"warming up: {type(error).__name__}: {error_text(error)}")
+        self._ready.set()
+
+    def _refusal(self) -> str:
+        """Why no goals are taken; empty if they are."""
+        if self._ending.is_set():
+            return "the node ends"
+        return "" if self._ready.is_set() else "the node is not ready"
 
     def _send(self, goal: Any) -> AnyGoalHandle:
         if isinstance(goal, MoveBaseGoal):
@@ -232,29 +238,32 @@ class NavigationNode:
     def _spin(self) -> None:
         """Take what comes, on a thread of its own, until the node ends."""
         try:
-            while not self._ending.is_set():
+            while self._spinning:
                 self._executor.spin_once(timeout_sec=1.0)
-        except BaseException as error:  # a fault of ours: nothing comes in any more
-            self.failure = f"{type(error).__name__}: {error_text(error)}"
-            if hasattr(self, "_session") and hasattr(self._session, "navigator"):
-                self._session.events.emit(EventKind.FAULT, NODE, type=type(error).__name__, message=self.failure)
-                self._session.navigator.server.runtime.gate.close(f"a callback raised {self.failure}")
-        self._ended.set()
+        except BaseException as error:  # nothing comes in any more
+            self._fail(error)
+
+    def _fail(self, error: BaseException) -> None:
+        """Stop the robot for good because of a fault of ours; the node ends."""
+        self.failure = f"{type(error).__name__}: {error_text(error)}"
+        if hasattr(self, "_session") and hasattr(self._session, "navigator"):
+            self._session.events.emit(EventKind.FAULT, NODE, type=type(error).__name__, message=self.failure)
+            self._session.navigator.server.runtime.gate.close(f"a callback raised {self.failure}")
+        self._failed.set()
 
     # ------------------------------------------------------------------------------------------- the end
     def _stop_serving(self) -> None:
         """Take no more goals, end those that run, and let their results be sent."""
-        for action in self._actions:
-            action.closing = True
+        self._ending.set()
         self._session.navigator.server.runtime.gate.close("the node ends")
         self._session.navigator.server.cancel_all("the node ends")
-        deadline = self._real_time.now() + TIME_TO_END
+        deadline = self._real_time.now() + self._options.time_to_end
         while any(action.unfinished for action in self._actions) and self._real_time.now() < deadline:
-            if self.wait(WATCH_PERIOD):
+            if self._thread.join(WATCH_PERIOD):
                 break
 
     def _end_executor(self) -> None:
-        self._ending.set()
+        self._spinning = False
         self._executor.wake()
-        self._thread.join(TIME_TO_END)
-        self._executor.shutdown(timeout_sec=TIME_TO_END)
+        self._thread.join(self._options.time_to_end)
+        self._executor.shutdown(timeout_sec=self._options.time_to_end)

@@ -32,7 +32,6 @@ from mbf_ros.ros2.robot import Arrivals, RosRobot
 ODOM, TF, TF_STATIC, CMD_VEL = "odom", "/tf", "/tf_static", "cmd_vel"
 GOAL_TOPICS = ("goal_pose", "move_base_simple/goal")
 WARN_PERIOD = 5.0  # s between two warnings about messages of one topic
-TIME_TO_SEND = 0.5  # s
 
 
 class CommandTopic:
@@ -52,11 +51,11 @@ class CommandTopic:
         message = twist_stamped(value, self._frame, now, self._context()) if self._stamped else twist(value)
         self._publisher.publish(fill(self._class(), message))
 
-    def wait_until_sent(self) -> None:
-        """Wait until all who listen have the last command, for at most ``TIME_TO_SEND``."""
+    def wait_until_sent(self, seconds: float) -> None:
+        """Wait until all who listen have the last command, for at most ``seconds``."""
         from rclpy.duration import Duration
 
-        self._publisher.wait_for_all_acked(Duration(seconds=TIME_TO_SEND))
+        self._publisher.wait_for_all_acked(Duration(seconds=seconds))
 
 
 class Inputs:
@@ -93,10 +92,12 @@ class Inputs:
             take = self._sensor(navigator, topic, kind, source)
             self._subscribe(topic, kind, take, self._sensor_data)
 
-    def listen_to_goals(self, send: Callable[[MoveBaseGoal], AnyGoalHandle]) -> None:
-        """Drive to the poses of the goal topics; a newer one takes the older over."""
+    def listen_to_goals(self, send: Callable[[MoveBaseGoal], AnyGoalHandle], refusal: Callable[[], str]) -> None:
+        """Drive to the poses of the goal topics, unless there is a refusal; a newer one takes the older over."""
 
         def go_to(message: Message) -> None:
+            if reason := refusal():
+                raise MessageError(reason)
             handle = send(MoveBaseGoal(pose_of(message, self._context(), "goal").stamped(0.0)))
             if handle.done and handle.result is not None:
                 raise MessageError(handle.result.message)

@@ -2,7 +2,6 @@
 
 import fcntl
 import hashlib
-import itertools
 import json
 import os
 import platform
@@ -24,17 +23,21 @@ PYTHONS = ((3, 10), (3, 13))
 """Oldest and newest Python for which there are wheels."""
 MBF = "from mbf_abstract.cli import main; main()"
 PEERS = Path(__file__).parent / "peers"
-WITHIN = 60.0  # s; nothing waits that long unless it fails
+WITHIN = 300.0  # s; nothing waits that long unless it fails
+DOMAINS = range(1, 101)  # domains of DDS whose ports are not those that Linux gives to other programs
 ROBOT = """
 backend: costmap
-controller_patience: 5.0
+controller_patience: 60.0
+planner_patience: 60.0
 max_vel_x: 0.5
-global_costmap: {width: 20.0, height: 20.0, origin_x: -10.0, origin_y: -10.0, layers: LAYERS, area: {zones: []}}
-local_costmap: {width: 20.0, height: 20.0, origin_x: -10.0, origin_y: -10.0, layers: LAYERS, area: {zones: []}}
+global_costmap: {SIZE, layers: LAYERS, area: {zones: []}}
+local_costmap: {SIZE, layers: LAYERS, area: {zones: []}}
 planners: [{name: shortest, type: straight_line}]
 controllers: [{name: follow, type: follow_path}]
 recovery_behaviors: [{name: pause, type: wait}]
-""".replace("LAYERS", "[{name: area, type: keepout}]")
+""".replace("LAYERS", "[{name: area, type: keepout}]").replace(
+    "SIZE", "width: 80.0, height: 80.0, resolution: 0.2, origin_x: -40.0, origin_y: -40.0"
+)
 
 
 def missing():
@@ -69,7 +72,7 @@ def clean_variables(folder, domain=0):
     kept = {name: os.environ[name] for name in ("PATH", "HOME", "NUMBA_CACHE_DIR") if name in os.environ}
     paths = [str(Path(folder) / "interfaces"), *(path for path in sys.path if path)]
     discovery = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    return {**kept, **discovery, "PYTHONPATH": os.pathsep.join(paths), "ROS_LOG_DIR": str(Path(folder) / "log")}
+    return {**kept, **discovery, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def prepared():
@@ -99,15 +102,28 @@ def _build(folder):
         subprocess.run(command, check=True, env=environment, timeout=900)
 
 
-class Peer:
-    """A process that writes JSON, one value a line, and takes orders on its standard input."""
+def free_domain(root, closing):
+    """Return a domain that no other trio on this machine has, and keep it until ``closing`` ends."""
+    for domain in DOMAINS:
+        lock = closing.enter_context(open(root / f"domain-{domain}", "w"))
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            continue
+        return domain
+    raise RuntimeError(f"all domains of DDS, {DOMAINS}, are in use")
 
-    def __init__(self, folder, domain, *command):
+
+class Peer:
+    """A process that writes JSON, one value a line, and takes orders on its standard input; its log is in ``logs``."""
+
+    def __init__(self, folder, domain, logs, *command):
         python = str(folder / "venv" / "bin" / "python")
-        self._log = open(folder / f"log-{os.getpid()}.txt", "a+")
+        self._log = open(logs / f"{Path(command[0]).stem}.txt", "a")
+        self._over = False
         self.process = subprocess.Popen(
             [python, *command],
-            env=clean_variables(folder, domain),
+            env={**clean_variables(folder, domain), "ROS_LOG_DIR": str(logs)},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._log,
@@ -123,6 +139,9 @@ class Peer:
             with self._condition:
                 self.lines.append(json.loads(line) if line.startswith("{") else {"text": line.strip()})
                 self._condition.notify_all()
+        with self._condition:
+            self._over = True
+            self._condition.notify_all()
 
     def order(self, text):
         self.process.stdin.write(f"{text if isinstance(text, str) else json.dumps(text)}\n")
@@ -130,12 +149,20 @@ class Peer:
 
     def wait_for(self, wanted, since=0):
         """Wait for a line of which ``wanted`` holds, among those after the first ``since``, and return it."""
-        found = lambda: next((line for line in self.lines[since:] if wanted(line)), None)  # noqa: E731
+        return self.wait_until(lambda: next((line for line in self.lines[since:] if wanted(line)), None))
+
+    def wait_until(self, wanted):
+        """Wait until something holds of the lines so far, or the process has written its last one; returns it."""
         with self._condition:
-            came = self._condition.wait_for(lambda: found() or self.process.poll() is not None, WITHIN)
-            line = found()
-            assert came and line, f"{self.process.args[1:]} said only {self.lines[since:][-20:]}"
-            return line
+            self._condition.wait_for(lambda: wanted() or self._over, WITHIN)
+            found = wanted()
+            log = Path(self._log.name).read_text()[-3000:]
+            assert found, f"{self.process.args[1:]} said at last {self.lines[-20:]}, and in its log {log}"
+            return found
+
+    def wait_for_end(self):
+        """Wait for the end of the process; returns its code."""
+        return self.process.wait(WITHIN)
 
     def kill(self):
         """As kill -9 does."""
@@ -154,14 +181,22 @@ class Peer:
 class Robot(Peer):
     """The robot of ``peers/robot.py``."""
 
-    def __init__(self, folder, domain, *arguments):
-        super().__init__(folder, domain, str(PEERS / "robot.py"), *arguments)
+    def __init__(self, folder, domain, logs, *arguments):
+        super().__init__(folder, domain, logs, str(PEERS / "robot.py"), *arguments)
+
+    @property
+    def x(self):
+        """Where it was when the last command came [m]."""
+        return next((line["x"] for line in reversed(self.lines) if "x" in line), 0.0)
 
     def set(self, topic, value):
-        """Silence a topic ("off"), let it speak ("on"), or set simulated time; returns when it was done [s]."""
+        """Silence a topic ("off"), let it speak ("on"), or set simulated time."""
         since = len(self.lines)
         self.order(f"{topic} {value}")
-        return self.wait_for(lambda line: line.get("done") == f"{topic} {value}", since)["at"]
+        self.wait_for(lambda line: line.get("done") == f"{topic} {value}", since)
+
+    def wait_until_last_speed_is_zero(self):
+        self.wait_until(lambda: [line["speed"] for line in self.lines if "speed" in line][-1:] == [0.0])
 
     def wait_for_speed(self, wanted, since=0):
         return self.wait_for(lambda line: "speed" in line and wanted(line["speed"]), since)
@@ -170,8 +205,8 @@ class Robot(Peer):
 class Client(Peer):
     """The client of ``peers/client.py``."""
 
-    def __init__(self, folder, domain):
-        super().__init__(folder, domain, str(PEERS / "client.py"))
+    def __init__(self, folder, domain, logs):
+        super().__init__(folder, domain, logs, str(PEERS / "client.py"))
         self._keys = 0
 
     def do(self, **order):
@@ -180,8 +215,19 @@ class Client(Peer):
         self.order({"key": str(self._keys), **order})
         return str(self._keys)
 
+    def meet(self):
+        """Wait until the client sees a node."""
+        self.wait(self.do(order="meet"), "ready")
+
     def send(self, action, **fields):
-        return self.do(order="send", action=action, **fields)
+        """Send a goal and wait until it is accepted; returns its key."""
+        key = self.do(order="send", action=action, **fields)
+        self.wait(key, "accepted")
+        return key
+
+    def put(self, name, value):
+        """Set a parameter; returns what the node answers."""
+        return self.wait(self.do(order="put", name=name, value=value), "set")
 
     def wait(self, key, what):
         return self.wait_for(lambda line: line.get("key") == key and line["what"] == what)
@@ -203,38 +249,61 @@ def ros_folder():
 class Trio:
     """A robot, our node and a client, in a domain of DDS of their own, where they hear no other test."""
 
-    domains = itertools.cycle(range(1 + 5 * (os.getpid() % 20), 6 + 5 * (os.getpid() % 20)))
-
-    def __init__(self, closing, folder, file, *arguments, simulated=False, program=("-c", MBF, "ros2")):
-        self._closing, self._folder, self._domain = closing, folder, next(self.domains)
-        file.write_text(ROBOT)
-        ros = ["--", "-p", "use_sim_time:=true"] if simulated else []
-        self.robot_arguments = ["simulated"] if simulated else []
-        self.robot = self.start(Robot, *self.robot_arguments)
-        self.node = self.start(Peer, *program, str(file), *arguments, *ros)
-        self.client = self.start(Client)
+    def __init__(self, closing, folder, logs, simulated):
+        self._closing, self._folder, self._logs = closing, folder, logs
+        self._domain = free_domain(folder.parent, closing)
+        self._file = logs / "robot.yaml"
+        self._file.write_text(ROBOT)
+        self._robot_arguments = ["simulated"] if simulated else []
+        self._node_arguments = ["--", "-p", "use_sim_time:=true"] if simulated else []
+        self.start_robot()
+        self.start_node()
+        self.start_client()
         self.wait_until_ready()
-        self.client.wait("", "ready")
+
+    def start_robot(self):
+        self.robot = self._start(Robot, *self._robot_arguments)
+
+    def start_node(self):
+        self.node = self._start(Peer, str(PEERS / "node.py"), str(self._file), *self._node_arguments)
+
+    def start_client(self):
+        self.client = self._start(Client)
 
     def wait_until_ready(self, since=0):
         """Wait until the node says that it hears the robot, in a line after the first ``since``."""
         self.node.wait_for(lambda line: "is ready" in line.get("text", ""), since)
+        self.client.meet()
 
-    def start(self, kind, *arguments):
-        peer = kind(self._folder, self._domain, *arguments)
+    def drive(self):
+        """Begin to drive to a place that is a minute away; returns the key of the goal."""
+        start = len(self.robot.lines)
+        goal = self.client.send("move_base", target=[-30.0 if self.robot.x > 0.0 else 30.0, 0.0])
+        self.robot.wait_for_speed(lambda speed: speed > 0.0, start)
+        return goal
+
+    def cancel(self, goal):
+        """Cancel a goal; returns its end."""
+        self.client.order({"order": "cancel", "key": goal})
+        return self.client.wait(goal, "result")
+
+    def _start(self, kind, *arguments):
+        peer = kind(self._folder, self._domain, self._logs, *arguments)
         self._closing.callback(peer.end)
         return peer
 
 
 @pytest.fixture(scope="module")
-def trio(ros_folder, tmp_path_factory):
-    """One trio for all tests of a module."""
+def module_trio(ros_folder, tmp_path_factory, request):
+    """One trio for all tests of a module, on simulated time where the module has ``SIMULATED``."""
     with ExitStack() as closing:
-        yield Trio(closing, ros_folder, tmp_path_factory.mktemp("node") / "robot.yaml")
+        yield Trio(closing, ros_folder, tmp_path_factory.mktemp("trio"), getattr(request.module, "SIMULATED", False))
 
 
 @pytest.fixture
-def start_trio(ros_folder, tmp_path):
-    """Start a trio for one test."""
-    with ExitStack() as closing:
-        yield lambda *arguments, **options: Trio(closing, ros_folder, tmp_path / "robot.yaml", *arguments, **options)
+def trio(module_trio):
+    """The trio of the module, with a node that runs."""
+    if module_trio.node.process.poll() is not None:
+        module_trio.start_node()
+        module_trio.wait_until_ready()
+    return module_trio

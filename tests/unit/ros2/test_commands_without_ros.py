@@ -1,11 +1,10 @@
 """Without ROS the commands say what is missing, in one text."""
 
-import importlib.util
-
-import pytest
-from typer.testing import CliRunner
-
-from mbf_abstract.cli import make_app
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 CONFIG = """
 backend: costmap
@@ -13,21 +12,32 @@ global_costmap: {width: 4.0, height: 4.0, layers: [{name: area, type: keepout}],
 local_costmap: {width: 4.0, height: 4.0, layers: [{name: area, type: keepout}], area: {zones: []}}
 planners: [{name: shortest, type: dijkstra}]
 """
+RUN = """
+import json, sys
+from typer.testing import CliRunner
+from mbf_abstract.cli import make_app
+results = [CliRunner().invoke(make_app(), one) for one in json.loads(sys.argv[1])]
+print(json.dumps([[one.exit_code, one.output] for one in results]))
+"""
 
 
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        (["ros2", "FILE"], "rclpy cannot be imported"),
-        (["ros2", "FILE", "--sensor", "scan"], "--sensor must be TOPIC:TYPE=SOURCE"),
-        (["ros2-interfaces", "--into", "FOLDER"], "the generators of ROS 2 are not installed"),
-    ],
-)
-def test_what_is_missing_is_said_in_one_text(tmp_path, arguments, text):
-    assert importlib.util.find_spec("rclpy") is None  # it would change the library paths of this very Python
+def without_ros():
+    """Environment variables of a process that finds no ROS, even where one is sourced here."""
+    paths = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    kept = [path for path in paths if not any((Path(path) / name).is_dir() for name in ("rclpy", "rosidl_adapter"))]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(kept)}
+
+
+def test_what_is_missing_is_said_in_one_text(tmp_path):
     file = tmp_path / "robot.yaml"
     file.write_text(CONFIG)
-    places = {"FILE": str(file), "FOLDER": str(tmp_path)}
-    result = CliRunner().invoke(make_app(), [places.get(one, one) for one in arguments])
-    assert result.exit_code == 2
-    assert text in result.output and "Traceback" not in result.output
+    expected = {
+        "rclpy cannot be imported": ["ros2", str(file)],
+        "--sensor must be TOPIC:TYPE=SOURCE": ["ros2", str(file), "--sensor", "scan"],
+        "the generators of ROS 2 are not installed": ["ros2-interfaces", "--into", str(tmp_path)],
+    }
+    command = [sys.executable, "-c", RUN, json.dumps(list(expected.values()))]
+    ran = subprocess.run(command, env=without_ros(), capture_output=True, text=True, check=True)
+    for text, (code, output) in zip(expected, json.loads(ran.stdout), strict=True):
+        assert code == 2
+        assert text in output and "Traceback" not in output

@@ -25,6 +25,8 @@ SERVICES = {
     "pause": Trigger,
     "resume": Trigger,
     "cancel_all": Trigger,
+    "get_parameters": GetParameters,
+    "set_parameters": SetParameters,
 }
 STATUSES = {
     GoalStatus.STATUS_SUCCEEDED: "succeeded",
@@ -35,12 +37,21 @@ STATUSES = {
 rclpy.init()
 node = rclpy.create_node("client")
 clients = {name: ActionClient(node, kind, f"/move_base_flex/{name}") for name, kind in ACTIONS.items()}
+services = {name: node.create_client(kind, f"/move_base_flex/{name}") for name, kind in SERVICES.items()}
 handles = {}
 
 
 def say(**fields):
     sys.stdout.write(json.dumps(fields) + "\n")
     sys.stdout.flush()
+
+
+def meet(key):
+    for client in clients.values():
+        client.wait_for_server()
+    for client in services.values():
+        client.wait_for_service()
+    say(key=key, what="ready")
 
 
 def pose(x, y, frame="map", w=1.0):
@@ -68,9 +79,9 @@ def send(key, action, target=None, path=None, **fields):
 
     def accepted(future):
         handles[key] = future.result()
-        say(key=key, what="accepted" if future.result().accepted else "rejected")
         if future.result().accepted:
             future.result().get_result_async().add_done_callback(ended)
+        say(key=key, what="accepted" if future.result().accepted else "rejected")
 
     def ended(future):
         result = future.result().result
@@ -96,33 +107,26 @@ def call(key, service, target=None, path=None, **fields):
         request.pose = pose(*target)
     if path is not None:
         request.path.poses = [pose(*one) for one in path]
-    client = node.create_client(SERVICES[service], f"/move_base_flex/{service}")
-    client.wait_for_service()
 
     def answered(future):
         names = [name for name in future.result().get_fields_and_field_types() if name in ("state", "cost", "success")]
         say(key=key, what="answer", **{name: getattr(future.result(), name) for name in names})
 
-    client.call_async(request).add_done_callback(answered)
+    services[service].call_async(request).add_done_callback(answered)
 
 
 def get(key, names):
-    client = node.create_client(GetParameters, "/move_base_flex/get_parameters")
-    client.wait_for_service()
-
     def plain(value):
         if value.type == ParameterType.PARAMETER_STRING_ARRAY:
             return list(value.string_array_value)
         return value.double_value if value.type == ParameterType.PARAMETER_DOUBLE else value.string_value
 
-    client.call_async(GetParameters.Request(names=names)).add_done_callback(
+    services["get_parameters"].call_async(GetParameters.Request(names=names)).add_done_callback(
         lambda future: say(key=key, what="values", values=[plain(one) for one in future.result().values])
     )
 
 
 def put(key, name, value):
-    client = node.create_client(SetParameters, "/move_base_flex/set_parameters")
-    client.wait_for_service()
     number = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
     request = SetParameters.Request(parameters=[Parameter(name=name, value=number)])
 
@@ -130,14 +134,11 @@ def put(key, name, value):
         result = future.result().results[0]
         say(key=key, what="set", successful=result.successful, reason=result.reason)
 
-    client.call_async(request).add_done_callback(answered)
+    services["set_parameters"].call_async(request).add_done_callback(answered)
 
 
 threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
-for client in clients.values():
-    client.wait_for_server()
-say(key="", what="ready")
-orders = {"send": send, "cancel": cancel, "call": call, "get": get, "put": put}
+orders = {"meet": meet, "send": send, "cancel": cancel, "call": call, "get": get, "put": put}
 for line in sys.stdin:
     order = json.loads(line)
     orders[order.pop("order")](**order)

@@ -1,0 +1,34 @@
+"""How the node is connected to its robot, and how long it may take to end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class NodeOptions:
+    """Options of the node.
+
+    Attributes
+    ----------
+    stamped_commands : bool
+        Publish ``cmd_vel`` as TwistStamped instead of Twist.
+    max_silence : float, optional
+        Longest time [s] without odometry, transforms, a sensor or simulated time; that of ``command_timeout`` if None.
+    sensors : mapping of str to (str, str)
+        Type, one of ``messages.sensors.SENSORS``, and source in the configuration, by topic.
+    ros_arguments : sequence of str
+        As after ``--ros-args``: remappings, parameters, log level.
+    time_to_end : float
+        Longest time [s] for goals to end and their results to be sent when the node ends.
+    time_to_send : float
+        Longest time [s] for the last command to reach all who listen.
+    """
+
+    stamped_commands: bool = False
+    max_silence: float | None = None
+    sensors: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    ros_arguments: tuple[str, ...] = ()
+    time_to_end: float = 2.0
+    time_to_send: float = 0.5
