@@ -10,6 +10,7 @@ import pytest
 import viser
 from typer.testing import CliRunner
 from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosedError
 
 from mbf_abstract.cli import make_app
 from mbf_abstract.events import EventKind
@@ -53,9 +54,15 @@ def test_what_a_client_sends_neither_raises_nor_stops_a_run_that_ends_in_order(m
     with Session(meadow) as session:
         sequence = GoalSequence(session, make_executive("move_base", session.navigator), stay=True)
         with LiveSession(session, sequence, ViewOptions(port=18600, speed=0.0)) as live:
-            controls = list(live._page._server.gui._gui_input_handle_from_uuid)
-            attacker = threading.Thread(target=lambda: asyncio.run(attack(live, controls)))
+            controls, attacked = list(live._page._server.gui._gui_input_handle_from_uuid), threading.Event()
+            attacker = threading.Thread(target=lambda: asyncio.run(attack(live, controls, attacked)))
             attacker.start()
+
+            def end_after_both(time):
+                if attacked.is_set() and sequence.is_waiting:
+                    live.controls.end("done")
+
+            session.loop.on_tick.append(end_after_both)
             result = sequence.visit_goals()
             attacker.join()
         events = session.memory.events
@@ -66,8 +73,8 @@ def test_what_a_client_sends_neither_raises_nor_stops_a_run_that_ends_in_order(m
     assert asked <= {"end"}
 
 
-async def attack(session, controls):
-    """Send every control nonsense, click into nowhere, then end the run from outside."""
+async def attack(session, controls, attacked):
+    """Send every control nonsense and click into nowhere, until the page disconnects or all is sent."""
     try:
         address = session.address.replace("http://", "ws://").rstrip("/")
         origin = "/".join(session.address.split("/")[:3])
@@ -79,8 +86,10 @@ async def attack(session, controls):
                     await socket.send(msgspec.msgpack.encode(update))
             await socket.send(msgspec.msgpack.encode(CLICK))
             await asyncio.wait_for(await socket.ping(), 20.0)
+    except ConnectionClosedError as closed:
+        assert closed.rcvd.reason == "too many messages that are refused here"
     finally:
-        session.controls.post(lambda: session.controls.end("done"))
+        attacked.set()
 
 
 def served(meadow, folder, **view):
