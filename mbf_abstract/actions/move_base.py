@@ -20,7 +20,8 @@ cancel                  cancel the sub-goals, wait for their ends, end CANCELED
 
 A robot that is stuck (failures of one kind at one place, again and again) gets the behaviours of
 ``escalation_behaviors`` instead of those of the list, and so does one whose list is used up; see
-``actions.stuck_monitor``. By default there are none, and the machine is that of Move Base Flex.
+``actions.stuck_monitor``. One that is blocked where it meets robots that announce their ways runs
+``right_of_way_behavior`` first. By default there are none of these, and the machine is that of Move Base Flex.
 
 Each behaviour of the list runs at most once until the list is reset: by a plan after trigger *plan*, by
 ``oscillation_distance`` of motion after the other two (upstream forgets that for *control*).
@@ -75,9 +76,11 @@ class MoveBaseAction(Action[MoveBaseGoal, MoveBaseResult, ExePathFeedback]):
     def _check(self, goal: MoveBaseGoal) -> tuple[int, str] | None:
         """Accept only names that are loaded and tolerances that make sense."""
         wanted = [(PluginKind.PLANNER, goal.planner), (PluginKind.CONTROLLER, goal.controller)]
-        behaviors = (*(goal.recovery_behaviors or ()), *self.runtime.parameters.escalation_behaviors)
+        parameters = self.runtime.parameters
+        behaviors = [*(goal.recovery_behaviors or ()), *parameters.escalation_behaviors]
+        behaviors += [parameters.right_of_way_behavior] if parameters.right_of_way_behavior else []
         wanted += [(PluginKind.RECOVERY, name) for name in behaviors]
-        if refiner := self.runtime.parameters.plan_refiner:
+        if refiner := parameters.plan_refiner:
             wanted.append((PluginKind.REFINER, refiner))
         for kind, name in wanted:
             problem = self._plugins.problem(kind, name)

@@ -5,6 +5,10 @@ An executive notes every failure it recovers from and every behaviour it has run
 the monitor emits an event, and the behaviours of ``escalation_behaviors`` are due, one after the other. Each runs once
 at a place; then there is nothing left to try, and ``described`` gives the text with which the executive gives up.
 
+Where a robot is blocked and meets robots that announce their ways (``mbf_abstract.traffic``), ``right_of_way_behavior``
+is due at the first failure: what clears maps or backs up takes time, and the others do not know of it. It runs
+``MOST_MEETINGS`` times at a place at most.
+
 When to use: one monitor for each goal of an executive of your own; ``move_base`` and the missions of behaviour trees
 have one. When not: a robot that moves without getting anywhere raises no failure; the oscillation and progress watches
 of ``exe_path`` make one of it.
@@ -22,9 +26,28 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.events import EventKind
 from mbf_abstract.execution.runtime import Runtime
 from mbf_abstract.geometry import Pose
-from mbf_abstract.outcomes import is_success, outcome_name
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, is_success, outcome_name
+from mbf_abstract.traffic.right_of_way import MEETING_LENGTH
 
 TIME_RESOLUTION = 1e-9  # s
+MOST_MEETINGS = 5
+"""How often the right of way is asked for at one place."""
+BLOCKED = frozenset(
+    [
+        GetPathOutcome.BLOCKED_START,
+        GetPathOutcome.BLOCKED_GOAL,
+        GetPathOutcome.NO_PATH_FOUND,
+        GetPathOutcome.PAT_EXCEEDED,
+        ExePathOutcome.NO_VALID_CMD,
+        ExePathOutcome.PAT_EXCEEDED,
+        ExePathOutcome.COLLISION,
+        ExePathOutcome.OSCILLATION,
+        ExePathOutcome.BLOCKED_GOAL,
+        ExePathOutcome.BLOCKED_PATH,
+        MoveBaseOutcome.OSCILLATION,
+    ]
+)
+"""Failures that another robot in the way causes."""
 
 
 @dataclass
@@ -41,12 +64,15 @@ class TroubleSpot:
         Behaviours that ran here, with their last outcome, in the order of their first run.
     escalations : int
         How many behaviours of the escalation are used up here.
+    meetings : int
+        How often the right of way was asked for here.
     """
 
     place: Pose
     failures: dict[int, list[float]] = field(default_factory=dict)
     tried: dict[str, int] = field(default_factory=dict)
     escalations: int = 0
+    meetings: int = 0
 
     def __str__(self) -> str:
         x, y, z = self.place.position
@@ -75,10 +101,12 @@ class StuckMonitor:
         self._escalation = tuple(escalation)
         self._spots: list[TroubleSpot] = []
         self._present: TroubleSpot | None = None
+        self._meets = False
 
     # ------------------------------------------------------------------------------------------- what happened
     def note_failure(self, outcome: int) -> None:
         """Count a failure where the robot is now; one of a robot that does not know where it is belongs nowhere."""
+        self._meets = False
         try:
             pose = self._runtime.robot.pose()
         except RobotStateError:
@@ -87,6 +115,7 @@ class StuckMonitor:
         self._present = spot = self._spot_at(pose)
         was_stuck = self._is_too_much(spot.failures.setdefault(outcome, []))
         spot.failures[outcome].append(self._runtime.clock.now())
+        self._meets = outcome in BLOCKED and spot.meetings < MOST_MEETINGS and self._meets_others()
         if self._is_too_much(spot.failures[outcome]) and not was_stuck:
             self._runtime.events.emit(
                 EventKind.STUCK,
@@ -97,6 +126,13 @@ class StuckMonitor:
                 tried=list(spot.tried),
                 message=str(spot),
             )
+
+    def _meets_others(self) -> bool:
+        """Whether there is a behaviour for robots that announce their ways, and the robot meets such robots."""
+        parameters, now = self._runtime.parameters, self._runtime.clock.now()
+        if not parameters.right_of_way_behavior:
+            return False
+        return self._runtime.traffic.meets_others(now, parameters.right_of_way_distance, MEETING_LENGTH)
 
     def _is_too_much(self, times: Sequence[float]) -> bool:
         """Whether failures of one kind at one place, at these times [s], mean that the robot is stuck."""
@@ -126,12 +162,19 @@ class StuckMonitor:
 
     @property
     def escalates(self) -> bool:
-        """Whether the escalation decides what happens next, instead of the usual recoveries."""
-        return self.stuck and bool(self._escalation)
+        """Whether right of way or escalation decide what happens next, instead of the usual recoveries."""
+        return self._meets or (self.stuck and bool(self._escalation))
 
     def next_behavior(self) -> str:
-        """Return the next behaviour of the escalation at the present place; empty if all have run here."""
+        """Return the one for the right of way, if it is due, else the next one of the escalation at the present place.
+
+        Empty if all have run here.
+        """
         spot = self._present
+        if spot is not None and self._meets:
+            self._meets = False
+            spot.meetings += 1
+            return self._runtime.parameters.right_of_way_behavior
         if spot is None or spot.escalations >= len(self._escalation):
             return ""
         spot.escalations += 1

@@ -200,6 +200,7 @@ class _Validation:
         for key, kind in PLUGIN_LISTS.items():
             self._plugin_list(key, kind)
         self._listed_names("escalation_behaviors", "recovery_behaviors")
+        self._listed_names("right_of_way_behavior", "recovery_behaviors")
         self._listed_names("fallback_planner", "planners")
         self._listed_names("plan_refiner", "refiners")
         validator = SectionValidator(self.document, self.registry, self.findings)

@@ -126,6 +126,14 @@ class NavigationParameters(ParameterModel):
         "navigation tree give up. They are not among those that move_base runs by default. Empty = no escalation, as "
         "in Move Base Flex.",
     )
+    right_of_way_behavior: str = parameter(
+        "",
+        "Recovery behaviour of a robot that is blocked where it meets robots that announce their ways, before any "
+        "other, such as a give_way; empty = none.",
+    )
+    right_of_way_distance: float = parameter(
+        0.8, "Two robots meet where their ways come nearer to each other than this.", unit="m", gt=0.0, le=5.0
+    )
 
     # Robot, frames and odometry
     global_frame: str = parameter("map", "Frame of goals and paths.", dynamic=False)

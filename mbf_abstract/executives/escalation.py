@@ -4,8 +4,11 @@
 task fails for good, it runs the next behaviour of the escalation and the task from its beginning. Each behaviour runs
 once at a place; then the mission fails, with a message that names the place and what was tried there.
 
-The list of behaviours is a parameter of the server, so that ``move_base`` and all trees share it. Without one the node
-does what its task does; only the message of a robot that is stuck says more.
+Where the task is blocked by robots that announce their ways, ``right_of_way_behavior`` runs at the first failure,
+before the recoveries inside the task.
+
+Both are parameters of the server, so that ``move_base`` and all trees share them. Without them the node does what its
+task does; only the message of a robot that is stuck says more.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ class NextBehavior(Recovery):
 
 
 class Escalation(Composite):
-    """Run a task; where it fails or the robot is stuck, run the next behaviour of the escalation, then the task anew.
+    """Run a task; where it fails or the robot is stuck, run the next behaviour that is due, then the task anew.
 
     How a behaviour ended does not matter: the task decides.
     """
@@ -41,7 +44,7 @@ class Escalation(Composite):
         super().__init__(name, [task, self._behavior])
 
     def setup(self, **kwargs: Any) -> None:
-        """Let the recoveries inside the task give up on a robot that is stuck: it is the escalation's turn then."""
+        """Let the recoveries inside the task give up where a behaviour is due that the stuck monitor decides on."""
         super().setup(**kwargs)
         for node in self.children[0].iterate():
             if isinstance(node, TaskWithRecoveries):

@@ -4,7 +4,7 @@
 - *control*: follow the path while a second planner keeps updating it; where driving fails, run a recovery that fits the
   outcome code, then drive on along the **same** path. Only if that does not help does the tree fall back to planning.
 - *navigation*: free the robot and the goal if they are blocked, then plan and drive. A robot that is stuck gets the
-  server's ``escalation_behaviors``, see ``executives.escalation``.
+  server's ``escalation_behaviors``, one that meets others its ``right_of_way_behavior``; see ``executives.escalation``.
 
 Use them as they are, or as a pattern: a tree is an expression of nodes. They need the behaviours named in
 ``TreeOptions`` to be loaded; a name of "" leaves the behaviour out.

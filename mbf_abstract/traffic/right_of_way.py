@@ -11,8 +11,13 @@ lasts.
 
 from __future__ import annotations
 
+import numpy as np
+
 from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.traffic.announcement import Announcement
+
+MEETING_LENGTH = 5.0
+"""How far along its way [m] a robot is blocked by others: about as far as it sees them."""
 
 
 def right_of_way(mine: Announcement, other: Announcement) -> bool:
@@ -36,3 +41,17 @@ def in_each_others_way(mine: Announcement, other: Announcement, distance: float,
     """
     a, b = mine.points_ahead(length), other.points_ahead(length)
     return bool(norm(a[:, None] - b).min() < distance)
+
+
+def face_each_other(mine: Announcement, other: Announcement, length: float) -> bool:
+    """Whether each of two robots is ahead on the next ``length`` [m] of the other's way.
+
+    So neither follows the other, and they have not passed each other. Of one that announces no way, because it lets
+    others pass, only its place counts.
+    """
+    return _is_ahead(other, mine, length) and (len(other.way) == 1 or _is_ahead(mine, other, length))
+
+
+def _is_ahead(robot: Announcement, traveller: Announcement, length: float) -> bool:
+    """Whether a robot is nearer to a later point of the traveller's way than to where the traveller is."""
+    return int(np.argmin(norm(traveller.points_ahead(length) - robot.way[0]))) > 0

@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from mbf_abstract.traffic.announcement import Announcement
+from mbf_abstract.traffic.right_of_way import face_each_other, in_each_others_way
 
 MAX_AGE = 3.0
 """A robot that announces nothing new for this long [s] does not count: it is switched off, or out of reach."""
@@ -105,3 +106,24 @@ class Traffic:
     def _first_seen(self, announcement: Announcement, now: float) -> tuple[float, float]:
         seen = self._seen.get(announcement.name)
         return seen if seen is not None and seen[0] == announcement.stamp else (announcement.stamp, now)
+
+    def rivals(self, now: float, distance: float, length: float) -> tuple[Announcement, ...]:
+        """Robots that go somewhere and are in this robot's way, as it is in theirs.
+
+        Parameters
+        ----------
+        now : float
+            [s]
+        distance, length : float
+            Their ways come nearer than ``distance`` [m] over the next ``length`` [m] of both.
+        """
+        own = self.own
+        if own is None:
+            return ()
+        going = [other for other in self.others(now) if other.remaining > 0.0]
+        return tuple(other for other in going if in_each_others_way(own, other, distance, length))
+
+    def meets_others(self, now: float, distance: float, length: float) -> bool:
+        """Whether any of the ``rivals`` is ahead of this robot and does not go ahead of it the same way."""
+        own, rivals = self.own, self.rivals(now, distance, length)
+        return own is not None and any(face_each_other(own, rival, length) for rival in rivals)

@@ -1,8 +1,8 @@
 """Give way: drive out of the way that the robot came along and would go on, to where another one can pass, and wait.
 
-When to use: in ``escalation_behaviors``, against whoever stands head on in a corridor or a door and waits for us. When
-not: things that never move; plan around those. Give two robots of the same kind different seeds: both may give way at
-first, the waits they draw let one go on before the other.
+When to use: as ``right_of_way_behavior``; in ``escalation_behaviors``, against whoever stands head on in a corridor or
+a door and waits for us. When not: things that never move; plan around those. Give two robots of the same kind different
+seeds: both may give way at first, the waits they draw let one go on before the other.
 
 The way is the track that the robot has driven, straight ahead and straight on behind the track. The nearest place is
 searched where the base stands ``distance`` from all of it, by the shortest manoeuvre on which the outline touches
@@ -21,7 +21,7 @@ The server's ``recovery_patience`` must leave time for the drive and the wait.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 from typing import ClassVar
@@ -42,7 +42,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_abstract.traffic.announcement import Announcement
-from mbf_abstract.traffic.right_of_way import in_each_others_way, right_of_way
+from mbf_abstract.traffic.right_of_way import right_of_way
 
 LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
 WAY_SPACING = 0.1  # m
@@ -117,23 +117,15 @@ class GiveWayRecovery(GuardedRecovery):
         return RecoveryResult(RecoveryOutcome.SUCCESS)
 
     # --------------------------------------------------------------------------------------------- the other robots
-    def _rivals(self) -> list[Announcement]:
-        """Robots that go somewhere and are in this robot's way, as it is in theirs."""
-        own, p = self.traffic.own, self.parameters
-        others = [] if own is None else self.traffic.others(self.clock.now())
-        return [
-            other
-            for other in others
-            if own is not None and other.remaining > 0.0
-            if in_each_others_way(own, other, p.distance, p.reach)
-        ]
+    def _rivals(self) -> tuple[Announcement, ...]:
+        return self.traffic.rivals(self.clock.now(), self.parameters.distance, self.parameters.reach)
 
-    def _before(self, rivals: list[Announcement]) -> list[Announcement]:
+    def _before(self, rivals: Sequence[Announcement]) -> list[Announcement]:
         """Those of the robots that go before this one."""
         own = self.traffic.own
         return [rival for rival in rivals if own is not None and not right_of_way(own, rival)]
 
-    def _wait_for(self, request: RecoveryRequest, rivals: list[Announcement], why: str) -> RecoveryResult:
+    def _wait_for(self, request: RecoveryRequest, rivals: Sequence[Announcement], why: str) -> RecoveryResult:
         """Stand until none of these robots is in the way, or the turn is another's; ``longest_wait`` at most."""
         names, begun = {rival.name for rival in rivals}, self.clock.now()
         went_before = {rival.name for rival in self._before(rivals)}

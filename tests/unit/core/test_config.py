@@ -311,6 +311,12 @@ def test_behaviours_for_a_stuck_robot_are_taken_over_in_their_order(tmp_path):
     assert check(tmp_path, text).parameters.escalation_behaviors == ("pause",)
 
 
+def test_a_behaviour_for_the_right_of_way_that_the_file_does_not_list_is_refused_with_its_line(tmp_path):
+    text = GOOD.replace("second: {", "right_of_way_behavior: pase\nsecond: {")
+    (finding,) = refused(tmp_path, text)
+    assert finding.startswith("8: right_of_way_behavior: expected the name of one of the recovery_behaviors")
+
+
 def test_a_fallback_planner_that_the_file_does_not_list_is_refused_with_its_line(tmp_path):
     text = GOOD.replace("second: {", "fallback_planner: secnd\nsecond: {")
     (finding,) = refused(tmp_path, text)

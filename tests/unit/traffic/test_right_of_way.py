@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mbf_abstract.traffic.announcement import SPACING, Announcement
-from mbf_abstract.traffic.right_of_way import in_each_others_way, right_of_way
+from mbf_abstract.traffic.right_of_way import face_each_other, in_each_others_way, right_of_way
 from mbf_abstract.traffic.traffic import MAX_AGE, SharedChannel, Traffic
 
 coordinates = st.floats(-20.0, 20.0, width=32)
@@ -85,6 +85,32 @@ def test_ways_are_in_each_others_way_where_they_come_near_and_that_is_mutual(a, 
     assert in_each_others_way(a, b, gap + 2.0 * SPACING, length)
     assert gap <= 2.0 * SPACING or not in_each_others_way(a, b, gap - 2.0 * SPACING, length)
     assert in_each_others_way(a, b, 1.0, length) is in_each_others_way(b, a, 1.0, length)
+
+
+@given(announcements, announcements)
+def test_two_robots_that_go_somewhere_face_each_other_mutually(a, b):
+    assert len(a.way) == 1 or len(b.way) == 1 or face_each_other(a, b, 5.0) is face_each_other(b, a, 5.0)
+
+
+def along_x(x_from, x_to):
+    return Announcement("", 0.0, np.array([(x_from, 0.0, 0.0), (x_to, 0.0, 0.0)]), abs(x_to - x_from))
+
+
+@pytest.mark.parametrize(
+    ("other", "expected"),
+    [
+        (along_x(2.0, -2.0), True),
+        (along_x(2.0, 1.0), True),
+        (along_x(1.0, 4.0), False),
+        (along_x(-1.0, 4.0), False),
+        (along_x(-1.0, -4.0), False),
+        (replace(along_x(1.0, 4.0), way=np.array([[1.0, 0.0, 0.0]])), True),
+        (replace(along_x(-1.0, 4.0), way=np.array([[-1.0, 0.0, 0.0]])), False),
+    ],
+    ids=["head on", "to a goal before it", "ahead", "behind", "passed", "lets it pass", "lets it pass, behind"],
+)
+def test_a_robot_faces_another_one_that(other, expected):
+    assert face_each_other(along_x(0.0, 4.0), other, 5.0) is expected
 
 
 @pytest.mark.parametrize(

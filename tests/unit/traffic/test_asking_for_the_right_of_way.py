@@ -1,0 +1,165 @@
+"""A robot that is blocked where it meets robots that announce their ways asks for the right of way before all else."""
+
+import numpy as np
+import pytest
+
+from mbf_abstract.actions.stuck_monitor import MOST_MEETINGS
+from mbf_abstract.events import EventKind
+from mbf_abstract.executives.reference_trees import TreeOptions, navigation_tree
+from mbf_abstract.executives.tree_executive import TreeExecutive
+from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import MoveBaseGoal
+from mbf_abstract.goals.handle import GoalStatus
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome
+from mbf_abstract.plugins import ControlResult, PlanResult
+from mbf_abstract.testing.scripted import ScriptedController, ScriptedPlanner, ScriptedRecovery, straight_plan
+from mbf_abstract.testing.scripted_session import ScriptedSession
+from mbf_abstract.traffic.announcement import Announcement
+from mbf_abstract.traffic.traffic import SharedChannel
+
+RECOVERIES = ("clear", "back_up", "give_way")
+GOAL = Pose.planar(2.0, 0.0)
+BLOCKED = ControlResult(ExePathOutcome.BLOCKED_PATH, "a robot ahead")
+STAMP = 0.0  # s; a robot is heard of for 3 s from the first look, longer than these tests meet it
+
+
+def with_tree(session):
+    options = TreeOptions(check_poses=False, second_planner_pause=0.0)
+    return TreeExecutive(navigation_tree(options), session.navigator).run(GOAL)
+
+
+def with_move_base(session):
+    return session.navigator.send(MoveBaseGoal(GOAL, recovery_behaviors=("clear", "back_up"))).wait()
+
+
+@pytest.fixture(params=[with_tree, with_move_base], ids=["tree", "move_base"])
+def run(request):
+    """``run(session)`` goes to the goal with each executive."""
+    return request.param
+
+
+@pytest.fixture
+def make_session():
+    """Make sessions of a robot at the origin that announces that it goes along x; all are closed at the end."""
+    sessions = []
+
+    def make(*others, **parameters):
+        plugins = {"planner": ScriptedPlanner, "controller": ScriptedController}
+        asked = {"right_of_way_behavior": "give_way", "planner_max_retries": 0, "controller_max_retries": 0}
+        session = ScriptedSession(plugins | dict.fromkeys(RECOVERIES, ScriptedRecovery), **asked | parameters)
+        sessions.append(session)
+        traffic, channel = session.server.runtime.traffic, SharedChannel()
+        traffic.connect("anna", channel)
+        traffic.announce(robot("", 0.0, 2.0))
+        for other in others:
+            channel.publish(other)
+        return session
+
+    yield make
+    for session in sessions:
+        session.close()
+
+
+def robot(name, x_from, x_to, y=0.0, remaining=None):
+    x = np.linspace(x_from, x_to, 20)
+    way = np.column_stack([x, np.full(20, y), np.zeros(20)])
+    return Announcement(name, STAMP, way, abs(x_to - x_from) if remaining is None else remaining)
+
+
+HEAD_ON = robot("ben", 4.0, -4.0)
+
+
+def recoveries(session):
+    return [event.data["plugin"] for event in session.recorded(EventKind.RECOVERY)]
+
+
+def test_it_is_asked_for_at_the_first_failure_of_driving(make_session, run):
+    session = make_session(HEAD_ON)
+    session.controller.play(BLOCKED, session.controller.follow)
+    assert run(session).success
+    assert recoveries(session) == ["give_way"]
+
+
+def test_it_is_asked_for_at_the_first_failure_of_planning(make_session, run):
+    session = make_session(HEAD_ON)
+    session.planner.play(PlanResult(GetPathOutcome.NO_PATH_FOUND, "a robot ahead"), straight_plan)
+    assert run(session).success
+    assert recoveries(session) == ["give_way"]
+
+
+@pytest.mark.parametrize(
+    ("others", "parameters"),
+    [
+        ([], {}),
+        ([robot("ben", 1.0, 9.0)], {}),
+        ([robot("ben", -1.0, 9.0)], {}),
+        ([robot("ben", -1.0, -9.0)], {}),
+        ([robot("ben", 4.0, -4.0, y=1.0)], {}),
+        ([robot("ben", 1.0, 1.0, remaining=0.0)], {}),
+        ([HEAD_ON], {"right_of_way_behavior": ""}),
+    ],
+    ids=[
+        "nobody",
+        "one that drives ahead",
+        "one that follows",
+        "one that has passed",
+        "one that passes beside",
+        "one that stays",
+        "no behaviour for it",
+    ],
+)
+def test_otherwise_the_usual_recoveries_come_first(make_session, run, others, parameters):
+    session = make_session(*others, **parameters)
+    session.controller.play(BLOCKED, session.controller.follow)
+    assert run(session).success
+    assert recoveries(session) == ["clear"]
+
+
+def test_it_waits_too_for_one_ahead_that_is_letting_others_pass(make_session, run):
+    session = make_session(Announcement("ben", STAMP, np.array([[1.0, 0.1, 0.0]]), 8.0))
+    session.controller.play(BLOCKED, session.controller.follow)
+    assert run(session).success
+    assert recoveries(session) == ["give_way"]
+
+
+def test_robots_meet_at_a_crossing(make_session, run):
+    across = Announcement("ben", STAMP, np.array([[1.0, -2.0, 0.0], [1.0, 2.0, 0.0]]), 4.0)
+    session = make_session(across)
+    session.controller.play(BLOCKED, session.controller.follow)
+    assert run(session).success
+    assert recoveries(session) == ["give_way"]
+
+
+def test_robots_meet_where_their_ways_come_nearer_than_the_distance(make_session, run):
+    session = make_session(robot("ben", 4.0, -4.0, y=1.0), right_of_way_distance=1.1)
+    session.controller.play(BLOCKED, session.controller.follow)
+    assert run(session).success
+    assert recoveries(session) == ["give_way"]
+
+
+def test_it_is_not_asked_for_after_a_failure_that_no_other_robot_causes(make_session, run):
+    session = make_session(HEAD_ON)
+    session.controller.play(ControlResult(ExePathOutcome.MISSED_PATH, "beside it"), session.controller.follow)
+    assert run(session).success
+    assert recoveries(session) == ["clear"]
+
+
+def test_a_robot_that_stays_blocked_goes_on_with_its_usual_recoveries(make_session, run):
+    session = make_session(HEAD_ON, stuck_failures=0)
+    session.controller.play(*[BLOCKED] * (MOST_MEETINGS + 2), session.controller.follow)
+    assert run(session).success
+    assert recoveries(session)[: MOST_MEETINGS + 1] == ["give_way"] * MOST_MEETINGS + ["clear"]
+
+
+def test_a_behaviour_that_is_not_loaded_refuses_a_goal_of_move_base(make_session):
+    session = make_session(right_of_way_behavior="step_aside")
+    handle = session.navigator.send(MoveBaseGoal(GOAL))
+    assert handle.status is GoalStatus.REJECTED
+    assert "step_aside" in handle.wait().message
+
+
+def test_where_recovery_is_off_move_base_does_not_ask(make_session):
+    session = make_session(HEAD_ON, recovery_enabled=False)
+    session.controller.play(BLOCKED)
+    assert not with_move_base(session).success
+    assert recoveries(session) == []
