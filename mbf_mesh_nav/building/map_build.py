@@ -8,12 +8,12 @@ origin in the coordinates of the survey, and the error of the surface (``files.m
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from mbf_abstract.whole_files import replacing
 from mbf_mesh_nav.arrays import FloatArray, IntArray
 from mbf_mesh_nav.building.clouds.point_cloud import MAX_POINTS, PointCloud, read_clouds
 from mbf_mesh_nav.building.map_facts import MapFacts, map_facts
@@ -87,14 +87,10 @@ def write_map(out: Path, vertices: FloatArray, faces: IntArray, header: MapHeade
     lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
     records = np.empty(len(faces), dtype=FACE)
     records["count"], records["corners"] = 3, faces
-    unfinished = out.with_name(f".{out.name}.{os.getpid()}")
     try:
-        with unfinished.open("wb") as file:
+        with replacing(out) as unfinished, unfinished.open("wb") as file:
             file.write("\n".join(lines).encode("ascii"))
             file.write(np.ascontiguousarray(vertices, dtype="<f8").tobytes())
             file.write(records.tobytes())
-        unfinished.replace(out)
     except OSError as error:
         raise MeshError(str(out), [f"cannot be written: {error}"]) from error
-    finally:
-        unfinished.unlink(missing_ok=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import base64
 import html
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from mbf_abstract.whole_files import write_whole
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
 from mbf_mesh_nav.building.farthest_plan import FarthestPlan, plan_farthest
 from mbf_mesh_nav.building.map_facts import MapFacts, lines_of
@@ -71,14 +71,10 @@ def write_report(
         plan_class="" if plan.success else ' class="failed"',
         pictures="\n".join(_figure(name, *picture) for name, picture in pictures),
     )
-    unfinished = file.with_name(f".{file.name}.{os.getpid()}")
     try:
-        unfinished.write_text(page, encoding="utf-8")
-        unfinished.replace(file)
+        write_whole(file, page)
     except OSError as error:
         raise MeshError(str(file), [f"cannot be written: {error}"]) from error
-    finally:
-        unfinished.unlink(missing_ok=True)
     return plan
 
 

@@ -11,7 +11,6 @@ does not say which parameters made it.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +20,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.whole_files import replacing
 from mbf_mesh_nav.arrays import Float32Array, FloatArray
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import MeshError
@@ -119,15 +119,11 @@ def write_lvr2_mesh(
     attributes = dict(vertex_attributes or {})
     if reasons := _misfits(attributes, len(vertices), part, layout):
         raise MeshError(str(path), reasons)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        with h5py.File(unfinished, "w") as file:
+        with replacing(path) as unfinished, h5py.File(unfinished, "w") as file:
             _fill(file.create_group(part), vertices, faces, attributes, LAYOUTS[layout])
-        unfinished.replace(path)
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise MeshError(str(path), [f"cannot be written: {error}"]) from error
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def _misfits(attributes: dict[str, NDArray[Any]], vertex_count: int, part: str, layout: str) -> list[str]:

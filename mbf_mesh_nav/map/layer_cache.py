@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-import os
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from mbf_abstract.config.bounded_files import ArrayFileError, read_arrays
+from mbf_abstract.whole_files import replacing
 from mbf_mesh_nav.map.layer import CostArray, LethalArray, MeshLayer
 
 VALUE_BYTES = 5
@@ -61,14 +61,9 @@ class LayerCache:
     def store(self, layer: MeshLayer) -> str:
         """Keep the present values of a layer; why that was not possible, or ""."""
         try:
-            target = self.file_of(layer)
-            unfinished = target.with_suffix(f".{os.getpid()}.npz")
             self.folder.mkdir(parents=True, exist_ok=True)
-            try:
+            with replacing(self.file_of(layer)) as unfinished:
                 np.savez(unfinished, costs=layer.costs, lethal=layer.lethal)
-                unfinished.replace(target)
-            finally:
-                unfinished.unlink(missing_ok=True)
         except (OSError, TypeError) as error:  # the latter for a class typed into an interpreter: it has no file
             return f"{type(error).__name__}: {getattr(error, 'strerror', None) or error}"
         return ""

@@ -53,6 +53,18 @@ class PricedHeadings:
     turning: float
 
 
+@dataclass(frozen=True)
+class _Task:
+    """What one search is asked, with the weights (m,) [m] of all moves."""
+
+    query: LegQuery
+    limits: HeadingLimits
+    costs: PricedHeadings
+    weights: Float32Array
+    start: StartStates
+    goal: GoalCorners
+
+
 class HeadingSearch:
     """Searches over (vertex, heading) on one map.
 
@@ -73,17 +85,16 @@ class HeadingSearch:
         """Vertices (n,) of the cheapest path and its cost [m], ends included; None if there is none, or cancelled."""
         if not len(start[0]) or not len(goal[0]):
             return None
-        mesh_map, weights = self._mesh_map, self._weights(query)
-        bound = self._bound(query, limits, costs, weights, start, goal)
-        scratch = scratch_for(len(mesh_map.vertices))
+        task = _Task(query, limits, costs, self._weights(query), start, goal)
+        bound, scratch = self._bound(task), scratch_for(len(self._mesh_map.vertices))
         for lazy_searches in range(LAZY_SEARCHES + 1):
             looks = lazy_searches == LAZY_SEARCHES
-            best, cost, _, predecessors = self._search(query, limits, costs, weights, start, goal, bound, looks)
+            best, cost, _, predecessors = self._search(task, bound, looks)
             if best < 0:
                 return None
             chain = follow_predecessors(predecessors, best)[::-1] // HEADINGS
             of_path = self.graph.moves, chain, limits.known, limits.chassis, scratch
-            if looks or find_out_along(mesh_map.topology.surface, *of_path):
+            if looks or find_out_along(self._mesh_map.topology.surface, *of_path):
                 return chain, cost
         return None
 
@@ -95,8 +106,8 @@ class HeadingSearch:
         Moves of which nothing is known count as drivable.
         """
         bound = GoalBound(np.full(len(self._mesh_map.vertices), np.inf, dtype=np.float32), -np.inf, *self._ends(query))
-        weights = self._weights(query)
-        best, _, distances, _ = self._search(query, limits, costs, weights, start, NOWHERE, bound, False)
+        task = _Task(query, limits, costs, self._weights(query), start, NOWHERE)
+        best, _, distances, _ = self._search(task, bound, False)
         return None if best == CANCELLED else distances.reshape(-1, HEADINGS)
 
     def _weights(self, query: LegQuery) -> Float32Array:
@@ -106,36 +117,26 @@ class HeadingSearch:
             self._kept = version, blocked, self.graph.weights(query.snapshot, blocked)
         return self._kept[2]
 
-    def _search(
-        self,
-        query: LegQuery,
-        limits: HeadingLimits,
-        costs: PricedHeadings,
-        weights: Float32Array,
-        start: StartStates,
-        goal: GoalCorners,
-        bound: GoalBound,
-        looks: bool,
-    ) -> tuple[int, float, Float32Array, IntArray]:
+    def _search(self, task: _Task, bound: GoalBound, looks: bool) -> tuple[int, float, Float32Array, IntArray]:
         """Run the kernel: best target state, its cost, distances and predecessors (16 V,) of the states it came to."""
-        mesh_map = self._mesh_map
+        mesh_map, query, limits = self._mesh_map, task.query, task.limits
         distances = np.full(HEADINGS * len(mesh_map.vertices), np.inf, dtype=np.float32)
         predecessors = np.full(len(distances), -1, dtype=np.int32)
-        seeds, offsets = start
+        seeds, offsets = task.start
         distances[seeds] = offsets
         best, cost = search_with_heading(
             mesh_map.topology.surface,
             self.graph.moves,
-            weights,
+            task.weights,
             query.blocked,
             limits.allowed,
             limits.roll,
-            costs.roll,
-            costs.turning,
+            task.costs.roll,
+            task.costs.turning,
             distances,
             predecessors,
             seeds,
-            *goal,
+            *task.goal,
             bound,
             limits.known,
             limits.chassis,
@@ -145,24 +146,17 @@ class HeadingSearch:
         )
         return best, cost, distances, predecessors
 
-    def _bound(
-        self,
-        query: LegQuery,
-        limits: HeadingLimits,
-        costs: PricedHeadings,
-        weights: Float32Array,
-        start: StartStates,
-        goal: GoalCorners,
-    ) -> GoalBound:
+    def _bound(self, task: _Task) -> GoalBound:
         """Spread the wave from the goal to a little behind the start."""
+        query, limits, costs = task.query, task.limits, task.costs
         mesh_map, ends, arrivals = self._mesh_map, self._ends(query), self.graph.arrivals
         limited = limits.allowed, limits.roll, costs.roll, limits.known, FORBIDDEN
-        backwards = weights_of_arrivals(arrivals, self.graph.moves.headings, weights, *limited)
+        backwards = weights_of_arrivals(arrivals, self.graph.moves.headings, task.weights, *limited)
         distances = np.full(len(mesh_map.vertices), np.inf, dtype=np.float32)
-        corners, rests, _ = goal
+        corners, rests, _ = task.goal
         np.minimum.at(distances, corners, rests)
         beyond = BEYOND_START * math.dist(query.start.point, query.goal.point) + costs.turning * TURNS_BEYOND
-        states, begun = start
+        states, begun = task.start
         around = (states // HEADINGS).astype(np.int32), begun + np.float32(beyond)
         propagate_distances(
             SearchGraph(arrivals.offsets, arrivals.origins, backwards, query.blocked),

@@ -6,7 +6,6 @@ It is written last and replaced as a whole, so a folder without one is a map tha
 from __future__ import annotations
 
 import json
-import os
 from collections import Counter
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +16,7 @@ from rtree import index as rtree_index
 
 from mbf_abstract.config.bounded_files import special_file
 from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.whole_files import write_whole
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.tiles.tile import TileKey
 
@@ -121,14 +121,10 @@ class TileIndex(BaseModel):
 def write_index(folder: Path, index: TileIndex) -> None:
     """Write the index of a map's folder, as a whole; ``MeshError`` if that fails."""
     path = folder / INDEX_FILE
-    unfinished = folder / f".{INDEX_FILE}.{os.getpid()}"
     try:
-        unfinished.write_text(json.dumps(index.model_dump(mode="python"), indent=1), encoding="utf-8")
-        unfinished.replace(path)
+        write_whole(path, json.dumps(index.model_dump(mode="python"), indent=1))
     except OSError as error:
         raise MeshError(str(path), [f"cannot be written: {error}"]) from error
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def read_index(folder: Path) -> TileIndex:

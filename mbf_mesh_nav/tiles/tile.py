@@ -11,7 +11,6 @@ what its headers promise is compared with its size before anything is read.
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Collection
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -21,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbf_abstract.config.bounded_files import ArrayFileError, read_arrays
+from mbf_abstract.whole_files import replacing
 from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.tiles.tile_arrays import FORMAT, misfit
@@ -104,14 +104,11 @@ def tile_file(folder: Path, key: TileKey) -> Path:
 
 def write_tile(path: Path, tile: Tile) -> None:
     """Write a tile; a file of that name is replaced when the new one is complete. ``MeshError`` if that fails."""
-    unfinished = path.with_name(f".{path.stem}.{os.getpid()}.npz")
     try:
-        np.savez(unfinished, **{field.name: getattr(tile, field.name) for field in fields(tile)})
-        unfinished.replace(path)
+        with replacing(path) as unfinished:
+            np.savez(unfinished, **{field.name: getattr(tile, field.name) for field in fields(tile)})
     except OSError as error:
         raise MeshError(str(path), [f"cannot be written: {error}"]) from error
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def read_tile(path: Path) -> Tile:

@@ -25,9 +25,9 @@ def compare(
         from rich.markup import escape
         from rich.table import Table
 
+        from mbf_abstract.whole_files import write_whole
         from terrain.commands.verdict_line import print_verdict
         from terrain.recording.run_folder import read_run
-        from terrain.recording.whole_files import write_whole
         from terrain.viewer.reports.comparison import compare_digests, compare_metrics, comparison_html, metrics_header
 
         runs, names = [read_run(folder) for folder in folders], names_of(folders)

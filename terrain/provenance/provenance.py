@@ -21,10 +21,10 @@ from mbf_abstract.config.validation import validate
 from mbf_abstract.config.yaml_source import load_yaml
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.whole_files import write_whole
 from terrain.provenance.code import Code, code_of
 from terrain.provenance.named_files import InputCopies, sha256_of, with_named_files
 from terrain.provenance.versions import versions
-from terrain.recording.whole_files import write_whole
 from terrain.scenarios.scenario import Scenario
 
 FILE, SCENARIO = "provenance.yaml", "scenario.yaml"

@@ -19,6 +19,7 @@ from mbf_abstract.config.bounded_files import read_arrays
 from mbf_abstract.events import Event
 from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.arithmetic import arccos
+from mbf_abstract.whole_files import replacing
 from terrain.physics.robot_models import Drive, RobotSpec
 from terrain.recording.actor_track import ActorTrack, track_arrays, tracks_from
 from terrain.recording.recorded_maps import (
@@ -30,7 +31,6 @@ from terrain.recording.recorded_maps import (
     meshes_from,
 )
 from terrain.recording.verdict import Verdict
-from terrain.recording.whole_files import replacing
 from terrain.worlds.surface import Surface
 
 StampedPoints = tuple[float, FloatArray]

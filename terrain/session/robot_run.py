@@ -12,6 +12,7 @@ from mbf_abstract.events import EventSink, JsonLinesSink
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.geometry.tilt import tilt_of
 from mbf_abstract.time.clock import wall_seconds
+from mbf_abstract.whole_files import write_whole
 from terrain.physics.incidents import IncidentKind
 from terrain.provenance.named_files import InputCopies
 from terrain.provenance.provenance import write_provenance, write_scenario
@@ -20,7 +21,6 @@ from terrain.recording.planning_times import PlanningTimes
 from terrain.recording.recording import Recording
 from terrain.recording.run_folder import RecordingParts, clear_results, has_parts
 from terrain.recording.verdict import judge
-from terrain.recording.whole_files import write_whole
 from terrain.scenarios.scenario import Scenario
 from terrain.scenarios.settings import apply_world_settings
 from terrain.scenarios.world import ScenarioWorld

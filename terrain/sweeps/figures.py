@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from terrain.recording.whole_files import write_whole
+from mbf_abstract.whole_files import write_whole
 from terrain.sweeps.statistics import METRICS, Row, values_of
 
 TRACK = "track"

@@ -17,8 +17,8 @@ from statistics import median
 from typing import Any
 from urllib.parse import quote
 
+from mbf_abstract.whole_files import replacing, write_whole
 from terrain.recording.verdict import Level
-from terrain.recording.whole_files import replacing, write_whole
 from terrain.sweeps.figures import write_figures
 from terrain.sweeps.latex import latex_table
 from terrain.sweeps.statistics import METRICS, Row, compare_variants, rate_of, spread_of, values_of

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from mbf_abstract.event_values import error_text
+from mbf_abstract.whole_files import write_whole
 from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recording import Recording
 from terrain.recording.verdict import Verdict
-from terrain.recording.whole_files import write_whole
 from terrain.viewer.pictures.picture import ViewerMissing, joint_picture_png, picture_png
 from terrain.viewer.replay import joint_replay_html, replay_html
 from terrain.viewer.reports.report import report_html

@@ -63,7 +63,7 @@ class GiveWayParameters(GuardedMotionParameters):
     wait: float = parameter(3.0, "How long to stand there, at least.", unit="s", ge=0.0, le=600.0)
     random_extra: float = parameter(3.0, "Stand up to this much longer, by chance.", unit="s", ge=0.0, le=600.0)
     longest_wait: float = parameter(
-        20.0, "How long to wait for robots that announce where they go, at most.", unit="s", ge=0.0, le=600.0
+        8.0, "How long to wait for robots that announce where they go, at most.", unit="s", ge=0.0, le=600.0
     )
 
 

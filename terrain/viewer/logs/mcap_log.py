@@ -13,8 +13,8 @@ from typing import Any
 from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
 
+from mbf_abstract.whole_files import replacing
 from terrain.recording.recording import Recording
-from terrain.recording.whole_files import replacing
 from terrain.viewer.logs.foxglove_messages import nanoseconds
 from terrain.viewer.logs.run_messages import JsonMessage, messages_of
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbf_abstract.whole_files import replacing
 from terrain.recording.recording import Recording
-from terrain.recording.whole_files import replacing
 from terrain.viewer.pictures.colours import BODY, DRIVEN, PLANNED, SCAN, Colour
 from terrain.viewer.pictures.picture import ViewerMissing
 from terrain.viewer.pictures.shading import vertex_colours

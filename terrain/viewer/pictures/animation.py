@@ -16,8 +16,8 @@ from PIL import Image, ImageDraw, ImageFont
 from trimesh.remesh import subdivide_to_size
 
 from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.whole_files import replacing
 from terrain.recording.recording import Recording
-from terrain.recording.whole_files import replacing
 from terrain.viewer.pictures.colours import BODY, DRIVEN, GOAL, PLANNED, SCAN, START, Colour
 from terrain.viewer.pictures.shading import lit_colours
 from terrain.viewer.pictures.shapes import marks, prism, standing_things

@@ -10,7 +10,7 @@ import numpy as np
 from mbf_abstract.geometry import Path as PlannedPath
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.view import GridView, MapView, MeshView
-from terrain.recording.whole_files import write_whole
+from mbf_abstract.whole_files import write_whole
 from terrain.viewer.pictures.colours import FLOOR, WALL
 from terrain.viewer.pictures.picture import draw_marks, draw_paths, draw_triangles, new_figure, png_bytes
 from terrain.viewer.pictures.shading import shaded_triangles

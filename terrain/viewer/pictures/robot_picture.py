@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mbf_abstract.geometry import FloatArray
+from mbf_abstract.whole_files import write_whole
 from terrain.description.description import RobotDescription
 from terrain.description.outline import as_array, convex_outline
-from terrain.recording.whole_files import write_whole
 from terrain.viewer.pictures.picture import new_figure, png_bytes
 
 if TYPE_CHECKING:

@@ -15,13 +15,13 @@ from mbf_abstract.config.yaml_source import load_yaml
 from mbf_abstract.events import EventBus, EventKind, MemorySink
 from mbf_abstract.geometry import Pose, Twist
 from mbf_abstract.goals.goal_types import MoveBaseResult
+from mbf_abstract.whole_files import replacing, write_whole
 from terrain.commands.live_line import LiveLine
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.metrics import measure
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import judge
-from terrain.recording.whole_files import replacing, write_whole
 from terrain.scenarios.limits import Limits
 from terrain.viewer import results
 from terrain.viewer.pictures.animation import write_animation
