@@ -1,9 +1,9 @@
 """Environments in which drives are repeated, each in a process of its own, and the digests of what happened there.
 
 Other CPUs are emulated: OpenBLAS and numpy can be set to an older one, numba to compile for any. With
-MBF_SAME_BYTES=all every drive is repeated on an old CPU, as on Haswell and with kernels compiled anew for a generic
-CPU, as ``.ci/run`` does, and a few drives on two more, whose libraries take the same steps as Haswell's and this
-machine's; without it a few drives in fewer environments.
+MBF_SAME_BYTES=all, as in ``.ci/run``, every drive is repeated as on Haswell, and on an old CPU with kernels compiled
+anew for a generic one. A few drives are repeated in the other environments, whose libraries take the same steps as in
+one of these two or on this machine. Without it a few drives in fewer environments.
 """
 
 import json
@@ -35,7 +35,7 @@ ENVIRONMENTS = {
     "Haswell": NO_AVX_512 | {"OPENBLAS_CORETYPE": "Haswell", "PYTHONHASHSEED": "2", "OPENBLAS_NUM_THREADS": "2"},
     "Zen, abroad": NO_AVX_512 | ABROAD | {"OPENBLAS_CORETYPE": "Zen", "PYTHONHASHSEED": "3"},
 }
-FEW_DRIVES = {"Zen, abroad", "Skylake-X"}
+FEW_DRIVES = {"an old CPU", "Zen, abroad", "Skylake-X"}
 IN_CI = {
     "Skylake-X": {"OPENBLAS_CORETYPE": "SkylakeX", "PYTHONHASHSEED": "4"},
     "kernels compiled anew for a generic CPU": OLDEST | ABROAD | {"NUMBA_CPU_NAME": "generic"},
