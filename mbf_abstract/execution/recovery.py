@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
 from mbf_abstract.drive.velocity_gate import Lease
 from mbf_abstract.execution.plugin_answer import PluginFault
 from mbf_abstract.execution.plugin_run import PluginRun
 from mbf_abstract.geometry import Command, Pose, Twist
 from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.parameters import with_changes
 from mbf_abstract.plugins import AbstractRecovery, RecoveryRequest, RecoveryResult
 from mbf_abstract.time.clock import Stopwatch
 
@@ -75,10 +80,10 @@ class GatedMotion:
 
 
 class RecoveryExecution:
-    """One recovery goal's call of its behaviour."""
+    """One recovery goal's call of its behaviour, with parameters of the goal in the place of its own."""
 
-    def __init__(self, run: PluginRun[AbstractRecovery]) -> None:
-        self._run = run
+    def __init__(self, run: PluginRun[AbstractRecovery], parameters: Mapping[str, Any]) -> None:
+        self._run, self._parameters = run, parameters
         self.motion = GatedMotion(run)
 
     def execute(self) -> RecoveryResult:
@@ -105,4 +110,23 @@ class RecoveryExecution:
     def _call(self) -> RecoveryResult:
         behavior = self._run.plugin.instance
         request = RecoveryRequest(self.motion, self._run.handle.cancel_token)
-        return self._run.ask_reported("run_behavior", lambda: behavior.run_behavior(request), RecoveryResult)
+
+        def run() -> RecoveryResult:
+            with self._own_parameters(behavior):
+                return behavior.run_behavior(request)
+
+        return self._run.ask_reported("run_behavior", run, RecoveryResult)
+
+    @contextmanager
+    def _own_parameters(self, behavior: AbstractRecovery) -> Iterator[None]:
+        """Let the behaviour, which nobody else uses meanwhile, have the goal's parameters."""
+        if not self._parameters:
+            yield
+            return
+        usual, behavior.parameters = behavior.parameters, with_changes(behavior.parameters, self._parameters)
+        try:
+            behavior.parameters_changed()
+            yield
+        finally:
+            behavior.parameters = usual
+            behavior.parameters_changed()

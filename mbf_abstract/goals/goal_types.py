@@ -6,8 +6,9 @@ a goal object can be sent any number of times.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from mbf_abstract.geometry import Command, Path, Pose
 from mbf_abstract.goals.goal_area import GoalArea
@@ -65,10 +66,17 @@ class ExePathGoal:
 
 @dataclass(frozen=True)
 class RecoveryGoal:
-    """Run a recovery behaviour."""
+    """Run a recovery behaviour.
+
+    Attributes
+    ----------
+    parameters : mapping
+        Values of parameters of the behaviour for this run only, e.g. ``{"angle": 1.57}`` for ``rotate``.
+    """
 
     behavior: str = ""
     concurrency_slot: int = 0
+    parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,13 @@ class MapQueries:
             check = served.map.pose_check(query, center_only=path_cells_only)
             return check_path(check, self._transforms.transform_path(path, served.map.frame_id), return_on, skip_poses)
 
+    def check_poses(self, path: Path, query: PlaceQuery = AS_CONFIGURED) -> tuple[PlaceAnswer, ...]:
+        """State and summed cost of the robot's outline at each pose of a path, all on one state of the map."""
+        served = self._of(query)
+        with served.in_use():
+            check: PlaceCheck = served.map.pose_check(query)
+            return tuple(check(pose) for pose in self._transforms.transform_path(path, served.map.frame_id))
+
     def find_valid_pose(
         self, pose: Pose | None, dist_tolerance: float, angle_tolerance: float, query: PlaceQuery = AS_CONFIGURED
     ) -> PoseAnswer:
@@ -120,26 +127,48 @@ class MapQueries:
 
     def _tracking(self) -> tuple[Served, tuple[TrackedObject, ...]]:
         """The first map that knows objects, the local one first, and they."""
-        for served in self._all():
+        for served in self._chosen(None):
             with served.in_use():
                 if objects := served.tracked_objects():
                     return served, objects
         return self._global, ()
 
-    def clear_map(self) -> None:
-        """Forget what sensors have marked, on the local map first, and update the maps."""
-        for served in self._all():
-            served.map.clear()
-        self.update_map()
+    def clear_map(self, local: bool | None = None) -> None:
+        """Forget what sensors have marked, and update the maps, the local one first.
 
-    def update_map(self) -> None:
+        ``local`` chooses the local or the global map only; None = both.
+        """
+        for served in self._chosen(local):
+            served.map.clear()
+        self.update_map(local)
+
+    def clear_area(self, size: float, local: bool | None = None, *, inside: bool = True) -> None:
+        """Do the same within a square of side ``size`` [m] around the robot, or everywhere else.
+
+        Raises
+        ------
+        ValueError
+            The size is not positive and finite.
+        RobotStateError
+            It is not known where the robot is.
+        """
+        if not 0.0 < size < math.inf:
+            raise ValueError(f"the area to clear must have a finite size above 0 m, got {size}")
+        for served in self._chosen(local):
+            served.map.clear_area(self._on(served, None), size, inside=inside)
+        self.update_map(local)
+
+    def update_map(self, local: bool | None = None) -> None:
         """Bring the maps up to date now, the local one first."""
-        for served in self._all():
+        for served in self._chosen(local):
             with served.in_use():
                 served.update()
 
-    def _all(self) -> list[Served]:
-        return [self._local, self._global] if self._local is not self._global else [self._global]
+    def _chosen(self, local: bool | None) -> list[Served]:
+        """The local map, the global one, or both; once where a server has only one."""
+        if local is not None or self._local is self._global:
+            return [self._local if local else self._global]
+        return [self._local, self._global]
 
     def _of(self, query: PlaceQuery) -> Served:
         return self._local if query.local else self._global

@@ -14,13 +14,28 @@ from typing import Any, TypeAlias
 from mbf_abstract.event_values import error_text
 from mbf_abstract.goals.goal_types import ActionResult
 from mbf_abstract.goals.handle import AnyGoalHandle, GoalStatus
-from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
+from mbf_abstract.outcomes import (
+    ExePathOutcome,
+    GetPathOutcome,
+    MoveBaseOutcome,
+    RecoveryOutcome,
+    RefinePathOutcome,
+)
 from mbf_ros.messages import mbf_actions
 from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
 from mbf_ros.messages.geometry import MessageContext
+from mbf_ros.messages.interfaces import Message
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
 
-Outcomes: TypeAlias = type[GetPathOutcome] | type[ExePathOutcome] | type[RecoveryOutcome] | type[MoveBaseOutcome]
+Outcomes: TypeAlias = (
+    type[GetPathOutcome]
+    | type[ExePathOutcome]
+    | type[RecoveryOutcome]
+    | type[RefinePathOutcome]
+    | type[MoveBaseOutcome]
+)
+More: TypeAlias = Callable[[], Message]
+"""Further fields of feedback and result, as they are now."""
 ACTIONS: dict[str, tuple[ActionMapping[Any, Any], Outcomes]] = {
     "get_path": (mbf_actions.GET_PATH, GetPathOutcome),
     "exe_path": (mbf_actions.EXE_PATH, ExePathOutcome),
@@ -39,7 +54,10 @@ class ServedAction:
     ----------
     node : rclpy.node.Node
     name : str
-        One of ``ACTIONS``.
+        As clients know it; ``~/`` stands for the name of the node.
+    mapping : ActionMapping
+    outcomes : type of enum
+        Those of its results.
     send : callable
         Sends a goal of ours.
     context : callable
@@ -48,6 +66,8 @@ class ServedAction:
         Why no goals are taken; empty if they are.
     on_fault : callable
         Takes an exception that no goal may raise.
+    more : callable
+        Called with each goal as it begins; returns what gives the fields of feedback and result that are not in ours.
 
     Attributes
     ----------
@@ -59,16 +79,19 @@ class ServedAction:
         self,
         node: Any,
         name: str,
+        mapping: ActionMapping[Any, Any],
+        outcomes: Outcomes,
         send: Callable[[Any], AnyGoalHandle],
         context: Callable[[], MessageContext],
         refusal: Callable[[], str],
         on_fault: Callable[[Exception], None],
+        more: Callable[[AnyGoalHandle], More] = lambda handle: dict,
     ) -> None:
         from rclpy.action import ActionServer
 
         self._node, self._send, self._context = node, send, context
         self._refusal, self._on_fault = refusal, on_fault
-        self._mapping, self._outcomes = ACTIONS[name]
+        self._mapping, self._outcomes, self._more = mapping, outcomes, more
         self._class = interface_class(self._mapping.type)
         self._goals: dict[bytes, AnyGoalHandle] = {}
         self._jumps: dict[bytes, str] = {}
@@ -76,7 +99,7 @@ class ServedAction:
         ActionServer(
             node,
             self._class,
-            f"~/{name}",
+            name,
             execute_callback=self._execute,
             goal_callback=self._accept,
             cancel_callback=self._cancel,
@@ -126,8 +149,7 @@ class ServedAction:
     async def _ended(self, goal_handle: Any) -> tuple[Any, GoalStatus]:
         """Run one goal; returns message and status. Of an exception rclpy would make the outcome 0, a success."""
         try:
-            result, status = await self._run(goal_handle)
-            return self._message(result), status
+            return await self._run(goal_handle)
         except RefusedGoal as error:
             return self._message(self._mapping.refused(error.outcome, str(error))), GoalStatus.REJECTED
         except Exception as error:  # a fault of ours
@@ -135,22 +157,22 @@ class ServedAction:
             text = f"{type(error).__name__}: {error_text(error)}"
             return self._message(self._mapping.refused(self._outcomes.INTERNAL_ERROR, text)), GoalStatus.ABORTED
 
-    def _message(self, result: ActionResult) -> Any:
-        return fill(self._class.Result(), self._mapping.result(result, self._context()))
+    def _message(self, result: ActionResult, more: More = dict) -> Any:
+        return fill(self._class.Result(), {**self._mapping.result(result, self._context()), **more()})
 
-    async def _run(self, goal_handle: Any) -> tuple[ActionResult, GoalStatus]:
+    async def _run(self, goal_handle: Any) -> tuple[Any, GoalStatus]:
         from rclpy.task import Future
 
         key = bytes(goal_handle.goal_id.uuid)
         handle = self._send(self._mapping.goal_of(to_dict(goal_handle.request), self._context()))
         if goal_handle.is_cancel_requested:  # before this coroutine had its first turn
             handle.cancel("canceled by the client")
-        self._goals[key] = handle
+        self._goals[key], more = handle, self._more(handle)
         try:
             executor = self._node.executor
             ended = Future(executor=executor)
             if self._mapping.feedback is not None:
-                handle.add_feedback_callback(lambda feedback: self._publish_feedback(goal_handle, feedback))
+                handle.add_feedback_callback(lambda feedback: self._publish_feedback(goal_handle, feedback, more))
             handle.add_done_callback(lambda done: executor.create_task(ended.set_result, done))
             await ended
         except Exception:
@@ -161,11 +183,12 @@ class ServedAction:
         assert handle.result is not None
         jump = self._jumps.pop(key, "")
         if jump and handle.status is GoalStatus.CANCELED:
-            return self._mapping.refused(self._outcomes.TF_ERROR, jump), GoalStatus.ABORTED
-        return handle.result, handle.status
+            tf_error = self._outcomes.__members__.get("TF_ERROR", self._outcomes.FAILURE)
+            return self._message(self._mapping.refused(tf_error, jump), more), GoalStatus.ABORTED
+        return self._message(handle.result, more), handle.status
 
-    def _publish_feedback(self, goal_handle: Any, feedback: Any) -> None:
+    def _publish_feedback(self, goal_handle: Any, feedback: Any, more: More) -> None:
         """Publish a feedback, on the thread of callbacks."""
         assert self._mapping.feedback is not None
-        message = fill(self._class.Feedback(), self._mapping.feedback(feedback, self._context()))
-        goal_handle.publish_feedback(message)
+        values = {**self._mapping.feedback(feedback, self._context()), **more()}
+        goal_handle.publish_feedback(fill(self._class.Feedback(), values))

@@ -130,7 +130,8 @@ class NavigationNode:
         NodeParameters(self._node, server)
         self._open_topics(config)
         self._actions = [
-            ServedAction(self._node, name, self._send, self._context, self._refusal, self._fail) for name in ACTIONS
+            ServedAction(self._node, f"~/{name}", *action, self._send, self._context, self._refusal, self._fail)
+            for name, action in ACTIONS.items()
         ]
         self._closing.callback(self._stop_serving)
         ServedQueries(self._node, server, self._context)
