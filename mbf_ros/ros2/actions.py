@@ -3,12 +3,14 @@
 Goals wait as coroutines of the executor, not on threads. What navigation refuses, or what means nothing, is accepted
 and ends aborted with outcome and text, as a rejected goal of ROS 2 has no result; see decision 0023. Rejected are goals
 beyond ``MAX_GOALS`` and those that come before the node is ready or while it ends. A goal that a newer one has taken
-over ends aborted with the outcome CANCELED: ROS 2 knows a canceled goal only where its client has asked for that.
+over ends aborted with the outcome CANCELED: ROS 2 knows a canceled goal only where its client has asked for that. So
+does one whose client is gone; see ``clients``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TypeAlias
 
 from mbf_abstract.event_values import error_text
@@ -25,6 +27,7 @@ from mbf_ros.messages import mbf_actions
 from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message
+from mbf_ros.ros2.clients import GoalClients, feedback_listeners
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
 
 Outcomes: TypeAlias = (
@@ -95,6 +98,7 @@ class ServedAction:
         self._class = interface_class(self._mapping.type)
         self._goals: dict[bytes, AnyGoalHandle] = {}
         self._jumps: dict[bytes, str] = {}
+        self._clients = GoalClients(partial(feedback_listeners, node, name))
         self.unfinished = 0
         ActionServer(
             node,
@@ -110,6 +114,13 @@ class ServedAction:
         for key, handle in self._goals.items():
             self._jumps[key] = message
             handle.cancel(message)
+
+    def cancel_abandoned(self) -> None:
+        """Cancel the goals whose clients are gone; on the executor's thread."""
+        for handle in map(self._goals.get, self._clients.abandoned(self._goals)):
+            if handle is not None and not handle.cancel_requested:
+                self._node.get_logger().warning(f"{self._mapping.type}: goal canceled: its client is gone")
+                handle.cancel("its client is gone")
 
     # ------------------------------------------------------------------- all of these on the executor's thread
     def _accept(self, request: Any) -> Any:
@@ -168,6 +179,7 @@ class ServedAction:
         if goal_handle.is_cancel_requested:  # before this coroutine had its first turn
             handle.cancel("canceled by the client")
         self._goals[key], more = handle, self._more(handle)
+        self._clients.welcome(key)
         try:
             executor = self._node.executor
             ended = Future(executor=executor)

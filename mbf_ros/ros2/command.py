@@ -37,6 +37,9 @@ def ros2(
         min=0.0,
         help="Time without odometry, transforms or a sensor at which the robot stops, in s; 0 = command_timeout.",
     ),
+    keep_goals: bool = typer.Option(
+        False, "--keep-goals", help="A goal goes on when its client is gone; else it is canceled."
+    ),
     ros_arguments: list[str] = typer.Argument(
         None,
         metavar="[-- ROS ARGUMENTS]",
@@ -49,7 +52,7 @@ def ros2(
         from mbf_ros.ros2.options import NodeOptions
         from mbf_ros.sensor_options import sensors_of
 
-        options = NodeOptions(stamped, max_silence or None, sensors_of(sensor), tuple(ros_arguments or ()))
+        options = NodeOptions(stamped, max_silence or None, sensors_of(sensor), keep_goals, tuple(ros_arguments or ()))
         with navigation_node(config, options) as node:
             _wait_for_end(node)
     if node.failure:

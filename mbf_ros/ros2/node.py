@@ -7,7 +7,7 @@ threads of their own. Where a callback raises, or that thread ends for another r
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,7 @@ CLOCK = "/clock"
 COMPILING = "compiling kernels"
 WATCH_PERIOD = 0.05  # s of real time between two looks at what fails to come
 CALENDAR_PERIOD = 0.1  # s between two looks at the calendar
+CLIENT_PERIOD = 0.5  # s of real time between two looks at who is gone
 
 
 class RosError(ValueError):
@@ -134,6 +135,8 @@ class NavigationNode:
             for name, action in ACTIONS.items()
         ]
         self._closing.callback(self._stop_serving)
+        if not self._options.keep_goals:
+            self._repeat(CLIENT_PERIOD, self._cancel_abandoned)
         ServedQueries(self._node, server, self._context)
         clock.on_jump.append(self._on_jump)
         watch = Ticker(self._real_time, session.events, self._stop_where_silent, WATCH_PERIOD, "silence watch")
@@ -154,13 +157,16 @@ class NavigationNode:
 
     def _make_clock(self) -> RosClock:
         if not self._node.get_parameter("use_sim_time").value:
-            from rclpy.clock import Clock, ClockType
-
             clock = RosClock(unix_seconds())
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self._node.create_timer(CALENDAR_PERIOD, lambda: clock.follow(unix_seconds()), clock=steady)
+            self._repeat(CALENDAR_PERIOD, lambda: clock.follow(unix_seconds()))
             return clock
         return self._simulated_clock()
+
+    def _repeat(self, period: float, call: Callable[[], object]) -> None:
+        """Call each ``period`` [s] of real time, on the executor's thread."""
+        from rclpy.clock import Clock, ClockType
+
+        self._node.create_timer(period, call, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _simulated_clock(self) -> RosClock:
         from rclpy.qos import qos_profile_sensor_data
@@ -221,6 +227,10 @@ class NavigationNode:
     def _stop_where_silent(self) -> None:
         if problem := self._robot.problem():
             self._session.navigator.server.runtime.gate.ask_stop(problem)
+
+    def _cancel_abandoned(self) -> None:
+        for action in self._actions:
+            action.cancel_abandoned()
 
     def _on_jump(self, difference: float) -> None:
         """End what was begun before ROS time jumped, and forget where frames were; static ones stay."""

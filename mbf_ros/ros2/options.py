@@ -18,6 +18,8 @@ class NodeOptions:
         Longest time [s] without odometry, transforms, a sensor or simulated time; that of ``command_timeout`` if None.
     sensors : mapping of str to (str, str)
         Type, one of ``messages.sensors.SENSORS``, and source in the configuration, by topic.
+    keep_goals : bool
+        Let a goal go on when its client is gone, instead of canceling it.
     ros_arguments : sequence of str
         As after ``--ros-args``: remappings, parameters, log level.
     time_to_end : float
@@ -29,6 +31,7 @@ class NodeOptions:
     stamped_commands: bool = False
     max_silence: float | None = None
     sensors: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    keep_goals: bool = False
     ros_arguments: tuple[str, ...] = ()
     time_to_end: float = 2.0
     time_to_send: float = 0.5

@@ -117,13 +117,13 @@ def free_domain(root, closing):
 class Peer:
     """A process that writes JSON, one value a line, and takes orders on its standard input; its log is in ``logs``."""
 
-    def __init__(self, folder, domain, logs, *command):
+    def __init__(self, folder, domain, logs, *command, **variables):
         python = str(folder / "venv" / "bin" / "python")
         self._log = open(logs / f"{Path(command[0]).stem}.txt", "a")
         self._over = False
         self.process = subprocess.Popen(
             [python, *command],
-            env={**clean_variables(folder, domain), "ROS_LOG_DIR": str(logs)},
+            env={**clean_variables(folder, domain), "ROS_LOG_DIR": str(logs), **variables},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._log,
@@ -206,7 +206,8 @@ class Client(Peer):
     """The client of ``peers/client.py``."""
 
     def __init__(self, folder, domain, logs):
-        super().__init__(folder, domain, logs, str(PEERS / "client.py"))
+        lease = str(PEERS / "client_lease.xml")
+        super().__init__(folder, domain, logs, str(PEERS / "client.py"), FASTDDS_DEFAULT_PROFILES_FILE=lease)
         self._keys = 0
 
     def do(self, **order):
@@ -264,8 +265,8 @@ class Trio:
     def start_robot(self):
         self.robot = self._start(Robot, *self._robot_arguments)
 
-    def start_node(self):
-        self.node = self._start(Peer, str(PEERS / "node.py"), str(self._file), *self._node_arguments)
+    def start_node(self, *options):
+        self.node = self._start(Peer, str(PEERS / "node.py"), str(self._file), *options, *self._node_arguments)
 
     def start_client(self):
         self.client = self._start(Client)

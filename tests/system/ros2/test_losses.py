@@ -33,14 +33,28 @@ def test_a_robot_of_which_nothing_is_heard_is_stopped_and_goes_on_when_it_is_hea
     assert trio.cancel(goal)["status"] == "canceled"
 
 
-def test_the_goal_of_a_new_client_takes_over_that_of_a_killed_one(trio):
+def test_the_robot_is_stopped_when_the_client_of_its_goal_is_killed_and_the_next_goal_works(trio):
     trio.drive()
+    before = len(trio.robot.lines)
     trio.client.kill()
+    trio.robot.wait_for_speed(lambda speed: speed == 0.0, before)
     trio.start_client()
     trio.client.meet()
-    trio.robot.wait_for_speed(lambda speed: speed > 0.0, len(trio.robot.lines))
     goal = trio.client.result("move_base", target=[trio.robot.x, 0.0])
     assert goal == ("succeeded", MoveBaseOutcome.SUCCESS)
+
+
+def test_the_goal_of_a_killed_client_goes_on_where_that_is_asked_for(trio):
+    trio.node.kill()
+    trio.start_node("--keep-goals")
+    trio.wait_until_ready()
+    target = trio.robot.x + 10.0
+    trio.client.send("move_base", target=[target, 0.0])
+    before = len(trio.robot.lines)
+    trio.client.kill()
+    trio.robot.wait_for(lambda line: line.get("speed") == 0.0 and abs(line["x"] - target) < 0.3, before)
+    trio.start_client()
+    trio.client.meet()
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 128 + signal.SIGTERM)])
