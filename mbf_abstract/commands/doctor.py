@@ -75,6 +75,7 @@ def examine() -> Iterator[Finding]:
     for name in POINT_CLOUDS:
         yield _package(name, "only for .las and .laz in mbf map build: pip install 'mbf-flex[maps]'", optional=True)
     yield _package("websockets", "only for mbf bridge serve: pip install 'mbf-flex[bridge]'", optional=True)
+    yield _package("rosbags", "only for mbf bag: pip install 'mbf-flex[bags]'", optional=True)
     yield _package("rerun", "only for mbf replay --rrd, Python >= 3.11: pip install 'mbf-flex[rerun]'", optional=True)
     yield _check("plugins", _plugins, "mbf plugins lists which and why")
     yield _check("kernel cache", _kernel_cache, "set NUMBA_CACHE_DIR to a folder that can be written")

@@ -160,10 +160,17 @@ def _draw_actors(axes: Axes, recording: Recording) -> None:
 
 
 def _draw_track(axes: Axes, recording: Recording, colour: Colour = DRIVEN, label: str = "driven track") -> None:
-    if len(recording.poses):
-        _line(axes, recording.poses[:, :2], colour, 1.5, zorder=6, label=label)
-        heading = Pose((0, 0, 0), tuple(recording.poses[-1, 3:].tolist()))
-        outline = recording.robot.footprint @ heading.rotation[:2, :2].T + recording.poses[-1, :2]
+    draw_track(axes, recording.poses, recording.robot.footprint, colour, label)
+
+
+def draw_track(
+    axes: Axes, poses: FloatArray, footprint: FloatArray, colour: Colour = DRIVEN, label: str = "driven track"
+) -> None:
+    """Draw the track of poses (n, 7), and the footprint (m, 2) [m] at the last one; nothing without poses."""
+    if len(poses):
+        _line(axes, poses[:, :2], colour, 1.5, zorder=6, label=label)
+        heading = Pose((0, 0, 0), tuple(poses[-1, 3:].tolist()))
+        outline = footprint @ heading.rotation[:2, :2].T + poses[-1, :2]
         axes.fill(*outline.T, facecolor=np.array(colour) / 255.0, edgecolor="white", linewidth=0.8, zorder=8)
 
 

@@ -29,12 +29,9 @@ def write_plan_picture(
     file: str | Path, view: MapView | None, start: Pose, goal: Pose, path: PlannedPath | None, title: str
 ) -> None:
     """Draw a plan into a PNG file; raises ViewerMissing without matplotlib."""
-    figure, axes = new_figure(_extent(view, start, goal))
-    if isinstance(view, GridView):
-        _draw_grid(axes, view)
-    elif isinstance(view, MeshView):
-        colours = cost_colours(view.costs).astype(np.uint8)
-        draw_triangles(axes, *shaded_triangles(Surface(view.vertices, view.faces), colours))
+    figure, axes = new_figure(map_extent(view, start, goal))
+    if view is not None:
+        draw_map(axes, view)
     if path is not None:
         draw_paths(axes, [(0.0, path.positions)])
     draw_marks(axes, start, (goal,))
@@ -42,6 +39,17 @@ def write_plan_picture(
     axes.set_title(f"{title} · {length}", loc="left", fontsize=11, fontweight="bold", parse_math=False)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=3, frameon=False, fontsize=9)
     write_whole(file, png_bytes(figure))
+
+
+def draw_map(axes: Axes, view: MapView) -> None:
+    """Draw the costs of a grid, or of a mesh in the light."""
+    if isinstance(view, MeshView):
+        colours = cost_colours(view.costs).astype(np.uint8)
+        draw_triangles(axes, *shaded_triangles(Surface(view.vertices, view.faces), colours))
+        return
+    small = shrunk(view, MOST_PIXELS)
+    pixels = cost_colours(small.costs).astype(np.uint8)
+    axes.imshow(pixels, origin="lower", extent=small.extent, interpolation="nearest", zorder=1)
 
 
 def cost_colours(costs: np.typing.NDArray[np.float32]) -> np.typing.NDArray[np.float64]:
@@ -70,13 +78,8 @@ def shrunk(view: GridView, most: int) -> GridView:
     return GridView(np.array(rows, dtype=np.float32), (x_min, x_max, y_min, y_max))
 
 
-def _draw_grid(axes: Axes, view: GridView) -> None:
-    small = shrunk(view, MOST_PIXELS)
-    pixels = cost_colours(small.costs).astype(np.uint8)
-    axes.imshow(pixels, origin="lower", extent=small.extent, interpolation="nearest", zorder=1)
-
-
-def _extent(view: MapView | None, start: Pose, goal: Pose) -> tuple[float, float, float, float]:
+def map_extent(view: MapView | None, start: Pose, goal: Pose) -> tuple[float, float, float, float]:
+    """What a picture shows [m]: x_min, x_max, y_min, y_max of the grid; of mesh, start and goal with a margin."""
     if isinstance(view, GridView):
         return view.extent
     ends = np.array([start.position, goal.position])

@@ -1,0 +1,119 @@
+"""The command ``mbf bag``: bags of ROS replayed through our layers."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from mbf_abstract.commands.coordinates import CoordinateCommand, parse_place
+from mbf_abstract.commands.reporting import FAILURE, readable_errors
+from mbf_abstract.commands.waiting import waiting
+
+if TYPE_CHECKING:
+    from mbf_abstract.geometry.transform import Transform
+    from mbf_ros.bags.replay import Replayed
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the application ``mbf``."""
+    bag = typer.Typer(help="Bags of ROS 1 and ROS 2, without ROS.", no_args_is_help=True)
+    bag.command("replay", cls=CoordinateCommand)(replay)
+    app.add_typer(bag, name="bag")
+
+
+def replay(
+    bag: Path = typer.Argument(..., help="A .bag file of ROS 1; a folder, .mcap or .db3 file of ROS 2."),
+    config: Path = typer.Argument(..., help="Configuration of the robot: its maps, layers and planners."),
+    out: Path | None = typer.Option(None, "--out", help="Folder for the results; replays/<name> if not given."),
+    goal: str = typer.Option("", "--goal", metavar="X Y [Z] [YAW]", help="Plan to this place [m, rad]."),
+    at: float = typer.Option(math.inf, "--at", min=0.0, help="With --goal: plan so many seconds after the beginning."),
+    planner: str = typer.Option("", "--planner", help="With --goal: name of the planner; the first one if not given."),
+    topic: list[str] = typer.Option(
+        [], "--topic", metavar="WHAT=TOPIC", help="Topic of tf, tf_static, odom or a source of CONFIG; empty for none."
+    ),
+    tf: list[str] = typer.Option(
+        [], "--tf", metavar="PARENT:CHILD=X,Y,Z,YAW", help="A transform that does not change and is not in the bag."
+    ),
+    odom_tf: bool = typer.Option(False, "--odom-tf", help="Take the poses of odometry for transforms."),
+    map_name: str = typer.Option("", "--map", help="Which map or layer to show; what planners see if not given."),
+    every: float = typer.Option(0.0, "--every", min=0.0, help="Seconds between two pictures; ten pictures if 0."),
+    as_json: bool = typer.Option(False, "--json", help="Print statistics and plan as one JSON object."),
+) -> None:
+    """Replay a bag through transform buffer and layers; exit code 1 if a plan was asked for and failed.
+
+    Results: report.html, statistics.json, plan.json, run.mcap, and the map over time in pictures.
+    """
+    place = parse_place(goal, "--goal") if goal else None
+    if place is None and (math.isfinite(at) or planner):
+        raise typer.BadParameter("needs a goal", param_hint="--at" if math.isfinite(at) else "--planner")
+    with readable_errors():
+        from mbf_abstract.drive_log import write_drive_log
+        from mbf_abstract.server.factory import read_config
+        from mbf_ros.bags.reading import open_bag
+        from mbf_ros.bags.replay import ReplayOptions, replay_bag
+        from mbf_ros.bags.report import report_of, result_line, statistics_of
+
+        options = ReplayOptions(_pairs(topic), _transforms(tf), odom_tf, map_name, place, at, planner, every)
+        folder = out or Path("replays") / bag.resolve().stem
+        with waiting("reading the configuration") as on_step:
+            with open_bag(bag) as opened:
+                replayed = replay_bag(opened, *read_config(config), options, on_step)
+            on_step("writing the results")
+            folder.mkdir(parents=True, exist_ok=True)
+            _write_json(folder / "statistics.json", {"bag": bag.name, **statistics_of(replayed)})
+            (folder / "plan.json").unlink(missing_ok=True)
+            if replayed.plan is not None:
+                _write_json(folder / "plan.json", replayed.plan)
+            problems = write_drive_log(folder, replayed.log, report_of(replayed))
+        for problem in problems:
+            typer.echo(f"note: {problem}", err=True)
+        if as_json:
+            typer.echo(json.dumps({**statistics_of(replayed), "plan": replayed.plan, "folder": str(folder)}))
+        else:
+            typer.echo(result_line(replayed))
+            typer.echo(f"results in {folder}: report.html, statistics.json, run.mcap, map_*.png")
+    if _has_failed(replayed):
+        raise typer.Exit(FAILURE)
+
+
+def _has_failed(replayed: Replayed) -> bool:
+    from mbf_abstract.outcomes import is_success
+
+    return replayed.plan is not None and not is_success(replayed.plan["outcome"])
+
+
+def _write_json(file: Path, content: Any) -> None:
+    file.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _pairs(texts: list[str]) -> dict[str, str]:
+    pairs = {}
+    for text in texts:
+        what, equals, topic = text.partition("=")
+        if not what or not equals:
+            raise ValueError(f"--topic must be WHAT=TOPIC, got {text!r}")
+        pairs[what] = topic
+    return pairs
+
+
+def _transforms(texts: list[str]) -> tuple[Transform, ...]:
+    """Transforms of ``PARENT:CHILD=X,Y,Z,YAW``."""
+    from mbf_abstract.geometry import Pose
+    from mbf_abstract.geometry.transform import Transform
+
+    found = []
+    for text in texts:
+        names, _, numbers = text.partition("=")
+        parent, _, child = names.partition(":")
+        try:
+            x, y, z, yaw = (float(number) for number in numbers.split(","))
+            pose = Pose.planar(x, y, yaw, z)
+        except ValueError as error:
+            raise ValueError(f"--tf must be PARENT:CHILD=X,Y,Z,YAW in metres and radians, got {text!r}") from error
+        parent, child = parent.lstrip("/"), child.lstrip("/")
+        found.append(Transform(pose.position, pose.orientation, parent, child, static=True))
+    return tuple(found)

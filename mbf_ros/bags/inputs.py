@@ -1,0 +1,144 @@
+"""Messages of a bag on their way to the transform buffer, the robot and the layers, counted on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+from mbf_abstract.drive.robot import Odometry
+from mbf_abstract.event_values import error_text
+from mbf_abstract.geometry import Command
+from mbf_abstract.geometry.transform import Transform, TransformError
+from mbf_abstract.geometry.transform_buffer import MAX_LEAD, TransformBuffer
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.server.map_server import MapServer
+from mbf_ros.bags.reading import Bag, Recorded
+from mbf_ros.bags.recorded_time import RecordedTime
+from mbf_ros.bags.statistics import FrameStatistics, TopicStatistics, reason_of
+from mbf_ros.bags.topics import BagTopics
+from mbf_ros.messages.geometry import MessageContext, odometry_of, quaternion_of, transforms_of, vector_of
+from mbf_ros.messages.interfaces import Message
+from mbf_ros.messages.sensors import SENSORS
+
+FROM_FUTURE = "stamped in the future"
+
+
+class RecordedRobot:
+    """The robot of a bag: its odometry is what was recorded last, and commands to it are a mistake of the caller."""
+
+    def __init__(self) -> None:
+        self.last: Odometry | None = None
+
+    def send_command(self, command: Command) -> None:
+        """Do nothing: what was recorded cannot be steered."""
+
+    def odometry(self) -> Odometry | None:
+        """The last odometry; None before the first one."""
+        return self.last
+
+
+class BagInputs:
+    """Takes the messages of a bag, each at its time.
+
+    Parameters
+    ----------
+    bag : Bag
+    topics : BagTopics
+    time : RecordedTime
+    server : MapServer
+        Its transform buffer and its maps are fed.
+    robot : RecordedRobot
+    odometry_as_transform : bool
+        Take the poses of odometry for the transform from its frame to its child frame.
+
+    Attributes
+    ----------
+    topics : dict of str to TopicStatistics
+    frames : dict of str to FrameStatistics
+        By child frame.
+    scan_listeners : list of callables
+        Called with each scan that a map has taken.
+    """
+
+    def __init__(
+        self,
+        bag: Bag,
+        topics: BagTopics,
+        time: RecordedTime,
+        server: MapServer,
+        robot: RecordedRobot,
+        odometry_as_transform: bool,
+    ) -> None:
+        self.topics = {topic: TopicStatistics(kind, topics.used_as(topic)) for topic, kind in sorted(bag.types.items())}
+        self.frames: dict[str, FrameStatistics] = {}
+        self.scan_listeners: list[Callable[[RangeScan], None]] = []
+        self._bag, self._time, self._server, self._robot = bag, time, server, robot
+        self._odometry_as_transform = odometry_as_transform
+        self._take: dict[str, Callable[[TopicStatistics, Message, float], None]] = {
+            topics.transforms: self._take_transforms,
+            topics.static: self._take_static,
+            topics.odometry: self._take_odometry,
+            **{topic: partial(self._take_scan, *sensor) for topic, sensor in topics.sensors.items()},
+        }
+        for topic, statistics in self.topics.items():
+            if statistics.used_as:
+                bag.require(topic)
+
+    def take(self, recorded: Recorded, now: float) -> None:
+        """Count a message that was recorded at our time ``now`` [s], and hand it on; one that is no use is counted."""
+        statistics = self.topics[recorded.topic]
+        statistics.recorded.take(now - self._time.began)
+        if not statistics.used_as:
+            return
+        try:
+            self._take[recorded.topic](statistics, self._bag.decode(recorded), now)
+        except (ValueError, TransformError) as error:
+            statistics.drop(reason_of(error), error_text(error))
+
+    @property
+    def _context(self) -> MessageContext:
+        return self._time.context
+
+    @property
+    def _transforms(self) -> TransformBuffer:
+        return self._server.runtime.transforms
+
+    def _take_transforms(self, statistics: TopicStatistics, message: Message, now: float) -> None:
+        for transform in transforms_of(message, self._context, now):
+            self._set(statistics, transform, now)
+
+    def _take_static(self, statistics: TopicStatistics, message: Message, now: float) -> None:
+        for transform in transforms_of(message, self._context, now, static=True):
+            self._set(statistics, transform, now)
+
+    def _take_odometry(self, statistics: TopicStatistics, message: Message, now: float) -> None:
+        self._robot.last = odometry_of(message, self._context, now)
+        if self._odometry_as_transform:
+            body, parent = message["pose"]["pose"], self._context.frame(message["header"]["frame_id"])
+            child = message["child_frame_id"].lstrip("/") or self._server.runtime.robot.robot_frame
+            place = vector_of(body["position"]), quaternion_of(body["orientation"])
+            self._set(statistics, Transform(*place, parent, child, self._robot.last.stamp), now)
+        else:
+            statistics.delays.take(now - self._robot.last.stamp)
+
+    def _set(self, statistics: TopicStatistics, transform: Transform, now: float) -> None:
+        """Give the buffer a transform, and count it; the buffer ignores one from the future."""
+        seen = replace(transform, stamp=transform.stamp - self._time.began)
+        self.frames.setdefault(transform.child, FrameStatistics(transform.parent)).take(seen, now - self._time.began)
+        if not transform.static:
+            statistics.delays.take(now - transform.stamp)
+            if transform.stamp > now + MAX_LEAD:
+                text = f"{transform.parent}->{transform.child} is {transform.stamp - now:.3f} s ahead"
+                statistics.drop(FROM_FUTURE, text)
+        self._transforms.set(transform)
+
+    def _take_scan(self, kind: str, source: str, statistics: TopicStatistics, message: Message, now: float) -> None:
+        scan = SENSORS[kind](message, self._context, source, now)
+        statistics.delays.take(now - scan.stamp)
+        frames = {served.map.frame_id for served in self._server.served.values() if served.map.listens_to(source)}
+        exact = all(self._transforms.can_transform(frame, scan.frame_id, scan.stamp) for frame in frames)
+        self._server.take_scan(scan)
+        statistics.placed_by_newest += not exact
+        for listener in self.scan_listeners:
+            listener(scan)

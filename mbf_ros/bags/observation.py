@@ -1,0 +1,131 @@
+"""What is kept of a replay: the robot's poses, scans, and the map at several times, as a ``DriveLog``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from typing import TypeVar
+
+import numpy as np
+
+from mbf_abstract.drive_log import DriveLog, LoggedScan
+from mbf_abstract.events import Event
+from mbf_abstract.geometry import FloatArray, Path, Pose
+from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.maps.tracking.contact import RobotBox
+from mbf_abstract.maps.view import MapView
+from mbf_abstract.server.map_server import MapServer
+from mbf_ros.bags.inputs import RecordedRobot
+
+Thing = TypeVar("Thing")
+
+SCAN_PERIOD = 0.5  # s between two scans of a source that are kept
+CORNERS = 16  # of the outline of a round robot
+
+
+class Observation:
+    """Looks at a server while a bag is replayed into it.
+
+    Parameters
+    ----------
+    server : MapServer
+    robot : RecordedRobot
+    map_name : str
+        Which of ``server.map_views``; the first one if empty.
+    began : float
+        Our time [s] at which the bag begins: what is kept counts from there.
+    """
+
+    def __init__(self, server: MapServer, robot: RecordedRobot, map_name: str, began: float) -> None:
+        if map_name and map_name not in server.map_views:
+            raise ValueError(f"--map {map_name}: there is no such map, only {', '.join(server.map_views)}")
+        self._server, self._robot, self._map_name, self._began = server, robot, map_name, began
+        served = server.served.get(map_name) or next(iter(server.served.values()))
+        self.frame_id: str = served.map.frame_id
+        self.poses_unknown = 0
+        self._outline = outline_of(served.map.robot_box)
+        self._rows: list[list[float]] = []
+        self._scans: list[LoggedScan] = []
+        self._next_scan: dict[str, float] = {}
+        self._maps: list[tuple[float, MapView]] = []
+
+    def sample(self, now: float) -> None:
+        """Note where the robot is and how fast it moves; nothing while its pose is unknown or old."""
+        robot = self._server.runtime.robot
+        limits = {"now": now, "max_age": robot.max_pose_age}
+        try:
+            place = self._server.runtime.transforms.lookup(self.frame_id, robot.robot_frame, **limits)
+        except TransformError:
+            self.poses_unknown += 1
+            return
+        velocity = [math.nan] * 3
+        if self._robot.last is not None:
+            measured = self._robot.last.velocity
+            velocity = [measured.vx, measured.vy, measured.wz]
+        self._rows.append([now - self._began, *place.translation, *place.rotation, *velocity])
+
+    def take_scan(self, scan: RangeScan) -> None:
+        """Keep what a scan hit, unless one of its source was kept just before."""
+        if scan.stamp < self._next_scan.get(scan.source, -math.inf):
+            return
+        try:
+            placed = scan.in_frame(self.frame_id, self._server.runtime.transforms)
+        except TransformError:  # another map could place it
+            return
+        self._next_scan[scan.source] = scan.stamp + SCAN_PERIOD
+        self._scans.append(LoggedScan(max(scan.stamp - self._began, 0.0), placed.origin, placed.points))
+
+    def look_at_map(self, now: float) -> None:
+        """Keep what the map looks like."""
+        view = self._server.map_view(self._map_name)
+        if view is not None:
+            self._maps.append((now - self._began, view))
+
+    def log(
+        self, name: str, paths: Sequence[tuple[float, Path]], goal: Pose | None, outcome: int | None, message: str,
+        events: Sequence[Event],
+    ) -> DriveLog:  # fmt: skip
+        """Return what was kept, with plans from their times [s] on, and the goal they lead to."""
+        rows = np.array(self._rows, dtype=np.float64).reshape(-1, 11)
+        transforms = self._server.runtime.transforms
+        first = rows[0, 1:8].tolist() if len(rows) else [0.0] * 6 + [1.0]
+        return DriveLog(
+            name=name,
+            backend=self._server.config.backend,
+            frame_id=self.frame_id,
+            outline=self._outline,
+            start=Pose(tuple(first[:3]), tuple(first[3:]), self.frame_id),
+            goals=tuple(() if goal is None else self._shown([goal], transforms.transform_pose)),
+            times=rows[:, 0].copy(),
+            poses=rows[:, 1:8].copy(),
+            twists=rows[:, 8:11].copy(),
+            commands=np.full((len(rows), 3), np.nan),
+            paths=[
+                (time - self._began, shown.positions)
+                for time, path in paths
+                for shown in self._shown([path], transforms.transform_path)
+            ],
+            scans=self._scans,
+            maps=self._maps,
+            events=tuple(event for event in events if event.time >= self._began),
+            outcome=outcome,
+            message=message,
+        )
+
+    def _shown(self, things: Iterable[Thing], transform: Callable[[Thing, str], Thing]) -> Iterator[Thing]:
+        """Poses or paths in the frame of the map that is shown; not those that cannot be placed in it."""
+        for thing in things:
+            with suppress(TransformError):
+                yield transform(thing, self.frame_id)
+
+
+def outline_of(box: RobotBox) -> FloatArray:
+    """Corners (n, 2) [m] of a robot's box, counter-clockwise; of a polygon around a round robot."""
+    if box.radius > 0.0:
+        angles = 2.0 * math.pi * np.arange(CORNERS) / CORNERS
+        return box.radius * np.array([(math.cos(angle), math.sin(angle)) for angle in angles.tolist()])
+    return np.array(
+        [(box.back, box.right), (box.front, box.right), (box.front, box.left), (box.back, box.left)], dtype=np.float64
+    )

@@ -1,0 +1,108 @@
+"""Where the robot would have planned: one plan in the middle of a replay, which goes on meanwhile."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbf_abstract.commands.coordinates import Place
+from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult, RefinePathGoal
+from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.navigator import Navigator
+
+
+class ReplayedPlan:
+    """One plan from where the robot is to a goal, sent through the configuration's ``plan_refiner``.
+
+    Parameters
+    ----------
+    navigator : Navigator
+    place : Place
+    planner : str
+        Name; the first one if empty.
+
+    Attributes
+    ----------
+    goal : Pose
+    start : Pose or None
+        Where the robot was; None where that was not known.
+    time : float
+        When it was planned [s].
+    result : GetPathResult or None
+        Once it is there.
+    path : Path or None
+        The plan, refined.
+    note : str
+        Why the plan was not refined; empty if it was, or is not meant to be.
+    """
+
+    def __init__(self, navigator: Navigator, place: Place, planner: str) -> None:
+        self._navigator, self._planner = navigator, planner
+        server = navigator.server
+        if server.ground_is_level:
+            place = place.on_flat_map()
+        self.goal: Pose = server.ground_pose(place.x, place.y, place.yaw or 0.0)
+        if place.z is not None:
+            frame = server.config.parameters.global_frame
+            self.goal = Pose.planar(place.x, place.y, place.yaw or 0.0, place.z, frame_id=frame)
+        self.start: Pose | None = None
+        self.time = 0.0
+        self.result: GetPathResult | None = None
+        self.path: Path | None = None
+        self.note = ""
+        self._handle: AnyGoalHandle | None = None
+
+    def begin(self, now: float) -> None:
+        """Send the goal."""
+        self.time = now
+        try:
+            self.start = self._navigator.robot_pose()
+        except RobotStateError:
+            self.start = None  # the result says why
+        self._handle = self._navigator.send(GetPathGoal(self.goal, planner=self._planner))
+
+    def look(self) -> None:
+        """Take what is done by now; a plan is then refined."""
+        if self._handle is None or not self._handle.done:
+            return
+        handle, self._handle = self._handle, None
+        if self.result is None:
+            self._take_plan(handle.wait())
+        else:
+            self._take_refined(handle.wait())
+
+    def finish(self) -> None:
+        """Wait for what is still to come."""
+        while self._handle is not None:
+            self._handle.wait()
+            self.look()
+
+    def _take_plan(self, result: Any) -> None:
+        self.result, self.path = result, result.path
+        refiner = self._navigator.server.config.parameters.plan_refiner
+        if result.success and result.path is not None and refiner:
+            self._handle = self._navigator.send(RefinePathGoal(result.path, refiner))
+
+    def _take_refined(self, result: Any) -> None:
+        if result.success and result.refined_path is not None:
+            self.path = result.refined_path
+        else:
+            self.note = f"the plan was not refined: {result.outcome_name}: {result.message}"
+
+    def to_json(self, began: float) -> dict[str, Any]:
+        """Everything, times in seconds from ``began``, poses as x y z qx qy qz qw."""
+        assert self.result is not None
+        return {
+            "at_s": round(self.time - began, 6),
+            "outcome": int(self.result.outcome),
+            "outcome_name": self.result.outcome_name,
+            "message": self.result.message,
+            "planner": self.result.planner,
+            "cost": round(self.result.cost, 6) if self.path is not None else None,
+            "length_m": round(self.path.length, 6) if self.path is not None else None,
+            "start": None if self.start is None else [*self.start.position, *self.start.orientation],
+            "goal": [*self.goal.position, *self.goal.orientation],
+            "note": self.note,
+            "poses": [] if self.path is None else [[*pose.position, *pose.orientation] for pose in self.path],
+        }

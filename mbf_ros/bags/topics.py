@@ -1,0 +1,110 @@
+"""Which topic of a bag is what: chosen by its type where only one comes into question, else by the user."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from mbf_ros.bags.reading import KNOWN_AS, BagError
+from mbf_ros.messages.sensors import SENSORS
+
+TRANSFORMS, STATIC, ODOMETRY = "tf", "tf_static", "odom"
+ROLES = {TRANSFORMS: "tf2_msgs/msg/TFMessage", STATIC: "tf2_msgs/msg/TFMessage", ODOMETRY: "nav_msgs/msg/Odometry"}
+SENSOR_TYPES = {kind.replace("/", "/msg/"): kind for kind in SENSORS}
+USUAL_NAMES = {"scan": "sensor_msgs/LaserScan", "points": "sensor_msgs/PointCloud2", "range": "sensor_msgs/Range"}
+"""Sources that are named after a type take topics of that type only."""
+
+
+@dataclass(frozen=True)
+class BagTopics:
+    """The topics that are replayed.
+
+    Attributes
+    ----------
+    transforms, static, odometry : str
+        Topics; empty where there is none.
+    sensors : dict of str to (str, str)
+        Type of ``sensors.SENSORS``, and source of the configuration, by topic.
+    """
+
+    transforms: str = ""
+    static: str = ""
+    odometry: str = ""
+    sensors: dict[str, tuple[str, str]] = field(default_factory=dict)
+
+    def used_as(self, topic: str) -> str:
+        """What a topic is replayed as; empty for one that is not."""
+        if topic in self.sensors:
+            return self.sensors[topic][1]
+        roles = {self.transforms: TRANSFORMS, self.static: STATIC, self.odometry: ODOMETRY}
+        return roles.get(topic, "")
+
+
+def choose_topics(
+    types: Mapping[str, str], chosen: Mapping[str, str], sources: Sequence[str], takes_any: bool
+) -> BagTopics:
+    """Find the topics of a bag.
+
+    Parameters
+    ----------
+    types : mapping of str to str
+        Message type by topic.
+    chosen : mapping of str to str
+        Topics that the user has named, by ``tf``, ``tf_static``, ``odom`` or a source; empty for none.
+    sources : sequence of str
+        Observation sources that the configuration names.
+    takes_any : bool
+        Whether a layer takes scans of any source: each topic of a sensor is then a source, of its own name.
+
+    Raises
+    ------
+    BagError
+        Several topics come into question, a chosen one is not there or of another type, or it is for nothing known.
+    """
+    own = sorted(topic for topic, kind in types.items() if kind in SENSOR_TYPES)
+    named = tuple(sources) or (tuple(topic.lstrip("/") for topic in own) if takes_any else ())
+    if unknown := sorted(chosen.keys() - {*ROLES, *named}):
+        known = ", ".join((*ROLES, *named))
+        raise BagError(f"--topic {unknown[0]}={chosen[unknown[0]]}: expected one of {known}, got {unknown[0]!r}")
+    roles = {role: _topic(role, _of_role(role, types), types, chosen) for role in ROLES}
+    if not sources:
+        pairs = {source: chosen.get(source, topic) for source, topic in zip(named, own, strict=False)}
+    else:
+        pairs = {source: _topic(source, _of_source(source, own, types), types, chosen) for source in named}
+    if twice := [topic for topic in set(pairs.values()) if topic and list(pairs.values()).count(topic) > 1]:
+        several = [source for source, topic in pairs.items() if topic == twice[0]]
+        raise BagError(f"{twice[0]} would be {' and '.join(several)}: name the topic of each by --topic SOURCE=TOPIC")
+    sensors = {topic: (SENSOR_TYPES[types[topic]], source) for source, topic in pairs.items() if topic}
+    return BagTopics(roles[TRANSFORMS], roles[STATIC], roles[ODOMETRY], sensors)
+
+
+def _of_role(role: str, types: Mapping[str, str]) -> list[str]:
+    """Topics that come into question; transforms that hold for ever are known by their name only."""
+    fitting = sorted(topic for topic, kind in types.items() if KNOWN_AS.get(kind, kind) == ROLES[role])
+    if role == ODOMETRY:
+        return fitting
+    return [topic for topic in fitting if topic.endswith(STATIC) == (role == STATIC)]
+
+
+def _of_source(source: str, own: Sequence[str], types: Mapping[str, str]) -> list[str]:
+    wanted = USUAL_NAMES.get(source)
+    return [topic for topic in own if wanted is None or SENSOR_TYPES[types[topic]] == wanted]
+
+
+def _topic(what: str, fitting: Sequence[str], types: Mapping[str, str], chosen: Mapping[str, str]) -> str:
+    """The chosen topic, or the only one; empty where there is none."""
+    if what not in chosen:
+        if len(fitting) > 1:
+            raise BagError(f"several topics may be {what!r}: {', '.join(fitting)}; choose by --topic {what}=TOPIC")
+        return fitting[0] if fitting else ""
+    topic = chosen[what]
+    allowed = {*SENSOR_TYPES} if what not in ROLES else {kind for kind in types.values() if _is(kind, ROLES[what])}
+    if topic and types.get(topic) not in allowed:
+        found = f"of type {types[topic]}" if topic in types else "not in the bag"
+        candidates = ", ".join(sorted(one for one, kind in types.items() if kind in allowed)) or "none"
+        raise BagError(f"--topic {what}={topic}: the topic is {found}; topics that may be {what!r}: {candidates}")
+    return topic
+
+
+def _is(kind: str, wanted: str) -> bool:
+    return KNOWN_AS.get(kind, kind) == wanted

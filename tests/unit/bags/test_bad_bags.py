@@ -1,0 +1,103 @@
+"""Bags that cannot be replayed end with one clear error."""
+
+import pytest
+
+from mbf_abstract.commands.coordinates import Place
+from mbf_ros.bags.reading import BagError, open_bag
+from tests.unit.bags.conftest import drive, make_bag, message, odometry, scan, static, tf
+
+
+def refusal(path):
+    with pytest.raises(BagError) as raised, open_bag(path) as bag:
+        list(bag.messages())
+    return str(raised.value)
+
+
+@pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap"])
+def test_a_bag_that_is_cut_short_is_named(tmp_path, kind):
+    path = make_bag(tmp_path, drive(), kind)
+    file = path if path.is_file() else next(one for one in path.iterdir() if one.suffix in (".mcap", ".db3"))
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    assert str(path) in refusal(path)
+
+
+@pytest.mark.parametrize("name", ["robot.bag", "robot.mcap", "robot.db3", "robot.txt"])
+def test_a_file_that_is_no_bag_is_named(tmp_path, name):
+    (tmp_path / name).write_text("backend: costmap\n" * 100)
+    assert str(tmp_path / name) in refusal(tmp_path / name)
+
+
+def test_what_is_not_there_is_named(tmp_path):
+    assert "no such file" in refusal(tmp_path / "nothing.bag")
+    assert "metadata.yaml" in refusal(tmp_path)
+
+
+def test_a_bag_without_transforms_says_how_to_give_them(replayed):
+    with pytest.raises(BagError, match=r"expected transforms.*--odom-tf.*--tf"):
+        replayed([odometry(0.0, 0.0), scan(0.0, 0.0)])
+
+
+def test_of_several_topics_the_candidates_are_listed(replayed):
+    messages = [static(), tf(0.0, 0.0), scan(0.0, 0.0, "/front"), scan(0.0, 0.0, "/rear")]
+    with pytest.raises(BagError, match=r"'lidar': /front, /rear; choose by --topic lidar=TOPIC"):
+        replayed(messages)
+
+
+def test_a_chosen_topic_is_taken_and_an_empty_one_is_none(tmp_path, replayed):
+    messages = [static(), tf(0.0, 0.0), scan(0.0, 0.0, "/front"), scan(0.0, 0.0, "/rear"), tf(0.1, 0.0)]
+    bag = make_bag(tmp_path, messages)
+    topics = replayed(bag, topics={"lidar": "/rear"}).topics
+    assert topics["/rear"].used_as == "lidar" and topics["/front"].used_as == ""
+    assert replayed(bag, topics={"lidar": ""}).topics["/rear"].used_as == ""
+
+
+@pytest.mark.parametrize(
+    ("topics", "text"),
+    [
+        ({"lidar": "/nothing"}, "not in the bag; topics that may be 'lidar': /base_scan"),
+        ({"lidar": "/odom"}, "of type nav_msgs/msg/Odometry; topics that may be 'lidar': /base_scan"),
+        ({"odom": "/tf"}, "of type tf2_msgs/msg/TFMessage; topics that may be 'odom': /odom"),
+        ({"sonar": "/base_scan"}, "expected one of tf, tf_static, odom, lidar, got 'sonar'"),
+    ],
+)
+def test_a_chosen_topic_that_does_not_fit_is_refused(replayed, topics, text):
+    with pytest.raises(BagError, match=text):
+        replayed(drive(0.1), topics=topics)
+
+
+def test_a_scan_that_means_nothing_is_dropped_and_counted(replayed):
+    bad = scan(0.5, 0.25)
+    bad.message["angle_min"] = float("nan")
+    counted = replayed([*drive(0.5), bad]).topics["/base_scan"]
+    assert counted.dropped["invalid message"] == 1
+    assert "must be finite" in counted.examples["invalid message"]
+
+
+def test_types_that_nobody_knows_matter_only_where_they_are_used(tmp_path, replayed):
+    from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
+
+    bag = make_bag(tmp_path, [*drive(0.2), message(0.2, "/chatter", "std_msgs/String", {"data": "hello"})])
+    with open_bag(bag) as opened:
+        strange = next(one for one in opened._reader.connections if one.topic == "/chatter")
+        assert opened.types["/chatter"] == "std_msgs/msg/String"
+        nothing = MessageDefinition(MessageDefinitionFormat.NONE, "")
+        opened._reader.connections[opened._reader.connections.index(strange)] = strange._replace(
+            msgtype="my_msgs/msg/Chatter", msgdef=nothing
+        )
+        with pytest.raises(BagError, match="/chatter: the definition of my_msgs/msg/Chatter cannot be used"):
+            opened.require("/chatter")
+    assert replayed(bag).topics["/chatter"].used_as == ""
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"goal": Place(1.0, 0.0), "at": 9.0}, "--at 9: the bag ends after 0.100 s"),
+        ({"every": 0.0001}, "would make 1001 pictures, allowed are 200"),
+        ({"map_name": "attic"}, "--map attic: there is no such map, only global_costmap, local_costmap"),
+        ({"odometry_as_transform": True, "topics": {"odom": ""}}, "--odom-tf needs odometry"),
+    ],
+)
+def test_options_that_do_not_fit_the_bag_are_refused(replayed, options, text):
+    with pytest.raises(ValueError, match=text):
+        replayed(drive(0.1), **options)
