@@ -87,7 +87,9 @@ def _has_failed(replayed: Replayed) -> bool:
 
 
 def _write_json(file: Path, content: Any) -> None:
-    file.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    from mbf_abstract.whole_files import write_whole
+
+    write_whole(file, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def _pairs(texts: list[str]) -> dict[str, str]:
