@@ -127,11 +127,11 @@ def add_scan(scene: Scene, name: str, points: FloatArray) -> Any:
 
 def pin_height(recording: Recording) -> float:
     """Height [m] of markers that can be seen from where the whole route is in the picture."""
-    _, lower, upper = _route(recording)
+    _, lower, upper = route_of(recording)
     return max(1.2, PIN_HEIGHT * float(np.linalg.norm(upper - lower)))
 
 
-def _route(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
+def route_of(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Start and goals (k, 3), and the lower and upper corner (3,) of the box around them and the track."""
     ends = np.array([pose.position for pose in (recording.start, *recording.goals)])
     points = np.concatenate([ends, recording.poses[:, :3]])
@@ -140,7 +140,7 @@ def _route(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def look_at_route(camera: Any, recording: Recording, farther: float = 1.0) -> None:
     """Put the first camera where start, goals and track are all in the picture, seen slantwise from the side."""
-    ends, lower, upper = _route(recording)
+    ends, lower, upper = route_of(recording)
     middle, length = (lower + upper) / 2.0, farther * max(float(np.linalg.norm(upper - lower)), 6.0)
     along = ends[-1, :2] - ends[0, :2]
     side = np.array([along[1], -along[0]]) / max(float(np.linalg.norm(along)), 1e-9)

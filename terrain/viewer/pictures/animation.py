@@ -21,7 +21,6 @@ from terrain.recording.recording import Recording
 from terrain.viewer.pictures.colours import BODY, DRIVEN, GOAL, PLANNED, SCAN, START, Colour
 from terrain.viewer.pictures.shading import lit_colours
 from terrain.viewer.pictures.shapes import marks, prism, standing_things
-from terrain.viewer.replay import status_text
 from terrain.viewer.scene import look_at_route
 from terrain.worlds.surface import NO_SURFACE, Surface, joined
 
@@ -165,6 +164,13 @@ def _paint_moment(painter: ImageDraw.ImageDraw, camera: Camera, recording: Recor
     _paint_robot(painter, camera, recording, index)
     text = status_text(recording, index) if index < len(recording.times) - 1 else recording.verdict.title
     painter.text((14, 10), text, fill=TEXT, font=ImageFont.load_default(20))
+
+
+def status_text(recording: Recording, index: int) -> str:
+    """Time, speed and tilt of a sample."""
+    speed = float(np.hypot(*recording.twists[index, :2]))
+    tilt = float(np.degrees(recording.tilt[index]))
+    return f"{recording.times[index]:.0f} s   {speed:.1f} m/s   tilt {tilt:.0f}°"
 
 
 def _paint_robot(painter: ImageDraw.ImageDraw, camera: Camera, recording: Recording, index: int) -> None:

@@ -18,6 +18,8 @@ DRIVEN: Colour = (225, 85, 10)
 START: Colour = (30, 140, 60)
 GOAL: Colour = (200, 20, 80)
 WALL: Colour = (66, 72, 84)
+LIT_WALL: Colour = (142, 150, 164)
+"""Walls of the replay, which its light darkens."""
 OBSTACLE: Colour = (196, 140, 60)
 FLOOR: Colour = (222, 220, 212)
 SCAN: Colour = (220, 30, 40)

@@ -7,14 +7,17 @@ import numpy as np
 from mbf_abstract.geometry import FloatArray, Pose
 from terrain.recording.recording import Recording, RobotShape
 from terrain.viewer.pictures.colours import GOAL, OBSTACLE, START, WALL, Colour
+from terrain.viewer.pictures.storeys import storeys
 from terrain.worlds.surface import Surface
 
 WALL_CUT = 0.9  # m above the lowest point of the walls
 
 
 def standing_things(recording: Recording) -> list[tuple[str, Surface, Colour]]:
-    """Names, surfaces and colours of walls, cut low, and obstacles, where there are any."""
-    walls = None if recording.walls is None else cut_walls(recording.walls)
+    """Names, surfaces and colours of walls and obstacles, where there are any; walls of one storey are cut low."""
+    walls = recording.walls
+    if walls is not None and not storeys(recording.ground):
+        walls = cut_walls(walls)
     things = [("walls", walls, WALL), ("obstacles", recording.obstacles, OBSTACLE)]
     return [(name, surface, colour) for name, surface, colour in things if surface is not None]
 

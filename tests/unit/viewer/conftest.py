@@ -1,6 +1,12 @@
 """Synthetic recordings: a drive over a hill and a drive through an office, no simulator needed."""
 
+import base64
+import json
 import math
+import re
+import zlib
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,12 +14,16 @@ import pytest
 from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose, Twist
 from terrain.physics.robot_models import HUSKY, TURTLEBOT
+from terrain.recording.actor_track import ActorTrack
+from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import Recording, RobotShape
 from terrain.recording.verdict import Verdict
 from terrain.scenarios.scenario import PlanarPose, Scenario, Sensor, load_scenario
 from terrain.scenarios.world_types import GeneratedWorld
+from terrain.worlds.generate import fractal_terrain
 from terrain.worlds.heightfield import Heightfield
+from terrain.worlds.multi_level import parking_garage
 from terrain.worlds.occupancy import OccupancyGrid, wall_surface
 from terrain.worlds.surface import Surface, box
 
@@ -91,6 +101,67 @@ def hill_recording() -> Recording:
 @pytest.fixture
 def office_recording() -> Recording:
     return make_office_recording()
+
+
+@pytest.fixture(scope="session")
+def garage_recording() -> Recording:
+    """A robot on the ground floor of a garage of two storeys."""
+    garage = parking_garage(2)
+    poses = [Pose.planar(14.0 + 0.05 * step, 7.0) for step in range(50)]
+    recorder = Recorder(
+        "garage",
+        "mesh",
+        RobotShape.of(HUSKY),
+        poses[0],
+        [garage.places["roof"]],
+        ground=garage.ground,
+        walls=garage.walls,
+    )
+    recorder.path(0.0, [[14, 7, 0], [20, 7, 0]])
+    drive(recorder, poses, speed=0.5)
+    return recorder.finish(Verdict(0, "goal reached"))
+
+
+@pytest.fixture
+def two_robots(hill_recording: Recording) -> JointRecording:
+    """Two robots on the hills, the second one 3 m north of the first."""
+    beside = replace(hill_recording, poses=hill_recording.poses + np.array([0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    track = [ActorTrack("robot", np.zeros((0, 3)), np.zeros((0, 3), np.int32), beside.poses)]
+    robots = {"a": replace(hill_recording, actors=track), "b": replace(beside, actors=track)}
+    return JointRecording(robots, Verdict(0, "goal reached"))
+
+
+@pytest.fixture(scope="session")
+def large_recording() -> Recording:
+    """A short drive over more than 300,000 triangles."""
+    hills = fractal_terrain(195.0, 195.0, 0.5, np.random.default_rng(1), roughness=0.03)
+    poses = [hills.pose_at(40.0 + 0.3 * step, 90.0, 0.0) for step in range(200)]
+    recorder = Recorder("large", "mesh", RobotShape.of(HUSKY), poses[0], [poses[-1]], ground=hills.surface())
+    recorder.path(0.0, [pose.position for pose in poses])
+    for step in range(0, 200, 10):
+        recorder.scan(step / RATE, np.array(poses[step].position) + np.eye(3))
+    drive(recorder, poses, speed=3.0)
+    return recorder.finish(Verdict(0, "goal reached"))
+
+
+@pytest.fixture
+def contents_of():
+    """What the page of a replay draws, and its arrays, row after row; the reverse of ``packing``, step by step."""
+
+    def contents(page: str) -> tuple[dict[str, Any], list[np.ndarray]]:
+        scene = json.loads(re.search(r'id="scene-data">(.*?)</script>', page, re.S)[1])
+        raw = zlib.decompress(base64.b64decode(re.search(r'id="scene-arrays">(.*?)</script>', page, re.S)[1]))
+        arrays, at = [], 0
+        for entry in scene["arrays"]:
+            kind, count = np.dtype(entry["type"]), entry["columns"] * entry["rows"]
+            planes = np.frombuffer(raw, np.uint8, count * kind.itemsize, at).reshape(kind.itemsize, count)
+            at += planes.size
+            columns = np.ascontiguousarray(planes.T).view(kind).reshape(entry["columns"], entry["rows"])
+            arrays.append(np.cumsum(columns, axis=1, dtype=kind).T)
+        assert at == len(raw)
+        return scene, arrays
+
+    return contents
 
 
 @pytest.fixture

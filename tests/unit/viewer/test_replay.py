@@ -2,22 +2,32 @@
 
 import base64
 import math
+import re
+import zlib
 from dataclasses import replace
+from html import escape
 
-import msgspec
+import hypothesis.extra.numpy as hnp
 import numpy as np
 import pytest
-import zstandard
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mbf_abstract.geometry import Pose
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
+from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
-from terrain.viewer.replay import FRAME_RATE, MAX_FRAMES, frame_indices, replay_html, status_text
+from terrain.viewer.pictures.animation import status_text
+from terrain.viewer.pictures.colours import FLEET
+from terrain.viewer.replay.packing import Packer
+from terrain.viewer.replay.replay_page import joint_replay_html, replay_html
+from terrain.viewer.replay.scene_content import FRAME_RATE, MAX_FRAMES, contour_step, frame_indices
+from terrain.viewer.replay.world_mesh import coarse_faces
 from terrain.viewer.scene import wheel_angles
-from terrain.worlds.surface import cylinder
+from terrain.worlds.surface import Surface, cylinder
 
 
 def test_frames_come_at_the_frame_rate_with_first_and_last():
@@ -54,42 +64,124 @@ def test_the_text_over_the_robot_shows_time_speed_and_tilt(hill_recording):
     assert status_text(hill_recording, 100).startswith("10 s   1.2 m/s   tilt ")
 
 
-@pytest.mark.parametrize("name", ["hill_recording", "office_recording"])
-def test_a_replay_is_one_html_file_of_a_few_megabytes(name, request, tmp_path, capsys):
-    (tmp_path / "replay.html").write_text(replay_html(request.getfixturevalue(name)), encoding="utf-8")
+@pytest.mark.parametrize("name", ["hill_recording", "office_recording", "garage_recording"])
+def test_a_replay_is_one_small_html_file_and_the_same_bytes_every_time(name, request):
+    page = replay_html(request.getfixturevalue(name))
 
-    page = (tmp_path / "replay.html").read_text(encoding="utf-8")
     assert page.lstrip().lower().startswith("<!doctype html>")
-    assert "__VISER_EMBED_DATA__" in page
-    assert len(page) < 4e6
-    assert capsys.readouterr().out == ""
+    assert len(page) < 3e5
+    assert page == replay_html(request.getfixturevalue(name))
+    assert "{{" not in page and "http" not in re.sub(r"http-equiv", "", page), "no address of another page"
 
 
-def test_a_run_that_never_began_has_a_replay_too():
+def test_a_replay_shows_each_frame_where_the_robot_was(hill_recording, contents_of):
+    scene, arrays = contents_of(replay_html(hill_recording))
+
+    robot, frames = scene["robots"][0], frame_indices(hill_recording.times)
+    lower = hill_recording.ground.vertices.min(axis=0)
+    np.testing.assert_allclose(arrays[scene["times"]][:, 0] / 1e3, hill_recording.times[frames], atol=6e-4)
+    positions = arrays[robot["positions"]] / 1e3 + lower
+    np.testing.assert_allclose(positions, hill_recording.poses[frames, :3], atol=6e-4)
+    np.testing.assert_allclose(arrays[robot["orientations"]] / 32767, hill_recording.poses[frames, 3:], atol=2e-5)
+    vertices = arrays[scene["world"]["vertices"]] / 65535 * scene["size"] + lower
+    np.testing.assert_allclose(vertices, hill_recording.ground.vertices, atol=1e-3)
+    np.testing.assert_array_equal(arrays[scene["world"]["levels"][0][1]], hill_recording.ground.faces)
+
+
+def test_a_run_that_never_began_has_a_replay_too(contents_of):
     run = Recorder("nothing", "mesh", RobotShape.of(HUSKY), Pose.planar(0, 0), []).finish(Verdict(100, "no robot"))
 
-    assert "__VISER_EMBED_DATA__" in replay_html(replace(run, goals=()))
+    scene, arrays = contents_of(replay_html(replace(run, goals=())))
+    assert [mark["name"] for mark in scene["marks"]] == ["start"]
+    assert len(arrays[scene["times"]]) == 0
 
 
-def test_people_doors_and_other_robots_move_through_the_replay(hill_recording):
+def test_people_doors_and_other_robots_move_through_the_replay(hill_recording, contents_of):
     count = len(hill_recording.times)
     poses = np.tile([0.0, 5.0, 0.85, 0.0, 0.0, 0.0, 1.0], (count, 1))
     poses[:, 0] = np.linspace(1.0, 9.0, count)
     person = ActorTrack("person", *cylinder(0.25, 1.7), poses)
 
-    messages = messages_of(replay_html(replace(hill_recording, actors=[person])))
+    scene, arrays = contents_of(replay_html(replace(hill_recording, actors=[person])))
 
-    places = [
-        message["position"] for message in messages if message.get("name") == "/actor_0" and "position" in message
-    ]
-    assert any(message.get("name") == "/actor_0/person" for message in messages)
-    assert len(places) >= len(frame_indices(hill_recording.times)) - 2
-    assert places[0][0] == pytest.approx(1.0, abs=0.1) and places[-1][0] == pytest.approx(9.0, abs=0.1)
+    (actor,) = scene["actors"]
+    places = arrays[actor["positions"]] / 1e3 + hill_recording.ground.vertices.min(axis=0)
+    np.testing.assert_allclose(places, poses[frame_indices(hill_recording.times), :3], atol=6e-4)
+    body, arrow, eyes = (arrays[part["corners"]] / 1e3 for part in actor["parts"])
+    assert arrow[:, 0].min() > 0.25 and arrow[:, 2].max() < -0.7, "on the floor, before the body"
+    assert len(body) == 3 * 4 * 24 and eyes[:, 0].max() > 0.25
 
 
-def messages_of(page):
-    """What viser packed into a page: its length, then messages and buffers compressed together."""
-    packed = base64.b64decode(page.split('__VISER_EMBED_DATA__="')[1].split('"')[0])
-    content = zstandard.ZstdDecompressor().decompressobj().decompress(packed[8:])
-    length = int.from_bytes(content[:8], "little")
-    return [message for _, message in msgspec.msgpack.decode(content[8 : 8 + length])["messages"]]
+def test_all_robots_of_a_run_are_in_its_replay_each_in_its_colour_with_path_and_track(two_robots, contents_of):
+    page = joint_replay_html(two_robots)
+    scene, arrays = contents_of(page)
+
+    assert [robot["name"] for robot in scene["robots"]] == ["a", "b"]
+    assert [tuple(robot["ring"]) for robot in scene["robots"]] == list(FLEET[:2])
+    a, b = (arrays[robot["positions"]] for robot in scene["robots"])
+    np.testing.assert_array_equal(b - a, np.tile([0, 3000, 0], (len(a), 1)))
+    assert all(arrays[robot["plans"]["counts"]].sum() > 50 for robot in scene["robots"])
+    assert scene["actors"] == [], "the other robot is drawn once"
+    assert ">a, its plan<" in page and ">b, driven<" in page
+
+
+@pytest.mark.parametrize("text", ["</script><script>alert(1)</script>", "{{arrays}}", "$&"])
+def test_a_name_cannot_become_part_of_the_page(hill_recording, two_robots, contents_of, text):
+    page = replay_html(replace(hill_recording, scenario=text, verdict=Verdict(110, text)))
+    joint = JointRecording({text: two_robots.robots["a"], "b": two_robots.robots["b"]}, Verdict(0, text))
+
+    assert escape(text) in page
+    for whole in (page, joint_replay_html(joint)):
+        assert "alert(1)</script>" not in whole
+        assert whole.count("</script>") == replay_html(hill_recording).count("</script>")
+    scene, _ = contents_of(joint_replay_html(joint))
+    assert scene["robots"][0]["name"] == text
+
+
+integers = st.sampled_from([np.uint8, np.uint16, np.int16, np.int32, np.uint32])
+
+
+@settings(max_examples=40)
+@given(integers.flatmap(lambda kind: hnp.arrays(kind, st.tuples(st.integers(0, 9), st.integers(1, 4)))))
+def test_arrays_come_out_of_a_page_as_they_went_in(values):
+    packer = Packer()
+    packer.add(values)
+    raw, (entry,) = zlib.decompress(base64.b64decode(packer.text())), packer.entries()
+
+    found = []
+    for column in range(entry["columns"]):  # byte by byte, sum by sum
+        total, count, size = 0, entry["columns"] * entry["rows"], values.itemsize
+        for row in range(entry["rows"]):
+            at = column * entry["rows"] + row
+            total += int.from_bytes(bytes(raw[plane * count + at] for plane in range(size)), "little")
+            found.append(total % 256**size)
+    np.testing.assert_array_equal(np.array(found, object), values.T.astype(object).ravel() % 256**values.itemsize)
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32), st.floats(0.3, 3.0))
+def test_a_coarse_level_is_the_fine_one_with_the_vertices_of_each_cell_made_one(seed, cell):
+    rng = np.random.default_rng(seed)
+    surface = Surface(rng.uniform(-4, 4, (30, 3)), rng.integers(0, 30, (60, 3)).astype(np.int32))
+    paints = rng.integers(0, 2, 30).astype(np.uint8)
+    lower = surface.vertices.min(axis=0)
+    cells = {}
+    for number, (vertex, paint) in enumerate(zip(surface.vertices, paints, strict=True)):
+        cells.setdefault((*((vertex - lower) // cell), paint), []).append(number)
+    chosen = {}
+    for members in cells.values():
+        mean = surface.vertices[members].mean(axis=0)
+        best = min(members, key=lambda member: np.linalg.norm(surface.vertices[member] - mean))
+        chosen |= dict.fromkeys(members, best)
+    wanted = [[chosen[corner] for corner in face] for face in surface.faces.tolist()]
+
+    found = coarse_faces(surface, paints, cell).tolist()
+
+    assert found == [face for face in wanted if len(set(face)) == 3]
+
+
+@pytest.mark.parametrize(
+    ("relief", "step"), [(0.0, 0.0), (1.9, 0.0), (2.5, 0.25), (9.0, 1.0), (30.0, 5.0), (9e3, 100.0)]
+)
+def test_contour_lines_are_about_a_dozen_of_round_heights(relief, step):
+    assert contour_step(relief) == step

@@ -13,11 +13,11 @@ from mbf_abstract.executives.tree_events import NodeState
 from terrain.recording.actor_track import ActorTrack
 from terrain.recording.verdict import Verdict
 from terrain.viewer.pictures.colours import BAD, GOOD, WARNING
-from terrain.viewer.replay_panel import legend_of, with_panel
+from terrain.viewer.replay.replay_page import replay_html
+from terrain.viewer.replay.run_panel import legend_of, panel_html
 from terrain.viewer.reports.tree_html import worth_showing
 
 WELL = Verdict(0, "goal reached")
-PAGE = "<html><body><p>scene</p></body></html>"
 NODES = [{"name": "root", "type": "Sequence", "depth": 0}, {"name": "leaf", "type": "GetPath", "depth": 1}]
 
 
@@ -37,7 +37,7 @@ def test_the_page_carries_each_run_of_a_tree_and_its_changes_with_their_times():
         tree(5.0, nodes=NODES),
     ]
 
-    first, second = contents(with_panel(PAGE, WELL, events))["trees"]
+    first, second = contents(panel_html(events))["trees"]
 
     assert first["nodes"] == [["root", 0], ["leaf", 1]]
     assert first["changes"] == [
@@ -48,12 +48,11 @@ def test_the_page_carries_each_run_of_a_tree_and_its_changes_with_their_times():
     assert (second["time"], second["changes"]) == (5.0, [])
 
 
-def test_the_panel_lies_inside_the_body_and_has_no_tree_where_none_ran():
-    page = with_panel(PAGE, WELL, [])
+def test_the_panel_has_no_tree_where_none_ran():
+    page = panel_html([])
 
-    assert page.startswith("<html><body><p>scene</p><style>") and page.endswith("</script></body></html>")
     assert "Behaviour tree" not in page
-    assert "Behaviour tree" in with_panel(PAGE, WELL, [tree(0.0, nodes=NODES)])
+    assert "Behaviour tree" in panel_html([tree(0.0, nodes=NODES)])
 
 
 @pytest.mark.parametrize(
@@ -65,15 +64,15 @@ def test_the_panel_lies_inside_the_body_and_has_no_tree_where_none_ran():
         (Verdict(110, "<script>blocked"), BAD),
     ],
 )
-def test_the_verdict_stands_above_everything_in_the_colour_of_its_level(verdict, colour):
-    page = with_panel(PAGE, verdict, [])
+def test_the_verdict_stands_above_everything_in_the_colour_of_its_level(verdict, colour, hill_recording):
+    page = replay_html(replace(hill_recording, verdict=verdict))
 
-    assert f"<p style='color:{colour}'>{escape(str(verdict))}</p><details" in page
+    assert f'<p id="verdict" style="color:{colour}">{escape(str(verdict))}</p>' in page
 
 
 def test_words_of_an_event_cannot_end_the_script():
     said = "</script><script>alert(1)</script>"
-    page = with_panel(PAGE, WELL, [Event(0.0, EventKind.FAULT, "x", {"message": said})])
+    page = panel_html([Event(0.0, EventKind.FAULT, "x", {"message": said})])
 
     assert "alert(1)</script>" not in page
     assert said in contents(page)["lines"][0][1]
@@ -103,10 +102,10 @@ def test_the_legend_names_what_occurs_in_the_run_and_nothing_else(hill_recording
     nobody = np.zeros((0, 3))
     people = [ActorTrack("person", nobody, nobody.astype(np.int32), np.zeros((0, 7)))] * 2
 
-    hill = [name for name, _ in legend_of(hill_recording)]
-    office = [name for name, _ in legend_of(replace(office_recording, actors=people))]
+    hill = [entry.name for entry in legend_of(hill_recording)]
+    office = [entry.name for entry in legend_of(replace(office_recording, actors=people))]
 
     assert hill == ["plan", "driven", "slope 0°", "slope 10°", "slope 20°", "slope 30°", "slope 45°"]
     assert office == ["plan", "driven", "seen by a sensor", "on no map", "person"]
-    page = with_panel(PAGE, WELL, [], legend_of(hill_recording))
+    page = panel_html([], legend_of(hill_recording))
     assert "rgb(25,90,220)" in page and ">plan<" in page

@@ -73,6 +73,17 @@ class Page:
         for kind, button in (("mouseMoved", "none"), ("mousePressed", "left"), ("mouseReleased", "left")):
             await self.command("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1)
 
+    async def key(self, key):
+        """Press and release a key, named as in JavaScript."""
+        text = {"text": key} if len(key) == 1 else {}
+        await self.command("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
+        await self.command("Input.dispatchKeyEvent", type="keyUp", key=key)
+
+    async def resize(self, width, height):
+        """Make the page as large as a window, or a phone's, of this size in pixels."""
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
+        await self.command("Emulation.setDeviceMetricsOverride", **size)
+
     async def press(self, label):
         """Press the button with this label, once it is there."""
         find = f"[...document.querySelectorAll('button')].find(b => b.textContent.trim() === {json.dumps(label)})"

@@ -5,11 +5,13 @@ import io
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from mbf_abstract.events import Event, EventKind
-from terrain.viewer.replay import replay_html
+from terrain.viewer.replay.replay_page import joint_replay_html, replay_html
 
+READY = "window.replay !== undefined && window.replay.used !== undefined && !window.replay.dirty"
 DRAWN = "document.querySelector('canvas') !== null && document.querySelector('canvas').clientWidth > 300"
 
 
@@ -70,12 +72,16 @@ def test_a_click_on_an_incident_takes_the_time_bar_to_it(chromium, hill_recordin
     async def watch(page):
         await page.open((tmp_path / "replay.html").as_uri())
         await page.wait_for(DRAWN)
-        await page.press("25.0 s  tipped over at (30.0, 20.0), robot 0.00 m/s")
-        await page.wait_for("document.querySelector('input').value === '24.0'")
+        await page.wait_for("window.replay !== undefined")
+        await page.key(" ")
+        await page.press("✖ 25.0 s  tipped over at (30.0, 20.0), robot 0.00 m/s")
+        await page.wait_for("Number(document.querySelector('input').value) === 24.0")
         await page.wait_for(f"{marks}.length === 2 && {marks}[1].style.left !== ''")
         places = await page.evaluate(f"[...{marks}].map(mark => mark.getBoundingClientRect().left)")
         await page.evaluate(f"{marks}[0].click()")
-        await page.wait_for("document.querySelector('input').value === '11.0'")
+        await page.wait_for("Number(document.querySelector('input').value) === 11.0")
+        await page.key("n")
+        await page.wait_for("Number(document.querySelector('input').value) === 24.0")
         return page.errors, places, await page.screenshot()
 
     errors, places, png = chromium.visit(watch)
@@ -83,3 +89,83 @@ def test_a_click_on_an_incident_takes_the_time_bar_to_it(chromium, hill_recordin
     (tmp_path / "screenshot.png").write_bytes(png)
     assert errors == []
     assert 0 < places[0] < places[1]
+
+
+def test_a_roof_does_not_hide_the_robot_under_it_and_all_storeys_can_be_shown(chromium, garage_recording, tmp_path):
+    (tmp_path / "replay.html").write_text(replay_html(garage_recording), encoding="utf-8")
+
+    async def watch(page):
+        await page.resize(700, 500)
+        await page.open((tmp_path / "replay.html").as_uri())
+        await page.wait_for("window.replay !== undefined")
+        await page.key(" ")
+        pictures, states = [], []
+        for key in ("1", "2", "]", "]", "]", "3", "?"):
+            await page.key(key)
+            await page.wait_for(READY)
+            states.append(await page.evaluate("[replay.camera.view, replay.storey, replay.used.cut]"))
+            pictures.append(np.asarray(Image.open(io.BytesIO(await page.screenshot())).convert("RGB")).astype(int))
+        await page.read("next, previous incident")
+        return page.errors, pictures, states
+
+    errors, pictures, states = chromium.visit(watch)
+
+    for number, pixels in enumerate(pictures):
+        Image.fromarray(pixels.astype(np.uint8)).save(tmp_path / f"screenshot_{number}.png")
+    assert errors == []
+    assert [state[0] for state in states] == ["overview", "follow", "follow", "follow", "follow", "above", "above"]
+    assert [state[1] for state in states[:5]] == ["robot", "robot", "0", "1", "all"]
+    cuts = [pytest.approx(1.96), pytest.approx(1.96), 1e9, 1e9]  # 0.7 of a storey of 2.8 m, above the robot's floor
+    assert [state[2] for state in states[1:5]] == cuts
+    yellow = [((p[..., 0] > 1.1 * p[..., 1]) & (p[..., 1] > 2.2 * p[..., 2])).sum() for p in pictures]
+    assert min(yellow[1], yellow[2]) > 200, "the robot is seen under the roof that is cut away"
+    assert yellow[4] < yellow[1] / 4, "the roof hides it where all storeys are shown"
+
+
+def test_controls_of_a_phone_lie_beside_the_scene(chromium, two_robots, tmp_path):
+    (tmp_path / "replay.html").write_text(joint_replay_html(two_robots), encoding="utf-8")
+    boxes = """['#scene', 'header', 'footer'].map(name => {
+      const box = document.querySelector(name).getBoundingClientRect(); return [box.top, box.bottom]; })"""
+    rest = """[document.documentElement.scrollWidth,
+      [...document.querySelectorAll('.pin b')].map(pin => pin.textContent)]"""
+
+    async def watch(page):
+        await page.resize(390, 844)
+        await page.open((tmp_path / "replay.html").as_uri())
+        await page.wait_for("window.replay !== undefined && window.replay.used !== undefined")
+        return page.errors, await page.evaluate(boxes), await page.evaluate(rest)
+
+    errors, (scene, header, footer), (width, names) = chromium.visit(watch)
+
+    assert errors == []
+    assert width == 390, "nothing stands out to the side"
+    assert header[1] <= scene[0] and scene[1] <= footer[0] and footer[1] <= 844
+    assert scene[1] - scene[0] > 0.75 * 844
+    assert names == ["a start", "a goal", "b start", "b goal", "a", "b"]
+
+
+def test_a_frame_of_three_hundred_thousand_triangles_stays_within_its_budget(chromium, large_recording, tmp_path):
+    page_text = replay_html(large_recording)
+    (tmp_path / "replay.html").write_text(page_text, encoding="utf-8")
+
+    async def watch(page):
+        await page.resize(320, 240)
+        await page.open((tmp_path / "replay.html").as_uri())
+        await page.wait_for("window.replay !== undefined")
+        await page.key(" ")
+        await page.evaluate("replay.player.seek(15)")
+        await page.wait_for(READY)
+        near = await page.evaluate("replay.used")
+        await page.evaluate("replay.camera.zoom(12)")
+        await page.wait_for(READY)
+        return page.errors, near, await page.evaluate("replay.used")
+
+    errors, near, far = chromium.visit(watch)
+
+    assert errors == []
+    assert near["triangles"] > 300_000
+    assert near["drawCalls"] <= 12, "shadows, world, sky, discs, bodies, three for each of two lines, scan"
+    assert near["bytes"] < 40e6, "shadows 17 MB; 12 bytes a vertex, 12 a triangle"
+    assert far["triangles"] < near["triangles"] / 20, "a coarser level of detail is drawn from afar"
+    assert far["drawCalls"] <= near["drawCalls"]
+    assert len(page_text) < 2e6

@@ -1,0 +1,193 @@
+"""What a replay's page draws, as JSON and packed arrays: world, robots and actors with their poses, plans, scans."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_abstract.event_values import well_formed
+from mbf_abstract.geometry import FloatArray
+from terrain.recording.recording import Recording, StampedPoints
+from terrain.viewer.pictures.colours import (
+    BODY,
+    DRIVEN,
+    FLOOR,
+    LIT_WALL,
+    OBSTACLE,
+    PLANNED,
+    SCAN,
+    SLOPE_COLOURS,
+    SLOPE_STOPS,
+    Colour,
+)
+from terrain.viewer.pictures.shading import LIGHT
+from terrain.viewer.pictures.shapes import marks
+from terrain.viewer.pictures.storeys import storeys
+from terrain.viewer.replay.bodies import actor_parts, robot_parts
+from terrain.viewer.replay.packing import Packer
+from terrain.viewer.replay.world_mesh import WorldMesh, world_mesh
+from terrain.viewer.scene import route_of, wheel_angles
+
+FRAME_RATE = 10.0  # Hz of recorded time
+MAX_FRAMES = 3000  # longer runs get fewer frames a second, so that the file stays small
+MAX_SCANS = 300
+MAX_SCAN_POINTS = 180
+LEAST_STEP = 0.1  # m between two points of a plan
+LEAST_RELIEF = 2.0  # m; lower ground has no contour lines
+CONTOURS = 12  # about so many on all of the relief
+CONTOUR_STEPS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # m
+
+
+class Looks(NamedTuple):
+    """Name and colour of a robot among several; a robot that is alone has no name."""
+
+    name: str
+    colour: Colour
+
+
+PLAIN = Looks("", DRIVEN)
+
+
+def duration(robots: Iterable[Recording]) -> float:
+    """Length [s] of the shortest recording: what can be played of all of them."""
+    return min(recording.duration for recording in robots)
+
+
+def scene_content(packer: Packer, world: Recording, robots: Mapping[Looks, Recording]) -> dict[str, Any]:
+    """Return what the page draws; arrays go to ``packer``.
+
+    Parameters
+    ----------
+    world : Recording
+        For what does not belong to one robot.
+    robots : mapping of Looks to Recording
+        Sampled at the same times.
+    """
+    mesh = world_mesh(world)
+    times = min((recording.times for recording in robots.values()), key=len)
+    frames = frame_indices(times)
+    begin = float(times[0]) if len(times) else 0.0
+    several = len(robots) > 1
+    return {
+        "ending": well_formed(world.verdict.title),
+        "size": mesh.size.tolist(),
+        "world": _packed_world(packer, mesh),
+        "storeys": [round(floor - float(mesh.origin[2]), 3) for floor in storeys(world.ground)],
+        **_route(world, mesh),
+        **_looks(mesh),
+        "times": packer.add_milli(times[frames] - begin),
+        "actors": [_actor(packer, track, frames, mesh.origin) for track in world.actors],
+        "robots": [_robot(packer, recording, looks, frames, mesh.origin, begin) for looks, recording in robots.items()],
+        "marks": [
+            {"name": well_formed(name), "position": np.round(pose.position - mesh.origin, 3).tolist(), "colour": colour}
+            for looks, recording in robots.items()
+            for name, pose, colour in marks(recording, looks.name if several else "")
+        ],
+    }
+
+
+def frame_indices(times: FloatArray) -> NDArray[np.intp]:
+    """Indices of the samples to show: at ``FRAME_RATE``, at most ``MAX_FRAMES``, first and last always."""
+    if not len(times):
+        return np.zeros(0, np.intp)
+    length = float(times[-1] - times[0])
+    period = max(1.0 / FRAME_RATE, length / MAX_FRAMES)
+    wanted = times[0] + period * np.arange(int(length / period) + 1)
+    found = np.minimum(np.searchsorted(times, wanted - 1e-9), len(times) - 1)
+    return np.unique(np.concatenate([found, [len(times) - 1]]))
+
+
+def contour_step(relief: float) -> float:
+    """Height [m] between two contour lines of ground with this relief [m]; 0 for none."""
+    if relief < LEAST_RELIEF:
+        return 0.0
+    return next((step for step in CONTOUR_STEPS if relief / step <= CONTOURS), CONTOUR_STEPS[-1])
+
+
+def _packed_world(packer: Packer, mesh: WorldMesh) -> dict[str, Any]:
+    return {
+        "vertices": packer.add(mesh.vertices),
+        "paints": packer.add(mesh.paints),
+        "levels": [[cell, packer.add(faces)] for cell, faces in mesh.levels],
+    }
+
+
+def _route(world: Recording, mesh: WorldMesh) -> dict[str, Any]:
+    """What the first views look at: the route from one side, all of the world from above."""
+    ends, lower, upper = route_of(world)
+    along = ends[-1, :2] - ends[0, :2]
+    middle, length = (lower + upper) / 2.0 - mesh.origin, float(np.linalg.norm(upper - lower))
+    yaw = float(np.arctan2(-along[0], along[1])) if along.any() else -np.pi / 2.0
+    route = {"middle": middle.tolist(), "length": length, "yaw": yaw}
+    box = {"middle": (0.5 * mesh.size).tolist(), "size": mesh.size.tolist()}
+    return {"route": route, "box": box, "ring": max(0.4, 0.008 * length)}
+
+
+def _looks(mesh: WorldMesh) -> dict[str, Any]:
+    paints = [SLOPE_COLOURS[0].tolist(), FLOOR, LIT_WALL, OBSTACLE]
+    return {
+        "light": LIGHT.tolist(),
+        "paints": (np.array(paints) / 255.0).round(4).tolist(),
+        "slopes": (SLOPE_COLOURS / 255.0).round(4).tolist(),
+        "stops": SLOPE_STOPS.tolist(),
+        "contour": contour_step(float(mesh.size[2])),
+        "scan": SCAN,
+    }
+
+
+def _robot(
+    packer: Packer, recording: Recording, looks: Looks, frames: NDArray[np.intp], origin: FloatArray, begin: float
+) -> dict[str, Any]:
+    shape, twists = recording.robot, recording.twists
+    angles = wheel_angles(shape, recording.times, twists)
+    scans = recording.scans[:: -(-len(recording.scans) // MAX_SCANS)] if recording.scans else []
+    scans = [(time, points[:: max(1, len(points) // MAX_SCAN_POINTS)]) for time, points in scans]
+    return {
+        "name": well_formed(looks.name),
+        "ring": looks.colour,
+        "plan": looks.colour if looks.name else PLANNED,
+        "height": shape.height,
+        "wheels": shape.wheels.tolist(),
+        "parts": robot_parts(packer, shape, looks.colour if looks.name else BODY),
+        **_poses(packer, recording.poses[frames], origin),
+        "angles": packer.add_milli(angles[frames]),
+        "speeds": packer.add_milli(np.hypot(twists[frames, 0], twists[frames, 1])),
+        "tilts": packer.add_milli(np.degrees(recording.tilt[frames])),
+        "plans": _sets(packer, [(time, _thinned(points)) for time, points in recording.paths], origin, begin),
+        "scans": _sets(packer, scans, origin, begin),
+    }
+
+
+def _actor(packer: Packer, track: Any, frames: NDArray[np.intp], origin: FloatArray) -> dict[str, Any]:
+    return {
+        "thing": track.thing,
+        "parts": actor_parts(packer, track),
+        **_poses(packer, track.poses[frames[frames < len(track.poses)]], origin),
+    }
+
+
+def _poses(packer: Packer, poses: FloatArray, origin: FloatArray) -> dict[str, Any]:
+    return {"positions": packer.add_milli(poses[:, :3] - origin), "orientations": packer.add_unit(poses[:, 3:])}
+
+
+def _sets(packer: Packer, sets: Sequence[StampedPoints], origin: FloatArray, begin: float) -> dict[str, int]:
+    """Sets of points, each shown from its time on until the next one."""
+    points = np.concatenate([np.zeros((0, 3)), *(points - origin for _, points in sets)])
+    return {
+        "times": packer.add_milli(np.array([time - begin for time, _ in sets])),
+        "counts": packer.add(np.array([len(points) for _, points in sets], np.int32)),
+        "points": packer.add_milli(points),
+    }
+
+
+def _thinned(points: FloatArray) -> FloatArray:
+    """A line without points nearer than ``LEAST_STEP`` to the last one kept; its ends stay."""
+    keep, last = [0], points[0] if len(points) else None
+    for index in range(1, len(points)):
+        if index == len(points) - 1 or np.abs(points[index] - last).max() > LEAST_STEP:
+            keep.append(index)
+            last = points[index]
+    return points[keep] if len(points) else points
