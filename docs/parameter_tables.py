@@ -34,7 +34,7 @@ What can change while running is changed by a call, all values of it or none: `s
 radius of a round robot (on a mesh: a radius). The map shows it after its next update.
 """
 
-SERVERS = ("costmap", "mesh")
+SERVERS = ("costmap", "mesh", "tiles")
 TITLES = {
     "planners": "Planners",
     "controllers": "Controllers",

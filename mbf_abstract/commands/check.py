@@ -1,8 +1,8 @@
 """``mbf check``: list all mistakes of a configuration, without driving.
 
-Other packages check files of their own, such as scenarios, by an entry point of the group ``mbf.checks``: a function
-``check(file, load)`` that returns ``Checked``, raises ConfigError with all findings, or returns None for a file that it
-does not know.
+Other packages check files and folders of their own, such as scenarios and maps of tiles, by an entry point of the
+group ``mbf.checks``: a function ``check(file, load)`` that returns ``Checked``, raises ConfigError with all findings,
+or returns None for what it does not know.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ def register(app: typer.Typer) -> None:
 
 
 def check(
-    config: Path = typer.Argument(..., help="Configuration, or a scenario: a file, or the name of a shipped one."),
+    config: Path = typer.Argument(
+        ..., help="Configuration, a scenario (a file, or the name of a shipped one), or a folder of tiles."
+    ),
     load: bool = typer.Option(
         True, "--load/--no-load", help="Also build the world, read the map files and construct the plugins."
     ),
@@ -53,8 +55,12 @@ def check(
 def check_config(file: Path, load: bool) -> Checked:
     """Check a configuration and, to ``load`` it, its maps and plugins; raises ConfigError with all findings."""
     from mbf_abstract.commands.standing_server import standing_server
+    from mbf_abstract.config.findings import ConfigError, Finding
     from mbf_abstract.server.factory import read_config
 
+    if file.is_dir():
+        expected = "a configuration, a scenario, or a folder of tiles (mbf map tile)"
+        raise ConfigError([Finding(str(file), 1, "", expected, "a folder of something else")])
     cls, config = read_config(file)
     notes: tuple[str, ...] = ()
     if load:

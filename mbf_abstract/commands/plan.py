@@ -34,7 +34,9 @@ def register(app: typer.Typer) -> None:
 
 
 def plan(
-    config: Path = typer.Argument(..., help="Configuration, or a bare map (yaml, png, pgm) or mesh (ply, obj, ...)."),
+    config: Path = typer.Argument(
+        ..., help="Configuration, bare map (yaml, png, pgm) or mesh (ply, obj, ...), or folder of tiles."
+    ),
     start: str = typer.Option(..., "--start", metavar="X Y [Z] [YAW]", help="Where the robot stands [m, rad]."),
     goal: str = typer.Option(..., "--goal", metavar="X Y [Z] [YAW]", help="Where it shall go [m, rad]."),
     planner: str = typer.Option("", "--planner", help="Name of the planner; the first one if not given."),

@@ -55,7 +55,7 @@ def place_robot(server: AbstractNavigationServer, pose: Pose) -> None:
 
 
 def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavigationServer], Config, list[str]]:
-    """Read a configuration, or make a default one for a bare map or mesh file.
+    """Read a configuration, or make a default one for a bare map or mesh file, or a folder of a map.
 
     Parameters
     ----------
@@ -73,9 +73,9 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
     ConfigError
         There is no such file, no installed server reads its format, or it is a configuration with mistakes.
     """
-    if not file.is_file():
+    if not (file.is_file() or file.is_dir()):
         raise ConfigError([Finding(str(file), 1, "", "a configuration, map or mesh file", "no such file")])
-    if file.suffix.lower() in YAML_SUFFIXES and not _is_map_description(file):
+    if file.is_file() and file.suffix.lower() in YAML_SUFFIXES and not _is_map_description(file):
         if unknown:
             expected = "a bare map: a configuration has track_unknown_space and allow_unknown for this"
             raise ConfigError([Finding(str(file), 1, "", expected, f"--unknown {unknown} with a configuration")])
@@ -84,6 +84,9 @@ def read_config_or_map(file: Path, unknown: str = "") -> tuple[type[AbstractNavi
         text = cls.config_for_map(file.resolve(), unknown_is_free=unknown != "lethal")
         if text is not None:
             return *read_config_text(text), _unknown_note(cls.read_floor(file), unknown)
+    if file.is_dir():
+        expected = "a configuration, map or mesh file, or a folder of tiles (mbf map tile)"
+        raise ConfigError([Finding(str(file), 1, "", expected, "a folder of something else")])
     raise ConfigError([Finding(str(file), 1, "", "a format that an installed server reads", repr(file.suffix))])
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from mbf_abstract.geometry import Pose
 from mbf_abstract.maps.queries import CellState
 from mbf_mesh_nav.map.mesh_map import MeshMap
@@ -31,3 +33,10 @@ def ground_heights(mesh_map: MeshMap, x: float, y: float) -> tuple[float, ...]:
         ranked.append((is_ceiling, is_blocked, height))
         start = height - ONE_SURFACE
     return tuple(height for _, _, height in sorted(ranked))
+
+
+def heights_text(heights: Sequence[float]) -> str:
+    """The heights [m] of the surfaces at a place that is on none of them, as a text."""
+    if not heights:
+        return "there is no surface above or below it"
+    return f"the surface there is at z = {', '.join(f'{height:.2f}' for height in sorted(heights))} m"

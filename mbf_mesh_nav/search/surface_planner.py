@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +25,7 @@ from mbf_mesh_nav.arrays import BoolArray, Float32Array
 from mbf_mesh_nav.kernels.motion.path_poses import poses_along
 from mbf_mesh_nav.map.snapshot import MeshSnapshot
 from mbf_mesh_nav.mesh.borders import on_surface
-from mbf_mesh_nav.mesh.ground import ground_heights
+from mbf_mesh_nav.mesh.ground import ground_heights, heights_text
 from mbf_mesh_nav.mesh.locate import SurfacePoint
 from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, position_text, surface_point_at_vertex
 from mbf_mesh_nav.plugins import MeshContext, MeshPlanner
@@ -103,7 +104,7 @@ class SurfacePlanner(MeshPlanner):
             return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
         if problem is not None:
             return problem
-        path = self._assemble(legs, request.goal, not near_goal)
+        path = path_of_legs(legs, request.goal, not near_goal, self.mesh_map.frame_id, self.clock.now())
         notes = [leg.note for leg in legs if leg.note]
         if near_goal:
             notes.append(f"ends {path[-1].distance_to(request.goal):.2f} m from the goal")
@@ -114,7 +115,7 @@ class SurfacePlanner(MeshPlanner):
     ) -> tuple[list[SurfacePoint], PlanResult | None]:
         """Start, via points and goal on the surface, in order, up to the first that has a problem; the problem."""
         stops: list[SurfacePoint] = []
-        for name, pose in _named_poses(request):
+        for name, pose in named_poses(request):
             point = self._locate(name, pose, snapshot, blocked)
             if isinstance(point, PlanResult):
                 return stops, point
@@ -133,7 +134,7 @@ class SurfacePlanner(MeshPlanner):
             where = f"the {name} {position_text(pose.position)} is {distance:.2f} m from the surface"
             if distance <= reach:
                 return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{where}, past its border")
-            hint = self._heights_text(pose)
+            hint = heights_text(ground_heights(self.mesh_map, pose.x, pose.y))
             return PlanResult(GetPathOutcome.OUT_OF_MAP, f"{where}, allowed are {reach:g} m; {hint}")
         vertex = nearest_corner(self.mesh_map, point)
         if blocked[vertex]:
@@ -141,13 +142,6 @@ class SurfacePlanner(MeshPlanner):
             reason = describe_blockage(self.mesh_map, snapshot, vertex, self.parameters.cost_limit)
             return PlanResult(outcome, f"the {name} {position_text(pose.position)} is blocked: {reason}")
         return point
-
-    def _heights_text(self, pose: Pose) -> str:
-        """Heights of the surface at a pose that is not on it, as a text."""
-        heights = sorted(ground_heights(self.mesh_map, pose.x, pose.y))
-        if not heights:
-            return "there is no surface above or below it"
-        return f"the surface there is at z = {', '.join(f'{height:.2f}' for height in heights)} m"
 
     def _different_components(self, start: SurfacePoint, stop: SurfacePoint) -> PlanResult | None:
         """NO_PATH_FOUND if two points lie on surfaces that do not touch; known without a search."""
@@ -192,18 +186,23 @@ class SurfacePlanner(MeshPlanner):
             tried = vertex  # a search may find out what ``reach`` did not know
         return None
 
-    def _assemble(self, legs: list[Leg], goal: Pose, goal_reached_exactly: bool) -> Path:
-        positions = np.concatenate([legs[0].positions[:1]] + [leg.positions[1:] for leg in legs])
-        normals = np.concatenate([legs[0].normals[:1]] + [leg.normals[1:] for leg in legs])
-        if goal_reached_exactly:
-            positions[-1] = goal.position
-        # Every pose looks to the next one and stands on the surface; the last one is as requested.
-        positions, orientations = poses_along(positions, normals, SAME_POINT)
-        orientations[-1] = goal.orientation
-        guidance = tuple(leg.guidance for leg in legs if leg.guidance is not None) or None
-        return Path(positions, orientations, self.mesh_map.frame_id, self.clock.now(), guidance)
+
+def path_of_legs(legs: Sequence[Leg], goal: Pose, ends_there: bool, frame_id: str, stamp: float) -> Path:
+    """One path of all legs; every pose looks to the next one and stands on the surface, the last one looks as ``goal``.
+
+    It ends at the position of ``goal``, too, if it ``ends_there``.
+    """
+    positions = np.concatenate([legs[0].positions[:1]] + [leg.positions[1:] for leg in legs])
+    normals = np.concatenate([legs[0].normals[:1]] + [leg.normals[1:] for leg in legs])
+    if ends_there:
+        positions[-1] = goal.position
+    positions, orientations = poses_along(positions, normals, SAME_POINT)
+    orientations[-1] = goal.orientation
+    guidance = tuple(leg.guidance for leg in legs if leg.guidance is not None) or None
+    return Path(positions, orientations, frame_id, stamp, guidance)
 
 
-def _named_poses(request: PlanRequest) -> list[tuple[str, Pose]]:
+def named_poses(request: PlanRequest) -> list[tuple[str, Pose]]:
+    """All poses of a request with what they are called in messages."""
     via = [(f"via point {index}", pose) for index, pose in enumerate(request.via)]
     return [("start", request.start), *via, ("goal", request.goal)]

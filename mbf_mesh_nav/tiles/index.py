@@ -6,6 +6,7 @@ It is written last and replaced as a whole, so a folder without one is a map tha
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from functools import cached_property
 from pathlib import Path
@@ -108,6 +109,18 @@ class TileIndex(BaseModel):
         return {entry.key: entry for entry in self.tiles}
 
     @cached_property
+    def box(self) -> Box:
+        """The box around all tiles."""
+        low = [min(one.box[axis] for one in self.tiles) for axis in range(3)]
+        high = [max(one.box[axis] for one in self.tiles) for axis in range(3, 6)]
+        return low[0], low[1], low[2], high[0], high[1], high[2]
+
+    @property
+    def spacing(self) -> float:
+        """About how far [m] vertices lie from each other in the densest tile."""
+        return self.tile_size / math.sqrt(max(one.core_vertices for one in self.tiles))
+
+    @cached_property
     def _boxes(self) -> Any:
         """Index over the tiles' boxes, by their place in ``tiles``."""
         settings = rtree_index.Property(dimension=3)
@@ -125,6 +138,11 @@ def write_index(folder: Path, index: TileIndex) -> None:
         write_whole(path, json.dumps(index.model_dump(mode="python"), indent=1))
     except OSError as error:
         raise MeshError(str(path), [f"cannot be written: {error}"]) from error
+
+
+def is_tile_folder(folder: Path) -> bool:
+    """Whether a folder holds a map of tiles, also one that is not complete."""
+    return folder.is_dir() and ((folder / INDEX_FILE).exists() or any(folder.glob("tile_*.npz")))
 
 
 def read_index(folder: Path) -> TileIndex:

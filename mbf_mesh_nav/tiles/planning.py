@@ -103,16 +103,37 @@ def plan_on_tiles(
     """
     places = []
     for name, position in (("start", start), ("goal", goal)):
-        there = np.asarray(position, dtype=np.float64)
-        place = tiled.find_place(there, surface_distance)
-        if place is None:
-            text = f"the {name} {position_text(there)} is not within {surface_distance:g} m of the surface"
-            return _failure(GetPathOutcome.OUT_OF_MAP, text)
-        if place.blocked_by:
-            outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
-            return _failure(outcome, f"the {name} {position_text(there)} is blocked: {place.blocked_by}")
+        place = place_on_tiles(tiled, name, position, surface_distance)
+        if isinstance(place, TiledPlan):
+            return place
         places.append(place)
-    first, last = places
+    return plan_between(tiled, *places, tolerance=tolerance, cancel_flag=cancel_flag)
+
+
+def place_on_tiles(
+    tiled: TiledMap, name: str, position: ArrayLike, surface_distance: float = SURFACE_DISTANCE
+) -> TilePlace | TiledPlan:
+    """The place of a position (3,) [m], or OUT_OF_MAP, BLOCKED_START or (any but the "start") BLOCKED_GOAL."""
+    there = np.asarray(position, dtype=np.float64)
+    place = tiled.find_place(there, surface_distance)
+    if place is None:
+        text = f"the {name} {position_text(there)} is not within {surface_distance:g} m of the surface"
+        return _failure(GetPathOutcome.OUT_OF_MAP, text)
+    if place.blocked_by:
+        outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
+        return _failure(outcome, f"the {name} {position_text(there)} is blocked: {place.blocked_by}")
+    return place
+
+
+def plan_between(
+    tiled: TiledMap,
+    first: TilePlace,
+    last: TilePlace,
+    *,
+    tolerance: float = TOLERANCE,
+    cancel_flag: FlagArray = NOT_CANCELLED,
+) -> TiledPlan:
+    """Plan along edges between two places, as ``plan_on_tiles``."""
     if first.key == last.key and first.face == last.face:
         cost = first.cost_to(last)
         positions, normals = np.array([first.point, last.point]), np.array([first.normal, last.normal])

@@ -18,7 +18,7 @@ import numpy as np
 from mbf_mesh_nav.arrays import FloatArray
 from mbf_mesh_nav.map.layer import CostArray, LethalArray
 from mbf_mesh_nav.mesh.mesh_report import MeshError
-from mbf_mesh_nav.tiles.index import read_index
+from mbf_mesh_nav.tiles.index import TileIndex, read_index
 from mbf_mesh_nav.tiles.places import TilePlace, find_place
 from mbf_mesh_nav.tiles.pool import TilePool
 from mbf_mesh_nav.tiles.portals import PortalGraph, TilePortals, estimated_costs
@@ -119,7 +119,7 @@ class TiledMap:
         """
         if key not in self.index.entries or layer not in self.index.layers:
             raise MeshError(str(self.folder), [f"has no tile {key} with a layer '{layer}'"])
-        tile = self._read_tile(key)
+        tile = sound_tile(self.folder, self.index, key)
         if costs.shape != (tile.core_vertices,) or lethal.shape != (tile.core_vertices,):
             expected = (tile.core_vertices,)
             raise ValueError(f"tile {key} takes values of shape {expected}, got {costs.shape} and {lethal.shape}")
@@ -144,18 +144,8 @@ class TiledMap:
         return TilePortals(bounds.portals, costs)
 
     def _read(self, key: TileKey) -> tuple[Tile, TileGraph]:
-        tile = self._read_tile(key)
+        tile = sound_tile(self.folder, self.index, key)
         return tile, tile_graph(tile, tile.costs[self._layer], tile.lethal[self._layer], self.profile)
-
-    def _read_tile(self, key: TileKey) -> Tile:
-        """A sound tile of this map."""
-        path, entry = tile_file(self.folder, key), self.index.entries[key]
-        tile = read_tile(path)
-        found = (tile.core_vertices, len(tile.neighbours), len(tile.shared), len(tile.costs))
-        expected = (entry.core_vertices, entry.neighbours, entry.shared, len(self.index.layers))
-        if found != expected or tile.build.tobytes().hex() != self.index.build:
-            raise MeshError(str(path), ["belongs to another map than the index"])
-        return tile
 
     def _read_portals(self, key: TileKey) -> TilePortals:
         path = tile_file(self.folder, key)
@@ -165,3 +155,17 @@ class TiledMap:
         if costs.shape != expected:
             raise MeshError(str(path), [f"'portal_costs' has the shape {costs.shape}, expected {expected}"])
         return TilePortals(portals, costs[self._profile_row])
+
+
+def sound_tile(folder: Path, index: TileIndex, key: TileKey) -> Tile:
+    """Read a tile of a map; ``MeshError`` if it is damaged or not of this map."""
+    path, entry = tile_file(folder, key), index.entries[key]
+    tile = read_tile(path)
+    found = (tile.core_vertices, len(tile.neighbours), len(tile.shared), len(tile.costs))
+    expected = (entry.core_vertices, entry.neighbours, entry.shared, len(index.layers))
+    if found != expected or tile.build.tobytes().hex() != index.build:
+        raise MeshError(str(path), ["belongs to another map than the index"])
+    core = tile.vertices[: tile.core_vertices]
+    if (*core.min(axis=0).tolist(), *core.max(axis=0).tolist()) != entry.box:
+        raise MeshError(str(path), ["does not lie where the index states"])
+    return tile

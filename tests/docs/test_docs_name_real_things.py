@@ -72,7 +72,7 @@ def test_every_script_of_the_shell_blocks_exists():
 
 
 def test_every_yaml_block_has_known_keys_or_names_of_its_plugins():
-    sections = {"global_costmap", "local_costmap", "mesh_map", "elevation_grid"}
+    sections = {"global_costmap", "local_costmap", "mesh_map", "tiled_map", "elevation_grid"}
     for block in blocks("yaml"):
         data = yaml.safe_load(block)
         names = {item["name"] for key in PLUGIN_LISTS for item in data.get(key, [])}

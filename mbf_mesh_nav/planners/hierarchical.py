@@ -1,0 +1,161 @@
+"""Cheapest path along edges on a map larger than memory: coarse over the portals of its tiles, then exact near it.
+
+Use it on the backend ``tiles``, it is the planner there. Costs are those of ``mesh.astar`` on the whole mesh, or above
+them by at most ``cost_tolerance`` where that can be proven; the message states which, see ``tiles.planning``. Blocked
+is what the map's cost profile calls so. Paths follow edges: see ``mesh.dijkstra``.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import ClassVar
+
+import numpy as np
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.maps.navigation_map import MapContext, MapPlugin
+from mbf_abstract.outcomes import GetPathOutcome
+from mbf_abstract.parameters import PluginParameters, parameter
+from mbf_abstract.plugins import AbstractPlanner, PlanRequest, PlanResult
+from mbf_mesh_nav.arrays import FlagArray
+from mbf_mesh_nav.mesh.borders import on_surface
+from mbf_mesh_nav.mesh.ground import heights_text
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+from mbf_mesh_nav.mesh.surface_point import describe_blockage, nearest_corner, position_text
+from mbf_mesh_nav.mesh.topology import group_of_each
+from mbf_mesh_nav.search.leg_search import Leg
+from mbf_mesh_nav.search.surface_planner import named_poses, path_of_legs
+from mbf_mesh_nav.tiles.places import TilePlace
+from mbf_mesh_nav.tiles.planning import SURFACE_DISTANCE, TOLERANCE, TiledPlan, place_on_tiles, plan_between
+from mbf_mesh_nav.tiles.serving.navigation_map import SEARCHED, TiledNavigationMap
+
+AT_VERTEX = 1e-6
+"""How far [m] a vertex may be from itself on the surface: rounding."""
+
+
+class HierarchicalParameters(PluginParameters):
+    """Parameters of ``tiles.hierarchical``."""
+
+    cost_tolerance: float = parameter(
+        TOLERANCE, "Share by which the cost may be above the cheapest; 0 = exact, if the memory allows it.", ge=0.0
+    )
+    max_surface_distance: float = parameter(
+        SURFACE_DISTANCE,
+        "A start, via point or goal farther than this above or below the surface, or past a border, is out of the map.",
+        unit="m",
+        gt=0.0,
+    )
+
+
+class HierarchicalPlanner(MapPlugin, AbstractPlanner):
+    """Plans over portals, then along edges."""
+
+    Parameters: ClassVar[type[PluginParameters]] = HierarchicalParameters
+    parameters: HierarchicalParameters
+
+    def __init__(self, context: MapContext[TiledNavigationMap]) -> None:
+        super().__init__(context)
+        if not isinstance(context.navigation_map, TiledNavigationMap):
+            raise ValueError("plans on a map of tiles, which the configuration's backend does not have")
+        self._map = context.navigation_map
+        self._tiled = context.navigation_map.tiled
+
+    def make_plan(self, request: PlanRequest) -> PlanResult:
+        """Plan from start over the via points to the goal; see ``AbstractPlanner``. A damaged tile is a MAP_ERROR."""
+        try:
+            return self._planned(request)
+        except MeshError as error:
+            return PlanResult(GetPathOutcome.MAP_ERROR, str(error))
+
+    def _planned(self, request: PlanRequest) -> PlanResult:
+        # 1. Where on the surface is everything? A tolerance helps with a problem of the goal only.
+        places, problem = self._locate(request)
+        if problem is not None and (len(places) <= len(request.via) or request.dist_tolerance <= 0.0):
+            return problem
+
+        # 2. Plan leg by leg; the last one may end near the goal instead of at it.
+        plans: list[TiledPlan] = []
+        flag = request.cancel_token.flag
+        for first, last in itertools.pairwise(places):
+            plan = self._plan(first, last, flag)
+            if plan.outcome != GetPathOutcome.SUCCESS:
+                problem = _failed(plan)
+                break
+            plans.append(plan)
+        near_goal = problem is not None and len(plans) == len(request.via) and request.dist_tolerance > 0.0
+        if near_goal and not request.cancel_token.cancelled:
+            near = self._near_goal(places[len(plans)], request.goal, request.dist_tolerance, flag)
+            plans, problem = ([*plans, near], None) if near is not None else (plans, problem)
+
+        # 3. One path of all legs, ending with the requested pose.
+        if request.cancel_token.cancelled:
+            return PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
+        if problem is not None:
+            return problem
+        legs = [Leg(plan.positions, plan.normals, plan.cost) for plan in plans]
+        path = path_of_legs(legs, request.goal, not near_goal, self._map.frame_id, self.clock.now())
+        notes = [plan.message for plan in plans]
+        if near_goal:
+            notes.append(f"ends {path[-1].distance_to(request.goal):.2f} m from the goal")
+        return PlanResult(GetPathOutcome.SUCCESS, "; ".join(notes), path, sum(leg.cost for leg in legs))
+
+    def _locate(self, request: PlanRequest) -> tuple[list[TilePlace], PlanResult | None]:
+        """Places of start, via points and goal, in order, up to the first that has a problem; the problem."""
+        places: list[TilePlace] = []
+        for name, pose in named_poses(request):
+            with self._map.searching:
+                place = place_on_tiles(self._tiled, name, pose.position, self.parameters.max_surface_distance)
+            if isinstance(place, TiledPlan):
+                return places, PlanResult(place.outcome, self._explained(place, name, pose))
+            places.append(place)
+        return places, None
+
+    def _explained(self, problem: TiledPlan, name: str, pose: Pose) -> str:
+        """The message of a pose that is blocked or not on the surface, with its layers or the heights there."""
+        if problem.outcome == GetPathOutcome.OUT_OF_MAP:
+            return f"{problem.message}; {heights_text(self._map.ground_heights(pose.x, pose.y))}"
+        there = self._map.around(pose.x, pose.y, self.parameters.max_surface_distance)
+        reach, limit = self.parameters.max_surface_distance, self._tiled.profile.cost_limit
+        point = None if there is None else on_surface(there.topology, there.locator, pose.position, reach)
+        if there is None or point is None:
+            return problem.message
+        reason = describe_blockage(there, there.snapshot(), nearest_corner(there, point), limit)
+        return f"the {name} {position_text(pose.position)} is blocked: {reason}"
+
+    def _plan(self, first: TilePlace, last: TilePlace, flag: FlagArray) -> TiledPlan:
+        with self._map.searching:
+            return plan_between(self._tiled, first, last, tolerance=self.parameters.cost_tolerance, cancel_flag=flag)
+
+    def _near_goal(self, start: TilePlace, goal: Pose, tolerance: float, flag: FlagArray) -> TiledPlan | None:
+        """Plan to the vertex with a path that is nearest to the goal, if one lies within the tolerance [m].
+
+        It is looked for at most ``SEARCHED`` distances between vertices away.
+        """
+        within = min(tolerance, SEARCHED * self._tiled.index.spacing)
+        there = self._map.around(goal.x, goal.y, within)
+        if there is None:
+            return None
+        # Free vertices that are connected have a path all or none: one of each group is tried.
+        free = ~there.snapshot().blocked(self._tiled.profile.cost_limit)
+        group = group_of_each(there.edges[free[there.edges].all(axis=1)].T, len(free))
+        offsets = norm(there.vertices - np.asarray(goal.position))
+        near = np.flatnonzero(free & (offsets <= within))
+        without_path: set[int] = set()
+        for vertex in near[np.argsort(offsets[near], kind="stable")].tolist():
+            if group[vertex] in without_path:
+                continue
+            with self._map.searching:
+                place = self._tiled.find_place(there.vertices[vertex], AT_VERTEX)
+            plan = self._plan(start, place, flag) if place is not None else None
+            if plan is not None and plan.outcome == GetPathOutcome.SUCCESS:
+                return plan
+            if flag[0] != 0:
+                return None
+            without_path.add(int(group[vertex]))
+        return None
+
+
+def _failed(plan: TiledPlan) -> PlanResult:
+    """Of a plan that failed; as the map does not change by itself, planning again does not help."""
+    return PlanResult(plan.outcome, plan.message, permanent=plan.outcome == GetPathOutcome.NO_PATH_FOUND)

@@ -1,0 +1,127 @@
+"""The server on a map of tiles.
+
+The configuration has one section, ``tiled_map``; the layers are those the tiles were built with. Plugin types are
+looked for with the prefix ``mesh.``, the planner is ``tiles.hierarchical``. Behaviours that know their map by its
+contract only work, plugins for one mesh are refused.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, cast
+
+from mbf_abstract.config.configuration import Config, PluginSpec
+from mbf_abstract.config.registry import PluginRegistry
+from mbf_abstract.execution.loaded_plugin import LoadedPlugin
+from mbf_abstract.maps.navigation_map import MapContext
+from mbf_abstract.maps.served_map import ServedMap
+from mbf_abstract.maps.view import GridView
+from mbf_abstract.parameters import ParameterModel, parameter
+from mbf_abstract.plugins import PluginContext, PluginKind
+from mbf_abstract.server.map_server import MapServer
+from mbf_abstract.server.plugin_host import ServerError
+from mbf_mesh_nav.mesh.mesh_report import MeshError
+from mbf_mesh_nav.plugins import MeshPlugin
+from mbf_mesh_nav.tiles.index import is_tile_folder, read_index
+from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
+from mbf_mesh_nav.tiles.serving.overview import overview
+from mbf_mesh_nav.tiles.tiled_map import DEFAULT_MEMORY, TiledMap
+
+BARE_TILES = """\
+backend: tiles
+global_frame: {frame}
+planner_max_retries: 0
+planner_patience: 100.0
+planners:
+  - {{name: hierarchical, type: tiles.hierarchical}}
+tiled_map:
+  folder: {folder}
+"""
+UPDATE_FREQUENCY = 1.0
+"""Hz; nothing changes the map by itself."""
+
+
+class TiledMapParameters(ParameterModel):
+    """Parameters of the ``tiled_map`` block."""
+
+    folder: str = parameter(..., "Folder of the tiles, as `mbf map tile` writes it.", dynamic=False)
+    profile: str = parameter("", "Cost profile of the map; empty = its first one.", dynamic=False)
+    memory: float = parameter(
+        DEFAULT_MEMORY, "What loaded tiles, searches and tables may take.", unit="bytes", gt=0.0, dynamic=False
+    )
+    inscribed_radius: float = parameter(
+        0.0, "Radius of the robot's inner circle; 0 = that of the map's layers.", unit="m", ge=0.0
+    )
+
+
+class TileServer(MapServer):
+    """Navigation on a map larger than memory."""
+
+    backend: ClassVar[str] = "tiles"
+    config_sections: ClassVar[Mapping[str, type[ParameterModel]]] = {"tiled_map": TiledMapParameters}
+
+    @property
+    def tiled_map(self) -> TiledNavigationMap:
+        """The map."""
+        tiled_map: TiledNavigationMap = self.served["tiled_map"].map
+        return tiled_map
+
+    @classmethod
+    def plugin_registry(cls, allow_module_types: bool = True) -> PluginRegistry:
+        """Types are those of the mesh server."""
+        return PluginRegistry("mesh", allow_module_types=allow_module_types, adapters=cls.plugin_adapters)
+
+    def serve_maps(self, config: Config) -> Iterator[ServedMap[Any]]:
+        """Open the folder."""
+        parameters = cast(TiledMapParameters, config.sections["tiled_map"].parameters)
+        folder = config.path.parent / Path(parameters.folder).expanduser()
+        try:
+            tiled = TiledMap(folder, parameters.profile, parameters.memory)
+        except KeyError as error:
+            raise MeshError(str(folder), [str(error.args[0])]) from error
+        if (frame := config.parameters.global_frame) != tiled.index.frame_id:
+            text = f"is in the frame '{tiled.index.frame_id}', the global_frame of the configuration is '{frame}'"
+            raise MeshError(str(folder), [text])
+        tiled_map = TiledNavigationMap(tiled, parameters.inscribed_radius)
+        yield ServedMap(tiled_map, self.runtime, "tiled_map", parameters, UPDATE_FREQUENCY)
+
+    def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
+        """The radius of the disc that stands for the robot; the map's layers keep theirs."""
+        if not isinstance(footprint, int | float):
+            raise ValueError(f"a mesh map takes the robot for a disc: a radius [m], not {footprint!r}")
+        return {"inscribed_radius": footprint}
+
+    def make_context(self, kind: PluginKind, options: Mapping[str, Any], base: PluginContext) -> PluginContext:
+        """Add the map."""
+        return MapContext(**vars(base), navigation_map=self.tiled_map, transforms=self.runtime.transforms)
+
+    def _construct(self, spec: PluginSpec) -> LoadedPlugin[Any]:
+        if issubclass(spec.plugin_class, MeshPlugin):
+            raise ServerError("needs the whole mesh in memory, which a map of tiles is not")
+        return super()._construct(spec)
+
+    def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
+        """Heights of all surfaces at a place, the lowest free one first; see ``ground.ground_heights``."""
+        return self.tiled_map.ground_heights(x, y)
+
+    @property
+    def map_views(self) -> tuple[str, ...]:
+        """Names of the layers, the one of the cost profile first."""
+        tiled = self.tiled_map.tiled
+        shown = tiled.index.layers[tiled.index.layer_of(tiled.profile)]
+        return tuple(sorted(tiled.index.layers, key=lambda name: name != shown))
+
+    def map_view(self, name: str = "") -> GridView:
+        """The costs of a layer from above, of the cost profile's layer without a name; reads all tiles."""
+        tiled = self.tiled_map.tiled
+        return overview(tiled, tiled.index.layers.index(name or self.map_views[0]))
+
+    @classmethod
+    def config_for_map(cls, file: Path, unknown_is_free: bool = True) -> str | None:
+        """Take folders of tiles."""
+        if not is_tile_folder(file):
+            return None
+        frame = read_index(file).frame_id
+        return BARE_TILES.format(folder=json.dumps(str(file)), frame=json.dumps(frame))

@@ -1,0 +1,110 @@
+"""The part of a tiled map around a place, as a mesh map of its own; all storeys, with the stored layers.
+
+It ends where it is cut off. Whoever asks it a question asks for so much that the cut does not matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from mbf_mesh_nav.map.layer import CostArray, LayerContext, LayerParameters, LethalArray, MeshLayer
+from mbf_mesh_nav.map.layer_graph import LayerGraph
+from mbf_mesh_nav.map.mesh_map import MeshMap
+from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
+from mbf_mesh_nav.mesh.topology import build_topology
+from mbf_mesh_nav.tiles.index import Box
+from mbf_mesh_nav.tiles.tile import Tile
+from mbf_mesh_nav.tiles.tiled_map import TiledMap
+
+
+class StoredLayer(MeshLayer):
+    """A layer with the values that the tiles hold."""
+
+    def compute(self) -> tuple[CostArray, LethalArray]:
+        """The values it was given."""
+        return self._costs, self._lethal
+
+
+def mesh_within(tiled: TiledMap, low: tuple[float, float], high: tuple[float, float]) -> MeshMap | None:
+    """The faces of a map that have a corner in a rectangle, from ``low`` to ``high`` (x, y) [m]; None without any.
+
+    Where tiles have different values for a vertex that they share, it has the worse ones.
+
+    Raises
+    ------
+    MeshError
+        A tile is damaged.
+    """
+    _, _, bottom, _, _, top = tiled.index.box
+    box: Box = (*low, bottom, *high, top)
+    parts = [part for key in tiled.index.tiles_in(box) if (part := _part_of(tiled.tile(key)[0], low, high)) is not None]
+    if not parts:
+        return None
+    # 1. One vertex for each number of the whole map.
+    numbers = np.concatenate([part.numbers for part in parts])
+    _, first, vertex_of = np.unique(numbers, return_index=True, return_inverse=True)
+    vertices: FloatArray = np.concatenate([part.vertices for part in parts])[first]
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    corners = [vertex_of[part.faces + start] for part, start in zip(parts, starts, strict=False)]
+    faces: IntArray = np.concatenate(corners).astype(np.int32)
+    own = np.arange(len(vertices), dtype=np.int32), np.arange(len(faces), dtype=np.int32)
+    mesh_map = MeshMap(build_topology(CheckedMesh(vertices, faces, *own, own[0])), tiled.index.frame_id)
+    # 2. The stored values, by the same numbers.
+    costs, lethal = (
+        np.concatenate(values, axis=1) for values in zip(*((p.costs, p.lethal) for p in parts), strict=True)
+    )
+    _put_layers(mesh_map, tiled, *_worst(costs, lethal, vertex_of.astype(np.int32), len(vertices)))
+    return mesh_map
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Of one tile's core: n vertices with their numbers in the whole map and their values, and the faces of them."""
+
+    numbers: NDArray[np.int64]
+    vertices: FloatArray
+    faces: IntArray
+    costs: Float32Array
+    lethal: BoolArray
+
+
+def _part_of(tile: Tile, low: tuple[float, float], high: tuple[float, float]) -> _Part | None:
+    """The core faces of a tile with a corner in a rectangle; None without any."""
+    x, y = tile.vertices[: tile.core_vertices, 0], tile.vertices[: tile.core_vertices, 1]
+    inside = (x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])
+    faces = tile.faces[: int(tile.core_faces[0])]
+    used, corners = np.unique(faces[inside[faces].any(axis=1)], return_inverse=True)
+    if not len(used):
+        return None
+    return _Part(
+        tile.numbers[used],
+        tile.vertices[used],
+        corners.reshape(-1, 3).astype(np.int32),
+        tile.costs[:, used],
+        tile.lethal[:, used],
+    )
+
+
+def _worst(costs: Float32Array, lethal: BoolArray, vertex_of: IntArray, count: int) -> tuple[Float32Array, BoolArray]:
+    """The greatest cost and the flags (L, count) of values (L, k) of some vertices, several times for some."""
+    worst, flags = np.zeros((len(costs), count), dtype=np.float32), np.zeros((len(costs), count), dtype=np.bool_)
+    for row in range(len(costs)):
+        np.maximum.at(worst[row], vertex_of, costs[row])
+        np.logical_or.at(flags[row], vertex_of, lethal[row])
+    return worst, flags
+
+
+def _put_layers(mesh_map: MeshMap, tiled: TiledMap, costs: Float32Array, lethal: BoolArray) -> None:
+    """Layers with the values (L, V) in the numbering the mesh was given in, and the profile's as the default one."""
+    order = mesh_map.internal_to_input
+    layers = []
+    for row, name in enumerate(tiled.index.layers):
+        layer = StoredLayer(LayerContext(name, mesh_map.topology, mesh_map.locator, LayerParameters()))
+        layer.replace(costs[row][order], lethal[row][order])
+        layers.append(layer)
+    shown = tiled.index.layers[tiled.index.layer_of(tiled.profile)]
+    mesh_map.set_layers(LayerGraph(layers), shown, tiled.profile.edge_cost_factor)
