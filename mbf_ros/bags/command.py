@@ -1,4 +1,4 @@
-"""The command ``mbf bag``: bags of ROS replayed through our layers."""
+"""The command ``mbf bag``: bags of ROS replayed through our layers, and runs written as bags."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands to the application ``mbf``."""
     bag = typer.Typer(help="Bags of ROS 1 and ROS 2, without ROS.", no_args_is_help=True)
     bag.command("replay", cls=CoordinateCommand)(replay)
+    bag.command("export")(export)
     app.add_typer(bag, name="bag")
 
 
@@ -78,6 +79,27 @@ def replay(
             typer.echo(f"results in {folder}: report.html, statistics.json, run.mcap, map_*.png")
     if _has_failed(replayed):
         raise typer.Exit(FAILURE)
+
+
+def export(
+    run: Path = typer.Argument(..., help="Folder of a run, e.g. runs/2030-01-02_03-04-05."),
+    out: Path | None = typer.Option(None, "--out", help="Folder of the bag, a new one; RUN/bag if not given."),
+    robot_frame: str = typer.Option("base_link", "--robot-frame", help="Name of the robot's frame in the bag."),
+) -> None:
+    """Write a run as a bag of ROS 2 (mcap) with standard messages; the same run gives the same bytes."""
+    with readable_errors():
+        from mbf_abstract.drive_log import read_drive_log
+        from mbf_ros.bags.export import messages_of
+        from mbf_ros.bags.writing import write_bag
+
+        folder = out or run / "bag"
+        with waiting("reading the run") as on_step:
+            log = read_drive_log(run)
+            on_step("writing the bag")
+            counts = write_bag(folder, messages_of(log, robot_frame))
+    for topic in sorted(counts):
+        typer.echo(f"{counts[topic]:7} {topic}")
+    typer.echo(f"bag in {folder}")
 
 
 def _has_failed(replayed: Replayed) -> bool:

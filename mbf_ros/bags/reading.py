@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -82,7 +82,7 @@ class Bag:
         kind, store = self.types[recorded.topic], self._store(recorded.topic)
         read = store.deserialize_ros1 if self._is_ros1 else store.deserialize_cdr
         try:
-            values = _by_field_name(read(recorded.raw, kind))
+            values = _by_field_name(read(recorded.raw, kind), store)
         except Exception as error:  # rosbags raises of many kinds for bytes that do not fit
             raise MessageError(f"the message cannot be decoded: {_reason(error)}") from error
         return completed(KNOWN_AS.get(kind, kind), values)
@@ -162,12 +162,12 @@ def _types_of(connection: Any) -> Any:
     return store
 
 
-def _by_field_name(value: Any) -> Any:
-    """A message of rosbags as a dictionary by field name, all the way down."""
+def _by_field_name(value: Any, store: Any) -> Any:
+    """A message of rosbags as a dictionary by field name, all the way down; without the constants of its type."""
     if is_dataclass(value):
-        names = (field.name for field in fields(value))
-        return {name: _by_field_name(getattr(value, name)) for name in names if not name.startswith("__")}
-    return [_by_field_name(one) for one in value] if isinstance(value, list) else value
+        names = (name for name, _ in store.fielddefs[value.__msgtype__][1])
+        return {name: _by_field_name(getattr(value, name), store) for name in names}
+    return [_by_field_name(one, store) for one in value] if isinstance(value, list) else value
 
 
 def _reason(error: Exception) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from mbf_abstract.event_values import well_formed
 from mbf_abstract.events import Event
-from mbf_abstract.geometry import Command, Pose, Twist
+from mbf_abstract.geometry import Command, FloatArray, Pose, Twist
 from mbf_abstract.maps.view import GridView, MapView, MeshView
 from terrain.physics.protocols import Actor
 from terrain.recording.actor_track import ActorTrack
@@ -68,6 +68,7 @@ class Recorder:
     obstacles: Surface | None = None
     paths: list[StampedPoints] = field(default_factory=list)
     scans: list[StampedPoints] = field(default_factory=list)
+    scan_origins: list[FloatArray] = field(default_factory=list)
     grids: list[RecordedGrid] = field(default_factory=list)
     meshes: list[RecordedMesh] = field(default_factory=list)
     actors: Sequence[Actor] = ()
@@ -88,9 +89,10 @@ class Recorder:
         """Add a plan (m, 3) [m] that the robot follows from now on."""
         self.paths.append((time, np.array(points, dtype=np.float64).reshape(-1, 3)))
 
-    def scan(self, time: float, points: ArrayLike) -> None:
-        """Add the points (k, 3) [m] of a range sensor, in the map."""
+    def scan(self, time: float, points: ArrayLike, origin: ArrayLike) -> None:
+        """Add the points (k, 3) [m] that a range sensor at ``origin`` (3,) [m] hit, in the map."""
         self.scans.append((time, np.array(points, dtype=np.float64).reshape(-1, 3)))
+        self.scan_origins.append(np.array(origin, dtype=np.float64).reshape(3))
 
     def map(self, time: float, look: Callable[[], MapView | None]) -> None:
         """Add what the map looks like now, unless it is too large or was looked at some seconds ago."""
@@ -140,6 +142,7 @@ class Recorder:
             commands=rows[:, 11:14].copy(),
             paths=self.paths[before.paths :],
             scans=self.scans[before.scans :],
+            scan_origins=np.array(self.scan_origins[before.scans :]).reshape(-1, 3),
             events=tuple(replace(event, time=max(0.0, round(event.time - began, 9))) for event in events),
             verdict=verdict,
             grids=self.grids[before.grids :],

@@ -98,6 +98,8 @@ class Recording:
         Every plan the robot followed, from the time it came.
     scans : list of (time, (k, 3) float64)
         Points a range sensor hit, in the map.
+    scan_origins : (len(scans), 3) float64
+        Where its rays started [m], in the map; without rows in older recordings.
     ground, walls, obstacles : Surface or None
         Obstacles are things that are on no map.
     goals : tuple of Pose
@@ -132,6 +134,7 @@ class Recording:
     grids: list[RecordedGrid] = field(default_factory=list)
     meshes: list[RecordedMesh] = field(default_factory=list)
     actors: list[ActorTrack] = field(default_factory=list)
+    scan_origins: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @cached_property
     def tilt(self) -> FloatArray:
@@ -153,6 +156,7 @@ class Recording:
             arrays |= _surface_arrays(name, getattr(self, name))
         for name in ("paths", "scans"):
             arrays |= _stamped_arrays(name, getattr(self, name))
+        arrays["scan_origins"] = self.scan_origins
         arrays |= grid_arrays(self.grids) | mesh_arrays(self.meshes) | track_arrays(self.actors)
         metadata: dict[str, Any] = {
             "scenario": self.scenario,
@@ -235,4 +239,5 @@ def _recording_from(arrays: dict[str, Any]) -> Recording:
         grids=grids_from(arrays),
         meshes=meshes_from(arrays),
         actors=tracks_from(arrays),
+        scan_origins=arrays.get("scan_origins", np.zeros((0, 3))),
     )

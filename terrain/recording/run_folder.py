@@ -131,6 +131,7 @@ def read_parts(folder: Path) -> Recording:
             goals=parts[-1].goals,
             paths=_joined(parts, "paths"),
             scans=_joined(parts, "scans"),
+            scan_origins=_rows(parts, "scan_origins"),
             events=tuple(_joined(parts, "events")),
             grids=_joined(parts, "grids"),
             meshes=_with_surface(_joined(parts, "meshes")),

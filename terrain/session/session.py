@@ -194,7 +194,7 @@ class Session(SimulationSession):
     def _record_scan(self, scan: RangeScan) -> None:
         self._scans += 1
         if self._scans % SCANS_PER_RECORDED == 1:
-            self.recorder.scan(scan.stamp, scan.points)
+            self.recorder.scan(scan.stamp, scan.points, scan.origin)
 
     def _record_refined_plan(self, handle: AnyGoalHandle) -> None:
         path = handle.result.refined_path if handle.result is not None else None

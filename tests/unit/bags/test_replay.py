@@ -9,14 +9,18 @@ from typer.testing import CliRunner
 from mbf_abstract.cli import make_app
 from mbf_abstract.commands.coordinates import Place
 from mbf_abstract.geometry.transform import Transform
+from mbf_ros.messages.geometry import MessageContext
+from mbf_ros.messages.sensors import point_cloud
 from tests.unit.bags.conftest import (
     COSTMAP,
     MESH,
     SPEED,
     WALL,
     drive,
+    header,
     last_grid,
     make_bag,
+    message,
     odometry,
     scan,
     static,
@@ -133,6 +137,20 @@ def test_a_layer_that_takes_any_source_gets_every_sensor(replayed):
     result = replayed(messages, text)
     sensors = {topic for topic, one in result.topics.items() if one.type == "sensor_msgs/msg/LaserScan"}
     assert {topic: result.topics[topic].used_as for topic in sensors} == {"/base_scan": "base_scan", "/front": "front"}
+
+
+def test_clouds_and_single_ranges_are_taken_as_well(replayed):
+    cloud = point_cloud(np.array([[2.0, 1.0, 0.0]]), "laser", 0.0, MessageContext())
+    cloud["header"] = header("laser", 0.2)
+    single = {"header": header("laser", 0.2), "field_of_view": 0.1, "max_range": 4.0, "range": 1.5}
+    messages = [static(), tf(0.0, 0.0), tf(0.2, 0.0), message(0.2, "/points", "sensor_msgs/PointCloud2", cloud)]
+    messages.append(message(0.2, "/sonar", "sensor_msgs/Range", single))
+    both = COSTMAP.replace("{lidar: {obstacle_max_range: 8.0, raytrace_max_range: 8.0}}", "{points: {}, range: {}}")
+    result = replayed(messages, both.replace("{lidar: {}}", "{points: {}}"))
+    assert not any(one.dropped for one in result.topics.values())
+    walls = marked(last_grid(result))
+    for place in ([2.1, 1.0], [1.6, 0.0]):
+        assert (np.abs(walls - place) < 0.11).all(axis=1).any()
 
 
 def test_the_local_map_can_be_shown_in_its_place(replayed):

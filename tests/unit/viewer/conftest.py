@@ -88,7 +88,7 @@ def make_office_recording() -> Recording:
     for index in range(0, 150, 5):
         pose = poses[index]
         ring = np.column_stack([pose.x + 2 * np.cos(angles), pose.y + 2 * np.sin(angles), np.full(180, 0.3)])
-        recorder.scan(index / RATE, ring)
+        recorder.scan(index / RATE, ring, ring.mean(axis=0))
     drive(recorder, poses, speed=0.5)
     return recorder.finish(Verdict(110, "a box stands on the path"), life_of_a_goal(15.4, 110, "blocked"))
 

@@ -31,7 +31,7 @@ def long_run():
         recorder.sample(index / RATE, pose, Twist.planar(1.0), Twist.planar(1.0))
         if index % RATE == 0:
             recorder.path(index / RATE, way[index::4])
-            recorder.scan(index / RATE, way[index] + 4.0 * rng.normal(size=(720, 3)))
+            recorder.scan(index / RATE, way[index] + 4.0 * rng.normal(size=(720, 3)), way[index])
     return recorder.finish(Verdict(0, "goal reached"))
 
 
