@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -164,7 +163,7 @@ def _types_of(connection: Any) -> Any:
 
 def _by_field_name(value: Any, store: Any) -> Any:
     """A message of rosbags as a dictionary by field name, all the way down; without the constants of its type."""
-    if is_dataclass(value):
+    if hasattr(value, "__msgtype__"):
         names = (name for name, _ in store.fielddefs[value.__msgtype__][1])
         return {name: _by_field_name(getattr(value, name), store) for name in names}
     return [_by_field_name(one, store) for one in value] if isinstance(value, list) else value
