@@ -1,8 +1,8 @@
 """Actions of nav2_msgs: goals of their clients to ours, our results and feedback to theirs.
 
-Fields are those of Kilted. A list of poses of Humble and Jazzy, where Kilted has nav_msgs/Goals, is taken too; their
-clients do not look for the fields of results that came later. What ours cannot respect, a behaviour tree or a goal
-checker, is refused where it is named, and not ignored.
+Fields are those of Kilted. Those of Jazzy are taken too: there a list of poses stands where Kilted has nav_msgs/Goals,
+and some fields are missing. What ours cannot respect, a behaviour tree or a goal checker, is refused where it is
+named, and not ignored.
 """
 
 from __future__ import annotations
@@ -14,12 +14,10 @@ from typing import Any
 
 from mbf_abstract.geometry import Pose
 from mbf_abstract.goals.goal_types import (
+    ActionResult,
     ExePathFeedback,
     ExePathGoal,
     ExePathResult,
-    FollowWaypointsFeedback,
-    FollowWaypointsGoal,
-    FollowWaypointsResult,
     GetPathGoal,
     GetPathResult,
     MoveBaseGoal,
@@ -27,34 +25,37 @@ from mbf_abstract.goals.goal_types import (
     RefinePathGoal,
     RefinePathResult,
 )
-from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, RefinePathOutcome
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RefinePathOutcome
 from mbf_ros.messages import nav2_codes as codes
-from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal, path_or_refuse, pose_or_refuse
+from mbf_ros.messages.action_mapping import ActionMapping, G, R, RefusedGoal, path_or_refuse, pose_or_refuse
 from mbf_ros.messages.geometry import MessageContext, command_twist, duration, path_message, pose_stamped
-from mbf_ros.messages.interfaces import Message, MessageError
-
-MISSED = 2  # nav2_msgs/WaypointStatus.FAILED
+from mbf_ros.messages.interfaces import Message
 
 
 @dataclass(frozen=True)
-class ThroughPosesMapping(ActionMapping[GetPathGoal, GetPathResult]):
-    """ComputePathThroughPoses, whose list of poses has become a message of its own with Kilted."""
+class GoalsMapping(ActionMapping[G, R]):
+    """An action with a list of poses, which has become a message of its own with Kilted; ``field`` is its name."""
 
-    def goal(self, values: object, context: MessageContext) -> GetPathGoal:
+    field: str = "goals"
+
+    def goal(self, values: object, context: MessageContext) -> G:
         """Return our goal of the values of a client, see ``ActionMapping``."""
-        if isinstance(values, Mapping) and isinstance(values.get("goals"), list | tuple):
-            values = {**values, "goals": {"goals": values["goals"]}}
+        if isinstance(values, Mapping) and isinstance(values.get(self.field), list | tuple):
+            values = {**values, self.field: {"goals": values[self.field]}}
         return super().goal(values, context)
 
 
-def _unsupported(message: Message, *names: str) -> None:
+def unsupported(message: Message, outcome: int, *names: str) -> None:
+    """Raise RefusedGoal where one of the fields has a value; not all distributions have all fields."""
     for name in names:
-        if message[name]:
-            raise MessageError(f"{name} {message[name]!r} is not supported here; leave it empty")
+        if value := message.get(name):
+            raise RefusedGoal(outcome, f"{name} {value!r} is not supported here; leave it empty")
 
 
-def _poses(messages: list[Message], context: MessageContext, name: str) -> tuple[Pose, ...]:
+def poses_or_refuse(message: Any, context: MessageContext, name: str) -> tuple[Pose, ...]:
+    """Return the poses of a list, or of a nav_msgs/Goals; raises RefusedGoal with INVALID_GOAL where one is none."""
     outcome = GetPathOutcome.INVALID_GOAL
+    messages: list[Message] = message["goals"] if isinstance(message, Mapping) else message
     named = {f"{name}[{i}]": one for i, one in enumerate(messages)}
     return tuple(pose_or_refuse(named, context, each, outcome) for each in named)
 
@@ -70,7 +71,7 @@ def _path_goal_of(message: Message, context: MessageContext) -> GetPathGoal:
 
 
 def _via_goal_of(message: Message, context: MessageContext) -> GetPathGoal:
-    poses = _poses(message["goals"]["goals"], context, "goals")
+    poses = poses_or_refuse(message["goals"], context, "goals")
     if not poses:
         raise RefusedGoal(GetPathOutcome.INVALID_GOAL, "goals: there is no pose to go to")
     return GetPathGoal(poses[-1], _start(message, context), message["planner_id"], via=poses[:-1])
@@ -82,22 +83,23 @@ def _path_result(result: GetPathResult, context: MessageContext, through: bool) 
         "path": path_message(result.path, context),
         "planning_time": duration(0.0),
         "error_code": code(result.outcome),
-        "error_msg": _text(result),
+        "error_msg": error_msg(result),
     }
 
 
-def _text(result: Any) -> str:
+def error_msg(result: ActionResult) -> str:
+    """What clients of Nav2 read of a failure; empty for a success."""
     return "" if result.success else f"{result.outcome_name}: {result.message}"
 
 
 # ------------------------------------------------------------------------------------------------------- driving
 def _follow_goal_of(message: Message, context: MessageContext) -> ExePathGoal:
-    _unsupported(message, "goal_checker_id", "progress_checker_id")
+    unsupported(message, ExePathOutcome.INVALID_PLUGIN, "goal_checker_id", "progress_checker_id")
     return ExePathGoal(path_or_refuse(message, context, ExePathOutcome.INVALID_PATH), message["controller_id"])
 
 
 def _follow_result(result: ExePathResult, context: MessageContext) -> Message:
-    return {"result": {}, "error_code": codes.following_code(result.outcome), "error_msg": _text(result)}
+    return {"result": {}, "error_code": codes.following_code(result.outcome), "error_msg": error_msg(result)}
 
 
 def _follow_feedback(feedback: ExePathFeedback, context: MessageContext) -> Message:
@@ -106,15 +108,16 @@ def _follow_feedback(feedback: ExePathFeedback, context: MessageContext) -> Mess
 
 
 def _navigate_goal_of(message: Message, context: MessageContext) -> MoveBaseGoal:
-    _unsupported(message, "behavior_tree")
+    unsupported(message, MoveBaseOutcome.FAILURE, "behavior_tree")
     return MoveBaseGoal(pose_or_refuse(message, context, "pose", GetPathOutcome.INVALID_GOAL))
 
 
 def _navigate_result(result: MoveBaseResult, context: MessageContext) -> Message:
-    return {"error_code": codes.navigating_code(result.outcome), "error_msg": _text(result)}
+    return {"error_code": codes.navigating_code(result.outcome), "error_msg": error_msg(result)}
 
 
-def _navigate_feedback(feedback: ExePathFeedback, context: MessageContext) -> Message:
+def navigate_feedback(feedback: ExePathFeedback, context: MessageContext) -> Message:
+    """Return a NavigateToPose_Feedback; what the goal has behind it is not in ours."""
     return {
         "current_pose": pose_stamped(feedback.current_pose, context),
         "navigation_time": duration(0.0),
@@ -124,38 +127,9 @@ def _navigate_feedback(feedback: ExePathFeedback, context: MessageContext) -> Me
     }
 
 
-# ----------------------------------------------------------------------------------------------------- waypoints
-def _waypoints_goal_of(message: Message, context: MessageContext) -> FollowWaypointsGoal:
-    """Nav2 counts the loops after the first one, and begins the first at ``goal_index``."""
-    poses, first, more = _poses(message["poses"], context, "poses"), message["goal_index"], message["number_of_loops"]
-    if first and more:
-        raise MessageError(f"goal_index {first} together with number_of_loops {more} is not supported here")
-    if not poses[first:]:
-        raise RefusedGoal(GetPathOutcome.INVALID_GOAL, f"poses: there is none from goal_index {first} on")
-    return FollowWaypointsGoal(poses[first:], loops=more + 1, stop_on_failure=False)
-
-
-def _waypoints_result(result: FollowWaypointsResult, context: MessageContext) -> Message:
-    missed = [
-        {
-            "waypoint_status": MISSED,
-            "waypoint_index": visit,
-            "waypoint_pose": pose_stamped(None, context),
-            "error_code": codes.navigating_code(result.results[visit].outcome),
-            "error_msg": _text(result.results[visit]),
-        }
-        for visit in result.failed
-    ]
-    code = codes.waypoints_code(result.outcome)
-    return {"missed_waypoints": missed, "error_code": code, "error_msg": _text(result)}
-
-
-def _waypoints_feedback(feedback: FollowWaypointsFeedback, context: MessageContext) -> Message:
-    return {"current_waypoint": feedback.waypoint}
-
-
 # ------------------------------------------------------------------------------------------------------ smoothing
 def _smooth_goal_of(message: Message, context: MessageContext) -> RefinePathGoal:
+    unsupported(message, RefinePathOutcome.FAILURE, "check_for_collisions")
     path = path_or_refuse(message, context, RefinePathOutcome.FAILURE)
     return RefinePathGoal(path, message["smoother_id"])
 
@@ -166,27 +140,20 @@ def _smooth_result(result: RefinePathResult, context: MessageContext) -> Message
         "smoothing_duration": duration(0.0),
         "was_completed": result.success,
         "error_code": codes.smoothing_code(result.outcome),
-        "error_msg": _text(result),
+        "error_msg": error_msg(result),
     }
 
 
 COMPUTE_PATH_TO_POSE = ActionMapping(
     "nav2_msgs/action/ComputePathToPose", _path_goal_of, partial(_path_result, through=False), None, GetPathResult
 )
-COMPUTE_PATH_THROUGH_POSES = ThroughPosesMapping(
+COMPUTE_PATH_THROUGH_POSES = GoalsMapping(
     "nav2_msgs/action/ComputePathThroughPoses", _via_goal_of, partial(_path_result, through=True), None, GetPathResult
 )
 FOLLOW_PATH = ActionMapping(
     "nav2_msgs/action/FollowPath", _follow_goal_of, _follow_result, _follow_feedback, ExePathResult
 )
 NAVIGATE_TO_POSE = ActionMapping(
-    "nav2_msgs/action/NavigateToPose", _navigate_goal_of, _navigate_result, _navigate_feedback, MoveBaseResult
-)
-FOLLOW_WAYPOINTS = ActionMapping(
-    "nav2_msgs/action/FollowWaypoints",
-    _waypoints_goal_of,
-    _waypoints_result,
-    _waypoints_feedback,
-    FollowWaypointsResult,
+    "nav2_msgs/action/NavigateToPose", _navigate_goal_of, _navigate_result, navigate_feedback, MoveBaseResult
 )
 SMOOTH_PATH = ActionMapping("nav2_msgs/action/SmoothPath", _smooth_goal_of, _smooth_result, None, RefinePathResult)

@@ -10,6 +10,7 @@ does one whose client is gone; see ``clients``.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -50,6 +51,28 @@ MAX_GOALS = 50
 """How many goals of one action may be unfinished at a time."""
 
 
+@dataclass(frozen=True)
+class Serving:
+    """What all action servers of a node have of it.
+
+    Attributes
+    ----------
+    send : callable
+        Sends a goal of ours.
+    context : callable
+        How stamps and frames relate to ours, now.
+    refusal : callable
+        Why no goals are taken; empty if they are.
+    on_fault : callable
+        Takes an exception that no goal may raise.
+    """
+
+    send: Callable[[Any], AnyGoalHandle]
+    context: Callable[[], MessageContext]
+    refusal: Callable[[], str]
+    on_fault: Callable[[Exception], None]
+
+
 class ServedAction:
     """One action server.
 
@@ -61,16 +84,7 @@ class ServedAction:
     mapping : ActionMapping
     outcomes : type of enum
         Those of its results.
-    send : callable
-        Sends a goal of ours.
-    context : callable
-        How stamps and frames relate to ours, now.
-    refusal : callable
-        Why no goals are taken; empty if they are.
-    on_fault : callable
-        Takes an exception that no goal may raise.
-    more : callable
-        Called with each goal as it begins; returns what gives the fields of feedback and result that are not in ours.
+    serving : Serving
 
     Attributes
     ----------
@@ -84,17 +98,12 @@ class ServedAction:
         name: str,
         mapping: ActionMapping[Any, Any],
         outcomes: Outcomes,
-        send: Callable[[Any], AnyGoalHandle],
-        context: Callable[[], MessageContext],
-        refusal: Callable[[], str],
-        on_fault: Callable[[Exception], None],
-        more: Callable[[AnyGoalHandle], More] = lambda handle: dict,
+        serving: Serving,
     ) -> None:
         from rclpy.action import ActionServer
 
-        self._node, self._send, self._context = node, send, context
-        self._refusal, self._on_fault = refusal, on_fault
-        self._mapping, self._outcomes, self._more = mapping, outcomes, more
+        self._node, self._mapping, self._outcomes = node, mapping, outcomes
+        self._serving, self._context = serving, serving.context
         self._class = interface_class(self._mapping.type)
         self._goals: dict[bytes, AnyGoalHandle] = {}
         self._jumps: dict[bytes, str] = {}
@@ -127,7 +136,7 @@ class ServedAction:
         from rclpy.action import GoalResponse
 
         many = f"{MAX_GOALS} goals are unfinished already" if self.unfinished >= MAX_GOALS else ""
-        if reason := self._refusal() or many:
+        if reason := self._serving.refusal() or many:
             self._node.get_logger().warning(f"{self._mapping.type}: goal rejected: {reason}")
             return GoalResponse.REJECT
         self.unfinished += 1
@@ -164,7 +173,7 @@ class ServedAction:
         except RefusedGoal as error:
             return self._message(self._mapping.refused(error.outcome, str(error))), GoalStatus.REJECTED
         except Exception as error:  # a fault of ours
-            self._on_fault(error)
+            self._serving.on_fault(error)
             text = f"{type(error).__name__}: {error_text(error)}"
             return self._message(self._mapping.refused(self._outcomes.INTERNAL_ERROR, text)), GoalStatus.ABORTED
 
@@ -175,10 +184,10 @@ class ServedAction:
         from rclpy.task import Future
 
         key = bytes(goal_handle.goal_id.uuid)
-        handle = self._send(self._mapping.goal_of(to_dict(goal_handle.request), self._context()))
+        handle = self._serving.send(self._mapping.goal_of(to_dict(goal_handle.request), self._context()))
         if goal_handle.is_cancel_requested:  # before this coroutine had its first turn
             handle.cancel("canceled by the client")
-        self._goals[key], more = handle, self._more(handle)
+        self._goals[key], more = handle, self._observe(goal_handle, handle)
         self._clients.welcome(key)
         try:
             executor = self._node.executor
@@ -198,6 +207,10 @@ class ServedAction:
             tf_error = self._outcomes.__members__.get("TF_ERROR", self._outcomes.FAILURE)
             return self._message(self._mapping.refused(tf_error, jump), more), GoalStatus.ABORTED
         return self._message(handle.result, more), handle.status
+
+    def _observe(self, goal_handle: Any, handle: AnyGoalHandle) -> More:
+        """Return what gives the fields of feedback and result that are not in ours, of a goal that begins."""
+        return dict
 
     def _publish_feedback(self, goal_handle: Any, feedback: Any, more: More) -> None:
         """Publish a feedback, on the thread of callbacks."""

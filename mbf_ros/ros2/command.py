@@ -40,6 +40,12 @@ def ros2(
     keep_goals: bool = typer.Option(
         False, "--keep-goals", help="A goal goes on when its client is gone; else it is canceled."
     ),
+    nav2: bool = typer.Option(
+        None, "--nav2/--no-nav2", help="Offer Nav2's names, too; if not given, where nav2_msgs is installed."
+    ),
+    amcl: bool = typer.Option(
+        False, "--amcl", help="Answer Nav2's clients for amcl, too: the robot is localised by something else."
+    ),
     ros_arguments: list[str] = typer.Argument(
         None,
         metavar="[-- ROS ARGUMENTS]",
@@ -52,7 +58,15 @@ def ros2(
         from mbf_ros.ros2.options import NodeOptions
         from mbf_ros.sensor_options import sensors_of
 
-        options = NodeOptions(stamped, max_silence or None, sensors_of(sensor), keep_goals, tuple(ros_arguments or ()))
+        options = NodeOptions(
+            stamped,
+            max_silence or None,
+            sensors_of(sensor),
+            keep_goals,
+            tuple(ros_arguments or ()),
+            nav2=nav2,
+            stands_for_amcl=amcl,
+        )
         with navigation_node(config, options) as node:
             _wait_for_end(node)
     if node.failure:
@@ -63,7 +77,7 @@ def ros2(
 def ros2_interfaces(
     into: Path = typer.Option(None, "--into", help="Folder for the packages; that of this Python if not given."),
 ) -> None:
-    """Compile mbf_msgs and tf2_msgs, which the wheels of ROS 2 lack; needs gcc."""
+    """Compile mbf_msgs, nav2_msgs and tf2_msgs, which the wheels of ROS 2 lack; needs gcc."""
     with readable_errors():
         from mbf_ros.ros2.interfaces.building import build
         from mbf_ros.ros2.interfaces.definitions import PACKAGES

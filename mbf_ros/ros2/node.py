@@ -25,9 +25,11 @@ from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import WallClock, unix_seconds
 from mbf_abstract.time.ticker import Ticker
 from mbf_ros.messages.geometry import NANOSECONDS, MessageContext
-from mbf_ros.ros2.actions import ACTIONS, ServedAction
+from mbf_ros.ros2.actions import ACTIONS, ServedAction, Serving
 from mbf_ros.ros2.clock import RosClock, SimulatedRosClock
 from mbf_ros.ros2.conversion import interface_class
+from mbf_ros.ros2.nav2 import is_offered, serve_actions
+from mbf_ros.ros2.nav2_services import Nav2Services
 from mbf_ros.ros2.options import NodeOptions
 from mbf_ros.ros2.parameters import NodeParameters
 from mbf_ros.ros2.robot import Arrivals, Frames, RosRobot
@@ -130,14 +132,15 @@ class NavigationNode:
         self._closing.callback(server.runtime.gate.close, "the node ends")
         NodeParameters(self._node, server)
         self._open_topics(config)
-        self._actions = [
-            ServedAction(self._node, f"~/{name}", *action, self._send, self._context, self._refusal, self._fail)
-            for name, action in ACTIONS.items()
-        ]
+        serving = Serving(self._send, self._context, self._refusal, self._fail)
+        self._actions = [ServedAction(self._node, f"~/{name}", *action, serving) for name, action in ACTIONS.items()]
         self._closing.callback(self._stop_serving)
         if not self._options.keep_goals:
             self._repeat(CLIENT_PERIOD, self._cancel_abandoned)
-        ServedQueries(self._node, server, self._context)
+        queries = ServedQueries(self._node, server, self._context)
+        if is_offered(self._options.nav2):
+            self._actions += serve_actions(self._node, server, serving)
+            Nav2Services(self._node, server, serving, queries, self._options.stands_for_amcl)
         clock.on_jump.append(self._on_jump)
         watch = Ticker(self._real_time, session.events, self._stop_where_silent, WATCH_PERIOD, "silence watch")
         self._closing.callback(watch.stop)

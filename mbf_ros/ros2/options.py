@@ -22,6 +22,10 @@ class NodeOptions:
         Let a goal go on when its client is gone, instead of canceling it.
     ros_arguments : sequence of str
         As after ``--ros-args``: remappings, parameters, log level.
+    nav2 : bool, optional
+        Offer Nav2's names; None = where nav2_msgs is installed.
+    stands_for_amcl : bool
+        Answer for the node ``amcl``, too, for which Nav2's clients wait; see ``nav2_services``.
     time_to_end : float
         Longest time [s] for goals to end and their results to be sent when the node ends.
     time_to_send : float
@@ -33,5 +37,7 @@ class NodeOptions:
     sensors: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     keep_goals: bool = False
     ros_arguments: tuple[str, ...] = ()
+    nav2: bool | None = None
+    stands_for_amcl: bool = False
     time_to_end: float = 2.0
     time_to_send: float = 0.5

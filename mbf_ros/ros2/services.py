@@ -23,41 +23,46 @@ NO_ANSWER: Message = {"state": int(CellState.UNKNOWN), "cost": 0}
 
 
 class ServedQueries:
-    """All services of a navigation server on a node; ``context`` as in ``ServedAction``."""
+    """All services of a navigation server on a node; ``context`` as in ``ServedAction``.
+
+    Attributes
+    ----------
+    group : rclpy.callback_groups.CallbackGroup
+        Of what need not wait for the other callbacks of the node.
+    """
 
     def __init__(self, node: Any, server: AbstractNavigationServer, context: Callable[[], MessageContext]) -> None:
         self._node, self._server, self._context = node, server, context
         from rclpy.callback_groups import ReentrantCallbackGroup
 
         self._calls = 0
-        beside = ReentrantCallbackGroup()  # in the group of the node all inputs would wait for an answer
+        self.group = ReentrantCallbackGroup()  # in the group of the node all inputs would wait for an answer
         for name, question in MAP_QUESTIONS.items():
-            node.create_service(
-                interface_class(question.type), f"~/{name}", self._asking(question), callback_group=beside
-            )
+            self.serve(question.type, f"~/{name}", self._asking(question), NO_ANSWER)
+        self.serve("std_srvs/srv/Empty", "~/clear_costmaps", self._clear, {})
         trigger = interface_class("std_srvs/srv/Trigger")
         for name, call, text in (
             ("cancel_all", lambda: server.cancel_all("canceled by a client"), "all goals canceled"),
             ("pause", server.pause_all, "all goals paused"),
             ("resume", server.resume_all, "all goals go on"),
         ):
-            node.create_service(trigger, f"~/{name}", self._triggering(call, text), callback_group=beside)
-        node.create_service(
-            interface_class("std_srvs/srv/Empty"), "~/clear_costmaps", self._clear, callback_group=beside
-        )
+            node.create_service(trigger, f"~/{name}", self._triggering(call, text), callback_group=self.group)
 
-    def _asking(self, question: MapQuestion) -> Callable[..., Any]:
-        async def ask(request: Any, response: Any) -> Any:
-            def answer() -> Message:
-                return question.ask(self._server.queries, to_dict(request), self._context())
+    def serve(self, type_name: str, name: str, answer: Callable[[Any], Message], no_answer: Message) -> None:
+        """Offer a service that is answered on a thread of its own; by ``no_answer`` where ``answer`` raises."""
 
-            return fill(response, await self._on_thread(answer, question.type) or NO_ANSWER)
+        async def call(request: Any, response: Any) -> Any:
+            values = await self._on_thread(lambda: answer(request), name)
+            return fill(response, no_answer if values is None else values)
 
-        return ask
+        self._node.create_service(interface_class(type_name), name, call, callback_group=self.group)
 
-    async def _clear(self, request: Any, response: Any) -> Any:
-        await self._on_thread(self._server.queries.clear_map, "clear_costmaps")
-        return response
+    def _asking(self, question: MapQuestion) -> Callable[[Any], Message]:
+        return lambda request: question.ask(self._server.queries, to_dict(request), self._context())
+
+    def _clear(self, request: Any) -> Message:
+        self._server.queries.clear_map()
+        return {}
 
     @staticmethod
     def _triggering(call: Callable[[], None], text: str) -> Callable[..., Any]:

@@ -9,7 +9,7 @@ from typing import Any
 from mbf_abstract.config.navigation_parameters import NavigationParameters
 from mbf_abstract.goals.goal_types import MoveBaseGoal
 from mbf_abstract.navigator import Navigator
-from mbf_ros.messages import mbf_actions, nav2_actions
+from mbf_ros.messages import mbf_actions, nav2_actions, nav2_waypoints
 from mbf_ros.messages.action_mapping import ActionMapping
 from mbf_ros.messages.geometry import MessageContext, pose_of
 from mbf_ros.messages.interfaces import Message, MessageError, json_text
@@ -28,7 +28,7 @@ ACTIONS: dict[str, ActionMapping[Any, Any]] = {
     "/compute_path_through_poses": nav2_actions.COMPUTE_PATH_THROUGH_POSES,
     "/follow_path": nav2_actions.FOLLOW_PATH,
     "/navigate_to_pose": nav2_actions.NAVIGATE_TO_POSE,
-    "/follow_waypoints": nav2_actions.FOLLOW_WAYPOINTS,
+    "/follow_waypoints": nav2_waypoints.FOLLOW_WAYPOINTS,
     "/smooth_path": nav2_actions.SMOOTH_PATH,
 }
 GOAL_TOPICS = ("/goal_pose", "/move_base_simple/goal")

@@ -1,8 +1,8 @@
-"""The packages mbf_msgs and tf2_msgs as interface files of ROS 2, made of the fields in ``interfaces.txt``.
+"""The packages mbf_msgs, nav2_msgs and tf2_msgs as interface files of ROS 2, made of the fields in ``interfaces.txt``.
 
 Names, types and the order of fields are those of the released packages, so both have the same RIHS01 hashes and speak
-to each other. Of tf2_msgs only TFMessage is here, and mbf_msgs has no ``SetTestRobotState``. Constants are not part of
-a hash; those of results are our outcomes.
+to each other. Of tf2_msgs only TFMessage is here, of nav2_msgs what the node offers, and mbf_msgs has no
+``SetTestRobotState``. Constants and defaults are not part of a hash; those of results of mbf_msgs are our outcomes.
 """
 
 from __future__ import annotations
@@ -12,13 +12,28 @@ from enum import IntEnum
 
 from mbf_abstract.maps.queries import CellState
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome
+from mbf_ros.messages import nav2_codes
 from mbf_ros.messages.interfaces import Field, fields_of, known_types
 from mbf_ros.messages.mbf_queries import GLOBAL_COSTMAP, LOCAL_COSTMAP
 
-PACKAGES = ("mbf_msgs", "tf2_msgs")
+PACKAGES = ("mbf_msgs", "nav2_msgs", "tf2_msgs")
 PARTS = {"msg": ("",), "srv": ("_Request", "_Response"), "action": ("_Goal", "_Result", "_Feedback")}
 QUESTIONS = ("CheckPoint", "CheckPose", "CheckPath", "FindValidPose")
 COSTMAPS = {"LOCAL_COSTMAP": LOCAL_COSTMAP, "GLOBAL_COSTMAP": GLOBAL_COSTMAP}
+
+NAV2_CODES: dict[str, type[IntEnum]] = {
+    "ComputePathToPose": nav2_codes.PlanningCode,
+    "ComputePathThroughPoses": nav2_codes.ThroughPosesCode,
+    "FollowPath": nav2_codes.FollowPathCode,
+    "NavigateToPose": nav2_codes.NavigateCode,
+    "NavigateThroughPoses": nav2_codes.NavigateThroughPosesCode,
+    "FollowWaypoints": nav2_codes.WaypointsCode,
+    "SmoothPath": nav2_codes.SmoothingCode,
+    "Spin": nav2_codes.SpinCode,
+    "BackUp": nav2_codes.BackUpCode,
+    "DriveOnHeading": nav2_codes.DriveOnHeadingCode,
+    "Wait": nav2_codes.WaitCode,
+}
 
 
 def _of_enum(enum: type[IntEnum]) -> dict[str, int]:
@@ -32,6 +47,8 @@ CONSTANTS: dict[str, tuple[str, Mapping[str, int]]] = {
     "mbf_msgs/action/MoveBase_Result": ("uint32", _of_enum(MoveBaseOutcome)),
     **{f"mbf_msgs/srv/{name}_Request": ("uint8", COSTMAPS) for name in QUESTIONS},
     **{f"mbf_msgs/srv/{name}_Response": ("uint8", _of_enum(CellState)) for name in QUESTIONS},
+    **{f"nav2_msgs/action/{name}_Result": ("uint16", _of_enum(codes)) for name, codes in NAV2_CODES.items()},
+    "nav2_msgs/msg/WaypointStatus": ("uint8", _of_enum(nav2_codes.WaypointState)),
 }
 """Type and values of the constants of a part, by its name."""
 
@@ -72,4 +89,5 @@ def _part(name: str) -> str:
 
 def _line(field: Field) -> str:
     brackets = "" if field.length is None else f"[{field.length or ''}]"
-    return f"{field.type}{brackets} {field.name}".replace("/msg/", "/")
+    default = f" {field.default:g}" if field.default else ""
+    return f"{field.type}{brackets} {field.name}{default}".replace("/msg/", "/")

@@ -203,11 +203,11 @@ class Robot(Peer):
 
 
 class Client(Peer):
-    """The client of ``peers/client.py``."""
+    """The client of ``peers/client.py``, or another one that takes the same kind of orders."""
 
-    def __init__(self, folder, domain, logs):
+    def __init__(self, folder, domain, logs, script="client.py"):
         lease = str(PEERS / "client_lease.xml")
-        super().__init__(folder, domain, logs, str(PEERS / "client.py"), FASTDDS_DEFAULT_PROFILES_FILE=lease)
+        super().__init__(folder, domain, logs, str(PEERS / script), FASTDDS_DEFAULT_PROFILES_FILE=lease)
         self._keys = 0
 
     def do(self, **order):
@@ -250,13 +250,16 @@ def ros_folder():
 class Trio:
     """A robot, our node and a client, in a domain of DDS of their own, where they hear no other test."""
 
-    def __init__(self, closing, folder, logs, simulated):
+    def __init__(self, closing, folder, logs, module):
         self._closing, self._folder, self._logs = closing, folder, logs
         self._domain = free_domain(folder.parent, closing)
-        self._file = logs / "robot.yaml"
-        self._file.write_text(ROBOT)
+        self._client = getattr(module, "CLIENT", "client.py")
+        self._options = getattr(module, "OPTIONS", ())
+        simulated = getattr(module, "SIMULATED", False)
         self._robot_arguments = ["simulated"] if simulated else []
         self._node_arguments = ["--", "-p", "use_sim_time:=true"] if simulated else []
+        self.file = logs / "robot.yaml"
+        self.file.write_text(getattr(module, "CONFIG", ROBOT))
         self.start_robot()
         self.start_node()
         self.start_client()
@@ -266,10 +269,11 @@ class Trio:
         self.robot = self._start(Robot, *self._robot_arguments)
 
     def start_node(self, *options):
-        self.node = self._start(Peer, str(PEERS / "node.py"), str(self._file), *options, *self._node_arguments)
+        arguments = *self._options, *options, *self._node_arguments
+        self.node = self._start(Peer, str(PEERS / "node.py"), str(self.file), *arguments)
 
     def start_client(self):
-        self.client = self._start(Client)
+        self.client = self._start(Client, self._client)
 
     def wait_until_ready(self, since=0):
         """Wait until the node says that it hears the robot, in a line after the first ``since``."""
@@ -296,9 +300,13 @@ class Trio:
 
 @pytest.fixture(scope="module")
 def module_trio(ros_folder, tmp_path_factory, request):
-    """One trio for all tests of a module, on simulated time where the module has ``SIMULATED``."""
+    """One trio for all tests of a module.
+
+    On simulated time where the module has ``SIMULATED``; with the script of its ``CLIENT``, its ``CONFIG`` and its
+    ``OPTIONS`` of the command, where it has them.
+    """
     with ExitStack() as closing:
-        yield Trio(closing, ros_folder, tmp_path_factory.mktemp("trio"), getattr(request.module, "SIMULATED", False))
+        yield Trio(closing, ros_folder, tmp_path_factory.mktemp("trio"), request.module)
 
 
 @pytest.fixture

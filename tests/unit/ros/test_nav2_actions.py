@@ -1,5 +1,7 @@
 """Goals of Nav2's clients of three distributions, our results with Nav2's error codes."""
 
+from functools import partial
+
 import pytest
 
 from mbf_abstract.geometry import Path, Pose, Twist
@@ -7,14 +9,16 @@ from mbf_abstract.goals.goal_types import (
     ExePathFeedback,
     ExePathResult,
     FollowWaypointsFeedback,
+    FollowWaypointsGoal,
     FollowWaypointsResult,
     GetPathResult,
     MoveBaseResult,
     RefinePathResult,
 )
-from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RefinePathOutcome
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_ros.messages import nav2_actions as nav2
 from mbf_ros.messages import nav2_codes as codes
+from mbf_ros.messages import nav2_waypoints as waypoints
 from mbf_ros.messages.action_mapping import RefusedGoal
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import MessageError, completed, fields_of
@@ -27,7 +31,27 @@ def at(x, y=0.0):
     return {"header": {"frame_id": "map"}, "pose": {"position": {"x": x, "y": y}}}
 
 
-@pytest.mark.parametrize("goals", [[at(1), at(2), at(3)], {"goals": [at(1), at(2), at(3)]}], ids=["jazzy", "kilted"])
+LISTS = pytest.mark.parametrize(
+    "goals", [[at(1), at(2), at(3)], {"goals": [at(1), at(2), at(3)]}], ids=["jazzy", "kilted"]
+)
+
+
+@LISTS
+def test_a_way_through_poses_visits_each_and_ends_at_the_first_it_cannot_reach(goals):
+    goal = waypoints.NAVIGATE_THROUGH_POSES.goal({"poses": goals}, CONTEXT)
+    assert [pose.x for pose in goal.waypoints] == [1, 2, 3]
+    assert (goal.loops, goal.stop_on_failure) == (1, True)
+
+
+def test_goals_of_jazzy_lack_fields_that_came_later():
+    path = completed("nav_msgs/Path", {"poses": [at(1)]})
+    assert len(nav2.FOLLOW_PATH.goal_of({"path": path, "controller_id": "", "goal_checker_id": ""}, CONTEXT).path) == 1
+    poses = path["poses"]
+    assert waypoints.FOLLOW_WAYPOINTS.goal_of({"poses": poses}, CONTEXT).visits == 1
+    assert len(waypoints.NAVIGATE_THROUGH_POSES.goal_of({"poses": poses}, CONTEXT).waypoints) == 1
+
+
+@LISTS
 def test_a_path_through_poses_is_asked_for_by_clients_of_jazzy_and_kilted_alike(goals):
     goal = nav2.COMPUTE_PATH_THROUGH_POSES.goal({"goals": goals, "planner_id": "astar"}, CONTEXT)
     assert [pose.x for pose in (*goal.via, goal.target_pose)] == [1, 2, 3]
@@ -41,9 +65,9 @@ def test_the_start_of_a_plan_counts_only_if_it_is_asked_for():
 
 
 def test_nav2_counts_the_loops_after_the_first():
-    goal = nav2.FOLLOW_WAYPOINTS.goal({"poses": [at(1), at(2)], "number_of_loops": 2}, CONTEXT)
+    goal = waypoints.FOLLOW_WAYPOINTS.goal({"poses": [at(1), at(2)], "number_of_loops": 2}, CONTEXT)
     assert (goal.loops, goal.visits, goal.stop_on_failure) == (3, 6, False)
-    later = nav2.FOLLOW_WAYPOINTS.goal({"poses": [at(1), at(2)], "goal_index": 1}, CONTEXT)
+    later = waypoints.FOLLOW_WAYPOINTS.goal({"poses": [at(1), at(2)], "goal_index": 1}, CONTEXT)
     assert [pose.x for pose in later.waypoints] == [2]
 
 
@@ -52,7 +76,11 @@ def test_nav2_counts_the_loops_after_the_first():
     [
         (nav2.NAVIGATE_TO_POSE, {"pose": at(1), "behavior_tree": "mine.xml"}, "behavior_tree 'mine.xml'"),
         (nav2.FOLLOW_PATH, {"path": {"poses": [at(1)]}, "goal_checker_id": "strict"}, "goal_checker_id 'strict'"),
-        (nav2.FOLLOW_WAYPOINTS, {"poses": [at(1)], "goal_index": 1, "number_of_loops": 1}, "goal_index 1 together"),
+        (
+            waypoints.FOLLOW_WAYPOINTS,
+            {"poses": [at(1)], "goal_index": 1, "number_of_loops": 1},
+            "goal_index 1 together",
+        ),
         (nav2.COMPUTE_PATH_TO_POSE, {"goal": at(1), "viapoints": []}, "has no field 'viapoints'"),
     ],
 )
@@ -65,9 +93,9 @@ def test_what_cannot_be_respected_is_refused_and_not_ignored(mapping, values, te
     ("mapping", "values"),
     [
         (nav2.COMPUTE_PATH_THROUGH_POSES, {"goals": []}),
-        (nav2.FOLLOW_WAYPOINTS, {"poses": [at(1)], "goal_index": 1}),
+        (waypoints.FOLLOW_WAYPOINTS, {"poses": [at(1)], "goal_index": 1}),
         (nav2.NAVIGATE_TO_POSE, {"pose": at(float("nan"))}),
-        (nav2.FOLLOW_WAYPOINTS, {"poses": [at(1), at(float("inf"))]}),
+        (waypoints.FOLLOW_WAYPOINTS, {"poses": [at(1), at(float("inf"))]}),
     ],
 )
 def test_a_goal_without_a_place_is_an_invalid_goal(mapping, values):
@@ -85,7 +113,11 @@ RESULTS = [
     (nav2.NAVIGATE_TO_POSE, MoveBaseResult(GetPathOutcome.BLOCKED_GOAL, "occupied"), 206),
     (nav2.NAVIGATE_TO_POSE, MoveBaseResult(MoveBaseOutcome.TF_ERROR, "no pose"), 9002),
     (nav2.NAVIGATE_TO_POSE, MoveBaseResult(MoveBaseOutcome.FAILURE, "no such planner"), 9000),
-    (nav2.FOLLOW_WAYPOINTS, FollowWaypointsResult(GetPathOutcome.NO_PATH_FOUND, "missed one"), 600),
+    (waypoints.FOLLOW_WAYPOINTS, FollowWaypointsResult(GetPathOutcome.NO_PATH_FOUND, "missed one"), 600),
+    (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsResult(0, ""), 0),
+    (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsResult(GetPathOutcome.BLOCKED_GOAL, "occupied"), 306),
+    (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsResult(MoveBaseOutcome.TF_ERROR, "no pose"), 9102),
+    (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsResult(ExePathOutcome.ROBOT_STUCK, "stuck"), 105),
     (nav2.SMOOTH_PATH, RefinePathResult(0, "", PATH), 0),
     (nav2.SMOOTH_PATH, RefinePathResult(RefinePathOutcome.DEPLETED, "late", PATH), 502),
 ]
@@ -103,8 +135,9 @@ def test_a_result_has_the_fields_of_its_type_and_the_error_code_of_nav2(mapping,
 def test_missed_waypoints_are_listed_with_their_error():
     reached, missed = MoveBaseResult(0, ""), MoveBaseResult(GetPathOutcome.NO_PATH_FOUND, "blocked")
     result = FollowWaypointsResult(missed.outcome, "one missed", (reached, missed, reached))
-    (status,) = nav2.FOLLOW_WAYPOINTS.result(result, CONTEXT)["missed_waypoints"]
+    (status,) = waypoints.FOLLOW_WAYPOINTS.result(result, CONTEXT)["missed_waypoints"]
     assert (status["waypoint_index"], status["error_code"], status["error_msg"]) == (1, 208, "NO_PATH_FOUND: blocked")
+    assert status["waypoint_status"] == codes.WaypointState.FAILED
 
 
 def test_feedback_has_the_fields_of_its_type():
@@ -112,13 +145,37 @@ def test_feedback_has_the_fields_of_its_type():
     for mapping, feedback in (
         (nav2.NAVIGATE_TO_POSE, driving),
         (nav2.FOLLOW_PATH, driving),
-        (nav2.FOLLOW_WAYPOINTS, FollowWaypointsFeedback(4, 1, (), driving)),
+        (waypoints.FOLLOW_WAYPOINTS, FollowWaypointsFeedback(4, 1, (), driving)),
+        (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsFeedback(1, 1, (), driving)),
     ):
         message = mapping.feedback(feedback, CONTEXT)
         completed(f"{mapping.type}_Feedback", message)
         assert set(message) == {field.name for field in fields_of(f"{mapping.type}_Feedback")}
     assert nav2.NAVIGATE_TO_POSE.feedback(driving, CONTEXT)["estimated_time_remaining"] == {"sec": 0, "nanosec": 0}
     assert nav2.FOLLOW_PATH.feedback(driving, CONTEXT) == {"distance_to_goal": 4.0, "speed": 0.5}
+
+
+def test_progress_through_poses_counts_the_leg_and_then_straight_from_pose_to_pose():
+    goal = FollowWaypointsGoal((Pose.planar(1, 0), Pose.planar(4, 0), Pose.planar(4, 3)))
+    driving = ExePathFeedback(0, "", Pose.planar(0, 0), 3.0, 0.1, 2.0, 4.0)
+    assert waypoints.through_poses_progress(goal, FollowWaypointsFeedback(1, 1, (), driving)) == {
+        "distance_remaining": 2.0 + 3.0,
+        "estimated_time_remaining": {"sec": 10, "nanosec": 0},
+        "number_of_poses_remaining": 2,
+    }
+    assert waypoints.through_poses_progress(goal, FollowWaypointsFeedback(1, 1, (), None)) == {}
+    assert waypoints.through_poses_progress(goal, None) == {}
+
+
+def test_each_pose_has_a_status_whether_it_was_reached_missed_or_is_still_to_come():
+    goal = FollowWaypointsGoal((Pose.planar(1, 0), Pose.planar(2, 0), Pose.planar(3, 0)))
+    results = (MoveBaseResult(0, ""), MoveBaseResult(GetPathOutcome.NO_PATH_FOUND, "blocked"))
+    statuses = waypoints.waypoint_statuses(goal, results, CONTEXT)
+    for status in statuses:
+        assert completed("nav2_msgs/WaypointStatus", status) == status
+    assert [one["waypoint_status"] for one in statuses] == [1, 3, 0]
+    assert [one["waypoint_pose"]["pose"]["position"]["x"] for one in statuses] == [1, 2, 3]
+    assert (statuses[1]["error_code"], statuses[1]["error_msg"]) == (308, "NO_PATH_FOUND: blocked")
 
 
 @pytest.mark.parametrize(
@@ -131,6 +188,13 @@ def test_feedback_has_the_fields_of_its_type():
         (codes.waypoints_code, MoveBaseOutcome, range(600, 604)),
         (codes.navigating_code, MoveBaseOutcome, [*range(100, 108), *range(200, 209), *range(9000, 9004)]),
         (codes.navigating_code, GetPathOutcome, [*range(200, 209), 9000]),
+        (codes.navigating_through_poses_code, GetPathOutcome, [*range(300, 310), 9100]),
+        (codes.navigating_through_poses_code, ExePathOutcome, [*range(100, 108), 9100]),
+        (codes.navigating_through_poses_code, MoveBaseOutcome, [*range(100, 108), *range(300, 310), 9100, 9102]),
+        (partial(codes.behavior_code, codes.SpinCode), RecoveryOutcome, range(700, 704)),
+        (partial(codes.behavior_code, codes.BackUpCode), RecoveryOutcome, range(710, 715)),
+        (partial(codes.behavior_code, codes.DriveOnHeadingCode), RecoveryOutcome, range(720, 725)),
+        (partial(codes.behavior_code, codes.WaitCode), RecoveryOutcome, range(740, 742)),
         (codes.navigating_code, ExePathOutcome, [*range(100, 108), 9000]),
     ],
 )

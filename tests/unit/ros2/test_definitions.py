@@ -25,17 +25,32 @@ def parts():
                     yield f"{package}/{kind}/{name}{part}", lines
 
 
-@pytest.mark.parametrize(("name", "text"), list(parts()))
-def test_a_part_has_the_hash_of_the_released_package(name, text):
+@pytest.fixture(scope="module")
+def store():
     store = get_typestore(Stores.ROS2_KILTED)
-    (fields,) = get_types_from_msg(text, name).values()
-    store.fielddefs[name] = fields
+    for name, text in parts():
+        (store.fielddefs[name],) = get_types_from_msg(text, name).values()
+    return store
+
+
+@pytest.mark.parametrize("name", [name for name, _ in parts()])
+def test_a_part_has_the_hash_of_the_released_package(store, name):
     assert store.hash_rihs01(name) == HASHES[name]
 
 
 def test_the_constants_of_a_result_are_our_outcomes():
     lines = interface_files("mbf_msgs")["action/GetPath.action"].splitlines()
     assert [line for line in lines if "=" in line] == [f"uint32 {one.name} = {int(one)}" for one in GetPathOutcome]
+
+
+def test_the_constants_of_nav2_are_its_error_codes_and_a_default_is_kept():
+    lines = interface_files("nav2_msgs")["action/Wait.action"].splitlines()
+    assert [line for line in lines if "=" in line] == [
+        "uint16 NONE = 0",
+        "uint16 UNKNOWN = 740",
+        "uint16 TIMEOUT = 741",
+    ]
+    assert "uint8 max_cost 254" in interface_files("nav2_msgs")["srv/IsPathValid.srv"].splitlines()
 
 
 def test_every_package_that_is_needed_is_named():

@@ -1,0 +1,86 @@
+"""Services of nav2_msgs that ask or clear the map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.geometry import Path
+from mbf_abstract.geometry.arithmetic import norm
+from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.maps.queries import CellState
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_ros.messages.geometry import MessageContext, path_of
+from mbf_ros.messages.interfaces import Message, MessageError
+
+INSCRIBED_COST, LETHAL_COST = 253, 254  # of a cell, as Nav2 counts
+NOT_VALID: Message = {"is_valid": False, "invalid_pose_indices": []}
+"""The answer where there is none."""
+
+
+@dataclass(frozen=True)
+class ServerQuestion:
+    """One service: its type, what answers it, and the answer where that raises."""
+
+    type: str
+    ask: Callable[[AbstractNavigationServer, Message, MessageContext], Message]
+    no_answer: Message
+
+
+def is_path_valid(server: AbstractNavigationServer, request: Message, context: MessageContext) -> Message:
+    """Return whether the robot fits at each pose that lies before it, and the indices of those where it does not.
+
+    As in Nav2 an empty path is not valid, poses that lie behind the robot do not count, and unknown ground does only
+    with ``consider_unknown_as_obstacle``. The robot's outline decides, so ``max_cost`` below that of an inscribed cell
+    raises MessageError.
+    """
+    if request.get("max_cost", LETHAL_COST) < INSCRIBED_COST:
+        raise MessageError(f"max_cost {request['max_cost']} is not supported here; leave it at {LETHAL_COST}")
+    path = path_of(request["path"], context)
+    if len(path) == 0:
+        return NOT_VALID
+    forbidden = {CellState.LETHAL, CellState.OUTSIDE}
+    if request.get("consider_unknown_as_obstacle", False):
+        forbidden.add(CellState.UNKNOWN)
+    first = _nearest(server, path)
+    places = server.queries.check_poses(path[first:])
+    invalid = [first + i for i, place in enumerate(places) if place.state in forbidden]
+    return {"is_valid": not invalid, "invalid_pose_indices": np.array(invalid, np.int32)}
+
+
+def _nearest(server: AbstractNavigationServer, path: Path) -> int:
+    """Index of the pose nearest to the robot; 0 where it is not known."""
+    try:
+        robot = server.runtime.transforms.transform_pose(server.runtime.robot.pose(), path.frame_id)
+    except (RobotStateError, TransformError):
+        return 0
+    return int(np.argmin(norm(path.positions - np.array(robot.position))))
+
+
+def _clearing(local: bool, inside: bool | None = None) -> ServerQuestion:
+    """Service that clears one of the two maps: all of it, or only what is inside or outside of a square."""
+
+    def clear(server: AbstractNavigationServer, request: Message, context: MessageContext) -> Message:
+        if inside is None:
+            server.queries.clear_map(local)
+        else:
+            server.queries.clear_area(request["reset_distance"], local, inside=inside)
+        return {}
+
+    name = {None: "ClearEntireCostmap", True: "ClearCostmapAroundRobot", False: "ClearCostmapExceptRegion"}[inside]
+    return ServerQuestion(f"nav2_msgs/srv/{name}", clear, {})
+
+
+NAV2_QUESTIONS = {
+    "is_path_valid": ServerQuestion("nav2_msgs/srv/IsPathValid", is_path_valid, NOT_VALID),
+    "global_costmap/clear_entirely_global_costmap": _clearing(local=False),
+    "local_costmap/clear_entirely_local_costmap": _clearing(local=True),
+    "global_costmap/clear_around_global_costmap": _clearing(local=False, inside=True),
+    "local_costmap/clear_around_local_costmap": _clearing(local=True, inside=True),
+    "global_costmap/clear_except_global_costmap": _clearing(local=False, inside=False),
+    "local_costmap/clear_except_local_costmap": _clearing(local=True, inside=False),
+}
+"""By the names of the services."""

@@ -1,0 +1,135 @@
+"""FollowWaypoints and NavigateThroughPoses of nav2_msgs, which are both sequences of ``move_base`` goals of ours.
+
+So the robot stops at each pose of NavigateThroughPoses, which Nav2 drives through; see decision 0032.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.goals.goal_types import (
+    FollowWaypointsFeedback,
+    FollowWaypointsGoal,
+    FollowWaypointsResult,
+    MoveBaseResult,
+)
+from mbf_abstract.outcomes import GetPathOutcome, MoveBaseOutcome
+from mbf_ros.messages import nav2_codes as codes
+from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
+from mbf_ros.messages.geometry import MessageContext, duration, pose_stamped
+from mbf_ros.messages.interfaces import Message
+from mbf_ros.messages.nav2_actions import GoalsMapping, error_msg, navigate_feedback, poses_or_refuse, unsupported
+
+
+def _waypoints_goal_of(message: Message, context: MessageContext) -> FollowWaypointsGoal:
+    """Nav2 counts the loops after the first one, and begins the first at ``goal_index``."""
+    poses = poses_or_refuse(message["poses"], context, "poses")
+    first, more = message.get("goal_index", 0), message.get("number_of_loops", 0)
+    if first and more:
+        text = f"goal_index {first} together with number_of_loops {more} is not supported here"
+        raise RefusedGoal(MoveBaseOutcome.FAILURE, text)
+    if not poses[first:]:
+        raise RefusedGoal(GetPathOutcome.INVALID_GOAL, f"poses: there is none from goal_index {first} on")
+    return FollowWaypointsGoal(poses[first:], loops=more + 1, stop_on_failure=False)
+
+
+def _waypoint_status(state: codes.WaypointState, visit: int, pose: Pose | None, context: MessageContext) -> Message:
+    return {
+        "waypoint_status": int(state),
+        "waypoint_index": visit,
+        "waypoint_pose": pose_stamped(pose, context),
+        "error_code": 0,
+        "error_msg": "",
+    }
+
+
+def _waypoints_result(result: FollowWaypointsResult, context: MessageContext) -> Message:
+    missed = [
+        {
+            **_waypoint_status(codes.WaypointState.FAILED, visit, None, context),
+            "error_code": codes.navigating_code(result.results[visit].outcome),
+            "error_msg": error_msg(result.results[visit]),
+        }
+        for visit in result.failed
+    ]
+    code = codes.waypoints_code(result.outcome)
+    return {"missed_waypoints": missed, "error_code": code, "error_msg": error_msg(result)}
+
+
+def _waypoints_feedback(feedback: FollowWaypointsFeedback, context: MessageContext) -> Message:
+    return {"current_waypoint": feedback.waypoint}
+
+
+# ----------------------------------------------------------------------------------------------- through poses
+def _through_goal_of(message: Message, context: MessageContext) -> FollowWaypointsGoal:
+    """Each pose is a waypoint, and the first that cannot be reached ends the goal."""
+    unsupported(message, MoveBaseOutcome.FAILURE, "behavior_tree")
+    poses = poses_or_refuse(message["poses"], context, "poses")
+    if not poses:
+        raise RefusedGoal(GetPathOutcome.INVALID_GOAL, "poses: there is none")
+    return FollowWaypointsGoal(poses)
+
+
+def _through_result(result: FollowWaypointsResult, context: MessageContext) -> Message:
+    return {
+        "error_code": codes.navigating_through_poses_code(result.outcome),
+        "error_msg": error_msg(result),
+        "waypoint_statuses": [],
+    }
+
+
+def _through_feedback(feedback: FollowWaypointsFeedback, context: MessageContext) -> Message:
+    """Feedback of the present leg; there must be one."""
+    assert feedback.driving is not None
+    leg = navigate_feedback(feedback.driving, context)
+    return {**leg, "number_of_poses_remaining": 0, "waypoint_statuses": []}
+
+
+def waypoint_statuses(
+    goal: FollowWaypointsGoal, results: Sequence[MoveBaseResult], context: MessageContext
+) -> list[Message]:
+    """Return a nav2_msgs/WaypointStatus of each pose of a goal, of which ``results`` are the visits that have ended."""
+    states = [codes.WaypointState.COMPLETED if one.success else codes.WaypointState.FAILED for one in results]
+    states += [codes.WaypointState.PENDING] * (len(goal.waypoints) - len(states))
+    statuses = [
+        _waypoint_status(state, visit, pose, context)
+        for visit, (state, pose) in enumerate(zip(states, goal.waypoints, strict=True))
+    ]
+    for status, result in zip(statuses, results, strict=False):
+        code = codes.navigating_through_poses_code(result.outcome)
+        status.update(error_code=code, error_msg=error_msg(result))
+    return statuses
+
+
+def through_poses_progress(goal: FollowWaypointsGoal, feedback: FollowWaypointsFeedback | None) -> Message:
+    """Return what feedback about a leg says of the whole way: the rest is straight from pose to pose."""
+    if feedback is None or feedback.driving is None:
+        return {}
+    leg, rest = feedback.driving, goal.waypoints[feedback.waypoint :]
+    straight = sum(one.distance_to(other) for one, other in pairwise(rest) if one.frame_id == other.frame_id)
+    whole = leg.distance_along_path + straight
+    share = whole / leg.distance_along_path if leg.distance_along_path > 0.0 else 1.0
+    return {
+        "distance_remaining": whole,
+        "estimated_time_remaining": duration(leg.time_to_goal * share),
+        "number_of_poses_remaining": len(rest),
+    }
+
+
+NAVIGATE_THROUGH_POSES = GoalsMapping(
+    "nav2_msgs/action/NavigateThroughPoses",
+    _through_goal_of,
+    _through_result,
+    _through_feedback,
+    FollowWaypointsResult,
+    field="poses",
+)
+FOLLOW_WAYPOINTS = ActionMapping(
+    "nav2_msgs/action/FollowWaypoints",
+    _waypoints_goal_of,
+    _waypoints_result,
+    _waypoints_feedback,
+    FollowWaypointsResult,
+)

@@ -1,0 +1,157 @@
+"""Nav2's names on the node, so that its clients, such as the ``BasicNavigator``, run against ours.
+
+They are offered where nav2_msgs is installed. The node then stands for Nav2's servers: actions and services have their
+names, and ``get_state`` of each of them answers ``active`` once goals are taken. What localises the robot is not ours:
+``amcl`` is answered for only where that is asked for, see ``NodeOptions.stands_for_amcl``.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from importlib.util import find_spec
+from typing import Any
+
+from mbf_abstract.actions.move_base_machine import SUB_GOAL_SLOT
+from mbf_abstract.drive.robot import RobotStateError
+from mbf_abstract.geometry import Pose, normalize_angle
+from mbf_abstract.goals.goal_types import RecoveryGoal
+from mbf_abstract.goals.handle import AnyGoalHandle
+from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
+from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_ros.messages import nav2_actions, nav2_waypoints
+from mbf_ros.messages.action_mapping import ActionMapping
+from mbf_ros.messages.geometry import duration
+from mbf_ros.messages.interfaces import Message
+from mbf_ros.messages.nav2_behaviors import behavior_mappings
+from mbf_ros.ros2.actions import More, Outcomes, ServedAction, Serving
+from mbf_ros.ros2.conversion import fill
+
+ACTIONS: dict[str, tuple[ActionMapping[Any, Any], Outcomes]] = {
+    "compute_path_to_pose": (nav2_actions.COMPUTE_PATH_TO_POSE, GetPathOutcome),
+    "compute_path_through_poses": (nav2_actions.COMPUTE_PATH_THROUGH_POSES, GetPathOutcome),
+    "follow_path": (nav2_actions.FOLLOW_PATH, ExePathOutcome),
+    "smooth_path": (nav2_actions.SMOOTH_PATH, RefinePathOutcome),
+    "navigate_to_pose": (nav2_actions.NAVIGATE_TO_POSE, MoveBaseOutcome),
+    "navigate_through_poses": (nav2_waypoints.NAVIGATE_THROUGH_POSES, MoveBaseOutcome),
+    "follow_waypoints": (nav2_waypoints.FOLLOW_WAYPOINTS, MoveBaseOutcome),
+}
+"""Mapping and outcomes by the names of the actions, without the behaviours."""
+TIMES = ("navigation_time", "planning_time", "smoothing_duration", "total_elapsed_time")
+"""Fields of feedback or result that say how long the goal has taken."""
+FEEDBACK_PERIOD = 0.1  # s of real time between two messages about a behaviour
+
+
+def is_offered(choice: bool | None) -> bool:
+    """Whether Nav2's names are offered: as chosen, with None where nav2_msgs is installed."""
+    return find_spec("nav2_msgs") is not None if choice is None else choice
+
+
+def serve_actions(node: Any, server: AbstractNavigationServer, serving: Serving) -> list[ServedAction]:
+    """Offer Nav2's actions on a node."""
+    recoveries = RecoveryCount(server)
+    behaviors = behavior_mappings(server.plugins)
+    own = {"navigate_through_poses": ThroughPosesAction, **dict.fromkeys(behaviors, BehaviorAction)}
+    actions = {**ACTIONS, **{name: (mapping, RecoveryOutcome) for name, mapping in behaviors.items()}}
+    return [
+        own.get(name, Nav2Action)(server, recoveries, node, name, *action, serving) for name, action in actions.items()
+    ]
+
+
+class RecoveryCount:
+    """How many recoveries that ``move_base`` has begun have ended.
+
+    Attributes
+    ----------
+    ended : int
+    """
+
+    def __init__(self, server: AbstractNavigationServer) -> None:
+        self.ended = 0
+        server.recovery.listeners.append(self._count)
+
+    def _count(self, handle: AnyGoalHandle) -> None:
+        self.ended += handle.goal.concurrency_slot == SUB_GOAL_SLOT
+
+
+class Nav2Action(ServedAction):
+    """An action of Nav2: its feedback and result also say how long the goal has taken, and what it has needed."""
+
+    def __init__(self, server: AbstractNavigationServer, recoveries: RecoveryCount, *action: Any) -> None:
+        self._server, self._recoveries = server, recoveries
+        super().__init__(*action)
+
+    def _observe(self, goal_handle: Any, handle: AnyGoalHandle) -> More:
+        clock = self._server.runtime.clock
+        began, recovered = clock.now(), self._recoveries.ended
+
+        def more() -> Message:
+            fields: Message = dict.fromkeys(TIMES, duration(clock.now() - began))
+            return {**fields, "number_of_recoveries": self._recoveries.ended - recovered}
+
+        return more
+
+
+class ThroughPosesAction(Nav2Action):
+    """NavigateThroughPoses, of which some fields need the goal."""
+
+    def _observe(self, goal_handle: Any, handle: AnyGoalHandle) -> More:
+        taken, goal = super()._observe(goal_handle, handle), handle.goal
+
+        def more() -> Message:
+            done = handle.result or handle.feedback
+            statuses = nav2_waypoints.waypoint_statuses(goal, done.results if done else (), self._context())
+            progress = nav2_waypoints.through_poses_progress(goal, handle.feedback)
+            return {**taken(), "waypoint_statuses": statuses, **progress}
+
+        return more
+
+    def _publish_feedback(self, goal_handle: Any, feedback: Any, more: More) -> None:
+        if feedback.driving is not None:  # between two legs there is no way to measure
+            super()._publish_feedback(goal_handle, feedback, more)
+
+
+class BehaviorAction(Nav2Action):
+    """A behaviour of Nav2; as ours have no feedback, the robot is watched meanwhile."""
+
+    def _observe(self, goal_handle: Any, handle: AnyGoalHandle) -> More:
+        from rclpy.clock import Clock, ClockType
+
+        progress, taken = Progress(self._server, handle.goal), super()._observe(goal_handle, handle)
+
+        def more() -> Message:
+            return {**taken(), **progress.look()}
+
+        def publish() -> None:
+            if not handle.done:
+                goal_handle.publish_feedback(fill(self._class.Feedback(), more()))
+
+        timer = self._node.create_timer(FEEDBACK_PERIOD, publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        executor = self._node.executor
+        handle.add_done_callback(lambda done: executor.create_task(self._node.destroy_timer, timer))
+        return more
+
+
+class Progress:
+    """What a behaviour has done, as seen of the robot: path and turn since the start, and the rest of its time."""
+
+    def __init__(self, server: AbstractNavigationServer, goal: RecoveryGoal) -> None:
+        self._robot, self._clock = server.runtime.robot, server.runtime.clock
+        self._end = self._clock.now() + goal.parameters.get("duration", 0.0)
+        self._start: Pose | None = None
+        self._last: Pose | None = None
+        self._driven = self._turned = 0.0
+        self.look()
+
+    def look(self) -> Message:
+        """Return the fields of feedback by now; without a pose of the robot those of the last one."""
+        with suppress(RobotStateError):
+            pose = self._robot.pose()
+            start, last = self._start or pose, self._last or pose
+            self._driven = start.distance_to(pose)
+            self._turned += normalize_angle(pose.yaw - last.yaw)
+            self._start, self._last = start, pose
+        return {
+            "distance_traveled": self._driven,
+            "angular_distance_traveled": self._turned,
+            "time_left": duration(max(self._end - self._clock.now(), 0.0)),
+        }

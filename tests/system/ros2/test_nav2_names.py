@@ -1,0 +1,178 @@
+"""A client of Nav2 against our node, on a costmap and on a mesh: goals, behaviours and services by Nav2's names."""
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_ros.messages import nav2_codes as codes
+
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
+CLIENT, OPTIONS = "commander.py", ("--amcl",)
+PLUGINS = """
+controller_patience: 60.0
+planner_patience: 60.0
+recovery_patience: 60.0
+max_vel_x: 0.5
+recovery_behaviors:
+  - {name: pause, type: wait}
+  - {name: turn, type: rotate}
+  - {name: back, type: back_up}
+  - {name: straight, type: drive_on_heading}
+turn: {time_limit: 60.0}
+back: {time_limit: 60.0}
+straight: {time_limit: 60.0}
+"""
+CONFIG = (
+    PLUGINS
+    + """
+backend: costmap
+global_costmap: {SIZE, layers: [{name: area, type: keepout}], area: {zones: []}}
+local_costmap: {SIZE, layers: [{name: area, type: keepout}], area: {zones: []}}
+planners: [{name: shortest, type: straight_line}]
+controllers: [{name: follow, type: follow_path}]
+refiners: [{name: smooth, type: smoother}]
+""".replace("SIZE", "width: 20.0, height: 20.0, resolution: 0.1, origin_x: -10.0, origin_y: -10.0")
+)
+MESH = (
+    PLUGINS
+    + """
+backend: mesh
+planners: [{name: wave, type: cvp}]
+controllers: [{name: follow, type: path_follower}]
+refiners: [{name: pull, type: string_pulling}]
+mesh_map: {mesh_file: floor.ply, inscribed_radius: 0.3, default_layer: steep, layers: [{name: steep, type: steepness}]}
+"""
+)
+SIZE = {"costmap": 20.0, "mesh": 16.0}  # m from end to end of the maps
+
+
+@pytest.fixture(scope="module", params=["costmap", "mesh"])
+def crew(module_trio, request):
+    """Robot, node and commander; the node is started anew with the mesh."""
+    if request.param == "mesh":
+        vertices, faces = heightfield_mesh(np.zeros((81, 81)), 0.2, 0.2)
+        floor = trimesh.Trimesh(vertices - [8.0, 8.0, 0.0], faces, process=False)
+        floor.export(module_trio.file.parent / "floor.ply")
+        module_trio.file.write_text(MESH)
+        module_trio.node.end()
+        module_trio.start_node()
+        module_trio.wait_until_ready()
+    module_trio.map_size = SIZE[request.param]
+    return module_trio
+
+
+def at(x, y=0.0):
+    return {"header": {"frame_id": "map"}, "pose": {"position": {"x": x, "y": y}}}
+
+
+def run(crew, action, goal, **options):
+    return crew.client.wait(crew.client.do(order="task", action=action, goal=goal, **options), "result")
+
+
+def ask(crew, service, request):
+    return crew.client.wait(crew.client.do(order="ask", service=service, request=request), "answer")
+
+
+def seconds(duration):
+    return duration["sec"] + duration["nanosec"] * 1e-9
+
+
+def test_a_path_is_planned_smoothed_checked_and_followed(crew):
+    poses = {"goals": [at(0.6), at(1.2)]}
+    planned = run(crew, "compute_path_through_poses", {"goals": poses, "start": at(0.0), "use_start": True})
+    assert (planned["status"], planned["error_code"], planned["error_msg"]) == ("succeeded", 0, "")
+    assert seconds(planned["planning_time"]) > 0.0
+    smoothed = run(crew, "smooth_path", {"path": planned["path"]})
+    assert smoothed["was_completed"] and seconds(smoothed["smoothing_duration"]) > 0.0
+    assert ask(crew, "is_path_valid", {"path": smoothed["path"]})["is_valid"]
+    followed = run(crew, "follow_path", {"path": smoothed["path"]})
+    assert (followed["status"], followed["error_code"]) == ("succeeded", 0)
+    assert followed["feedback"][0]["distance_to_goal"] > followed["feedback"][-1]["distance_to_goal"]
+
+
+def test_feedback_on_the_way_to_a_pose_says_what_is_left_and_what_has_passed(crew):
+    end = run(crew, "navigate_to_pose", {"pose": at(0.0)})
+    assert (end["status"], end["error_code"]) == ("succeeded", 0)
+    first, last = end["feedback"][0], end["feedback"][-1]
+    assert first["distance_remaining"] > last["distance_remaining"]
+    assert seconds(first["navigation_time"]) < seconds(last["navigation_time"])
+    assert first["current_pose"]["header"]["frame_id"] == "map" and first["number_of_recoveries"] == 0
+
+
+def test_a_canceled_task_leaves_the_robot_standing(crew):
+    before = len(crew.robot.lines)
+    assert run(crew, "navigate_to_pose", {"pose": at(7.0)}, cancel=True)["status"] == "canceled"
+    crew.robot.wait_for_speed(lambda speed: speed == 0.0, before)
+
+
+def test_every_pose_of_a_way_is_reached_in_its_order(crew):
+    end = run(crew, "navigate_through_poses", {"poses": {"goals": [at(0.8), at(0.8, 0.6)]}})
+    assert (end["status"], end["error_code"]) == ("succeeded", 0)
+    assert [one["waypoint_status"] for one in end["waypoint_statuses"]] == [codes.WaypointState.COMPLETED] * 2
+    first, last = end["feedback"][0], end["feedback"][-1]
+    assert (first["number_of_poses_remaining"], last["number_of_poses_remaining"]) == (2, 1)
+    assert first["distance_remaining"] > 0.6 > last["distance_remaining"]
+    assert [one["waypoint_status"] for one in last["waypoint_statuses"]] == [
+        codes.WaypointState.COMPLETED,
+        codes.WaypointState.PENDING,
+    ]
+
+
+def test_a_missed_waypoint_is_named_and_the_others_are_visited(crew):
+    end = run(crew, "follow_waypoints", {"poses": [at(0.8, 0.3), at(50.0), at(0.8, 0.0)]})
+    assert {one["current_waypoint"] for one in end["feedback"]} == {0, 1, 2}
+    assert (end["status"], end["error_code"]) == ("aborted", codes.WaypointsCode.UNKNOWN)
+    (missed,) = end["missed_waypoints"]
+    assert (missed["waypoint_index"], missed["waypoint_status"]) == (1, codes.WaypointState.FAILED)
+    assert missed["error_code"] == codes.PlanningCode.GOAL_OUTSIDE_MAP
+
+
+@pytest.mark.parametrize(
+    ("action", "goal", "field", "amount"),
+    [
+        ("spin", {"target_yaw": -1.0, "time_allowance": {"sec": 50}}, "angular_distance_traveled", -1.0),
+        ("backup", {"target": {"x": 0.3}, "speed": 0.3}, "distance_traveled", 0.3),
+        ("drive_on_heading", {"target": {"x": 0.3}, "speed": 0.3}, "distance_traveled", 0.3),
+        ("wait", {"time": {"sec": 1}}, "time_left", 0.0),
+    ],
+)
+def test_a_behavior_does_what_its_goal_says_and_reports_it(crew, action, goal, field, amount):
+    end = run(crew, action, goal)
+    assert (end["status"], end["error_code"], end["error_msg"]) == ("succeeded", 0, "")
+    reported = end["feedback"][-1][field]
+    assert (seconds(reported) if action == "wait" else reported) == pytest.approx(amount, abs=0.25)
+    assert seconds(end["total_elapsed_time"]) > 0.5
+
+
+@pytest.mark.parametrize(
+    ("action", "goal", "code", "text"),
+    [
+        ("backup", {"target": {"y": 1.0}, "speed": 0.1}, codes.BackUpCode.INVALID_INPUT, "on the robot's x axis"),
+        ("drive_on_heading", {"target": {"x": 99.0}, "speed": 0.1}, codes.DriveOnHeadingCode.INVALID_INPUT, "20"),
+        ("spin", {"disable_collision_checks": True}, codes.SpinCode.UNKNOWN, "disable_collision_checks"),
+        ("navigate_to_pose", {"pose": at(1.0), "behavior_tree": "t"}, codes.NavigateCode.UNKNOWN, "behavior_tree"),
+        ("follow_path", {"goal_checker_id": "g"}, codes.FollowPathCode.INVALID_CONTROLLER, "goal_checker_id"),
+        ("compute_path_to_pose", {"goal": at(1.0), "planner_id": "p"}, codes.PlanningCode.INVALID_PLANNER, "'p'"),
+        ("navigate_to_pose", {"pose": at(math.nan)}, codes.NavigateCode.UNKNOWN, "INVALID_GOAL"),
+    ],
+)
+def test_what_cannot_be_done_ends_aborted_with_a_code_of_nav2_and_a_text(crew, action, goal, code, text):
+    end = run(crew, action, goal)
+    assert (end["status"], end["error_code"]) == ("aborted", code)
+    assert text in end["error_msg"]
+
+
+def test_a_path_that_leaves_the_map_is_not_valid_from_there_on(crew):
+    far = [at(0.0), at(1.0), at(crew.map_size), at(crew.map_size + 1.0)]
+    assert ask(crew, "is_path_valid", {"path": {"poses": far}})["invalid_pose_indices"] == [2, 3]
+    assert not ask(crew, "is_path_valid", {"path": {"poses": []}})["is_valid"]
+
+
+def test_costmaps_are_cleared(crew):
+    for name in ("global", "local"):
+        ask(crew, f"{name}_costmap/clear_entirely_{name}_costmap", {})
+        ask(crew, f"{name}_costmap/clear_around_{name}_costmap", {"reset_distance": 2.0})
+        ask(crew, f"{name}_costmap/clear_except_{name}_costmap", {"reset_distance": 2.0})
