@@ -11,7 +11,8 @@ from mbf_abstract.whole_files import write_whole
 from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recording import Recording
 from terrain.recording.verdict import Verdict
-from terrain.viewer.pictures.picture import ViewerMissing, joint_picture_png, picture_png
+from terrain.viewer.pictures.picture import ViewerMissing
+from terrain.viewer.pictures.run_picture import joint_picture_png, picture_png
 from terrain.viewer.replay.replay_page import joint_replay_html, replay_html
 from terrain.viewer.reports.report import report_html
 

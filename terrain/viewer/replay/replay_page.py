@@ -4,7 +4,7 @@ The page draws itself with WebGL 2 from the arrays in it; its scripts are those 
 at ``FRAME_RATE`` and interpolated by the page, so that files stay small: half a megabyte for a terrain of a quarter of
 a million triangles. The same recording gives the same bytes.
 
-Use ``terrain.viewer.pictures.picture`` where one look is enough.
+Use ``terrain.viewer.pictures.run_picture`` where one look is enough.
 """
 
 from __future__ import annotations

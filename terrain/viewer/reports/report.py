@@ -19,7 +19,8 @@ from mbf_abstract.geometry import FloatArray
 from mbf_abstract.outcomes import is_success, outcome_name
 from terrain.recording.metrics import cross_track_errors
 from terrain.recording.recording import Recording
-from terrain.viewer.pictures.picture import ViewerMissing, picture_png
+from terrain.viewer.pictures.picture import ViewerMissing
+from terrain.viewer.pictures.run_picture import picture_png
 from terrain.viewer.reports.event_lines import NOTABLE, event_text
 from terrain.viewer.reports.page import page, table
 from terrain.viewer.reports.timeline import timeline_svg

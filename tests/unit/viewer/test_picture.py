@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from mbf_abstract.events import Event, EventKind
 from mbf_abstract.geometry import Pose
 from terrain.physics.robot_models import HUSKY
 from terrain.recording.actor_track import ActorTrack
@@ -17,6 +18,8 @@ from terrain.viewer.pictures.colours import (
     ACTORS,
     BAD,
     DRIVEN,
+    FLEET,
+    GOAL,
     GOOD,
     OBSTACLE,
     PLANNED,
@@ -25,8 +28,10 @@ from terrain.viewer.pictures.colours import (
     linear_for_viewer,
     slope_colours,
 )
-from terrain.viewer.pictures.picture import picture_png
+from terrain.viewer.pictures.picture import round_length
+from terrain.viewer.pictures.run_picture import INCIDENT_COLOUR, joint_picture_png, picture_png
 from terrain.viewer.pictures.shading import face_colours, face_normals, shaded_triangles, vertex_colours
+from terrain.worlds.multi_level import STOREY
 from terrain.worlds.surface import Surface
 
 
@@ -61,6 +66,54 @@ def test_the_picture_of_hills_is_written_to_the_file(hill_recording, tmp_path):
     pixels = pixels_of((tmp_path / "picture.png").read_bytes())
     assert min(pixels.shape[:2]) > 600
     assert count(pixels, DRIVEN) > 100
+
+
+def columns_of(pixels, colour, tolerance=6):
+    return np.nonzero((np.abs(pixels - colour).max(axis=2) <= tolerance).any(axis=0))[0]
+
+
+def test_each_storey_has_a_panel_with_its_part_of_plan_and_track(garage_recording):
+    storey = STOREY * np.ones(3)
+    plan = [[14.0, 7.0, 0.0], [20.0, 7.0, 0.0], [20.0, 7.0, STOREY], [14.0, 7.0, STOREY]]
+    up = replace(garage_recording, paths=[(0.0, np.array(plan))])
+
+    one, two = (pixels_of(picture_png(run)) for run in (replace(up, paths=[(0.0, storey * plan[:2])]), up))
+
+    middle = one.shape[1] // 2
+    assert columns_of(one, PLANNED).max() < middle < columns_of(two, PLANNED).max()
+    assert columns_of(two, GOAL).min() > middle, "the goal is on the roof"
+    boxes = [np.abs(two[:, half] - WALL).max(axis=2) <= 6 for half in (slice(0, middle), slice(middle, None))]
+    assert boxes[0].sum() > boxes[1].sum() * 1.02, "pillars and parked cars of the ground floor are in its panel only"
+
+
+def test_all_robots_of_a_run_are_in_its_picture_with_plan_and_track(two_robots):
+    pixels = pixels_of(joint_picture_png(two_robots))
+
+    for colour in FLEET[:2]:
+        assert count(pixels, colour) > 800, colour
+
+
+def test_a_route_in_a_corner_of_the_world_is_shown_large_with_an_inset_of_the_world(large_recording):
+    near = replace(large_recording, poses=large_recording.poses[:30], times=large_recording.times[:30], goals=())
+    whole = replace(near, ground=Surface(near.ground.vertices, near.ground.faces[:0]), paths=[])
+
+    assert count(pixels_of(picture_png(whole)), DRIVEN) > 2000, "large enough for the robot to be seen"
+
+
+def test_incidents_are_in_the_picture(hill_recording):
+    data = {"what": "collision_person", "x": 20.0, "y": 12.0, "z": 1.0}
+    met = replace(hill_recording, events=(Event(3.0, EventKind.INCIDENT, "simulator", data),))
+
+    red = [int(INCIDENT_COLOUR[k : k + 2], 16) for k in (1, 3, 5)]
+    assert count(pixels_of(picture_png(met)), red) > 60
+    assert count(pixels_of(picture_png(hill_recording)), red) == 0
+
+
+@pytest.mark.parametrize(
+    ("length", "rounded"), [(1.0, 1.0), (1.99, 1.0), (2.0, 2.0), (4.9, 2.0), (17.0, 10.0), (0.07, 0.05), (600.0, 500.0)]
+)
+def test_a_scale_bar_has_a_round_length(length, rounded):
+    assert round_length(length) == pytest.approx(rounded)
 
 
 @pytest.mark.parametrize(
