@@ -2,9 +2,11 @@
 
     python benchmarks/moving.py --quick
     python benchmarks/moving.py --seeds 0:50 --cases bay wide crossing --executive navigation --json results.jsonl
+    python benchmarks/moving.py --pairs 100 --first-seed 1000
 
-Cases: ``bay`` is a corridor of one robot's width with a pull-out place, ``wide`` one in which two robots can pass, both
-with two robots head on; ``crossing`` has four robots that come from four sides; ``warehouse_N`` N robots on drawn ways
+Cases: ``bay`` is a corridor of one robot's width with a pull-out place, ``dead_end`` one of which one robot comes out
+while the other one wants to its closed end, ``wide`` one in which two robots can pass, all with two robots head on;
+``crossing`` has four robots that come from four sides; ``warehouse_N`` N robots on drawn ways
 between racks. A seed draws places, goals and headings. Parameters were chosen on seeds 100 to 199; report others.
 """
 
@@ -32,6 +34,7 @@ RESOLUTION = 0.05  # m
 NAMES = ("anna", "ben", "carla", "dora", "emil", "fritz", "greta", "hans", "ida", "jan")
 TIME_LIMIT = 240.0  # s for each goal
 QUICK_SEEDS = "0:2"
+PAIRS = ("bay", "dead_end")  # head on where only one can pass
 
 Place = tuple[float, float, float]
 Case = tuple[NDArray[np.bool_], list[tuple[Place, Place]]]
@@ -61,6 +64,17 @@ def corridor(rng: np.random.Generator, width: float, bay: bool) -> Case:
     offsets = rng.uniform(-1.5, 1.5, size=4).tolist()
     west, east = (left, 3.0 + offsets[0], 0.0), (right, 3.0 + offsets[1], float(np.pi))
     return free, [(west, (right, 3.0 + offsets[2], 0.0)), (east, (left, 3.0 + offsets[3], float(np.pi)))]
+
+
+def dead_end(rng: np.random.Generator) -> Case:
+    """A room with a corridor of 0.9 m that ends after 8 m: one robot comes out, the other one goes in."""
+    free = floor(14.0, 6.0)
+    cut(free, 0.5, 5.0, 0.5, 5.5)
+    cut(free, 5.0, 13.0, 2.55, 3.45)
+    outside, offsets = 2.0 + float(rng.uniform(-1.0, 1.5)), rng.uniform(-1.5, 1.5, size=2).tolist()
+    inside = 12.0 + float(rng.uniform(-1.0, 0.5))
+    going_in = ((outside, 3.0 + offsets[0], 0.0), (inside, 3.0, 0.0))
+    return free, [going_in, ((inside, 3.0, float(np.pi)), (outside, 3.0 + offsets[1], float(np.pi)))]
 
 
 def crossing(rng: np.random.Generator) -> Case:
@@ -97,6 +111,7 @@ def warehouse(rng: np.random.Generator, robots: int) -> Case:
 
 CASES: dict[str, Callable[[np.random.Generator], Case]] = {
     "bay": lambda rng: corridor(rng, 0.9, True),
+    "dead_end": dead_end,
     "wide": lambda rng: corridor(rng, 1.8, False),
     "crossing": crossing,
     "warehouse_2": lambda rng: warehouse(rng, 2),
@@ -179,11 +194,15 @@ def main() -> None:
     parser.add_argument("--seeds", default="0:10", help="first and one past the last, or a list")
     parser.add_argument("--cases", nargs="*", choices=list(CASES), default=list(CASES))
     parser.add_argument("--executive", nargs="*", default=["move_base", "navigation"])
+    parser.add_argument("--pairs", type=int, help=f"so many pairs of {' and '.join(PAIRS)} each, instead of --cases")
+    parser.add_argument("--first-seed", type=int, default=0, help="of --pairs")
     parser.add_argument("--json", type=Path, help="append one line for each run to this file")
     asked = parser.parse_args()
-    cases = ["bay", "crossing"] if asked.quick else asked.cases
+    cases, seeds = (["bay", "crossing"], QUICK_SEEDS) if asked.quick else (asked.cases, asked.seeds)
+    if asked.pairs is not None:
+        cases, seeds = list(PAIRS), f"{asked.first_seed}:{asked.first_seed + asked.pairs}"
     rows = []
-    for seed in parse_seeds(QUICK_SEEDS if asked.quick else asked.seeds):
+    for seed in parse_seeds(seeds):
         for case in cases:
             for executive in asked.executive:
                 row = run(case, seed, executive)

@@ -28,9 +28,12 @@ class Announcement:
     way : (n, 3) float64
         Where it is, then the path that it wants to follow from there [m]; only where it is if it goes nowhere.
     remaining : float
-        Length [m] of the way to its goal, of which ``way`` may be the beginning.
+        Length [m] of the way to its goal, of which ``way`` may be the beginning; while it meets others, that of the
+        moment when it met them.
     cannot_yield : bool
-        Whether it has looked for a place to let others pass and has found none.
+        Whether it has looked for a place to let others pass and has found none, or did not get there.
+    waits : int
+        How often it has waited in vain for others to let it pass, since it has met them.
     """
 
     name: str
@@ -38,6 +41,7 @@ class Announcement:
     way: FloatArray
     remaining: float
     cannot_yield: bool = False
+    waits: int = 0
 
     def to_json(self) -> str:
         """Return it as a JSON object, to be sent; ``from_json`` reads it."""
@@ -56,16 +60,13 @@ class Announcement:
                 way,
                 float(values["remaining"]),
                 bool(values["cannot_yield"]),
+                int(values["waits"]),
             )
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"no announcement of a robot: {type(error).__name__}: {error}") from error
         if not (read.name and len(way) and np.isfinite(way).all() and math.isfinite(read.stamp + read.remaining)):
             raise ValueError("no announcement of a robot: it needs a name, a place and finite numbers")
         return read
-
-    def ahead(self, length: float) -> FloatArray:
-        """Points (n, 2) [m] of ``points_ahead``, seen from above."""
-        return self.points_ahead(length)[:, :2]
 
     def points_ahead(self, length: float) -> FloatArray:
         """Points (n, 3) [m] of its way up to ``length`` [m] from where it is, ``SPACING`` apart, the first included."""

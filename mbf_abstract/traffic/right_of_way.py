@@ -1,12 +1,13 @@
 """Who of two robots goes first where only one can, by a rule that both compute from what they have announced.
 
-First goes the one that cannot yield; of two that can, or two that cannot, the one that has less way to its goal; of two
-with equally much, the one whose name comes first. The ranks of all robots are in one order, so of any number of robots
-in each other's way exactly one may go before all others, and they never wait for each other in a circle. The rule of
-the road, right before left, would let four robots at a crossing wait for ever.
+First goes the one that cannot yield; of two that can, or two that cannot, the one that has waited in vain less often;
+of two that have waited equally often, the one that has less way to its goal; of two with equally much, the one whose
+name comes first. The ranks of all robots are in one order, so of any number of robots in each other's way exactly one
+may go before all others, and they never wait for each other in a circle. The rule of the road, right before left, would
+let four robots at a crossing wait for ever.
 
-Driving back makes the way of the one that yields longer, and driving on that of the other one shorter, so the decision
-lasts.
+While robots meet, each announces the way that it had left when they met. So the decision lasts, also where the one that
+yields drives forward, or the other one plans a detour. Only a wait in vain, or a robot that cannot yield, changes it.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ def right_of_way(mine: Announcement, other: Announcement) -> bool:
     return _rank(mine) < _rank(other)
 
 
-def _rank(robot: Announcement) -> tuple[bool, float, str]:
-    return not robot.cannot_yield, robot.remaining, robot.name
+def _rank(robot: Announcement) -> tuple[bool, int, float, str]:
+    return not robot.cannot_yield, robot.waits, robot.remaining, robot.name
 
 
 def in_each_others_way(mine: Announcement, other: Announcement, distance: float, length: float) -> bool:

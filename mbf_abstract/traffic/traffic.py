@@ -7,9 +7,9 @@ where the robot is and where it goes.
 
 from __future__ import annotations
 
-import math
 import threading
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from mbf_abstract.traffic.announcement import Announcement
@@ -17,6 +17,8 @@ from mbf_abstract.traffic.right_of_way import face_each_other, in_each_others_wa
 
 MAX_AGE = 3.0
 """A robot that announces nothing new for this long [s] does not count: it is switched off, or out of reach."""
+PARTED_AFTER = 10.0
+"""A meeting is over when nobody has been in the way for this long [s]: longer than it takes to drive past."""
 
 
 class Channel(Protocol):
@@ -47,6 +49,31 @@ class SharedChannel:
             return tuple(self._latest[name] for name in sorted(self._latest))
 
 
+@dataclass
+class Meeting:
+    """What decides on the right of way of a robot while it meets others; it stays until they have parted.
+
+    Attributes
+    ----------
+    distance, length : float
+        As for ``Traffic.rivals`` [m].
+    seen : float
+        Last time [s] at which anybody was in the way.
+    remaining : float
+        Length [m] of the way to the goal when they met.
+    cannot_yield : bool
+    waits : int
+        As they are announced.
+    """
+
+    distance: float
+    length: float
+    seen: float
+    remaining: float
+    cannot_yield: bool = False
+    waits: int = 0
+
+
 class Traffic:
     """What one robot wants and what it knows of the others; empty until ``connect`` is called.
 
@@ -63,7 +90,7 @@ class Traffic:
         self.yields = False
         self._name = ""
         self._channel: Channel | None = None
-        self._no_room_until = -math.inf
+        self._meeting: Meeting | None = None
         self._seen: dict[str, tuple[float, float]] = {}
         """By robot: the stamp of its newest announcement, and when this robot has first seen it, on its own clock."""
         self._lock = threading.Lock()
@@ -75,21 +102,45 @@ class Traffic:
     def announce(self, announcement: Announcement) -> None:
         """Publish where the robot is, and look who else has announced something.
 
-        Its name, and whether it yields or cannot, are filled in.
+        Its name, and all that only this class knows of it, are filled in.
         """
+        now, meeting = announcement.stamp, self._meeting
         self._publish(announcement)
-        self.others(announcement.stamp)  # their announcements age, also while no plugin asks for them
+        self.others(now)  # their announcements age, also while no plugin asks for them
+        if meeting is not None:
+            if self.rivals(now, meeting.distance, meeting.length):
+                meeting.seen = now
+            elif now - meeting.seen > PARTED_AFTER:
+                self._meeting = None
 
     def _publish(self, announcement: Announcement) -> None:
-        if self._channel is not None:
-            no_room = announcement.stamp < self._no_room_until
-            self.own = replace(announcement, name=self._name, cannot_yield=no_room)
-            self._channel.publish(replace(self.own, way=self.own.way[:1]) if self.yields else self.own)
+        if self._channel is None:
+            return
+        own, meeting = replace(announcement, name=self._name), self._meeting
+        if meeting is not None and own.remaining > 0.0:  # one that has arrived has nothing left
+            own = replace(own, remaining=meeting.remaining, cannot_yield=meeting.cannot_yield, waits=meeting.waits)
+        self.own = own
+        self._channel.publish(replace(own, way=own.way[:1]) if self.yields else own)
 
-    def found_no_room(self, until: float) -> None:
-        """Announce up to this time [s] that there is no place to let others pass."""
-        self._no_room_until = until
-        if self.own is not None:
+    # ----------------------------------------------------------------------------------------------- a meeting
+    def meet(self, now: float, distance: float, length: float) -> tuple[Announcement, ...]:
+        """Return the ``rivals``; from the first of them on the robot keeps its rank until they have parted."""
+        rivals = self.rivals(now, distance, length)
+        if rivals and self._meeting is None and self.own is not None:
+            self._meeting = Meeting(distance, length, now, self.own.remaining)
+        return rivals
+
+    def set_cannot_yield(self, cannot_yield: bool) -> None:
+        """Announce for the present meeting whether there is a place to let the others pass."""
+        if self._meeting is not None and self.own is not None:
+            self._meeting.cannot_yield = cannot_yield
+            self._publish(self.own)
+
+    def wait_was_in_vain(self, rivals: Sequence[Announcement]) -> None:
+        """Let the rivals go first from now on, because waiting for them does not help."""
+        if self._meeting is not None and self.own is not None:
+            self._meeting.cannot_yield = False
+            self._meeting.waits = 1 + max((rival.waits for rival in rivals), default=0)
             self._publish(self.own)
 
     def others(self, now: float) -> tuple[Announcement, ...]:

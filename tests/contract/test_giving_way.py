@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from mbf_abstract.geometry import Pose, Twist
+from mbf_abstract.maps.pull_out import find_pull_out, way_in_plane
+from mbf_abstract.maps.queries import CellState, PlaceQuery
 from mbf_abstract.maps.recoveries.give_way import GiveWayParameters, GiveWayRecovery
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.plugins import RecoveryRequest
@@ -14,6 +16,7 @@ from mbf_abstract.testing.contract.recovery import RigMotion
 from mbf_abstract.testing.contract.rig import rig
 from mbf_abstract.time.cancel import CancelToken
 from mbf_abstract.traffic.announcement import Announcement
+from mbf_abstract.traffic.right_of_way import in_each_others_way, right_of_way
 from mbf_abstract.traffic.traffic import SharedChannel, Traffic
 
 RADIUS = 0.2  # m, of the robot
@@ -45,12 +48,14 @@ def hall(x, y):
 
 
 class Watched(RigMotion):
-    """Notes how near the robot's centre comes to a wall [m]."""
+    """Notes how near the robot's centre comes to a wall [m]; ``on_the_way(pose)`` is called before each command."""
 
     least_gap = math.inf
+    on_the_way = staticmethod(lambda pose: None)
 
     def send(self, command):
         pose = self.pose()
+        self.on_the_way(pose)
         self.least_gap = min(self.least_gap, float(np.hypot(*(self.walls - (pose.x, pose.y)).T).min(initial=math.inf)))
         return super().send(command)
 
@@ -59,8 +64,8 @@ class Watched(RigMotion):
 def give_way(world):
     """``give_way(lethal, start, track, **parameters)`` -> result, motion with its end and seconds."""
 
-    def run(lethal, start=START, track=(), traffic=None, **parameters):
-        navigation_map = world.map_of(lethal)
+    def run(lethal, start=START, track=(), traffic=None, navigation_map=None, on_the_way=None, **parameters):
+        navigation_map = navigation_map or world.map_of(lethal)
 
         def make_context(base):
             return world.context(**vars(base), navigation_map=navigation_map)
@@ -72,6 +77,7 @@ def give_way(world):
             made.plugin.traffic = traffic or Traffic()
             token = CancelToken()
             motion = Watched(made, token, lambda pose: pose)
+            motion.on_the_way = on_the_way or motion.on_the_way
             x, y = np.meshgrid(np.arange(81) * 0.1, np.arange(61) * 0.1)  # the vertices of the mesh
             motion.walls = np.column_stack([x[lethal(x, y)], y[lethal(x, y)]])
             result = made.plugin.run_behavior(RecoveryRequest(motion, token))
@@ -116,6 +122,47 @@ def test_in_a_hall_it_steps_aside(give_way):
     result, motion = give_way(hall, distance=0.6)
     assert result.outcome == RecoveryOutcome.SUCCESS
     assert 0.5 < abs(motion.end.y - 3.0) < 1.1 and abs(motion.end.x - 4.5) < 1.5
+
+
+def test_where_the_way_to_the_place_is_not_free_any_more_another_place_is_searched(give_way, world):
+    """On the side to which it steps aside a wall is seen that was not there when it set out."""
+    seen, sides = world.sensing(), []
+
+    def wall_appears(pose):
+        if not sides and abs(pose.y - 3.0) > 0.1:
+            sides.append(math.copysign(1.0, pose.y - 3.0))
+            world.see(seen, *((x, 3.0 + 0.55 * sides[0]) for x in np.arange(2.0, 7.0, 0.05)))
+
+    result, motion = give_way(hall, distance=0.6, navigation_map=seen, on_the_way=wall_appears)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert sides[0] * (motion.end.y - 3.0) < -0.5
+
+
+def test_where_there_is_room_a_manoeuvre_keeps_off_the_walls(world):
+    """So that small errors of the drive do not end it; in a corridor that leaves no room it goes all the same."""
+    start = Pose.planar(4.5, 3.0)
+    way = way_in_plane(start, np.zeros((0, 3)), [], 4.0)
+    for half_width, keeps in ((0.4, 0.05), (0.25, 0.0)):
+
+        def lethal(x, y, half_width=half_width):
+            in_bay = (x > 2.0) & (x < 3.4) & (y >= 3.0) & (y < 4.6)
+            return ((np.abs(y - 3.0) >= half_width) & ~in_bay) | (x > 7.7)
+
+        navigation_map = world.map_of(lethal)
+        steps = find_pull_out(navigation_map, start, way, 0.8, 4.0)
+        check = navigation_map.pose_check(PlaceQuery(use_padded_footprint=True, safety_dist=keeps))
+        poses = [Pose.planar(4.5 + x, 3.0 + y, yaw) for step in steps for x, y, yaw in step.poses]
+        assert all(check(pose).state <= CellState.INSCRIBED for pose in poses)
+        assert poses[-1].y > 3.8
+
+
+def test_distances_on_a_slope_are_those_along_the_ground():
+    pitch = 0.4
+    on_slope = Pose((1.0, 2.0, 5.0), (0.0, math.sin(0.5 * pitch), 0.0, math.cos(0.5 * pitch)))
+    ahead = on_slope.position + 3.0 * on_slope.rotation[:, 0]
+    beyond = on_slope.position + np.array([3.0, 0.0, 0.0])  # more than a metre above the ground there
+    way = way_in_plane(on_slope, np.zeros((0, 3)), [np.array([ahead, beyond])], 1.0)
+    assert way[-1] == pytest.approx([3.0, 0.0])
 
 
 def test_it_waits_between_its_bounds_and_the_same_for_the_same_seed(give_way):
@@ -178,11 +225,37 @@ def head_on(remaining, channel=None):
     return traffic
 
 
-def test_the_robot_that_goes_first_waits_for_the_other_one_and_does_not_move(give_way):
-    result, motion = give_way(bay(2.4, 3.4, True), traffic=head_on(remaining=9.0), longest_wait=4.0)
+class BackingUp(Radio):
+    """The other robot drives back at 0.1 m/s."""
+
+    def anew(self, one):
+        back = (0.1 * min(self.clock.now(), self.until), 0.0, 0.0)
+        return replace(super().anew(one), way=one.way + back)
+
+
+def test_the_robot_that_goes_first_waits_as_long_as_the_other_one_makes_room_and_does_not_move(give_way):
+    traffic = head_on(9.0, BackingUp(until=12.0))  # heard of until 15 s
+    result, motion = give_way(bay(2.4, 3.4, True), traffic=traffic, longest_wait=6.0)
     assert result.outcome == RecoveryOutcome.SUCCESS
-    assert "has the right of way over ben; waited 4" in result.message
+    assert "has the right of way over ben; waited 15." in result.message
     assert all(command.is_stopped() for command in motion.commands)
+
+
+def test_the_robot_that_goes_first_pulls_out_itself_when_the_other_one_stands_and_stands(give_way):
+    traffic = head_on(remaining=9.0)
+    result, motion = give_way(bay(2.4, 3.4, True), traffic=traffic, longest_wait=4.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS
+    assert "has pulled out" in result.message and "for ben; waited 4" in result.message
+    assert 2.4 < motion.end.x < 3.4 and motion.end.y > 3.7
+    assert not right_of_way(traffic.own, traffic.others(motion.seconds)[0])
+
+
+def test_two_that_can_neither_yield_nor_wait_for_each_other_give_up(give_way):
+    traffic = head_on(remaining=9.0)
+    result, motion = give_way(corridor, traffic=traffic, reach=1.5, longest_wait=4.0)
+    assert result.outcome == RecoveryOutcome.IMPASSABLE
+    assert traffic.own.cannot_yield
+    assert motion.seconds < 10.0
 
 
 def test_it_waits_no_longer_for_a_robot_that_is_silent(give_way):
@@ -201,12 +274,31 @@ def test_the_other_one_pulls_out_and_waits_until_the_first_has_passed(give_way):
     assert not traffic.yields
 
 
-def test_it_does_not_pull_out_to_where_the_first_one_goes(give_way):
-    """The first one turns into the bay behind."""
+@pytest.mark.parametrize("distance", [0.4, 0.55, 0.7, 0.85])
+def test_a_robot_that_has_pulled_out_is_not_in_the_way_of_the_first_one(give_way, distance):
+    result, motion = give_way(hall, traffic=head_on(remaining=1.0), distance=distance, longest_wait=1.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    place = Announcement("anna", 0.0, np.array([motion.end.position]), 3.0)
+    assert not in_each_others_way(place, announced("ben", 5.3, 0.5, 1.0), distance, 5.0)
+
+
+def into_the_bay(height):
+    """Traffic of ``head_on``; the first one turns into the bay behind, or at a height [m] above the bay."""
     traffic = head_on(remaining=1.0)
     along = announced("ben", 5.3, 0.5, 1.0).way
-    into_the_bay = np.concatenate([along[along[:, 0] > 2.9], [(2.9, y, 0.0) for y in np.linspace(3.0, 4.6, 9)]])
-    traffic._channel.publish(Announcement("ben", 0.0, into_the_bay, 1.0))
+    turning = np.concatenate([along[along[:, 0] > 2.9], [(2.9, y, height) for y in np.linspace(3.0, 4.6, 9)]])
+    traffic._channel.publish(Announcement("ben", 0.0, turning, 1.0))
+    return traffic
+
+
+def test_one_that_goes_over_the_bay_on_another_storey_does_not_need_it(give_way):
+    result, motion = give_way(bay(2.4, 3.4, True), traffic=into_the_bay(3.0), reach=7.0, longest_wait=1.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert 2.4 < motion.end.x < 3.4 and motion.end.y > 3.7
+
+
+def test_it_does_not_pull_out_to_where_the_first_one_goes(give_way):
+    traffic = into_the_bay(0.0)
     result, _ = give_way(bay(2.4, 3.4, True), traffic=traffic, reach=2.5, longest_wait=1.0)
     assert result.outcome == RecoveryOutcome.IMPASSABLE
     assert "asks for the right of way over ben" in result.message

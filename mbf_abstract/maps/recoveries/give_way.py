@@ -6,37 +6,37 @@ seeds: both may give way at first, the waits they draw let one go on before the 
 
 The way is the track that the robot has driven, straight ahead and straight on behind the track. The nearest place is
 searched where the base stands ``distance`` from all of it, by the shortest manoeuvre on which the outline touches
-nothing the map knows: back into a bay, around a corner, or a step aside in a hall; see ``maps.manoeuvres``. It is
-driven slowly, each command checked as in every recovery; afterwards the robot stands for a time that is drawn anew for
-each run. Where there is no such place it ends with IMPASSABLE at once.
+nothing the map knows: back into a bay, around a corner, or a step aside in a hall; see ``maps.pull_out``. It is driven
+slowly, each command checked as in every recovery, and searched anew where a command is refused, ``ATTEMPTS`` times in
+all; afterwards the robot stands for a time that is drawn anew for each run. Where there is no such place it ends with
+IMPASSABLE at once.
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
 goes first waits until the others are out of its way, the others pull out, also out of the way that the first one has
-announced, and wait until it has passed. Both wait for ``longest_wait`` at most. One that finds no place announces that,
-and then goes first.
+announced, and wait until it has passed. Both wait while the others move, and ``longest_wait`` longer. One that finds no
+place, or does not get there, announces that, and then goes first. One that goes first and has waited in vain announces
+that, too: then the others go first, and it pulls out itself.
 
 The server's ``recovery_patience`` must leave time for the drive and the wait.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbf_abstract.execution.path_tracker import PathTracker
 from mbf_abstract.geometry import Path, Pose, Twist, normalize_angle
 from mbf_abstract.geometry.arcs import arc_to
-from mbf_abstract.geometry.arithmetic import norm, rotated_back
+from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.guarded_motion import GuardedMotionParameters, GuardedRecovery
-from mbf_abstract.maps.manoeuvres import PlanarPose, Step, find_manoeuvre
-from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_abstract.maps.manoeuvres import PlanarPose, Step
+from mbf_abstract.maps.pull_out import find_pull_out, way_in_plane
 from mbf_abstract.maps.recoveries.wait import stand
 from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
@@ -45,9 +45,9 @@ from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.right_of_way import right_of_way
 
 LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
-WAY_SPACING = 0.1  # m
+ATTEMPTS = 3  # to drive to a place
 WAIT_PERIOD = 0.5  # s between two looks at where the other robots are
-LEAVING = 0.3  # m around a robot that touches something
+MOVED = 0.2  # m, of another robot that does not stand
 END_REACHED, HEADING_REACHED = 0.04, 0.05  # m, rad
 
 
@@ -55,7 +55,12 @@ class GiveWayParameters(GuardedMotionParameters):
     """Parameters of ``give_way``."""
 
     distance: float = parameter(
-        0.8, "How far its base must stand from its way: half of both widths and a margin.", unit="m", gt=0.0, le=5.0
+        0.8,
+        "How far its base stands from its way, at least: half of both widths and a margin. Others are in its way where "
+        "theirs comes nearer.",
+        unit="m",
+        gt=0.0,
+        le=5.0,
     )
     reach: float = parameter(4.0, "Longest manoeuvre to such a place.", unit="m", gt=0.0, le=20.0)
     speed: float = parameter(0.3, "How fast, forward and backward.", unit="m/s", gt=0.0, le=2.0)
@@ -63,7 +68,7 @@ class GiveWayParameters(GuardedMotionParameters):
     wait: float = parameter(3.0, "How long to stand there, at least.", unit="s", ge=0.0, le=600.0)
     random_extra: float = parameter(3.0, "Stand up to this much longer, by chance.", unit="s", ge=0.0, le=600.0)
     longest_wait: float = parameter(
-        8.0, "How long to wait for robots that announce where they go, at most.", unit="s", ge=0.0, le=600.0
+        8.0, "How long to wait for robots that announce where they go and stand.", unit="s", ge=0.0, le=600.0
     )
 
 
@@ -74,31 +79,46 @@ class GiveWayRecovery(GuardedRecovery):
     parameters: GiveWayParameters
 
     def recover(self, request: RecoveryRequest) -> RecoveryResult:
-        """Pull out and wait; or only wait, where the right of way is this robot's."""
+        """Pull out and wait; or wait first, where the right of way is this robot's."""
         rivals = self._rivals()
         if rivals and not self._before(rivals):
             result = self._wait_for(request, rivals, "has the right of way over")
             rivals = self._rivals()
-            if not result.success or not self._before(rivals):
+            if not (result.success and rivals):
                 return result
+            if not self._before(rivals):
+                self.traffic.wait_was_in_vain(rivals)
+        before = self._before(rivals)
         self.traffic.yields = True
         try:
-            return self._pull_out(request, self._before(rivals))
+            result = self._pull_out(request)
+            if result.success:
+                return self._stand_aside(request, before)
         finally:
             self.traffic.yields = False
+        return self._without_room(request, before, result) if result.outcome == RecoveryOutcome.IMPASSABLE else result
 
-    def _pull_out(self, request: RecoveryRequest, before: list[Announcement]) -> RecoveryResult:
-        """Search the place, drive there section by section, and wait; ``before`` are the robots that go first."""
-        p, begin = self.parameters, request.motion.pose()
-        steps = self._manoeuvre(begin, [rival.ahead(p.reach + p.distance) for rival in before], request)
-        if request.cancel_token.cancelled:
-            return RecoveryResult(RecoveryOutcome.CANCELED, request.cancel_token.reason)
-        if steps is None:
-            return self._without_room(request, before)
-        result = self._drive_along(begin, steps, request)
-        if not result.success:
-            return result
-        place = request.motion.pose()
+    def _pull_out(self, request: RecoveryRequest) -> RecoveryResult:
+        """Search a place and drive there section by section; search anew where the way there is not free."""
+        p, token = self.parameters, request.cancel_token
+        result = RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
+        for _ in range(ATTEMPTS):
+            begin = request.motion.pose()
+            steps = self._manoeuvre(begin, request)
+            if token.cancelled:
+                return RecoveryResult(RecoveryOutcome.CANCELED, token.reason)
+            if steps is None:
+                text = f"no place {p.distance:g} m beside its way within a manoeuvre of {p.reach:g} m"
+                return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
+            self.traffic.set_cannot_yield(False)
+            result = self._drive_along(begin, steps, request)
+            if result.outcome != RecoveryOutcome.IMPASSABLE:
+                break
+        return result
+
+    def _stand_aside(self, request: RecoveryRequest, before: list[Announcement]) -> RecoveryResult:
+        """Wait beside the way, until the robots that go first have passed."""
+        p, place = self.parameters, request.motion.pose()
         if before:
             return self._wait_for(request, before, f"has pulled out at ({place.x:.2f}, {place.y:.2f}) for")
         result = stand(request, p.wait + p.random_extra * float(self.rng.random()))
@@ -118,7 +138,7 @@ class GiveWayRecovery(GuardedRecovery):
 
     # --------------------------------------------------------------------------------------------- the other robots
     def _rivals(self) -> tuple[Announcement, ...]:
-        return self.traffic.rivals(self.clock.now(), self.parameters.distance, self.parameters.reach)
+        return self.traffic.meet(self.clock.now(), self.parameters.distance, self.parameters.reach)
 
     def _before(self, rivals: Sequence[Announcement]) -> list[Announcement]:
         """Those of the robots that go before this one."""
@@ -126,67 +146,44 @@ class GiveWayRecovery(GuardedRecovery):
         return [rival for rival in rivals if own is not None and not right_of_way(own, rival)]
 
     def _wait_for(self, request: RecoveryRequest, rivals: Sequence[Announcement], why: str) -> RecoveryResult:
-        """Stand until none of these robots is in the way, or the turn is another's; ``longest_wait`` at most."""
+        """Stand until none of these robots is in the way, or the turn is another's, or they stand for too long."""
         names, begun = {rival.name for rival in rivals}, self.clock.now()
         went_before = {rival.name for rival in self._before(rivals)}
-        while self.clock.now() - begun < self.parameters.longest_wait:
+        places, moved = {rival.name: rival.way[0] for rival in rivals}, begun
+        while self.clock.now() - moved < self.parameters.longest_wait:
             result = stand(request, WAIT_PERIOD)
             if not result.success:
                 return result
             left = [rival for rival in self._rivals() if rival.name in names]
             if not left or {rival.name for rival in self._before(left)} - went_before:
                 break
+            for rival in left:
+                if norm(rival.way[0] - places[rival.name]) > MOVED:
+                    places[rival.name], moved = rival.way[0], self.clock.now()
         text = f"{why} {', '.join(sorted(names))}; waited {self.clock.now() - begun:.1f} s"
         return RecoveryResult(RecoveryOutcome.SUCCESS, text)
 
-    def _without_room(self, request: RecoveryRequest, before: list[Announcement]) -> RecoveryResult:
-        """Announce that there is no place, so that the others yield, and wait for them."""
-        p = self.parameters
-        text = f"no place {p.distance:g} m beside its way within a manoeuvre of {p.reach:g} m"
+    def _without_room(
+        self, request: RecoveryRequest, before: list[Announcement], failed: RecoveryResult
+    ) -> RecoveryResult:
+        """Announce that this robot has failed to pull out, so that the others yield, and wait for them."""
         if not before:
-            return RecoveryResult(RecoveryOutcome.IMPASSABLE, text)
-        self.traffic.yields = False
-        self.traffic.found_no_room(self.clock.now() + p.longest_wait)
-        result = self._wait_for(request, before, f"{text}; asks for the right of way over")
+            return failed
+        self.traffic.set_cannot_yield(True)
+        result = self._wait_for(request, before, f"{failed.message}; asks for the right of way over")
         return replace(result, outcome=RecoveryOutcome.IMPASSABLE) if result.success and self._rivals() else result
 
     # -------------------------------------------------------------------------------------------------- the search
-    def _manoeuvre(self, begin: Pose, ways: list[NDArray[np.float64]], request: RecoveryRequest) -> list[Step] | None:
+    def _manoeuvre(self, begin: Pose, request: RecoveryRequest) -> list[Step] | None:
         """Shortest manoeuvre in the plane of the robot at ``begin`` to a place beside its way and those of others."""
-        start = self.on_map(begin)
-        heights = [np.full((len(way), 1), begin.z) for way in ways]
-        others = [
-            rotated_back(begin.rotation, np.column_stack([way, height]) - np.asarray(begin.position))[:, :2]
-            for way, height in zip(ways, heights, strict=True)
-        ]
-        way = np.concatenate([self._way(begin), *others])
-        frame = Transform(start.position, start.orientation, start.frame_id, "begin")
-        check = self.navigation_map.pose_check(PlaceQuery(use_padded_footprint=True))
-        touches = check(start).state > CellState.INSCRIBED
-
-        def is_free(pose: PlanarPose) -> bool:
-            x, y, yaw = pose
-            if touches and math.hypot(x, y) <= LEAVING:
-                return True  # it is let out of what it touches; each command is checked when it is driven
-            return check(frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id="begin"))).state <= CellState.INSCRIBED
-
-        def left(pose: PlanarPose) -> float:
-            return max(self.parameters.distance - float(norm(way - np.array(pose[:2])).min()), 0.0)
-
-        token = request.cancel_token
-        return find_manoeuvre(is_free, left, self.parameters.reach, self.min_turning_radius, lambda: token.cancelled)
-
-    def _way(self, begin: Pose) -> NDArray[np.float64]:
-        """Points (n, 2) [m] of the way in the plane of the robot: the track behind it, and straight on at both ends."""
-        length = self.parameters.reach + self.parameters.distance
-        on = np.arange(0.0, length, WAY_SPACING)[:, None]
-        track = rotated_back(begin.rotation, self.robot.recent_track()[::-1] - np.asarray(begin.position))[:, :2]
-        track = np.concatenate([np.zeros((1, 2)), track])
-        driven = np.concatenate([[0.0], np.cumsum(norm(np.diff(track, axis=0)))])
-        track = track[driven <= length]
-        older = track[norm(track - track[-1]) > WAY_SPACING]
-        back = track[-1] - older[-1] if len(older) else np.array([-1.0, 0.0])
-        return np.concatenate([on * (1.0, 0.0), track, track[-1] + on * back / norm(back)])
+        p, token = self.parameters, request.cancel_token
+        length = p.reach + p.distance
+        ways = [rival.points_ahead(length) for rival in self._before(self._rivals())]
+        way = way_in_plane(begin, self.robot.recent_track(), ways, length)
+        start, turning_radius = self.on_map(begin), self.min_turning_radius
+        return find_pull_out(
+            self.navigation_map, start, way, p.distance, p.reach, turning_radius, lambda: token.cancelled
+        )
 
     # --------------------------------------------------------------------------------------------------- the drive
     def _follow(self, request: RecoveryRequest, poses: list[Pose], gear: int) -> RecoveryResult:

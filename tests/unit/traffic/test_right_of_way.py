@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mbf_abstract.traffic.announcement import SPACING, Announcement
 from mbf_abstract.traffic.right_of_way import face_each_other, in_each_others_way, right_of_way
-from mbf_abstract.traffic.traffic import MAX_AGE, SharedChannel, Traffic
+from mbf_abstract.traffic.traffic import MAX_AGE, PARTED_AFTER, SharedChannel, Traffic
 
 coordinates = st.floats(-20.0, 20.0, width=32)
 heights = st.sampled_from([0.0, 0.25, 4.0])  # the ground, a kerb, a bridge
@@ -23,6 +23,7 @@ announcements = st.builds(
     way=ways,
     remaining=st.integers(0, 3).map(float),
     cannot_yield=st.booleans(),
+    waits=st.integers(0, 2),
 )
 fleets = st.lists(announcements, min_size=2, max_size=5, unique_by=lambda one: one.name)
 
@@ -44,11 +45,17 @@ def test_of_any_number_of_robots_exactly_one_goes_before_all_others(fleet):
 @pytest.mark.parametrize(
     ("first", "second"),
     [
-        ({"name": "zoe", "cannot_yield": True, "remaining": 9.0}, {"name": "ben", "remaining": 1.0}),
+        ({"name": "zoe", "cannot_yield": True, "waits": 1, "remaining": 9.0}, {"name": "ben", "remaining": 1.0}),
+        ({"name": "zoe", "remaining": 9.0}, {"name": "ben", "waits": 1, "remaining": 1.0}),
         ({"name": "zoe", "remaining": 1.0}, {"name": "ben", "remaining": 1.01}),
         ({"name": "anna", "remaining": 1.0}, {"name": "ben", "remaining": 1.0}),
     ],
-    ids=["one that cannot yield", "then the one with less way left", "then by name"],
+    ids=[
+        "one that cannot yield",
+        "then the one that has waited in vain less often",
+        "then the one with less way left",
+        "then by name",
+    ],
 )
 def test_first_goes(first, second):
     base = Announcement("", 0.0, np.zeros((1, 3)), 5.0)
@@ -119,7 +126,8 @@ def test_a_robot_faces_another_one_that(other, expected):
         "",
         "[]",
         "{}",
-        '{"name":"a","stamp":0,"way":[],"remaining":0,"cannot_yield":false}',
+        '{"name":"a","stamp":0,"way":[],"remaining":0,"cannot_yield":false,"waits":0}',
+        '{"name":"a","stamp":0,"way":[[0,0,0]],"remaining":0,"cannot_yield":false}',
         "9" * 400,
         "null",
         pytest.param("[" * 100_000, id="nested too deeply"),
@@ -151,14 +159,103 @@ def test_a_robot_without_a_channel_announces_nothing():
     assert (alone.own, alone.others(0.0)) == (None, ())
 
 
-def test_one_that_lets_others_pass_announces_only_where_it_is_and_one_without_room_says_so_for_a_while():
+def test_one_that_lets_others_pass_announces_only_where_it_is():
     channel, anna = SharedChannel(), Traffic()
     anna.connect("anna", channel)
     anna.yields = True
     anna.announce(state(1.0, 0.0, 3.0))
     assert len(channel.latest()[0].way) == 1
     assert len(anna.own.way) == 2
-    anna.found_no_room(until=5.0)
-    assert channel.latest()[0].cannot_yield
-    anna.announce(state(5.0, 0.0))
-    assert not channel.latest()[0].cannot_yield
+
+
+# --------------------------------------------------------------------------------------------------- while they meet
+DISTANCE, LENGTH = 0.6, 5.0
+
+
+class Pair:
+    """Two robots head on, and what they announce from second to second."""
+
+    def __init__(self):
+        self.channel, self.time = SharedChannel(), 0.0
+        self.robots = {"anna": Traffic(), "ben": Traffic()}
+        for name, traffic in self.robots.items():
+            traffic.connect(name, self.channel)
+
+    def announce(self, anna, ben):
+        """Announce the ways from x to x with what remains, a second later."""
+        self.time += 1.0
+        for traffic, (x_from, x_to, remaining) in zip(self.robots.values(), (anna, ben), strict=True):
+            way = np.array([(x_from, 0.0, 0.0), (x_to, 0.0, 0.0)])
+            traffic.announce(Announcement("", self.time, way, remaining))
+
+    def meet(self):
+        """Both find that they meet; returns whom each has met."""
+        met = [traffic.meet(self.time, DISTANCE, LENGTH) for traffic in self.robots.values()]
+        return [[rival.name for rival in rivals] for rivals in met]
+
+    def first(self):
+        """Name of the one that goes first, which both compute."""
+        anna, ben = self.channel.latest()
+        assert right_of_way(anna, ben) is not right_of_way(ben, anna)
+        return "anna" if right_of_way(anna, ben) else "ben"
+
+
+@pytest.fixture
+def pair():
+    """Anna has 4 m to go, ben 5 m, and they have met."""
+    made = Pair()
+    made.announce((0.0, 4.0, 4.0), (2.0, -3.0, 5.0))
+    assert made.meet() == [["ben"], ["anna"]]
+    assert made.first() == "anna"
+    return made
+
+
+def test_one_that_yields_by_driving_forward_does_not_overtake_in_rank(pair):
+    pair.announce((0.0, 4.0, 4.0), (0.9, -3.0, 3.9))
+    assert pair.first() == "anna"
+
+
+def test_one_that_finds_a_longer_way_does_not_lose_its_rank(pair):
+    pair.announce((0.0, 4.0, 40.0), (2.0, -3.0, 5.0))
+    assert pair.first() == "anna"
+
+
+def test_the_rank_is_kept_until_they_have_parted_for_a_while_and_then_what_remains_counts(pair):
+    for _ in range(int(PARTED_AFTER)):
+        pair.announce((6.0, 7.0, 4.5), (-2.0, -3.0, 1.0))
+    assert pair.first() == "anna"
+    pair.announce((6.0, 7.0, 4.5), (-2.0, -3.0, 1.0))
+    pair.announce((6.0, 7.0, 4.5), (-2.0, -3.0, 1.0))
+    assert pair.first() == "ben"
+
+
+def test_a_robot_that_has_arrived_announces_that_nothing_remains(pair):
+    pair.announce((0.0, 0.0, 0.0), (2.0, -3.0, 5.0))
+    assert pair.channel.latest()[0].remaining == 0.0
+
+
+def test_robots_that_wait_in_vain_let_each_other_go_first_by_turns(pair):
+    order = []
+    for _ in range(4):
+        order.append(pair.first())
+        first = pair.robots[order[-1]]
+        first.wait_was_in_vain(first.meet(pair.time, DISTANCE, LENGTH))
+    assert order == ["anna", "ben", "anna", "ben"]
+
+
+def test_one_that_cannot_yield_goes_first_until_it_has_waited_in_vain(pair):
+    ben = pair.robots["ben"]
+    ben.set_cannot_yield(True)
+    pair.announce((0.0, 4.0, 4.0), (2.0, -3.0, 5.0))
+    assert pair.first() == "ben"
+    ben.wait_was_in_vain(ben.meet(pair.time, DISTANCE, LENGTH))
+    assert pair.first() == "anna"
+
+
+def test_one_that_meets_nobody_announces_no_trouble():
+    alone = Pair()
+    alone.announce((0.0, 4.0, 4.0), (2.0, 9.0, 5.0))
+    alone.robots["anna"].set_cannot_yield(True)
+    alone.robots["anna"].wait_was_in_vain(())
+    anna = alone.channel.latest()[0]
+    assert (anna.cannot_yield, anna.waits) == (False, 0)

@@ -1,0 +1,135 @@
+"""Where a robot can leave its way and let others pass, and the shortest manoeuvre there; for any map.
+
+When to use: in a recovery that makes room, such as ``give_way``. When not: obstacles that stay where they are.
+
+The way is known in the plane of the robot at its pose ``begin``: on a slope its distances are those along the ground.
+Places of a manoeuvre lie on the ground near that plane, so a way of others that is farther than ``STOREY`` above or
+below it leads over another storey and is in nobody's way here.
+
+A manoeuvre is driven with small errors, and may end a little before its place. So the search first asks for ``ROOM``
+around the outline and for a place ``AT_EASE`` farther from the way than it must be; if there is none, for no room and
+``SHORT``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from mbf_abstract.geometry import FloatArray, Pose
+from mbf_abstract.geometry.arithmetic import norm, rotated_back
+from mbf_abstract.geometry.transform import Transform
+from mbf_abstract.maps.manoeuvres import PlanarPose, Step, find_manoeuvre
+from mbf_abstract.maps.navigation_map import NavigationMap
+from mbf_abstract.maps.queries import CellState, PlaceQuery
+
+WAY_SPACING = 0.1  # m
+STOREY = 1.0  # m
+ROOM = 0.05  # m
+AT_EASE, SHORT = 0.1, 0.05  # m
+LEAVING = 0.3  # m around a robot that touches something
+NEAREST_WITHIN = 2.0  # m
+
+
+def find_pull_out(
+    navigation_map: NavigationMap,
+    start: Pose,
+    way: FloatArray,
+    distance: float,
+    reach: float,
+    turning_radius: float = 0.0,
+    is_canceled: Callable[[], bool] = lambda: False,
+) -> list[Step] | None:
+    """Find the shortest manoeuvre from ``start`` to a place beside a way.
+
+    Parameters
+    ----------
+    navigation_map : NavigationMap
+        The robot's outline with its padding touches nothing of it.
+    start : Pose
+        Of the robot, in the frame of the map.
+    way : (n, 2) float64
+        Points [m] of all that must stay free, in the plane of the robot: x ahead, y to the left.
+    distance : float
+        How far [m] the robot's base stands from all of it, at least.
+    reach, turning_radius, is_canceled
+        As of ``find_manoeuvre``.
+
+    Returns
+    -------
+    list of Step or None
+        None if there is no such place, or it was canceled.
+    """
+    for room, farther in ((ROOM, AT_EASE), (0.0, SHORT)):
+        is_free = _freedom(navigation_map, start, room)
+
+        def left(pose: PlanarPose, wanted: float = distance + farther) -> float:
+            return max(wanted - float(norm(way - np.array(pose[:2])).min()), 0.0)
+
+        steps = find_manoeuvre(is_free, left, reach, turning_radius, is_canceled)
+        if steps is not None:
+            return steps
+    return None
+
+
+def _freedom(navigation_map: NavigationMap, start: Pose, room: float) -> Callable[[PlanarPose], bool]:
+    """Return whether the robot, with room [m] around it, may stand at a pose in its own plane.
+
+    Where it touches something it is let out, to where it is no nearer to what it touches.
+    """
+    frame = Transform(start.position, start.orientation, start.frame_id, "begin")
+    check = navigation_map.pose_check(PlaceQuery(use_padded_footprint=True, safety_dist=room))
+    touches = check(start).state > CellState.INSCRIBED
+    least_gap = _gap(navigation_map, start) if touches else math.inf
+
+    def is_free(pose: PlanarPose) -> bool:
+        x, y, yaw = pose
+        there = frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id="begin"))
+        if check(there).state <= CellState.INSCRIBED:
+            return True
+        return touches and math.hypot(x, y) <= LEAVING and _gap(navigation_map, there) >= least_gap
+
+    return is_free
+
+
+def _gap(navigation_map: NavigationMap, pose: Pose) -> float:
+    """Distance [m] of the nearest obstacle; inf if it is far away."""
+    offset = navigation_map.nearest_obstacle(pose, NEAREST_WITHIN)
+    return math.inf if offset is None else math.hypot(*offset)
+
+
+def way_in_plane(begin: Pose, track: FloatArray, ways: Sequence[FloatArray], length: float) -> FloatArray:
+    """Return what a robot must leave free, in its plane: its own way, and those of others on its storey.
+
+    Parameters
+    ----------
+    begin : Pose
+        Of the robot.
+    track : (n, 3) float64
+        Where it has driven [m], oldest first. Its own way is this, straight on behind it, and straight ahead.
+    ways : sequence of (n, 3) float64
+        Where others go [m], in the frame of ``begin``.
+    length : float
+        How far [m] to go back and straight on.
+
+    Returns
+    -------
+    (n, 2) float64
+        Points [m], x ahead, y to the left.
+    """
+    on = np.arange(0.0, length, WAY_SPACING)[:, None]
+    behind = np.concatenate([np.zeros((1, 2)), _on_storey(begin, track[::-1])])
+    driven = np.concatenate([[0.0], np.cumsum(norm(np.diff(behind, axis=0)))])
+    behind = behind[driven <= length]
+    older = behind[norm(behind - behind[-1]) > WAY_SPACING]
+    back = behind[-1] - older[-1] if len(older) else np.array([-1.0, 0.0])
+    others = [_on_storey(begin, way) for way in ways]
+    return np.concatenate([on * (1.0, 0.0), behind, behind[-1] + on * back / norm(back), *others])
+
+
+def _on_storey(begin: Pose, points: FloatArray) -> FloatArray:
+    """Those of points (n, 3) [m] that are near the plane of the robot, as points (m, 2) in it."""
+    seen = rotated_back(begin.rotation, points - np.asarray(begin.position))
+    return np.asarray(seen[np.abs(seen[:, 2]) <= STOREY, :2])
