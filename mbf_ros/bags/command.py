@@ -1,4 +1,4 @@
-"""The command ``mbf bag``: bags of ROS replayed through our layers, and runs written as bags."""
+"""The command ``mbf bag``: bags of ROS replayed through our layers, maps taken from them, runs written as bags."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands to the application ``mbf``."""
     bag = typer.Typer(help="Bags of ROS 1 and ROS 2, without ROS.", no_args_is_help=True)
     bag.command("replay", cls=CoordinateCommand)(replay)
+    bag.command("map")(recorded_map)
     bag.command("export")(export)
     app.add_typer(bag, name="bag")
 
@@ -79,6 +80,26 @@ def replay(
             typer.echo(f"results in {folder}: report.html, statistics.json, run.mcap, map_*.png")
     if _has_failed(replayed):
         raise typer.Exit(FAILURE)
+
+
+def recorded_map(
+    bag: Path = typer.Argument(..., help="A .bag file of ROS 1; a folder, .mcap or .db3 file of ROS 2."),
+    out: Path = typer.Option(Path("map.yaml"), "--out", help="YAML file of map_server; an image is written beside it."),
+    topic: str = typer.Option("", "--topic", help="Topic of the map, where the bag has several."),
+    at: float = typer.Option(math.inf, "--at", min=0.0, help="The map so many seconds after the beginning."),
+) -> None:
+    """Write the recorded map, the last one or that of a time, as a file for static layers."""
+    with readable_errors():
+        from mbf_ros.bags.reading import open_bag
+        from mbf_ros.bags.recorded_map import map_topic, read_recorded_map, write_recorded_map
+
+        if out.suffix not in (".yaml", ".yml"):
+            raise ValueError(f"--out must be a .yaml file, got {out}")
+        with waiting("reading the bag"), open_bag(bag) as opened:
+            message = read_recorded_map(opened, map_topic(opened, topic), at)
+            write_recorded_map(out, message)
+    info = message["info"]
+    typer.echo(f"{out}: {info['width']} x {info['height']} cells of {info['resolution']:.3g} m")
 
 
 def export(

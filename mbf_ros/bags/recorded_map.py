@@ -1,0 +1,89 @@
+"""A recorded map (nav_msgs/OccupancyGrid) as a file of map_server, which configurations, plans and scenarios read."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from mbf_abstract.geometry import Pose
+from mbf_abstract.whole_files import write_whole
+from mbf_ros.bags.reading import Bag, BagError
+from mbf_ros.messages.geometry import NANOSECONDS, quaternion_of, vector_of
+from mbf_ros.messages.interfaces import Message, MessageError
+
+MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
+UNKNOWN = 255
+YAML = """\
+image: {image}
+mode: raw  # pixels are occupancies: 0 free to 100 occupied, 255 unknown
+resolution: {resolution!r}
+origin: [{x!r}, {y!r}, {yaw!r}]
+negate: 0
+occupied_thresh: 0.65
+free_thresh: 0.196
+"""
+
+
+def map_topic(bag: Bag, chosen: str) -> str:
+    """Return the topic of the map: the chosen one, the only one of its type, or the only one that is named ``map``.
+
+    Raises
+    ------
+    BagError
+        There is none, it is of another type, or several come into question.
+    """
+    maps = sorted(topic for topic, kind in bag.types.items() if kind == MAP_TYPE)
+    named = [topic for topic in maps if topic.rsplit("/", 1)[-1] == "map"]
+    listed = ", ".join(maps) or "none"
+    if chosen:
+        if chosen not in maps:
+            raise BagError(f"{bag.path}: --topic {chosen}: expected a topic of {MAP_TYPE}: {listed}")
+        return chosen
+    if len(maps) != 1 and len(named) != 1:
+        raise BagError(f"{bag.path}: expected one topic of {MAP_TYPE}, found {listed}; choose by --topic")
+    return maps[0] if len(maps) == 1 else named[0]
+
+
+def read_recorded_map(bag: Bag, topic: str, at: float) -> Message:
+    """Return the last map that had been recorded ``at`` seconds after the beginning; raises BagError without one."""
+    bag.require(topic)
+    last = None
+    for recorded in bag.messages():
+        if (recorded.time - bag.start) / NANOSECONDS > at:
+            break
+        if recorded.topic == topic:
+            last = recorded
+    if last is None:
+        raise BagError(f"{bag.path}: no map on {topic} in the first {at:g} s")
+    try:
+        return bag.decode(last)
+    except MessageError as error:
+        raise BagError(f"{bag.path}: {topic}: {error}") from error
+
+
+def write_recorded_map(file: Path, message: Message) -> None:
+    """Write a map as ``file``, a YAML file, and an image beside it with all occupancies as they are.
+
+    Raises
+    ------
+    BagError
+        The map has no cells, not as many as its size says, or a resolution or origin that means nothing.
+    """
+    info, data = message["info"], np.asarray(message["data"])
+    width, height, resolution = info["width"], info["height"], info["resolution"]
+    if not data.size or width * height != data.size:
+        raise BagError(f"the map has {data.size} cells, its size is {width} x {height}")
+    if not (math.isfinite(resolution) and resolution > 0.0):
+        raise BagError(f"the map has a resolution of {resolution} m, expected more than 0")
+    try:
+        origin = Pose(vector_of(info["origin"]["position"]), quaternion_of(info["origin"]["orientation"]))
+    except ValueError as error:
+        raise BagError(f"the origin of the map means nothing: {error}") from error
+    rows = np.where(data < 0, UNKNOWN, data).astype(np.uint8).reshape(height, width)[::-1]
+    image = file.with_suffix(".pgm")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(image, b"P5\n%d %d\n255\n" % (width, height) + rows.tobytes())
+    resolution = float(f"{resolution:.7g}")  # float32: 0.05 was recorded as 0.05000000074505806
+    write_whole(file, YAML.format(image=image.name, resolution=resolution, x=origin.x, y=origin.y, yaw=origin.yaw))

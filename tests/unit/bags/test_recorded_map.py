@@ -1,0 +1,85 @@
+"""A recorded map becomes a file that static layers read, cell by cell as it was."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from mbf_abstract.cli import make_app
+from mbf_abstract.server.factory import read_floor
+from mbf_ros.bags.reading import BagError, open_bag
+from mbf_ros.bags.recorded_map import write_recorded_map
+from mbf_ros.messages.interfaces import completed
+from tests.unit.bags.conftest import COSTMAP, drive, header, last_grid, make_bag, message
+
+CELLS = np.random.default_rng(0).choice([-1, 0, 30, 65, 99, 100], size=(4, 6)).astype(np.int8)
+
+
+def grid(seconds, cells, topic="/map", resolution=0.05, yaw_w=1.0):
+    height, width = cells.shape
+    origin = {"position": {"x": -1.5, "y": 0.25, "z": 0.0}, "orientation": {"w": yaw_w}}
+    info = {"resolution": resolution, "width": width, "height": height, "origin": origin}
+    values = {"header": header("map", seconds), "info": info, "data": cells.reshape(-1)}
+    return message(seconds, topic, "nav_msgs/OccupancyGrid", values, True)
+
+
+def run(*arguments):
+    return CliRunner().invoke(make_app(), ["bag", "map", *map(str, arguments)])
+
+
+@pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap"])
+def test_every_cell_is_kept(tmp_path, kind):
+    bag = make_bag(tmp_path, [grid(0.0, CELLS)], kind)
+    assert run(bag, "--out", tmp_path / "office.yaml").exit_code == 0
+    floor = read_floor(tmp_path / "office.yaml")
+    np.testing.assert_array_equal(floor.occupancy, CELLS.astype(np.uint8))  # -1 is 255, unknown
+    assert (floor.resolution, floor.origin_x, floor.origin_y) == (0.05, -1.5, 0.25)
+
+
+def test_the_map_of_a_time_is_the_last_one_until_then(tmp_path):
+    bag = make_bag(tmp_path, [grid(0.0, CELLS), grid(2.0, CELLS[:2]), *drive(3.0)[-1:]])
+    for at, rows in ((1.0, 4), (2.5, 2)):
+        run(bag, "--out", tmp_path / "office.yaml", "--at", at)
+        assert len(read_floor(tmp_path / "office.yaml").occupancy) == rows
+
+
+def test_of_several_maps_the_one_named_map_is_taken_or_asked_for(tmp_path):
+    bag = make_bag(tmp_path, [grid(0.0, CELLS, "/global_costmap/costmap"), grid(0.0, CELLS[:3], "/robot/map")])
+    assert "6 x 3 cells" in run(bag, "--out", tmp_path / "a.yaml").output
+    assert "6 x 4" in run(bag, "--out", tmp_path / "a.yaml", "--topic", "/global_costmap/costmap").output
+    (tmp_path / "two").mkdir()
+    two = make_bag(tmp_path / "two", [grid(0.0, CELLS, "/one/map"), grid(0.0, CELLS, "/two/map")])
+    refused = run(two, "--out", tmp_path / "a.yaml")
+    assert refused.exit_code == 2 and "found /one/map, /two/map; choose by --topic" in refused.output
+    assert "/robot/odom: expected a topic of" in run(bag, "--topic", "/robot/odom").output
+
+
+def test_a_replay_with_the_recorded_map_has_its_walls(tmp_path, replayed):
+    walls = np.zeros((40, 60), np.int8)
+    walls[5, 7] = 100
+    bag = make_bag(tmp_path, [grid(0.0, walls, resolution=0.1), *drive(0.5)])
+    run(bag, "--out", tmp_path / "office.yaml")
+    static = COSTMAP.replace("layers: [{name", "layers: [{name: walls, type: static}, {name", 1)
+    static = static.replace("robot_radius: 0.2, update", "walls: {map_file: office.yaml}, robot_radius: 0.2, update")
+    assert last_grid(replayed(bag, static))[5, 7]
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"width": 5}, "has 24 cells, its size is 5 x 4"),
+        ({"resolution": 0.0}, "resolution of 0.0 m, expected more than 0"),
+        ({"origin": {"position": {"x": float("nan"), "y": 0.0}}}, "origin of the map means nothing"),
+    ],
+)
+def test_a_map_that_means_nothing_is_refused(tmp_path, change, text):
+    values = grid(0.0, CELLS).message
+    broken = completed("nav_msgs/OccupancyGrid", {**values, "info": {**values["info"], **change}})
+    with pytest.raises(BagError, match=text):
+        write_recorded_map(tmp_path / "office.yaml", broken)
+
+
+def test_a_bag_without_a_map_says_so(tmp_path):
+    with open_bag(make_bag(tmp_path, drive(0.1))) as bag:
+        assert "/map" not in bag.types
+    assert "expected one topic of nav_msgs/msg/OccupancyGrid, found none" in run(tmp_path / "drive").output
+    assert "must be a .yaml file" in run(tmp_path / "drive", "--out", tmp_path / "map.pgm").output
