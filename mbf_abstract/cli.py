@@ -14,9 +14,9 @@ from importlib.metadata import EntryPoint, entry_points, version
 import typer
 
 from mbf_abstract.commands import check, doctor, new, plan, plugins
+from mbf_abstract.config.installed_plugins import DISTRIBUTION
 
 COMMANDS_GROUP = "mbf.commands"
-DISTRIBUTION = "mbf-flex"
 
 
 def make_app() -> typer.Typer:

@@ -18,6 +18,7 @@ from pathlib import Path
 import typer
 
 from mbf_abstract.commands.reporting import FAILURE
+from mbf_abstract.config.installed_plugins import DISTRIBUTION
 
 NEEDED = (*("numpy", "scipy", "numba", "trimesh", "networkx", "rtree", "yaml", "pydantic", "rich", "py_trees", "PIL"),)
 MESH_FILES = ("h5py", "lxml", "collada")
@@ -101,7 +102,7 @@ def _package(name: str, cure: str, optional: bool) -> Finding:
 @cache
 def oldest_versions() -> dict[str, str]:
     """Least version of each distribution that this package's own metadata asks for."""
-    asked = (re.match(r"([\w.-]+)>=([\d.]+)", text) for text in requires("mbf-flex") or ())
+    asked = (re.match(r"([\w.-]+)>=([\d.]+)", text) for text in requires(DISTRIBUTION) or ())
     return {match[1]: match[2] for match in asked if match}
 
 

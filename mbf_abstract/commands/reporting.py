@@ -23,8 +23,6 @@ def text_of(error: Exception) -> str:
 @contextmanager
 def readable_errors() -> Iterator[None]:
     """Turn every exception into a text and exit code 2; set the environment variable MBF_TRACEBACK=1 to see it all."""
-    from mbf_abstract.config.findings import ConfigError
-
     try:
         yield
     except (typer.Exit, typer.Abort, typer.BadParameter):
@@ -32,6 +30,8 @@ def readable_errors() -> Iterator[None]:
     except Exception as error:
         if os.environ.get(TRACEBACK_VARIABLE):
             raise
+        from mbf_abstract.config.findings import ConfigError
+
         if isinstance(error, ConfigError):
             count = len(error.findings)
             typer.echo(f"{error}\n{count} mistake{'s' if count != 1 else ''} found", err=True)

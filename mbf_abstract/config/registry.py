@@ -13,14 +13,12 @@ from __future__ import annotations
 import importlib
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 
 from mbf_abstract.config.findings import suggest
+from mbf_abstract.config.installed_plugins import GROUPS, PluginEntry, entry_of, origin_of, points_of
 from mbf_abstract.event_values import error_text
 from mbf_abstract.plugins import PLUGIN_BASES, PluginKind
-
-GROUPS = (*(kind.value for kind in PluginKind), "costmap_layers", "mesh_layers", "servers")
 
 Adapter = Callable[[str, type], type | None]
 """Given a group and a class that is no MBF plugin, return an MBF plugin class that wraps it, or None."""
@@ -38,31 +36,6 @@ class PluginError(Exception):
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         """Survive pickling, for the return from a worker process."""
         return type(self), (self.group, self.type, self.reason)
-
-
-@dataclass(frozen=True)
-class PluginEntry:
-    """One known plugin type, for listings.
-
-    Attributes
-    ----------
-    name : str
-        Full name, e.g. ``mesh.cvp``.
-    group : str
-        One of ``GROUPS``.
-    target : str
-        ``module:Class``.
-    origin : str
-        Distribution and version it comes from, or ``registered`` for a direct registration.
-    error : str or None
-        Why it cannot be used.
-    """
-
-    name: str
-    group: str
-    target: str
-    origin: str
-    error: str | None
 
 
 class PluginRegistry:
@@ -135,21 +108,20 @@ class PluginRegistry:
 
     def entries(self) -> list[PluginEntry]:
         """Import every known plugin and list all of them, those that fail with the error."""
-        return [self._entry(group, name) for group in GROUPS for name in sorted(self._known(group))]
+        return [self.entry(group, name) for group in GROUPS for name in sorted(self._known(group))]
 
-    def _entry(self, group: str, name: str) -> PluginEntry:
-        registered = self._registered.get((group, name))
-        if registered is not None:
-            target, origin = f"{registered.__module__}:{registered.__qualname__}", "registered"
-        else:
-            points = self._entry_points(group)[name]
-            target, origin = points[0].value, ", ".join(_origin(point) for point in points)
+    def entry(self, group: str, name: str) -> PluginEntry:
+        """Import a known plugin, by its full name, and list it, with the error if that fails."""
         try:
             plugin_class = self._import_known(group, name)
             self._checked(group, name, plugin_class, None)
+            reason = None
         except PluginError as error:
-            return PluginEntry(name, group, target, origin, error.reason)
-        return PluginEntry(name, group, target, origin, None)
+            reason = error.reason
+        registered = self._registered.get((group, name))
+        if registered is None:
+            return entry_of(group, self._entry_points(group)[name], reason)
+        return PluginEntry(name, group, f"{registered.__module__}:{registered.__qualname__}", "registered", reason)
 
     def _import(self, group: str, type_name: str) -> object:
         if ":" in type_name:
@@ -173,7 +145,7 @@ class PluginRegistry:
             return registered
         points = self._entry_points(group)[name]
         if len({point.value for point in points}) > 1:
-            clash = " and ".join(f"{point.value} ({_origin(point)})" for point in points)
+            clash = " and ".join(f"{point.value} ({origin_of(point)})" for point in points)
             raise PluginError(group, name, f"name clash between {clash}; use module:Class")
         try:
             return points[0].load()
@@ -208,10 +180,7 @@ class PluginRegistry:
 
     def _entry_points(self, group: str) -> dict[str, list[EntryPoint]]:
         if group not in self._found:
-            points: dict[str, list[EntryPoint]] = {}
-            for point in entry_points(group=f"mbf.{group}"):
-                points.setdefault(point.name, []).append(point)
-            self._found[group] = points
+            self._found[group] = points_of(group)
         return self._found[group]
 
 
@@ -220,10 +189,6 @@ _BASES: dict[str, type] = {kind.value: base for kind, base in PLUGIN_BASES.items
 
 def _group(group: PluginKind | str) -> str:
     return group.value if isinstance(group, PluginKind) else group
-
-
-def _origin(point: EntryPoint) -> str:
-    return f"{point.dist.name} {point.dist.version}" if point.dist is not None else "unknown distribution"
 
 
 def _describe(error: BaseException) -> str:

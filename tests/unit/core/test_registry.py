@@ -1,10 +1,12 @@
+import sys
 from importlib.metadata import EntryPoint
 from types import SimpleNamespace
 
 import pytest
 
-from mbf_abstract.config import registry as registry_module
-from mbf_abstract.config.registry import GROUPS, PluginError, PluginRegistry
+from mbf_abstract.config import installed_plugins
+from mbf_abstract.config.installed_plugins import GROUPS
+from mbf_abstract.config.registry import PluginError, PluginRegistry
 from mbf_abstract.plugins import AbstractPlanner, PlanResult, PluginKind
 
 PLUGIN_SOURCE = """
@@ -33,7 +35,7 @@ class FreePlanner(MeshPlanner):
 @pytest.fixture(autouse=True)
 def nothing_installed(monkeypatch):
     """Hide the entry points of the installed packages."""
-    monkeypatch.setattr(registry_module, "entry_points", lambda group: [])
+    monkeypatch.setattr(installed_plugins, "entry_points", lambda group: [])
 
 
 @pytest.fixture
@@ -44,7 +46,7 @@ def plugin_module(tmp_path, monkeypatch):
     (tmp_path / "broken_plugin_module.py").write_text("raise RuntimeError('no driver')")
     monkeypatch.syspath_prepend(tmp_path)
     yield path
-    registry_module.sys.modules.pop("plugin_module_under_test", None)
+    sys.modules.pop("plugin_module_under_test", None)
 
 
 @pytest.fixture
@@ -58,7 +60,7 @@ def installed(monkeypatch):
             vars(point).update(dist=SimpleNamespace(name=distribution, version="1.0"))
             points.append(point)
         monkeypatch.setattr(
-            registry_module, "entry_points", lambda group: [point for point in points if point.group == group]
+            installed_plugins, "entry_points", lambda group: [point for point in points if point.group == group]
         )
 
     return install
