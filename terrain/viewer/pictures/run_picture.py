@@ -208,9 +208,8 @@ def _draw_incidents(panel: Panel, recording: Recording) -> None:
         if what is not None:
             marker, label = INCIDENTS[what]
             style: dict[str, Any] = {"linestyle": "none", "markeredgecolor": "white", "markersize": 8, "zorder": 9}
-            panel.axes.plot(
-                event.data["x"], event.data["y"], marker=marker, color=INCIDENT_COLOUR, label=label, **style
-            )
+            place = np.array([event.data["x"], event.data["y"]], dtype=np.float64).tolist()
+            panel.axes.plot(*place, marker=marker, color=INCIDENT_COLOUR, label=label, **style)
 
 
 def _caption(panel: Panel, number: int) -> None:
