@@ -1,9 +1,7 @@
-"""The command ``mbf bridge serve``: a navigator behind a rosbridge server, with a robot of a scenario or a real one."""
+"""The command ``mbf bridge serve``: a navigator, or a simulated robot alone, behind a rosbridge server."""
 
 from __future__ import annotations
 
-import signal
-import threading
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -13,13 +11,15 @@ import typer
 
 from mbf_abstract.commands.reporting import readable_errors
 from mbf_abstract.commands.waiting import waiting
+from mbf_ros.ending import wait_for_ctrl_c
+from mbf_ros.rosbridge_robot.command import connect
 
 if TYPE_CHECKING:
     from mbf_abstract.access.page_access import PageAccess
     from mbf_abstract.session import NavigationSession
     from mbf_ros.rosbridge.server import RosbridgeServer
     from mbf_ros.rosbridge.serving import BridgeOptions
-    from mbf_ros.rosbridge.topic_robot import TopicRobot
+    from mbf_ros.rosbridge_robot.topic_robot import TopicRobot
 
 WORLDS_GROUP = "mbf.worlds"
 
@@ -28,6 +28,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands to the application ``mbf``."""
     bridge = typer.Typer(help="Navigation for clients of rosbridge: roslibpy, roslib pages.", no_args_is_help=True)
     bridge.command("serve")(serve)
+    bridge.command("connect")(connect)
     app.add_typer(bridge, name="bridge")
 
 
@@ -57,21 +58,28 @@ def serve(
     keep_goals: bool = typer.Option(
         False, "--keep-goals", help="A goal goes on when its client is gone; else it is canceled."
     ),
+    robot_only: bool = typer.Option(
+        False, "--robot-only", help="Only the robot of a scenario, for a navigator that connects: see bridge connect."
+    ),
 ) -> None:
-    """Serve a navigator to clients of rosbridge, until Ctrl-C."""
+    """Serve a navigator, or a simulated robot alone, to clients of rosbridge, until Ctrl-C."""
     with readable_errors():
         from mbf_ros.rosbridge.server import ServerOptions
         from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
+        from mbf_ros.rosbridge_robot.simulated_robot import serve_robot
         from mbf_ros.sensor_options import sensors_of
 
         access = _access(host, token)
         server_options = ServerOptions(access, port, tuple(allow_origin), max_message)
         options = BridgeOptions(server_options, not keep_goals, stamped, sensors_of(sensor))
+        if robot_only and _is_navigation(Path(what)):
+            raise ValueError("--robot-only is of scenarios; the robot of a navigation file is a client itself")
         with waiting("reading the configuration") as on_step:
             session, robot = _open(what, backend or None, seed if seed >= 0 else None, on_step)
-        with session, serve_session(session, options, robot) as server:
+        served = serve_robot(session, options) if robot_only else serve_session(session, options, robot)
+        with session, served as server:
             _report(server, options, robot is not None)
-            _wait_for_ctrl_c()
+            wait_for_ctrl_c()
 
 
 def _access(host: str, token: bool) -> PageAccess:
@@ -109,7 +117,7 @@ def _real_robot(file: Path) -> tuple[NavigationSession, TopicRobot]:
     from mbf_abstract.server.factory import read_config
     from mbf_abstract.session import NavigationSession
     from mbf_abstract.time.clock import WallClock
-    from mbf_ros.rosbridge.topic_robot import TopicRobot
+    from mbf_ros.rosbridge_robot.topic_robot import TopicRobot
 
     server_class, config = read_config(file)
     session, transforms = NavigationSession(WallClock()), TransformBuffer(config.parameters.tf_cache_time)
@@ -135,14 +143,3 @@ def _report(server: RosbridgeServer, options: BridgeOptions, is_real: bool) -> N
             "address can drive the robot",
             err=True,
         )
-
-
-def _wait_for_ctrl_c() -> None:
-    """Wait for Ctrl-C; SIGTERM ends the program by an exception, see ``server.process_end``."""
-    pressed = threading.Event()
-    before = signal.signal(signal.SIGINT, lambda number, stack: pressed.set())
-    try:
-        while not pressed.wait(1.0):  # a wait without an end would not let signals through on Windows
-            pass
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -101,8 +101,8 @@ def completed(type_name: str, values: object, where: str = "") -> Message:
     ----------
     type_name : str
     values : mapping
-        As it came from JSON: null stands for NaN, and a list of bytes may be base64. Times may have the fields of
-        ROS 1 (``secs``, ``nsecs``), and headers a ``seq``, which is dropped.
+        As it came from JSON, in which null stands for NaN and a list of bytes may be base64, or from CBOR. Times may
+        have the fields of ROS 1 (``secs``, ``nsecs``), and headers a ``seq``, which is dropped.
     where : str
         Name of the message in error texts, its type if empty.
 
@@ -202,6 +202,8 @@ def _numbers(kind: str, value: Any, where: str) -> NDArray[Any]:
             return np.frombuffer(base64.b64decode(value, validate=True), np.uint8)
         except (binascii.Error, ValueError) as error:
             raise MessageError(f"{where}: expected bytes in base64: {error}") from error
+    if isinstance(value, bytes) and kind == "uint8":
+        return np.frombuffer(value, np.uint8)
     if isinstance(value, np.ndarray) and value.dtype == np.dtype(kind) and value.ndim == 1:
         return value
     if not isinstance(value, list | tuple | np.ndarray):

@@ -103,10 +103,7 @@ class ActionTable:
         package, _, short = action.mapping.type.partition("/action/")
         if type_name not in ("", action.mapping.type, f"{package}/{short}"):
             raise OperationError(f"{name} has the type {action.mapping.type}, not {type_name}")
-        if goal_id is None or goal_id in client.goals:
-            raise OperationError(f"send_action_goal: an id is needed that no unfinished goal has, got {goal_id!r}")
-        if len(client.goals) >= MAX_GOALS:
-            raise OperationError(f"{MAX_GOALS} goals of this client are unfinished already")
+        free_id(client, goal_id)
         return action, action.mapping.goal(values, self._context)
 
     def _forward_feedback(
@@ -144,6 +141,15 @@ class ActionTable:
     @staticmethod
     def _answer(client: Client, name: str, goal_id: str | None, fields: Message) -> None:
         client.outbox.answer(frame("action_result", id=goal_id, action=name, **fields))
+
+
+def free_id(client: Client, goal_id: str | None) -> str:
+    """Return the id of a new goal; raises OperationError where it is missing or used, or the client has too many."""
+    if goal_id is None or goal_id in client.goals:
+        raise OperationError(f"send_action_goal: an id is needed that no unfinished goal has, got {goal_id!r}")
+    if len(client.goals) >= MAX_GOALS:
+        raise OperationError(f"{MAX_GOALS} goals of this client are unfinished already")
+    return goal_id
 
 
 def _on_loop(loop: asyncio.AbstractEventLoop, call: Callable[[Any], None]) -> Callable[[Any], None]:

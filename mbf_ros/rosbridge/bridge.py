@@ -12,10 +12,11 @@ from mbf_abstract.event_values import error_text
 from mbf_abstract.events import EventBus, EventKind
 from mbf_abstract.time.clock import Clock
 from mbf_ros.messages.geometry import MessageContext
-from mbf_ros.rosbridge.actions import ActionTable
+from mbf_ros.rosbridge.actions import ActionTable, free_id
 from mbf_ros.rosbridge.authentication import Authentication
 from mbf_ros.rosbridge.client import Client
-from mbf_ros.rosbridge.protocol import Operation, OperationError, absolute, id_in, number_in, parsed, text_in
+from mbf_ros.rosbridge.offered_actions import OfferedActions
+from mbf_ros.rosbridge.protocol import Operation, OperationError, absolute, frame, id_in, number_in, parsed, text_in
 from mbf_ros.rosbridge.services import ServiceTable
 from mbf_ros.rosbridge.topics import MAX_QUEUE, MAX_THROTTLE, TopicTable
 
@@ -25,7 +26,6 @@ NOT_OFFERED = {
     "fragment": "send whole messages",
     "png": "this server does not compress",
     "advertise_service": "clients cannot offer services here",
-    "advertise_action": "clients cannot offer actions here",
 }
 
 
@@ -55,6 +55,7 @@ class Bridge:
         self.topics = TopicTable()
         self.services = ServiceTable(clock)
         self.actions = ActionTable(context)
+        self.offered = OfferedActions()
         self._events = events
         self._authentication = authentication
         self._cancel_on_disconnect = cancel_on_disconnect
@@ -67,15 +68,19 @@ class Bridge:
             "call_service": self._call_service,
             "send_action_goal": self._send_action_goal,
             "cancel_action_goal": lambda client, op: self.actions.cancel_goal(client, id_in(op)),
+            "advertise_action": self._advertise_action,
+            "unadvertise_action": lambda client, op: self.offered.withdraw(client, _action(op)),
+            "action_feedback": lambda client, op: self.offered.feedback(client, _action(op), op),
+            "action_result": lambda client, op: self.offered.result(client, _action(op), op),
             "set_level": lambda client, op: None,  # errors are always sent, and nothing else
             "auth": lambda client, op: None,  # of a client that needs none
         }
 
-    def take(self, client: Client, frame: str | bytes) -> None:
+    def take(self, client: Client, text: str | bytes) -> None:
         """Do what a client asks for; what cannot be done is answered with a status of the level error."""
         operation_id = None
         try:
-            operation = parsed(frame)
+            operation = parsed(text)
             operation_id = id_in(operation)
             if client.role is None:
                 self._authenticate(client, operation)
@@ -84,13 +89,14 @@ class Bridge:
         except OperationError as error:
             client.refuse(str(error), operation_id)
         except Exception as error:  # a fault of ours must not take the connection along
-            text = f"{type(error).__name__}: {error_text(error)}"
-            self._events.emit(EventKind.FAULT, "rosbridge", type=type(error).__name__, message=text)
-            client.refuse(f"an error in the server: {text}", operation_id)
+            fault = f"{type(error).__name__}: {error_text(error)}"
+            self._events.emit(EventKind.FAULT, "rosbridge", type=type(error).__name__, message=fault)
+            client.refuse(f"an error in the server: {fault}", operation_id)
 
     def forget(self, client: Client) -> None:
         """End what a client that is gone has left; its goals, if it is so configured."""
         self.topics.forget(client)
+        self.offered.forget(client)
         goals = list(client.goals.values())
         client.goals.clear()
         if self._cancel_on_disconnect:
@@ -135,9 +141,26 @@ class Bridge:
         self.services.call(client, name, op.get("args"), id_in(op))
 
     def _send_action_goal(self, client: Client, op: Operation) -> None:
-        name, kind = absolute(text_in(op, "action")), text_in(op, "action_type", "")
-        self.actions.send_goal(client, name, kind, id_in(op), op.get("args", {}), op.get("feedback") is True)
+        name, kind = _action(op), text_in(op, "action_type", "")
+        if name not in self.offered.offers:
+            self.actions.send_goal(client, name, kind, id_in(op), op.get("args", {}), op.get("feedback") is True)
+            return
+        try:
+            self.offered.send_goal(client, name, free_id(client, id_in(op)), op)
+        except OperationError as error:
+            failed = {"values": str(error), "status": 0, "result": False}
+            client.outbox.answer(frame("action_result", id=id_in(op), action=name, **failed))
+
+    def _advertise_action(self, client: Client, op: Operation) -> None:
+        name = _action(op)
+        if name in self.actions.actions:
+            raise OperationError(f"advertise_action: {name} is the navigator's own")
+        self.offered.offer(client, name, text_in(op, "type"))
 
 
 def _topic(op: Operation) -> str:
     return absolute(text_in(op, "topic"))
+
+
+def _action(op: Operation) -> str:
+    return absolute(text_in(op, "action"))

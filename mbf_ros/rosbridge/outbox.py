@@ -1,7 +1,7 @@
-"""What waits to be sent to one client. It never makes the robot wait, and never grows without end.
+"""What waits to be sent to the other end of a connection. It never makes the robot wait, and never grows without end.
 
 Of a topic the newest messages are kept, as many as its subscription asks for, and of the feedback of a goal the newest
-one. Answers are all kept; a client with too many that it does not read is disconnected.
+one. Answers are all kept, up to a limit; who lets more than that wait is disconnected.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from collections.abc import Hashable
 MAX_ANSWERS = 1000
 
 
-class Outbox:
-    """Frames in the order in which they are due; used on the server's event loop only.
+class WaitingFrames:
+    """Frames in the order in which they are due; used by one thread at a time.
 
     Attributes
     ----------
@@ -27,7 +27,6 @@ class Outbox:
         self._max_answers = max_answers
         self._answers = 0
         self._waiting: OrderedDict[Hashable, deque[str]] = OrderedDict()
-        self._ready = asyncio.Event()
 
     @property
     def is_empty(self) -> bool:
@@ -41,7 +40,6 @@ class Outbox:
             self.overflowed = True
         else:
             self._waiting[object()] = deque([frame])
-        self._ready.set()
 
     def newest(self, kind: Hashable, frame: str, keep: int = 1) -> None:
         """Add a frame of which only the newest ``keep`` of its kind matter."""
@@ -49,17 +47,13 @@ class Outbox:
         while len(frames) >= keep:
             frames.popleft()
         frames.append(frame)
-        self._ready.set()
 
     def forget(self, kind: Hashable) -> None:
         """Drop what waits of a kind."""
         self._waiting.pop(kind, None)
 
-    async def take(self) -> str:
-        """Wait for the next frame, one kind after the other."""
-        while not self._waiting:
-            self._ready.clear()
-            await self._ready.wait()
+    def pop(self) -> str:
+        """Return the next frame, one kind after the other; raises StopIteration where none waits."""
         kind, frames = next(iter(self._waiting.items()))
         frame = frames.popleft()
         if frames:
@@ -69,3 +63,28 @@ class Outbox:
         if type(kind) is object:
             self._answers -= 1
         return frame
+
+
+class Outbox(WaitingFrames):
+    """What waits for one client of the server; used on the server's event loop only."""
+
+    def __init__(self, max_answers: int = MAX_ANSWERS) -> None:
+        super().__init__(max_answers)
+        self._ready = asyncio.Event()
+
+    def answer(self, frame: str) -> None:
+        """Add a frame that must not be lost."""
+        super().answer(frame)
+        self._ready.set()
+
+    def newest(self, kind: Hashable, frame: str, keep: int = 1) -> None:
+        """Add a frame of which only the newest ``keep`` of its kind matter."""
+        super().newest(kind, frame, keep)
+        self._ready.set()
+
+    async def take(self) -> str:
+        """Wait for the next frame."""
+        while self.is_empty:
+            self._ready.clear()
+            await self._ready.wait()
+        return self.pop()

@@ -66,7 +66,7 @@ def serve_rosapi(
         "ServicesForType": lambda request: {
             "services": sorted(name for name, one in services.items() if one.type == request.get("type"))
         },
-        "ActionServers": lambda _: {"action_servers": sorted(actions)},
+        "ActionServers": lambda _: {"action_servers": sorted({*actions, *bridge.offered.offers})},
         "Nodes": lambda _: {"nodes": [node]},
         "NodeDetails": node_details,
         "Publishers": publishers,

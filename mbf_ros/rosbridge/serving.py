@@ -23,7 +23,7 @@ from mbf_ros.rosbridge.page import page_files
 from mbf_ros.rosbridge.publishing import Publisher
 from mbf_ros.rosbridge.rosapi import serve_rosapi
 from mbf_ros.rosbridge.server import RosbridgeServer, ServerOptions
-from mbf_ros.rosbridge.topic_robot import TopicRobot
+from mbf_ros.rosbridge_robot.topic_robot import TopicRobot
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ SPAWNERS = (
     "mbf_abstract/testing/",
     "mbf_ros/ros2/",
     "mbf_ros/rosbridge/",
+    "mbf_ros/rosbridge_robot/",
     "terrain/",
 )
 SEEDED = {"np.random.default_rng", "np.random.Generator", "np.random.SeedSequence"}

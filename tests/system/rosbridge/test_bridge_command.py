@@ -51,6 +51,7 @@ def test_it_serves_until_it_is_interrupted_and_says_farewell(config, raw, ask, s
     [
         (["--sensor", "/scan"], "--sensor must be TOPIC:TYPE=SOURCE with one of the types LaserScan"),
         (["--sensor", "/scan:Image=camera"], "got '/scan:Image=camera'"),
+        (["--robot-only"], "--robot-only is of scenarios; the robot of a navigation file is a client itself"),
         (["--seed", "3"], "--backend and --seed are of scenarios"),
         (["--host", "192.0.2.1", "--port", "0"], "cannot listen at 192.0.2.1:0"),
     ],

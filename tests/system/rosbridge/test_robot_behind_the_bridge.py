@@ -18,7 +18,7 @@ from mbf_abstract.testing.scripted_session import SCRIPTED, MapFreeServer, _spec
 from mbf_abstract.time.clock import WallClock
 from mbf_ros.rosbridge.server import ServerOptions
 from mbf_ros.rosbridge.serving import BridgeOptions, serve_session
-from mbf_ros.rosbridge.topic_robot import TopicRobot
+from mbf_ros.rosbridge_robot.topic_robot import TopicRobot
 
 PERIOD = 0.05
 

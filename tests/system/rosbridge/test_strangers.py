@@ -111,7 +111,7 @@ def test_who_may_only_watch_sees_everything_and_changes_nothing(serving, raw, as
         ('{"op": 3}', 'expected an object with a text "op"'),
         ('{"op": "dance"}', "'dance' is not offered: it is not known"),
         ('{"op": "fragment"}', "send whole messages"),
-        ('{"op": "advertise_action"}', "clients cannot offer actions"),
+        ('{"op": "advertise_service"}', "clients cannot offer services"),
         ('{"op": "subscribe"}', "'topic' must be a text"),
         ('{"op": "subscribe", "topic": "/dance"}', "its type must be given"),
         ('{"op": "subscribe", "topic": "/odom", "type": "std_msgs/String"}', "has the type nav_msgs/msg/Odometry"),

@@ -24,7 +24,8 @@ from mbf_ros.rosbridge.rosapi import serve_rosapi
 
 OPERATIONS = (
     *("advertise", "unadvertise", "publish", "subscribe", "unsubscribe", "call_service", "send_action_goal"),
-    *("cancel_action_goal", "set_level", "auth", "fragment", "dance"),
+    *("cancel_action_goal", "advertise_action", "unadvertise_action", "action_feedback", "action_result"),
+    *("set_level", "auth", "fragment", "dance"),
 )
 TOPICS = ("/goal_pose", "/move_base/goal", "/move_base/cancel", "/cmd_vel", "/chatter", "odom", "")
 TYPES = ("geometry_msgs/PoseStamped", "std_msgs/String", "move_base_msgs/MoveBaseActionGoal", "x/Y", "")

@@ -1,0 +1,21 @@
+"""How commands that run for as long as they are wanted come to their end."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+
+
+def wait_for_ctrl_c(look: Callable[[], None] = lambda: None, period: float = 1.0) -> None:
+    """Wait for Ctrl-C, and call ``look`` every ``period`` [s] until then.
+
+    SIGTERM ends the program by an exception, see ``server.process_end``.
+    """
+    pressed = threading.Event()
+    before = signal.signal(signal.SIGINT, lambda number, stack: pressed.set())
+    try:
+        while not pressed.wait(period):  # a wait without an end would not let signals through on Windows
+            look()
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,78 @@
+"""The command ``mbf bridge connect``: navigation for a robot that has a rosbridge server, without ROS here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from mbf_abstract.commands.reporting import readable_errors
+from mbf_ros.ending import wait_for_ctrl_c
+from mbf_ros.rosbridge_robot.options import LinkOptions, RobotOptions, TimeSource
+
+if TYPE_CHECKING:
+    from mbf_ros.rosbridge_robot.navigator import RobotNavigator
+
+LOOK_PERIOD = 0.1  # s
+
+
+def connect(
+    address: str = typer.Argument(..., metavar="ADDRESS", help="The robot's rosbridge, e.g. ws://robot:9090."),
+    config: Path = typer.Argument(..., metavar="CONFIG", help="A navigation file."),
+    sensor: list[str] = typer.Option(
+        ["/scan:LaserScan=scan", "/points:PointCloud2=points", "/range:Range=range"],
+        "--sensor",
+        help="TOPIC:TYPE=SOURCE of a sensor of the robot, with its source in CONFIG; may be repeated.",
+    ),
+    stamped: bool = typer.Option(False, "--stamped", help="Publish /cmd_vel as TwistStamped."),
+    max_silence: float = typer.Option(
+        0.0,
+        "--max-silence",
+        min=0.0,
+        help="Time without odometry, transforms or a sensor at which the robot stops, in s; 0 = command_timeout.",
+    ),
+    cloud_period: float = typer.Option(
+        0.1, "--cloud-period", min=0.0, help="Least time between two clouds of a topic, in s."
+    ),
+    time: TimeSource = typer.Option(
+        TimeSource.CALENDAR,
+        "--time",
+        help="What shows the time of the robot's stamps: the calendar, odometry as it arrives, or the topic /clock.",
+    ),
+    secret_file: Path = typer.Option(
+        None, "--secret-file", help="File with the secret of a rosbridge that asks for auth.", dir_okay=False
+    ),
+) -> None:
+    """Navigate a robot through its rosbridge server, until Ctrl-C."""
+    with readable_errors():
+        from mbf_ros.rosbridge_robot.navigator import connect_navigator
+        from mbf_ros.sensor_options import sensors_of
+
+        link = LinkOptions(secret=secret_file.read_text("utf-8").strip() if secret_file else "")
+        options = RobotOptions(link, stamped, max_silence or None, sensors_of(sensor), cloud_period, time)
+        with connect_navigator(address, config, options, _warn) as navigator:
+            wait_for_ctrl_c(_shown_state(navigator), LOOK_PERIOD)
+
+
+def _warn(text: str) -> None:
+    typer.echo(f"warning: {text}", err=True)
+
+
+def _shown_state(navigator: RobotNavigator) -> Callable[[], None]:
+    """Return what prints whether goals can be driven, or for what is waited, whenever that changes."""
+    from mbf_ros.rosbridge_robot.navigator import COMPILING
+
+    known: str | None = None
+
+    def look() -> None:
+        nonlocal known
+        problem = navigator.problem()
+        if problem and (not known or problem == COMPILING != known):
+            typer.echo(f"waiting: {problem}")
+        if known != "" and not problem:
+            typer.echo("move_base_flex is ready")
+        known = problem
+
+    return look
