@@ -94,8 +94,7 @@ class OfferedGoals:
     def offers() -> Iterator[str]:
         """Yield the frames that offer all actions."""
         for name, mapping in ACTIONS.items():
-            package, _, short = mapping.type.partition("/action/")
-            yield frame("advertise_action", action=name, type=f"{package}/{short}")
+            yield frame("advertise_action", action=name, type=mapping.type)
 
     def take_goal(self, operation: Operation) -> None:
         """Take a goal; raises OperationError where the operation names no action of ours."""
