@@ -21,7 +21,9 @@ from mbf_ros.bags.inputs import RecordedRobot
 
 Thing = TypeVar("Thing")
 
-SCAN_PERIOD = 0.5  # s between two scans of a source that are kept
+SCAN_PERIOD = 0.5  # s between two scans of a source that are kept, in bags of up to a quarter of an hour
+MOST_SCANS, MOST_POINTS = 2000, 5000  # of a source, and of a scan, that are kept to be shown
+MOST_COSTS = 200_000_000  # of all maps that are kept, four bytes each
 CORNERS = 16  # of the outline of a round robot
 
 
@@ -34,11 +36,16 @@ class Observation:
     robot : RecordedRobot
     map_name : str
         Which of ``server.map_views``; the first one if empty.
-    began : float
-        Our time [s] at which the bag begins: what is kept counts from there.
+    began, duration : float
+        Our time [s] at which the bag begins, from where what is kept counts, and its length [s].
+
+    Raises
+    ------
+    ValueError
+        There is no such map.
     """
 
-    def __init__(self, server: MapServer, robot: RecordedRobot, map_name: str, began: float) -> None:
+    def __init__(self, server: MapServer, robot: RecordedRobot, map_name: str, began: float, duration: float) -> None:
         if map_name and map_name not in server.map_views:
             raise ValueError(f"--map {map_name}: there is no such map, only {', '.join(server.map_views)}")
         self._server, self._robot, self._map_name, self._began = server, robot, map_name, began
@@ -49,6 +56,7 @@ class Observation:
         self._rows: list[list[float]] = []
         self._scans: list[LoggedScan] = []
         self._next_scan: dict[str, float] = {}
+        self._scan_period = max(SCAN_PERIOD, duration / MOST_SCANS)
         self._maps: list[tuple[float, MapView]] = []
 
     def sample(self, now: float) -> None:
@@ -74,8 +82,17 @@ class Observation:
             placed = scan.in_frame(self.frame_id, self._server.runtime.transforms)
         except TransformError:  # another map could place it
             return
-        self._next_scan[scan.source] = scan.stamp + SCAN_PERIOD
-        self._scans.append(LoggedScan(max(scan.stamp - self._began, 0.0), placed.origin, placed.points))
+        self._next_scan[scan.source] = scan.stamp + self._scan_period
+        points = placed.points[:: 1 + len(placed.points) // MOST_POINTS]
+        self._scans.append(LoggedScan(max(scan.stamp - self._began, 0.0), placed.origin, points))
+
+    def check_pictures(self, count: int) -> None:
+        """Raise ValueError where so many pictures of the map would not fit into the memory."""
+        view = self._server.map_view(self._map_name)
+        costs = 0 if view is None else view.costs.size
+        if costs * count > MOST_COSTS:
+            most = MOST_COSTS // costs
+            raise ValueError(f"--every: {count} pictures of a map of {costs} costs are too many, at most {most}")
 
     def look_at_map(self, now: float) -> None:
         """Keep what the map looks like."""
@@ -87,7 +104,7 @@ class Observation:
         self, name: str, paths: Sequence[tuple[float, Path]], goal: Pose | None, outcome: int | None, message: str,
         events: Sequence[Event],
     ) -> DriveLog:  # fmt: skip
-        """Return what was kept, with plans from their times [s] on, and the goal they lead to."""
+        """Return what was kept; ``paths`` with their times [s], ``events`` in the time of the bag."""
         rows = np.array(self._rows, dtype=np.float64).reshape(-1, 11)
         transforms = self._server.runtime.transforms
         first = rows[0, 1:8].tolist() if len(rows) else [0.0] * 6 + [1.0]
@@ -109,7 +126,7 @@ class Observation:
             ],
             scans=self._scans,
             maps=self._maps,
-            events=tuple(event for event in events if event.time >= self._began),
+            events=tuple(events),
             outcome=outcome,
             message=message,
         )

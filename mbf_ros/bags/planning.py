@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from mbf_abstract.commands.coordinates import Place
@@ -99,7 +100,7 @@ class ReplayedPlan:
             "outcome_name": self.result.outcome_name,
             "message": self.result.message,
             "planner": self.result.planner,
-            "cost": round(self.result.cost, 6) if self.path is not None else None,
+            "cost": round(self.result.cost, 6) if math.isfinite(self.result.cost) else None,
             "length_m": round(self.path.length, 6) if self.path is not None else None,
             "start": None if self.start is None else [*self.start.position, *self.start.orientation],
             "goal": [*self.goal.position, *self.goal.orientation],

@@ -126,7 +126,7 @@ def replay_bag(
         _check_transforms(bag, topics, options)
         time = RecordedTime(bag, topics, config.parameters.global_frame)
         inputs = BagInputs(bag, topics, time, server, robot, options.odometry_as_transform)
-        observation = Observation(server, robot, options.map_name, time.began)
+        observation = Observation(server, robot, options.map_name, time.began, time.duration)
         inputs.scan_listeners.append(observation.take_scan)
         with server.using_map(PluginKind.PLANNER):
             player = _Player(session, server, time, observation, options, on_progress)
@@ -155,9 +155,10 @@ class _Player:
             raise ValueError(f"--at {options.at:g}: the bag ends after {time.duration:.3f} s")
         self._plan_at = time.began + options.at
         self._every = options.every or max(time.duration / PICTURES, SAMPLE_PERIOD)
-        if time.duration / self._every > MOST_PICTURES:
-            count = math.ceil(time.duration / self._every)
+        count = math.ceil(time.duration / self._every) + 1
+        if count > MOST_PICTURES:
             raise ValueError(f"--every {self._every:g}: would make {count} pictures, allowed are {MOST_PICTURES}")
+        observation.check_pictures(count)
         self._samples = self._pictures = 0
         self._is_planned = False
 

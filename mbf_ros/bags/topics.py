@@ -67,11 +67,11 @@ def choose_topics(
         known = ", ".join((*ROLES, *named))
         raise BagError(f"--topic {unknown[0]}={chosen[unknown[0]]}: expected one of {known}, got {unknown[0]!r}")
     roles = {role: _topic(role, _of_role(role, types), types, chosen) for role in ROLES}
+    fitting = {source: _of_source(source, own, types) for source in named}
     if not sources:
-        pairs = {source: chosen.get(source, topic) for source, topic in zip(named, own, strict=False)}
-    else:
-        pairs = {source: _topic(source, _of_source(source, own, types), types, chosen) for source in named}
-    if twice := [topic for topic in set(pairs.values()) if topic and list(pairs.values()).count(topic) > 1]:
+        fitting = {source: [topic] for source, topic in zip(named, own, strict=False)}
+    pairs = {source: _topic(source, fitting[source], types, chosen) for source in named}
+    if twice := sorted(topic for topic in set(pairs.values()) if topic and [*pairs.values()].count(topic) > 1):
         several = [source for source, topic in pairs.items() if topic == twice[0]]
         raise BagError(f"{twice[0]} would be {' and '.join(several)}: name the topic of each by --topic SOURCE=TOPIC")
     sensors = {topic: (SENSOR_TYPES[types[topic]], source) for source, topic in pairs.items() if topic}

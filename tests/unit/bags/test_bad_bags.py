@@ -3,8 +3,9 @@
 import pytest
 
 from mbf_abstract.commands.coordinates import Place
+from mbf_ros.bags import observation
 from mbf_ros.bags.reading import BagError, open_bag
-from tests.unit.bags.conftest import drive, make_bag, message, odometry, scan, static, tf
+from tests.unit.bags.conftest import MESH, drive, make_bag, message, odometry, scan, static, tf
 
 
 def refusal(path):
@@ -65,6 +66,18 @@ def test_a_chosen_topic_that_does_not_fit_is_refused(replayed, topics, text):
         replayed(drive(0.1), topics=topics)
 
 
+def test_of_a_layer_that_takes_any_source_a_chosen_topic_must_be_there(replayed):
+    text = MESH.replace("obstacles: {sources: [lidar]}", "obstacles: {}")
+    with pytest.raises(BagError, match="--topic base_scan=/rear: the topic is not in the bag"):
+        replayed(drive(0.1), text, topics={"base_scan": "/rear"})
+
+
+def test_pictures_that_do_not_fit_into_the_memory_are_refused(replayed, monkeypatch):
+    monkeypatch.setattr(observation, "MOST_COSTS", 10_000)
+    with pytest.raises(ValueError, match="11 pictures of a map of 2400 costs are too many, at most 4"):
+        replayed(drive(1.0))
+
+
 def test_a_scan_that_means_nothing_is_dropped_and_counted(replayed):
     bad = scan(0.5, 0.25)
     bad.message["angle_min"] = float("nan")
@@ -93,7 +106,7 @@ def test_types_that_nobody_knows_matter_only_where_they_are_used(tmp_path, repla
     ("options", "text"),
     [
         ({"goal": Place(1.0, 0.0), "at": 9.0}, "--at 9: the bag ends after 0.100 s"),
-        ({"every": 0.0001}, "would make 1001 pictures, allowed are 200"),
+        ({"every": 0.0001}, "would make 1002 pictures, allowed are 200"),
         ({"map_name": "attic"}, "--map attic: there is no such map, only global_costmap, local_costmap"),
         ({"odometry_as_transform": True, "topics": {"odom": ""}}, "--odom-tf needs odometry"),
     ],

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from mbf_abstract.cli import make_app
 from mbf_abstract.commands.coordinates import Place
+from mbf_abstract.events import EventKind
 from mbf_abstract.geometry.transform import Transform
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.sensors import point_cloud
@@ -69,6 +70,12 @@ def test_a_plan_is_made_from_where_the_robot_was_at_the_asked_time(replayed):
     assert len(early.log.times) == 20  # the replay went on; at 0 s there was no pose yet
 
 
+def test_events_are_in_the_time_of_the_bag(replayed):
+    events = replayed(drive(0.5), goal=GOAL, at=0.13).log.events
+    accepted = [event.time for event in events if event.kind is EventKind.GOAL_ACCEPTED]
+    assert accepted == [pytest.approx(0.13)]
+
+
 def test_a_plan_that_fails_is_a_result(replayed):
     result = replayed(drive(), goal=Place(4.0, 0.0))
     assert result.plan["outcome_name"] == "NO_PATH_FOUND" and result.plan["poses"] == []
@@ -115,13 +122,13 @@ def test_stamps_of_a_simulator_are_moved_onto_the_clock_of_the_recording(replaye
 def test_the_command_writes_the_same_bytes_twice(tmp_path, configuration):
     bag, file = make_bag(tmp_path, drive(1.0)), configuration()
     for name in ("first", "second"):
-        arguments = ["bag", "replay", bag, file, "--goal", 2, 0, "--at", 0.5, "--every", 0.6, "--out", tmp_path / name]
+        arguments = ["bag", "replay", bag, file, "--goal", 2, 0, "--at", 0.5, "--every", 0.9, "--out", tmp_path / name]
         result = CliRunner().invoke(make_app(), [str(one) for one in arguments])
         assert result.exit_code == 0, result.output
         assert "plan at 0.5 s: SUCCESS" in result.output
     written = sorted(file.name for file in (tmp_path / "first").iterdir())
     assert written == [
-        *("map_00000.6s.png", "map_00001.0s.png", "plan.json", "report.html", "run.mcap"),
+        *("map_00000.9s.png", "map_00001.0s.png", "plan.json", "report.html", "run.mcap"),
         "statistics.json",
     ]
     for name in written:
