@@ -44,6 +44,8 @@ class RecoveryAction(PluginAction[RecoveryGoal, RecoveryResultMessage, NoFeedbac
 
     def _problem(self, goal: RecoveryGoal) -> tuple[int, str] | None:
         """Refuse parameters that the behaviour does not have, or values that are not legal."""
+        if not goal.parameters:
+            return None
         plugin = self._plugins.get(self.kind, goal.behavior)
         try:
             with_changes(plugin.instance.parameters, goal.parameters)

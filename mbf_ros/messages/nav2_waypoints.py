@@ -5,7 +5,7 @@ So the robot stops at each pose of NavigateThroughPoses, which Nav2 drives throu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from mbf_abstract.geometry import Pose
@@ -35,31 +35,69 @@ def _waypoints_goal_of(message: Message, context: MessageContext) -> FollowWaypo
     return FollowWaypointsGoal(poses[first:], loops=more + 1, stop_on_failure=False)
 
 
-def _waypoint_status(state: codes.WaypointState, visit: int, pose: Pose | None, context: MessageContext) -> Message:
+def _waypoint_status(state: codes.WaypointState, index: int, pose: Pose | None, context: MessageContext) -> Message:
     return {
         "waypoint_status": int(state),
-        "waypoint_index": visit,
+        "waypoint_index": index,
         "waypoint_pose": pose_stamped(pose, context),
         "error_code": 0,
         "error_msg": "",
     }
 
 
+def _missed_waypoints(
+    result: FollowWaypointsResult, waypoint: Callable[[int], tuple[int, Pose | None]], context: MessageContext
+) -> list[Message]:
+    """The visits that failed; ``waypoint`` gives index and pose in the client's list by the number of a visit."""
+    missed = []
+    for visit in result.failed:
+        status = _waypoint_status(codes.WaypointState.FAILED, *waypoint(visit), context)
+        code, text = codes.navigating_code(result.results[visit].outcome), error_msg(result.results[visit])
+        missed.append({**status, "error_code": code, "error_msg": text})
+    return missed
+
+
 def _waypoints_result(result: FollowWaypointsResult, context: MessageContext) -> Message:
-    missed = [
-        {
-            **_waypoint_status(codes.WaypointState.FAILED, visit, None, context),
-            "error_code": codes.navigating_code(result.results[visit].outcome),
-            "error_msg": error_msg(result.results[visit]),
-        }
-        for visit in result.failed
-    ]
+    missed = _missed_waypoints(result, lambda visit: (visit, None), context)
     code = codes.waypoints_code(result.outcome)
     return {"missed_waypoints": missed, "error_code": code, "error_msg": error_msg(result)}
 
 
 def _waypoints_feedback(feedback: FollowWaypointsFeedback, context: MessageContext) -> Message:
     return {"current_waypoint": feedback.waypoint}
+
+
+def waypoints_of_client(
+    goal: FollowWaypointsGoal,
+    first: int,
+    feedback: FollowWaypointsFeedback | None,
+    result: FollowWaypointsResult | None,
+    context: MessageContext,
+) -> Message:
+    """Return the fields of feedback and result that have a place in the client's list.
+
+    Parameters
+    ----------
+    goal : FollowWaypointsGoal
+        Ours.
+    first : int
+        The ``goal_index`` of the client's, where ours begins.
+    feedback, result
+        The present ones, if there are any.
+    context : MessageContext
+    """
+    count = len(goal.waypoints)
+
+    def in_list(visit: int) -> tuple[int, Pose]:
+        return first + visit % count, goal.waypoints[visit % count]
+
+    fields: Message = {} if feedback is None else {"current_waypoint": first + feedback.waypoint}
+    if result is not None:
+        fields["missed_waypoints"] = [
+            {**one, "index": one["waypoint_index"], "goal": one["waypoint_pose"]}  # the latter two as in Jazzy
+            for one in _missed_waypoints(result, in_list, context)
+        ]
+    return fields
 
 
 # ----------------------------------------------------------------------------------------------- through poses

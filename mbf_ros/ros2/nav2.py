@@ -50,7 +50,11 @@ def serve_actions(node: Any, server: AbstractNavigationServer, serving: Serving)
     """Offer Nav2's actions on a node."""
     recoveries = RecoveryCount(server)
     behaviors = behavior_mappings(server.plugins)
-    own = {"navigate_through_poses": ThroughPosesAction, **dict.fromkeys(behaviors, BehaviorAction)}
+    own: dict[str, type[Nav2Action]] = {
+        "navigate_through_poses": ThroughPosesAction,
+        "follow_waypoints": WaypointsAction,
+        **dict.fromkeys(behaviors, BehaviorAction),
+    }
     actions = {**ACTIONS, **{name: (mapping, RecoveryOutcome) for name, mapping in behaviors.items()}}
     return [
         own.get(name, Nav2Action)(server, recoveries, node, name, *action, serving) for name, action in actions.items()
@@ -106,8 +110,21 @@ class ThroughPosesAction(Nav2Action):
         return more
 
     def _publish_feedback(self, goal_handle: Any, feedback: Any, more: More) -> None:
-        if feedback.driving is not None:  # between two legs there is no way to measure
+        if feedback.driving is not None:  # between two legs nothing is driven
             super()._publish_feedback(goal_handle, feedback, more)
+
+
+class WaypointsAction(Nav2Action):
+    """FollowWaypoints, whose waypoints are numbered as in the list of the client."""
+
+    def _observe(self, goal_handle: Any, handle: AnyGoalHandle) -> More:
+        taken, first = super()._observe(goal_handle, handle), getattr(goal_handle.request, "goal_index", 0)
+
+        def more() -> Message:
+            seen = handle.goal, first, handle.feedback, handle.result
+            return {**taken(), **nav2_waypoints.waypoints_of_client(*seen, self._context())}
+
+        return more
 
 
 class BehaviorAction(Nav2Action):

@@ -25,11 +25,16 @@ class NodeOptions:
     nav2 : bool, optional
         Offer Nav2's names; None = where nav2_msgs is installed.
     stands_for_amcl : bool
-        Answer for the node ``amcl``, too, for which Nav2's clients wait; see ``nav2_services``.
+        Answer for the node ``amcl``, too, for which Nav2's clients wait; see ``nav2_services``. Offers Nav2's names.
     time_to_end : float
         Longest time [s] for goals to end and their results to be sent when the node ends.
     time_to_send : float
         Longest time [s] for the last command to reach all who listen.
+
+    Raises
+    ------
+    ValueError
+        The node is to answer for ``amcl`` without Nav2's names.
     """
 
     stamped_commands: bool = False
@@ -41,3 +46,8 @@ class NodeOptions:
     stands_for_amcl: bool = False
     time_to_end: float = 2.0
     time_to_send: float = 0.5
+
+    def __post_init__(self) -> None:
+        if self.stands_for_amcl and self.nav2 is False:
+            raise ValueError("--amcl answers clients of Nav2, and --no-nav2 leaves out what they ask for")
+        object.__setattr__(self, "nav2", self.stands_for_amcl or self.nav2)

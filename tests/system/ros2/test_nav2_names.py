@@ -131,6 +131,7 @@ def test_a_missed_waypoint_is_named_and_the_others_are_visited(crew):
     assert (end["status"], end["error_code"]) == ("aborted", codes.WaypointsCode.UNKNOWN)
     (missed,) = end["missed_waypoints"]
     assert (missed["waypoint_index"], missed["waypoint_status"]) == (1, codes.WaypointState.FAILED)
+    assert missed["waypoint_pose"]["pose"]["position"]["x"] == 50.0
     assert missed["error_code"] == codes.PlanningCode.GOAL_OUTSIDE_MAP
 
 

@@ -140,6 +140,25 @@ def test_missed_waypoints_are_listed_with_their_error():
     assert status["waypoint_status"] == codes.WaypointState.FAILED
 
 
+def test_waypoints_are_numbered_as_in_the_list_of_the_client():
+    goal = waypoints.FOLLOW_WAYPOINTS.goal({"poses": [at(1), at(2), at(3)], "goal_index": 1}, CONTEXT)
+    reached, missed = MoveBaseResult(0, ""), MoveBaseResult(GetPathOutcome.NO_PATH_FOUND, "blocked")
+    result = FollowWaypointsResult(missed.outcome, "one missed", (reached, missed))
+    seen = waypoints.waypoints_of_client(goal, 1, FollowWaypointsFeedback(1, 1, (), None), result, CONTEXT)
+    (status,) = seen["missed_waypoints"]
+    assert (seen["current_waypoint"], status["waypoint_index"], status["index"]) == (2, 2, 2)
+    assert status["waypoint_pose"]["pose"]["position"]["x"] == status["goal"]["pose"]["position"]["x"] == 3.0
+    assert waypoints.waypoints_of_client(goal, 1, None, None, CONTEXT) == {}
+
+
+def test_a_waypoint_that_is_missed_in_every_loop_is_the_same_one():
+    goal = waypoints.FOLLOW_WAYPOINTS.goal({"poses": [at(1), at(2)], "number_of_loops": 1}, CONTEXT)
+    reached, missed = MoveBaseResult(0, ""), MoveBaseResult(GetPathOutcome.NO_PATH_FOUND, "blocked")
+    result = FollowWaypointsResult(missed.outcome, "two missed", (reached, missed, reached, missed))
+    seen = waypoints.waypoints_of_client(goal, 0, None, result, CONTEXT)["missed_waypoints"]
+    assert [one["waypoint_index"] for one in seen] == [1, 1]
+
+
 def test_feedback_has_the_fields_of_its_type():
     driving = ExePathFeedback(0, "", Pose.planar(1, 2), 3.0, 0.1, 4.0, float("inf"), Twist.planar(0.5))
     for mapping, feedback in (
