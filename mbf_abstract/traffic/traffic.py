@@ -125,23 +125,25 @@ class Traffic:
     # ----------------------------------------------------------------------------------------------- a meeting
     def meet(self, now: float, distance: float, length: float) -> tuple[Announcement, ...]:
         """Return the ``rivals``; from the first of them on the robot keeps its rank until they have parted."""
-        rivals = self.rivals(now, distance, length)
-        if rivals and self._meeting is None and self.own is not None:
-            self._meeting = Meeting(distance, length, now, self.own.remaining)
+        rivals, own = self.rivals(now, distance, length), self.own
+        if rivals and self._meeting is None and own is not None:
+            self._meeting = Meeting(distance, length, now, own.remaining)
         return rivals
 
     def set_cannot_yield(self, cannot_yield: bool) -> None:
         """Announce for the present meeting whether there is a place to let the others pass."""
-        if self._meeting is not None and self.own is not None:
-            self._meeting.cannot_yield = cannot_yield
-            self._publish(self.own)
+        meeting, own = self._meeting, self.own  # the announcing thread may end the meeting
+        if meeting is not None and own is not None:
+            meeting.cannot_yield = cannot_yield
+            self._publish(own)
 
     def wait_was_in_vain(self, rivals: Sequence[Announcement]) -> None:
         """Let the rivals go first from now on, because waiting for them does not help."""
-        if self._meeting is not None and self.own is not None:
-            self._meeting.cannot_yield = False
-            self._meeting.waits = 1 + max((rival.waits for rival in rivals), default=0)
-            self._publish(self.own)
+        meeting, own = self._meeting, self.own
+        if meeting is not None and own is not None:
+            meeting.cannot_yield = False
+            meeting.waits = 1 + max((rival.waits for rival in rivals), default=0)
+            self._publish(own)
 
     def others(self, now: float) -> tuple[Announcement, ...]:
         """Return what the other robots have announced lately, in the order of their names; ``now`` [s] is own time.
