@@ -182,8 +182,8 @@ def ratios(side: int, count: int, folder: Path) -> dict[str, Any]:
     write_heights(file, side)
     heights = np.load(file)
     index = build_tiles(HeightSource(heights, SPACING, SPACING), folder / "subset", SUBSET_SETTINGS, workers=2)
-    slot = TilePool(index.tiles, 0.0).slot_bytes
-    tiled = TiledMap(folder / "subset", memory=slot * (KEPT_TILES + SUBSET_SHARE * len(index.tiles)))
+    slot, tables = TilePool(index.tiles, 0.0).slot_bytes, TiledMap(folder / "subset").table_bytes
+    tiled = TiledMap(folder / "subset", memory=tables + slot * (KEPT_TILES + SUBSET_SHARE * len(index.tiles) + 0.5))
     vertices, faces = heightfield_mesh(heights, SPACING, SPACING, keep_grid=True)
     whole = build_mesh_map(PARAMETERS, BLOCKS, vertices=vertices, faces=faces)
     snapshot = whole.snapshot()

@@ -265,7 +265,7 @@ class _Search:
         tiled.hold(list(tiles))
         graph = tiled.pool.corridor({key: corridor.is_open[tiled.portals.portals_of(key)] for key in tiles})
         closed = float(self._bounds[~corridor.is_open].min(initial=np.inf))
-        found = self._cheapest(graph)
+        found = self._cheapest(graph, tiles)
         if found is None:
             return replace(_failure(GetPathOutcome.NO_PATH_FOUND, "", tiles), least_cost=closed)
         chain, cost = found
@@ -278,12 +278,13 @@ class _Search:
         least = min(cost, closed)
         return TiledPlan(GetPathOutcome.SUCCESS, "", positions[kept], normals[kept], cost, least, tiles, gain)
 
-    def _cheapest(self, graph: SearchGraph) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int32]], float] | None:
+    def _cheapest(
+        self, graph: SearchGraph, tiles: tuple[TileKey, ...]
+    ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int32]], float] | None:
         """Vertices of the pool from start to goal, and the cost [m]; None without a path or if cancelled."""
         pool, (seeds, targets) = self._tiled.pool, (self._in_pool(place) for place in self._ends)
-        distances = np.full(len(graph.blocked), np.inf, dtype=np.float32)
-        predecessors = np.full(len(distances), -1, dtype=np.int32)
-        distances[seeds] = self._start.corner_costs
+        distances, predecessors = pool.search_arrays(tiles)
+        distances[seeds], predecessors[seeds] = self._start.corner_costs, -1
         vertices = pool.vertices[: len(distances)]
         vertices.flags.writeable = False
         step = self._tiled.tile(self._start.key)[1].mean_edge

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from mbf_mesh_nav.arrays import BoolArray, FloatArray
+from mbf_mesh_nav.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mbf_mesh_nav.kernels.search.dijkstra import SearchGraph
 from mbf_mesh_nav.tiles.index import TileEntry
 from mbf_mesh_nav.tiles.tile import Tile, TileKey
@@ -61,6 +61,8 @@ class TilePool:
         self._neighbours = np.empty(edges, dtype=np.int32)
         self._weights = np.empty(edges, dtype=np.float32)
         self._blocked = np.empty(vertices, dtype=np.bool_)
+        self._distances = np.empty(vertices, dtype=np.float32)
+        self._predecessors = np.empty(vertices, dtype=np.int32)
         self._slot_of: OrderedDict[TileKey, int] = OrderedDict()  # least recently used first
         self._links: dict[TileKey, NDArray[np.int64]] = {}
         self._used = 0
@@ -73,6 +75,17 @@ class TilePool:
     def first_vertex(self, key: TileKey) -> int:
         """Number in the pool of the first vertex of a loaded tile."""
         return int(self._slot_of[key] * self._vertices_of_slot)
+
+    def search_arrays(self, keys: Iterable[TileKey]) -> tuple[Float32Array, IntArray]:
+        """Distances and predecessors of the pool's vertices for a search over loaded tiles, valid until the next call.
+
+        Distances of these tiles are inf. All else is what searches have left; seeds are for the caller to set.
+        """
+        for key in keys:
+            first = self.first_vertex(key)
+            self._distances[first : first + self._vertices_of_slot] = np.inf
+        vertices = self._used * self._vertices_of_slot
+        return self._distances[:vertices], self._predecessors[:vertices]
 
     def drop(self, key: TileKey) -> None:
         """Load a tile anew when it is needed next, because it changed."""

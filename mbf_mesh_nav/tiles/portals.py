@@ -128,6 +128,7 @@ class PortalGraph:
             key: np.array([number[portal] for portal in _names(one)], dtype=np.int32) for key, one in tiles.items()
         }
         self._graph: SearchGraph | None = None
+        self._step = 1.0  # m, of the work lists of its searches
 
     def portals_of(self, key: TileKey) -> IntArray:
         """Numbers (p,) of a tile's portals, in the order of the tile's file."""
@@ -152,9 +153,7 @@ class PortalGraph:
             np.minimum.at(distances, self._numbers[key], costs)
         seeds = np.flatnonzero(np.isfinite(distances)).astype(np.int32)
         predecessors = np.full(len(distances), -1, dtype=np.int32)
-        finite = graph.weights[np.isfinite(graph.weights)]
-        step = float(finite.mean()) if len(finite) else 1.0
-        propagate_distances(graph, distances, predecessors, seeds, step, NO_TARGETS, NO_OFFSETS, NOT_CANCELLED)
+        propagate_distances(graph, distances, predecessors, seeds, self._step, NO_TARGETS, NO_OFFSETS, NOT_CANCELLED)
         return distances
 
     def as_networkx(self) -> networkx.MultiGraph[int]:
@@ -187,6 +186,7 @@ class PortalGraph:
             offsets = np.zeros(len(self.portals) + 1, dtype=np.int32)
             np.cumsum(np.bincount(start, minlength=len(self.portals)), out=offsets[1:])
             weight = np.concatenate([NO_OFFSETS, *weights])[order].astype(np.float32)
+            self._step = float(weight.mean()) if len(weight) else 1.0
             self._graph = SearchGraph(offsets, end[order], weight, np.zeros(len(self.portals), dtype=np.bool_))
         return self._graph
 

@@ -212,16 +212,21 @@ def test_each_profile_has_plans_of_its_own(hills, whole_hills, tmp_path):
         assert_near_exact(plan_on_tiles(fast, start, goal), whole_fast.cost(start, goal))
 
 
-def build_storeys(folder, portal_length):
-    """Tiles of 10 m of two storeys of 40 by 4 m, 3 m above each other."""
+def storeys():
+    """Vertices and faces of two storeys of 40 by 4 m, 3 m above each other."""
     xs = np.arange(41.0)
     grid = np.array([[x, y, z] for z in (0.0, 3.0) for y in np.arange(5.0) for x in xs])
     corner = np.array([floor * 205 + row * 41 + column for floor in (0, 1) for row in range(4) for column in range(40)])
     faces = np.stack([np.column_stack([corner, corner + 1, corner + 41])] * 2, axis=1)
     faces[:, 1] = np.column_stack([corner + 1, corner + 42, corner + 41])
+    return grid, faces.reshape(-1, 3).astype(np.int32)
+
+
+def build_storeys(folder, portal_length):
+    """Tiles of 10 m of two storeys."""
     parameters = MeshMapParameters(layers=(MeshLayerEntry(name="slope", type="steepness"),))
     wanted = TileSettings(mesh_map=parameters, tile_size=10.0, portal_length=portal_length)
-    build_tiles(MeshSource(grid, faces.reshape(-1, 3).astype(np.int32)), folder, wanted)
+    build_tiles(MeshSource(*storeys()), folder, wanted)
     return TiledMap(folder)
 
 
