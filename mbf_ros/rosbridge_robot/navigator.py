@@ -85,7 +85,7 @@ class RobotNavigator:
     session: NavigationSession
 
     def __init__(self, address: str, options: RobotOptions, report: Report) -> None:
-        self._address, self._options, self._report = address, options, report
+        self._options, self._report = options, report
         self._real_time = WallClock()
         self._reports = Reports(self._real_time.now, report)
         self._links = RobotLinks(
@@ -217,6 +217,8 @@ class RobotNavigator:
     # ------------------------------------------------------------------------------------------- watching
     def _watch(self) -> None:
         self._time.follow_calendar()
+        if self._links.commands.problem:
+            return  # zero cannot be sent; the gate tries again every command_timeout
         if problem := self._robot.problem():
             self.session.navigator.server.runtime.gate.ask_stop(problem)
 

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from mbf_abstract.geometry import Pose
+from mbf_ros.rosbridge_robot.options import TimeSource
 
 WITHIN = 20.0
 FAR = (30.0, 5.0)
@@ -89,8 +90,8 @@ def test_goals_are_canceled_taken_over_and_refused_as_by_a_navigator_of_our_own(
     assert unsupported["error_code"] and "behavior_tree 'mine.xml' is not supported" in unsupported["error_msg"]
 
 
-def test_a_pose_on_a_goal_topic_is_driven_to(driven):
-    made, sender = driven()
+def test_a_pose_on_a_goal_topic_is_driven_to_on_the_time_of_the_odometry(driven):
+    made, sender = driven(time=TimeSource.ODOM)
     sender.say(op="advertise", topic="/goal_pose", type="geometry_msgs/PoseStamped")
     sender.say(op="publish", topic="/goal_pose", msg=pose(2.0, 5.0))
     made.wait_until(lambda: made.robot.pose.x > 1.7 and not made.moves)
