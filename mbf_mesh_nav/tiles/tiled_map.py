@@ -168,4 +168,7 @@ def sound_tile(folder: Path, index: TileIndex, key: TileKey) -> Tile:
     core = tile.vertices[: tile.core_vertices]
     if (*core.min(axis=0).tolist(), *core.max(axis=0).tolist()) != entry.box:
         raise MeshError(str(path), ["does not lie where the index states"])
+    if len(tile.portal_costs) != len(index.profiles):
+        reason = f"has costs of {len(tile.portal_costs)} profiles, the index has {len(index.profiles)}"
+        raise MeshError(str(path), [reason])
     return tile

@@ -117,18 +117,11 @@ class TiledNavigationMap(NavigationMap):
 
         Looked for at most ``SEARCHED`` distances between vertices away, however large the tolerance is.
         """
-        spacing = self.tiled.index.spacing
-        farthest, reach = min(dist_tolerance, SEARCHED * spacing), LEAST_MARGIN * spacing
-        while True:
-            within = min(reach, farthest)
-            there = self.around(pose.x, pose.y, within + self.inscribed_radius + query.safety_dist)
-            if there is not None:
-                answer = there.places().find_valid_pose(pose, within, query)
-            else:
-                answer = PoseAnswer(OUTSIDE.state, OUTSIDE.cost, None)
-            if answer.pose is not None or within >= farthest:
-                return answer
-            reach *= 2.0
+        within = min(dist_tolerance, SEARCHED * self.tiled.index.spacing)
+        there = self.around(pose.x, pose.y, within + SURFACE_DISTANCE + self.inscribed_radius + query.safety_dist)
+        if there is None:
+            return PoseAnswer(OUTSIDE.state, OUTSIDE.cost, None)
+        return there.places().find_valid_pose(pose, within, query)
 
     # -------------------------------------------------------------------------------------------------- motion
     def obstacle_ahead(self, pose: Pose, command: Twist, duration: float) -> str:

@@ -94,7 +94,7 @@ def test_via_points_are_passed_in_their_order(tiled, whole_hills):
         assert all(ours.path[i].distance_to(s) < 0.01 for i, s in zip(passed, stops, strict=True))
 
 
-@pytest.mark.parametrize("tolerance", [0.3, 2.0, 50.0])
+@pytest.mark.parametrize("tolerance", [0.3, 50.0])
 def test_with_a_tolerance_a_path_ends_at_the_same_vertex_near_a_goal_that_cannot_be_reached(
     tiled, whole_hills, tolerance
 ):
