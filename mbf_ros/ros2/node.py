@@ -33,6 +33,7 @@ from mbf_ros.ros2.nav2_services import Nav2Services
 from mbf_ros.ros2.options import NodeOptions
 from mbf_ros.ros2.parameters import NodeParameters
 from mbf_ros.ros2.robot import Arrivals, Frames, RosRobot
+from mbf_ros.ros2.running import RosError, Spinner, ros_2
 from mbf_ros.ros2.services import ServedQueries
 from mbf_ros.ros2.topics import ODOM, CommandTopic, Inputs, Outputs
 
@@ -42,10 +43,6 @@ COMPILING = "compiling kernels"
 WATCH_PERIOD = 0.05  # s of real time between two looks at what fails to come
 CALENDAR_PERIOD = 0.1  # s between two looks at the calendar
 CLIENT_PERIOD = 0.5  # s of real time between two looks at who is gone
-
-
-class RosError(ValueError):
-    """ROS 2 is not installed, or cannot be used; the text says why."""
 
 
 @contextmanager
@@ -59,21 +56,10 @@ def navigation_node(file: Path, options: NodeOptions | None = None) -> Iterator[
     RosError, MissingInterfaceError
         ROS 2, or a package of messages, is missing.
     """
-    try:
-        import rclpy
-        from rclpy.signals import SignalHandlerOptions
-    except ImportError as error:
-        raise RosError(
-            f"rclpy cannot be imported ({error}): source the setup file of your ROS 2, or install the extra 'ros2' "
-            "in an environment of its own, see docs/ros2.md"
-        ) from error
-
     options = options or NodeOptions()
-    server_class, config = read_config(file)
-    arguments = ["--ros-args", *options.ros_arguments] if options.ros_arguments else []
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     with ExitStack() as closing:
-        closing.callback(rclpy.try_shutdown)
+        closing.enter_context(ros_2(options.ros_arguments))
+        server_class, config = read_config(file)
         node = NavigationNode(options)
         closing.callback(node.close)
         node.serve(server_class, config)
@@ -91,7 +77,6 @@ class NavigationNode:
 
     def __init__(self, options: NodeOptions) -> None:
         import rclpy
-        from rclpy.executors import SingleThreadedExecutor
 
         self._options = options
         self.failure = ""
@@ -101,11 +86,8 @@ class NavigationNode:
         self._arrivals = Arrivals(self._real_time.now)
         self._node: Any = rclpy.create_node(NODE)
         self._closing.callback(self._node.destroy_node)
-        self._executor: Any = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._spinning = True
-        self._thread = self._real_time.spawn(self._spin, "ros executor")
-        self._closing.callback(self._end_executor)
+        self._spinner = Spinner(self._node, self._real_time, self._fail)
+        self._closing.callback(self._spinner.close, options.time_to_end)
 
     def wait(self, seconds: float) -> bool:
         """Wait until the node fails, at most so long; returns whether it has."""
@@ -249,14 +231,6 @@ class NavigationNode:
             action.abort_all(text)
         self._session.navigator.server.cancel_all(text)
 
-    def _spin(self) -> None:
-        """Take what comes, on a thread of its own, until the node ends."""
-        try:
-            while self._spinning:
-                self._executor.spin_once(timeout_sec=1.0)
-        except BaseException as error:  # nothing comes in any more
-            self._fail(error)
-
     def _fail(self, error: BaseException) -> None:
         """Stop the robot for good because of a fault of ours; the node ends."""
         self.failure = f"{type(error).__name__}: {error_text(error)}"
@@ -273,11 +247,5 @@ class NavigationNode:
         self._session.navigator.server.cancel_all("the node ends")
         deadline = self._real_time.now() + self._options.time_to_end
         while any(action.unfinished for action in self._actions) and self._real_time.now() < deadline:
-            if self._thread.join(WATCH_PERIOD):
+            if self._spinner.join(WATCH_PERIOD):
                 break
-
-    def _end_executor(self) -> None:
-        self._spinning = False
-        self._executor.wake()
-        self._thread.join(self._options.time_to_end)
-        self._executor.shutdown(timeout_sec=self._options.time_to_end)

@@ -65,6 +65,16 @@ def run(
     view_speed: float = typer.Option(
         1.0, "--view-speed", min=0.0, help="With --view: at most so many times real time; 0 = no limit."
     ),
+    ros2: bool = typer.Option(
+        False, "--ros2", help="The robot is a node of ROS 2, and whoever publishes cmd_vel drives it; see docs/ros2.md."
+    ),
+    ros2_stamped: bool = typer.Option(False, "--ros2-stamped", help="With --ros2: cmd_vel is a TwistStamped."),
+    ros2_lockstep: bool = typer.Option(
+        False, "--ros2-lockstep", help="With --ros2: wait for the command of each control period while it moves."
+    ),
+    ros2_patience: float = typer.Option(
+        60.0, "--ros2-patience", min=1.0, help="With --ros2: end after so long without a command to move, in s."
+    ),
     stay: bool = typer.Option(True, "--stay/--no-stay", help="With --view: wait for goals from the page at the end."),
     show: bool = typer.Option(False, "--open", help="Open the replay in the browser at the end."),
     quiet: bool = typer.Option(False, "--quiet", help="Print the result without progress."),
@@ -114,6 +124,10 @@ def run(
                     return LiveSession(session, goals, page, lambda at: live.note(f"{title} at {at}"), live.note)
 
                 options = replace(options, watch=watch, stay=stay)
+            if ros2:
+                from terrain.commands.robot_on_ros import driven_over_ros
+
+                options = driven_over_ros(options, ros2_stamped, ros2_lockstep, ros2_patience)
             try:
                 result = run_scenario(on_other_map(load_scenario(scenario)), options)
             except (ConfigError, ServerError) as error:

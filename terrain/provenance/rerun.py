@@ -9,6 +9,7 @@ from mbf_abstract.config.findings import ConfigError, Finding
 from terrain.provenance.differences import RunDifferences, compare_runs, read_metrics
 from terrain.provenance.provenance import FILE, SCENARIO, Provenance, changed_files, read_provenance
 from terrain.scenarios.scenario import load_scenario
+from terrain.session.executives import EXECUTIVES
 from terrain.session.runner import RunOptions, RunResult, run_scenario
 
 
@@ -53,6 +54,9 @@ def rerun(folder: Path, options: RunOptions) -> Repetition:
     if provenance.clock == "real":
         expected = "simulated: real time (--wall-clock) gives another drive each time"
         raise ConfigError([Finding(str(folder / FILE), 1, "clock", expected, provenance.clock)])
+    if provenance.executive not in EXECUTIVES:
+        expected = f"one of {', '.join(EXECUTIVES)}: what somebody outside has driven cannot be repeated"
+        raise ConfigError([Finding(str(folder / FILE), 1, "executive", expected, repr(provenance.executive))])
     if options.folder.resolve() == folder.resolve():
         raise ConfigError([Finding(str(folder), 1, "", "another folder for the repetition", "the same one")])
     scenario = load_scenario(folder / SCENARIO)

@@ -79,7 +79,8 @@ class RobotRun:
         session.loop.on_sample.append(self._report_progress)
         for note in session.navigator.server.notes:
             options.on_note(f"note: {note}")
-        self.sequence = GoalSequence(session, make_executive(options.executive, session.navigator), options.stay)
+        make = options.outside or (lambda one: make_executive(options.executive, one.navigator))
+        self.sequence = GoalSequence(session, make(session), options.stay)
 
     def begin(self) -> None:
         """Let the wall time count; called before time passes."""

@@ -10,6 +10,7 @@ from typing import Any
 
 from terrain.recording.recording import Recording
 from terrain.recording.verdict import Verdict
+from terrain.session.executives import GoalExecutive
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session, SessionOptions
 
@@ -54,7 +55,10 @@ class RunOptions(SessionOptions):
     command : str
         The command line that asked for the run, as it is recorded; empty for a run of a script.
     executive : str
-        Who decides on plans, drives and recoveries, a name of ``terrain.session.executives.EXECUTIVES``.
+        Who decides on plans, drives and recoveries, a name of ``terrain.session.executives.EXECUTIVES``, or as it is
+        recorded of a run with ``outside``.
+    outside : callable, optional
+        Makes what visits the goals of a session instead of an executive of that name, where somebody outside drives.
     geodesic : bool
         Measure the shortest path over the ground too, which takes up to some seconds.
     stay : bool
@@ -74,6 +78,7 @@ class RunOptions(SessionOptions):
     folder: Path
     command: str = ""
     executive: str = "move_base"
+    outside: Callable[[Session], GoalExecutive] | None = None
     geodesic: bool = False
     stay: bool = False
     watch: Watch = lambda session, goals: nullcontext()

@@ -47,7 +47,7 @@ def test_every_option_of_the_shell_blocks_exists():
         for word in call.split():
             command = getattr(command, "commands", {}).get(word, command)
         known = {option for parameter in command.params for option in parameter.opts + parameter.secondary_opts}
-        assert set(re.findall(r"--[a-z-]+", call)) <= known | {"--help"}, f"mbf {call}"
+        assert set(re.findall(r"--[a-z0-9-]+", call)) <= known | {"--help"}, f"mbf {call}"
 
 
 def test_every_file_of_python_that_is_named_exists():

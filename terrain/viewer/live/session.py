@@ -17,7 +17,8 @@ from types import FrameType
 from mbf_abstract.access.page_access import LOOPBACK, PageAccess, Role, is_loopback
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry.tilt import tilt_of
-from mbf_abstract.time.clock import Clock, WallClock
+from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.pace import Pace
 from terrain.session.goal_sequence import GoalSequence
 from terrain.session.session import Session
 from terrain.viewer.live.controls import LiveControls
@@ -27,7 +28,6 @@ from terrain.viewer.live.plots import PERIOD, UNWATCHED_PERIOD, History
 from terrain.viewer.server.page_server import page_server
 
 FRAME_PERIOD = 0.1  # s of wall time between two drawings
-MAX_LAG = 0.5  # s behind the wall clock that are caught up at most
 
 
 @dataclass(frozen=True)
@@ -69,27 +69,6 @@ class ViewOptions:
         """Return the access control of the page, with new tokens each time."""
         make = PageAccess.by_token if self.token else PageAccess.open
         return make(self.host, self.read_only)
-
-
-class Pace:
-    """Waits on a wall clock, with the whole simulation waiting too, until simulated time may go on.
-
-    Parameters
-    ----------
-    wall : Clock
-        Real time; a simulated clock in tests.
-    """
-
-    def __init__(self, wall: Clock) -> None:
-        self._wall = wall
-        self._stamp = 0.0  # wall time [s] of the last step
-        self._time = 0.0  # simulated time [s] of that step
-
-    def wait(self, time: float, speed: float) -> None:
-        """Wait until simulated time ``time`` [s] is due at ``speed`` simulated seconds per second; 0 = no wait."""
-        due = self._stamp + (time - self._time) / speed if speed > 0.0 else self._wall.now()
-        self._wall.sleep_until(due)
-        self._stamp, self._time = max(due, self._wall.now() - MAX_LAG), time
 
 
 class LiveSession:

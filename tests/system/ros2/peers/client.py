@@ -3,6 +3,7 @@
 import json
 import sys
 import threading
+import time
 
 import rclpy
 from action_msgs.msg import GoalStatus
@@ -137,8 +138,15 @@ def put(key, name, value):
     services["set_parameters"].call_async(request).add_done_callback(answered)
 
 
+def look(key, topic):
+    """Say when somebody publishes on a topic."""
+    while not node.count_publishers(topic):
+        time.sleep(0.1)
+    say(key=key, what="seen")
+
+
 threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
-orders = {"meet": meet, "send": send, "cancel": cancel, "call": call, "get": get, "put": put}
+orders = {"meet": meet, "send": send, "cancel": cancel, "call": call, "get": get, "put": put, "look": look}
 for line in sys.stdin:
     order = json.loads(line)
     orders[order.pop("order")](**order)

@@ -7,6 +7,7 @@ from mbf_abstract.events import Event, EventKind
 from mbf_abstract.executives.tree_events import NodeState
 from mbf_abstract.geometry import AckermannCommand, Pose, Twist, quaternion_from_yaw
 from mbf_abstract.maps.view import FieldView, GridView
+from mbf_abstract.time.pace import MAX_LAG, Pace
 from mbf_abstract.time.sim_clock import SimClock
 from terrain.viewer.live.follow import first_direction
 from terrain.viewer.live.ground import costs_at, legend_html
@@ -14,7 +15,7 @@ from terrain.viewer.live.log import LiveLog
 from terrain.viewer.live.moving import AHEAD, AHEAD_STEPS, field_arrows, motion_of, predicted_points
 from terrain.viewer.live.overlay import Overlay
 from terrain.viewer.live.plots import LENGTH, PERIOD, History
-from terrain.viewer.live.session import MAX_LAG, Pace, ViewOptions
+from terrain.viewer.live.session import ViewOptions
 from terrain.viewer.live.status_html import lines_html
 from terrain.viewer.pictures.colours import BAD, FLOOR, GOOD, NEITHER, WALL, cost_ramp
 from terrain.viewer.reports.tree_html import tree_html

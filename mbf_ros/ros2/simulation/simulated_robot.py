@@ -1,0 +1,148 @@
+"""The robot of a simulation as a node of ROS 2: it publishes time and its state, and takes ``cmd_vel``.
+
+The node has no thread that publishes: the simulation asks for that after each step, so that time, transforms and
+scans leave together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any
+
+from mbf_abstract.geometry import Command, Pose
+from mbf_abstract.session import NavigationSession
+from mbf_abstract.time.clock import WallClock
+from mbf_ros.messages.geometry import InvalidValueError, MessageContext, pose_stamped, twist_of
+from mbf_ros.messages.interfaces import Message
+from mbf_ros.robot_messages import POINTS, SCAN, STATE_TOPICS, TF, TF_STATIC, RobotMessages
+from mbf_ros.ros2.conversion import fill, interface_class, to_dict
+from mbf_ros.ros2.running import RosError, Spinner, ros_2
+
+NODE = "simulator"
+CLOCK, CMD_VEL, GOAL = "/clock", "cmd_vel", "~/goal"
+EPOCH = 1000.0
+"""ROS time [s] at the start: the same in each run, so that a new one is a jump back for who has seen an older one."""
+TIME_TO_END = 2.0  # s
+WARN_PERIOD = 5.0  # s
+
+
+class SimulatedRobot:
+    """The node of one robot; ROS 2 is started and ended with it.
+
+    Parameters
+    ----------
+    session : NavigationSession
+        Of the simulation.
+    stamped_commands : bool
+        Take ``cmd_vel`` as TwistStamped instead of Twist.
+
+    Raises
+    ------
+    RosError, MissingInterfaceError
+        ROS 2, or a package of messages, is missing.
+    """
+
+    def __init__(self, session: NavigationSession, stamped_commands: bool = False) -> None:
+        self._session = session
+        self._context = MessageContext(session.navigator.server.runtime.robot.global_frame, EPOCH)
+        self._real_time = WallClock()
+        self._condition = self._real_time.condition()
+        self._command: Command | None = None
+        self._failure: BaseException | None = None
+        self._last: dict[str, Any] = {}
+        with ExitStack() as closing:
+            closing.enter_context(ros_2())
+            self._open(stamped_commands, closing)
+            self._closing = closing.pop_all()
+
+    def close(self) -> None:
+        """Leave the graph and end ROS 2; once."""
+        self._closing.close()
+
+    def publish(self) -> None:
+        """Publish the state of the robot, then the time; raises RosError if a callback has failed."""
+        if self._failure is not None:
+            raise RosError(f"{type(self._failure).__name__}: {self._failure}") from self._failure
+        for topic, message in self._state.changes():
+            self._send(topic, message)
+        self._send(CLOCK, {"clock": self._context.time(self._session.clock.now())})
+
+    def repeat(self) -> None:
+        """Publish the last message of each topic once more."""
+        for topic, message in self._last.items():
+            self._publishers[topic].publish(message)
+
+    def show_goal(self, goal: Pose) -> None:
+        """Publish a goal, for late subscribers too."""
+        self._send(GOAL, pose_stamped(goal, self._context))
+
+    def take(self) -> Command | None:
+        """Return the newest command if one has come since the last call."""
+        with self._condition:
+            command, self._command = self._command, None
+            return command
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for a command, at most ``seconds`` of real time; returns whether there is one to take."""
+        with self._condition:
+            if self._command is None:
+                self._condition.wait(seconds)
+            return self._command is not None
+
+    # ---------------------------------------------------------------------------------------------------------
+    def _open(self, stamped_commands: bool, closing: ExitStack) -> None:
+        import rclpy
+        from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+
+        self._node: Any = rclpy.create_node(NODE)
+        closing.callback(self._node.destroy_node)
+        usual, latched = QoSProfile(depth=10), QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        qualities = {
+            SCAN: qos_profile_sensor_data,
+            POINTS: qos_profile_sensor_data,
+            TF: QoSProfile(depth=100),
+            TF_STATIC: latched,
+            GOAL: latched,
+        }
+        types = {**STATE_TOPICS, CLOCK: "rosgraph_msgs/Clock", GOAL: "geometry_msgs/PoseStamped"}
+        self._classes = {topic: interface_class(kind) for topic, kind in types.items()}
+        self._publishers = {
+            topic: self._node.create_publisher(kind, _name(topic), qualities.get(topic, usual))
+            for topic, kind in self._classes.items()
+        }
+        command = interface_class("geometry_msgs/TwistStamped" if stamped_commands else "geometry_msgs/Twist")
+        self._node.create_subscription(command, CMD_VEL, self._taking(stamped_commands), usual)
+        self._state = RobotMessages(self._session.navigator.server, self._context, self._is_wanted)
+        closing.callback(self._state.close)
+        spinner = Spinner(self._node, self._real_time, self._fail)
+        closing.callback(spinner.close, TIME_TO_END)
+
+    def _is_wanted(self, topic: str) -> bool:
+        return bool(self._publishers[topic].get_subscription_count())
+
+    def _send(self, topic: str, message: Message) -> None:
+        self._last[topic] = fill(self._classes[topic](), message)
+        self._publishers[topic].publish(self._last[topic])
+
+    def _taking(self, stamped: bool) -> Callable[[Any], None]:
+        def take(message: Any) -> None:
+            values = to_dict(message)
+            try:
+                command = twist_of(values["twist"] if stamped else values)
+            except InvalidValueError as error:
+                self._node.get_logger().warning(f"{CMD_VEL}: {error}", throttle_duration_sec=WARN_PERIOD)
+                return
+            with self._condition:
+                self._command = command
+                self._condition.notify_all()
+
+        return take
+
+    def _fail(self, error: BaseException) -> None:
+        self._failure = error
+
+
+def _name(topic: str) -> str:
+    """The name under which a topic is published; those of sensors can be put into a namespace."""
+    return topic if topic in (TF, TF_STATIC, CLOCK) else topic.removeprefix("/")

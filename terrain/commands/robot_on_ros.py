@@ -1,0 +1,56 @@
+"""The option ``--ros2`` of ``mbf run``: somebody else drives, over ROS 2."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING
+
+from mbf_abstract.config.findings import ConfigError, Finding
+from terrain.outside.driver import OutsideOptions, outside_executive
+
+if TYPE_CHECKING:
+    from terrain.session.executives import GoalExecutive
+    from terrain.session.run_options import RunOptions
+    from terrain.session.session import Session
+
+LINKS_GROUP = "mbf.robot_links"
+ROS2 = "ros2"
+
+
+def driven_over_ros(options: RunOptions, stamped: bool, lockstep: bool, patience: float) -> RunOptions:
+    """Let the robot of a run be driven over ROS 2; the connection is made by the package that knows ROS.
+
+    Raises
+    ------
+    ValueError
+        No such package is installed, or the options name who else decides, or another clock.
+    """
+    if options.wall_clock or options.executive != "move_base":
+        given = "--wall-clock" if options.wall_clock else "--executive"
+        raise ValueError(f"{given} does not go with --ros2: time passes as real time there, and others decide")
+    makers = [point.load() for point in entry_points(group=LINKS_GROUP, name=ROS2)]
+    if not makers:
+        raise ValueError("no package that connects robots with ROS 2 is installed")
+    outside = OutsideOptions(partial(makers[0], stamped_commands=stamped), lockstep, patience)
+
+    def make(session: Session) -> GoalExecutive:
+        if "/" in session.scenario.name:  # of one of several robots
+            raise ConfigError([Finding("--ros2", 1, "", "a scenario with one robot", "several")])
+        executive = outside_executive(session, outside)
+        options.on_note(f"the robot waits for cmd_vel; our navigation for it: {_our_navigation(session, stamped)}")
+        return executive
+
+    return replace(options, executive=ROS2, outside=make)
+
+
+def _our_navigation(session: Session, stamped: bool) -> str:
+    """Return the command that drives the robot with the configuration of its scenario."""
+    sensors = [
+        f"--sensor scan:LaserScan={one.name}" if one.type == "planar" else f"--sensor points:PointCloud2={one.name}"
+        for one in session.scenario.sensors
+    ]
+    commands = ["--stamped"] if stamped else []
+    config = str(session.folder / "navigation.yaml")
+    return " ".join(["mbf ros2", config, *sensors, *commands, "--max-silence 5", "-- -p use_sim_time:=true"])
