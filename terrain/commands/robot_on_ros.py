@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING
 
@@ -25,7 +24,7 @@ def driven_over_ros(options: RunOptions, stamped: bool, lockstep: bool, patience
     Raises
     ------
     ValueError
-        No such package is installed, or the options name who else decides, or another clock.
+        No such package is installed, ROS 2 is not, or the options name who else decides, or another clock.
     """
     if options.wall_clock or options.executive != "move_base":
         given = "--wall-clock" if options.wall_clock else "--executive"
@@ -33,7 +32,7 @@ def driven_over_ros(options: RunOptions, stamped: bool, lockstep: bool, patience
     makers = [point.load() for point in entry_points(group=LINKS_GROUP, name=ROS2)]
     if not makers:
         raise ValueError("no package that connects robots with ROS 2 is installed")
-    outside = OutsideOptions(partial(makers[0], stamped_commands=stamped), lockstep, patience)
+    outside = OutsideOptions(makers[0](stamped), lockstep, patience)
 
     def make(session: Session) -> GoalExecutive:
         if "/" in session.scenario.name:  # of one of several robots

@@ -151,13 +151,13 @@ class OutsideDriver:
         near = distance <= self._tolerance[0] and math.degrees(angle) <= self._tolerance[1]
         if not (near and self._stands()):
             self._standing_since = None
+            if not self._has_patience():
+                silence = f"no command to move has come for {self._options.patience:g} s"
+                self._end(MoveBaseOutcome.FAILURE, f"{silence}, and the robot is {distance:.2f} m from the goal")
         elif self._standing_since is None:
             self._standing_since = time
         elif time - self._standing_since >= TIME_AT_GOAL:
             self._end(MoveBaseOutcome.SUCCESS, "the robot stands at the goal")
-        if not self._has_patience():
-            silence = f"no command to move has come for {self._options.patience:g} s"
-            self._end(MoveBaseOutcome.FAILURE, f"{silence}, and the robot is {distance:.2f} m from the goal")
 
     def _stands(self) -> bool:
         velocity = self._session.simulation.robot.velocity()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
 from mbf_abstract.geometry import Command, Pose
@@ -17,7 +18,7 @@ from mbf_ros.messages.geometry import InvalidValueError, MessageContext, pose_st
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.robot_messages import POINTS, SCAN, STATE_TOPICS, TF, TF_STATIC, RobotMessages
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
-from mbf_ros.ros2.running import RosError, Spinner, ros_2
+from mbf_ros.ros2.running import RosError, Spinner, require_ros_2, ros_2
 
 NODE = "simulator"
 CLOCK, CMD_VEL, GOAL = "/clock", "cmd_vel", "~/goal"
@@ -25,6 +26,20 @@ EPOCH = 1000.0
 """ROS time [s] at the start: the same in each run, so that a new one is a jump back for who has seen an older one."""
 TIME_TO_END = 2.0  # s
 WARN_PERIOD = 5.0  # s
+
+
+def robot_connector(stamped_commands: bool) -> Callable[[NavigationSession], SimulatedRobot]:
+    """Return what makes the node of a session's robot; the entry point ``mbf.robot_links``.
+
+    Raises
+    ------
+    RosError, MissingInterfaceError
+        ROS 2, or a package of messages, is missing: before a world is built in vain.
+    """
+    require_ros_2()
+    for kind in STATE_TOPICS.values():
+        interface_class(kind)
+    return partial(SimulatedRobot, stamped_commands=stamped_commands)
 
 
 class SimulatedRobot:
@@ -36,14 +51,9 @@ class SimulatedRobot:
         Of the simulation.
     stamped_commands : bool
         Take ``cmd_vel`` as TwistStamped instead of Twist.
-
-    Raises
-    ------
-    RosError, MissingInterfaceError
-        ROS 2, or a package of messages, is missing.
     """
 
-    def __init__(self, session: NavigationSession, stamped_commands: bool = False) -> None:
+    def __init__(self, session: NavigationSession, stamped_commands: bool) -> None:
         self._session = session
         self._context = MessageContext(session.navigator.server.runtime.robot.global_frame, EPOCH)
         self._real_time = WallClock()

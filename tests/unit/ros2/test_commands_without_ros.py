@@ -33,6 +33,8 @@ def test_what_is_missing_is_said_in_one_text(tmp_path):
     file.write_text(CONFIG)
     expected = {
         "rclpy cannot be imported": ["ros2", str(file)],
+        "error: rclpy cannot be imported": ["run", "indoor", "--ros2", "--out", str(tmp_path / "run")],
+        "--wall-clock does not go with --ros2": ["run", "indoor", "--ros2", "--wall-clock", "--out", str(tmp_path)],
         "--sensor must be TOPIC:TYPE=SOURCE": ["ros2", str(file), "--sensor", "scan"],
         "the generators of ROS 2 are not installed": ["ros2-interfaces", "--into", str(tmp_path)],
     }
