@@ -8,6 +8,7 @@ any more, or learn of its end: all goals that came over it are canceled.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -50,6 +51,8 @@ JUMPS: dict[Any, int] = {
     RefinePathResult: RefinePathOutcome.STOPPED,
 }
 """Outcome of a goal during which the robot's time jumped."""
+LARGE = 1e38
+"""What stands for infinity; servers find that the largest float32 overflows when it comes as text."""
 
 
 @dataclass(eq=False)
@@ -60,6 +63,20 @@ class _Goal:
     handle: AnyGoalHandle
     is_cancel_asked: bool = False
     jump: str = ""
+
+
+def in_finite_numbers(value: Any) -> Any:
+    """Return values of a message with 1e38 for numbers that are not finite.
+
+    JSON has none of them, and a server on a robot may refuse null; the goal would never get its result then.
+    """
+    if isinstance(value, dict):
+        return {name: in_finite_numbers(inner) for name, inner in value.items()}
+    if isinstance(value, list):
+        return [in_finite_numbers(inner) for inner in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return -LARGE if value < 0.0 else LARGE
+    return value
 
 
 class OfferedGoals:
@@ -159,12 +176,12 @@ class OfferedGoals:
             self._answer(goal_id, goal.name, result, STATUSES[status])
 
     def _answer(self, goal_id: str, name: str, result: ActionResult, status: Status) -> None:
-        values = ACTIONS[name].result(result, self._context())
+        values = in_finite_numbers(ACTIONS[name].result(result, self._context()))
         text = frame("action_result", id=goal_id, action=name, values=values, status=int(status), result=True)
         self._post(lambda connection: connection.answer(text))
 
     def _send_feedback(self, goal_id: str, goal: _Goal, values: object) -> None:
-        text = frame("action_feedback", id=goal_id, action=goal.name, values=values)
+        text = frame("action_feedback", id=goal_id, action=goal.name, values=in_finite_numbers(values))
         if self._goals.get(goal_id) is goal:
             self._post(lambda connection: connection.newest(("feedback", goal_id), text))
 

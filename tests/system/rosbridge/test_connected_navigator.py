@@ -85,6 +85,7 @@ def test_goals_are_canceled_taken_over_and_refused_as_by_a_navigator_of_our_own(
     made.wait_until(lambda: not made.moves)
     refused = sender.wait("action_result", id=sender.send("/move_base_flex/move_base", target_pose=pose(1.0, 1.0, w=0)))
     assert refused["status"] == 6 and refused["values"]["outcome"] and "quaternion" in refused["values"]["message"]
+    assert refused["values"]["dist_to_goal"] == 1e38  # servers on robots refuse null
     asked = sender.send("/navigate_to_pose", pose=pose(2.0, 2.0), behavior_tree="mine.xml")
     unsupported = sender.wait("action_result", id=asked)["values"]
     assert unsupported["error_code"] and "behavior_tree 'mine.xml' is not supported" in unsupported["error_msg"]
