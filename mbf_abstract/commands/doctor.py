@@ -78,9 +78,10 @@ def examine() -> Iterator[Finding]:
     yield _package("websockets", "only for mbf bridge serve: pip install 'mbf-flex[bridge]'", optional=True)
     yield _package("rosbags", "only for mbf bag: pip install 'mbf-flex[bags]'", optional=True)
     yield _package("rerun", "only for mbf replay --rrd, Python >= 3.11: pip install 'mbf-flex[rerun]'", optional=True)
+    yield _package("av", "only for mbf replay --mp4: pip install 'mbf-flex[video]'", optional=True)
     yield _check("plugins", _plugins, "mbf plugins lists which and why")
     yield _check("kernel cache", _kernel_cache, "set NUMBA_CACHE_DIR to a folder that can be written")
-    yield _check("loopback port", _loopback_port, "a firewall or sandbox forbids sockets: no replay, no live view")
+    yield _check("loopback port", _loopback_port, "a firewall or sandbox forbids sockets: no live view")
 
 
 def _package(name: str, cure: str, optional: bool) -> Finding:

@@ -158,9 +158,15 @@ def _all_that_is_wrong(
 
 
 def _open_replay(folder: Path) -> None:
-    page = (folder / "replay.html").resolve()
-    if page.is_file():
+    page = _replay_page(folder)
+    if page is not None:
         typer.launch(page.as_uri())
+
+
+def _replay_page(folder: Path) -> Path | None:
+    """Return the absolute path of the replay of a run, if there is one."""
+    page = (folder / "replay.html").resolve()
+    return page if page.is_file() else None
 
 
 def scenarios(
@@ -185,6 +191,7 @@ def replay(
     show: bool = typer.Option(True, "--open/--no-open", help="Open the page in the browser."),
     rrd: bool = typer.Option(False, "--rrd", help="Write run.rrd for Rerun too; needs the extra rerun."),
     gif: bool = typer.Option(False, "--gif", help="Write animation.gif too, for where no script may run."),
+    mp4: bool = typer.Option(False, "--mp4", help="Write film.mp4 too, in full colour; needs the extra video."),
 ) -> None:
     """Write picture, report, replay and MCAP log of a run, also of one that was killed, and open the replay."""
     with readable_errors():
@@ -193,6 +200,7 @@ def replay(
         from terrain.recording.run_folder import read_run, robots_of
         from terrain.viewer.logs.rerun_log import write_rrd
         from terrain.viewer.pictures.animation import write_animation
+        from terrain.viewer.pictures.film import write_film
         from terrain.viewer.results import write_joint_results, write_results
 
         recordings = {}
@@ -208,6 +216,9 @@ def replay(
                 if gif:
                     live.step("writing the animation")
                     write_animation(own / "animation.gif", recordings[name])
+                if mp4:
+                    live.step("writing the film")
+                    write_film(own / "film.mp4", recordings[name])
             if "" not in recordings:
                 verdict = judge_together({name: recording.verdict for name, recording in recordings.items()})
                 problems += write_joint_results(folder, recordings, verdict, live.step)
@@ -248,5 +259,8 @@ def _print_result(result: RunResult, as_json: bool) -> None:
             typer.echo(f"  {name}: {own['verdict']}; {own['path_length_m']:.1f} m in {own['time_s']:.1f} s")
         typer.echo(f"  contacts between robots: {len(metrics['contacts_between_robots'])}")
         typer.echo(f"results in {result.folder}: replay.html, picture.png, metrics.json, and a folder for each robot")
-        return
-    typer.echo(f"results in {result.folder}: replay.html, report.html, picture.png, run.mcap, metrics.json")
+    else:
+        typer.echo(f"results in {result.folder}: replay.html, report.html, picture.png, run.mcap, metrics.json")
+    page = _replay_page(result.folder)
+    if page is not None:
+        typer.echo(f"replay: {page.as_uri()}")
