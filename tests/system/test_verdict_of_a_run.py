@@ -53,7 +53,8 @@ def test_a_contact_while_the_robot_moves_fails_the_run_everywhere(rude, tmp_path
     report = (tmp_path / "run" / "report.html").read_text()
     assert f'<p class="outcome arrived">{verdict}</p>' in report
     replay = (tmp_path / "run" / "replay.html").read_text()
-    assert f"<p style='color:{WARNING}'>{verdict}</p>" in replay
+    assert f'<p id="verdict" style="color:{WARNING}">{verdict}</p>' in replay
+    assert f"replay: {(tmp_path / 'run' / 'replay.html').as_uri()}" in run.stdout
     compared = mbf("compare", tmp_path / "run", tmp_path / "run", "--out", tmp_path / "compare.html")
     assert f"run: {verdict}" in compared.stdout and verdict in (tmp_path / "compare.html").read_text()
 
