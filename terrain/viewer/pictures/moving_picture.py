@@ -83,11 +83,12 @@ class MovingPicture:
         return image
 
     def _empty(self, camera: Camera, cut: float) -> Canvas:
-        """The world below the cut."""
+        """The world below the cut; faces that reach above it end there."""
         canvas = _sky(self._fine)
-        heights = self._world.vertices[self._world.faces, 2].mean(axis=1)
-        shown = heights < cut
-        paint_surface(canvas, camera, Surface(self._world.vertices, self._world.faces[shown]), self._colours[shown])
+        vertices, faces = self._world
+        shown = vertices[faces, 2].min(axis=1, initial=np.inf) < cut
+        below = np.column_stack([vertices[:, :2], np.minimum(vertices[:, 2], cut)])
+        paint_surface(canvas, camera, Surface(below, faces[shown]), self._colours[shown])
         return canvas
 
     def _cut(self, index: int) -> float:
@@ -156,7 +157,7 @@ def status_text(recording: Recording, index: int) -> str:
 def _world(recording: Recording) -> tuple[Surface, FloatArray]:
     """All that does not move, and the colours (F, 3) of its faces in the light; large faces in pieces.
 
-    Near the camera, and at a cut through storeys, faces are left out as a whole.
+    Near the camera faces are left out as a whole.
     """
     parts: list[tuple[Surface, Colour | None]] = []
     if recording.ground is not None:
