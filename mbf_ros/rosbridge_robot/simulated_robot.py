@@ -41,13 +41,13 @@ def serve_robot(session: NavigationSession, options: BridgeOptions | None = None
     """
     options = options or BridgeOptions()
     clock, events, server = session.clock, session.events, session.navigator.server
+    lease = server.runtime.gate.acquire(DRIVER)
+    if lease is None:
+        raise ValueError(f"the robot is driven by {server.runtime.gate.holder!r} already")
     context = MessageContext(server.runtime.robot.global_frame, unix_seconds() - clock.now())
     authentication = Authentication(options.server.access.roles, unix_seconds)
     bridge = Bridge(clock, events, context, authentication, options.cancel_on_disconnect)
     served = RosbridgeServer(bridge, events, options.server, page_files())
-    lease = server.runtime.gate.acquire(DRIVER)
-    if lease is None:
-        raise ValueError(f"the robot is driven by {server.runtime.gate.holder!r} already")
 
     def drive(message: Message) -> None:
         lease.send(twist_of(message["twist"] if options.stamped_commands else message))
