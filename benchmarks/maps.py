@@ -2,12 +2,12 @@
 
     python benchmarks/maps.py [--quick] [--json] [--workers 2] [--terrains 40] [--buildings 10] [--sizes 1,10]
 
-Terrains are those of ``outdoor_terrains.py`` of every level, with posts, on seeds that nothing was chosen on. Their
+Terrains are those of ``mbf bench outdoor`` of every level, with posts, on seeds that nothing was chosen on. Their
 clouds have 100 points on a square metre with noise of 2 cm, crowns above the posts, and grass of 10 cm on a fifth of
 the ground. Buildings are the shipped bridge and garage, scanned on all sides with the same density and noise. Each is
 driven once on the built map and once on the true one, of which the faces below the posts are cut out. Rates are over
-the terrains with a route (``benchmarks.reachability``, posts included). ``--sizes`` are millions of points, each built
-in a process of its own; CPU time and peak memory are of that process.
+the terrains with a route (by the judge of ``mbf bench``, posts included). ``--sizes`` are millions of points, each
+built in a process of its own; CPU time and peak memory are of that process.
 """
 
 from __future__ import annotations
@@ -24,8 +24,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from outdoor_terrains import FROM_CORNER, LEVELS, SIZE, generated
-from reachability import is_reachable
 
 from mbf_mesh_nav.building.clouds.point_cloud import PointCloud
 from mbf_mesh_nav.building.map_build import write_map
@@ -34,6 +32,8 @@ from mbf_mesh_nav.building.surface import BuiltSurface, build_surface
 from mbf_mesh_nav.files.map_header import MapHeader
 from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from terrain.experiments.evaluation.outdoor import FROM_CORNER, LEVELS, SIZE, generated
+from terrain.experiments.evaluation.reachability import is_reachable
 from terrain.physics.robot_models import HUSKY
 from terrain.scenarios.environment import FOREST_STREAM, WORLD_STREAM
 from terrain.scenarios.obstacles import Forest, Obstacle

@@ -14,7 +14,7 @@ def command_line(context: typer.Context) -> str:
 
     Of an absolute path only the last part is kept, also of one behind the equals sign of ``--set KEY=VALUE``.
     """
-    words = ["mbf", context.info_name or ""]
+    words = ["mbf", *(context.command_path.split()[1:] or [context.info_name or ""])]  # a group's name, too
     for parameter in context.command.params:
         name = parameter.name or ""
         source = context.get_parameter_source(name)

@@ -34,7 +34,7 @@ def code_of(servers: Sequence[AbstractNavigationServer]) -> dict[str, Code]:
     for server in servers:
         modules += [type(server).__module__, *_modules_of_plugins(server)]
     packages = sorted({module.partition(".")[0] for module in modules})
-    places = {package: place for package in packages if (place := _place_of(package)) is not None}
+    places = {package: place for package in packages if (place := place_of(package)) is not None}
     return {package: Code(sha256=hash_of_code(place), commit=commit_of(place)) for package, place in places.items()}
 
 
@@ -59,7 +59,7 @@ def _inner_types(plugin_class: type[Plugin], parameters: ParameterModel) -> Iter
         yield inner.kind, getattr(parameters, inner.type_key)
 
 
-def _place_of(package: str) -> Path | None:
+def place_of(package: str) -> Path | None:
     """Folder of an imported package, file of an imported module; None for code that was typed in."""
     module = sys.modules.get(package)
     file = getattr(module, "__file__", None)

@@ -188,13 +188,18 @@ def _write_parquet(table: Sequence[Row], file: Path) -> Path:
 def _page(
     title: str, table: Sequence[Row], spreads: Sequence[Row], tests: Sequence[Row], figures: Sequence[Path]
 ) -> str:
-    parts = [_html_table(summarise(table)) if table else ""]
+    parts = [html_table(summarise(table)) if table else ""]
     parts += [_inline(figure.read_text("utf-8")) for figure in figures]
     if spreads:
-        parts += ["<h2>Medians, quartiles and 95 % intervals</h2>", _html_table(spreads)]
+        parts += ["<h2>Medians, quartiles and 95 % intervals</h2>", html_table(spreads)]
     if tests:
-        parts += ["<h2>Tests of two variants, seed by seed</h2>", f"<p>{TESTS}</p>", _html_table(tests)]
-    parts += ["<h2>All runs</h2>", _html_table(table)]
+        parts += ["<h2>Tests of two variants, seed by seed</h2>", f"<p>{TESTS}</p>", html_table(tests)]
+    parts += ["<h2>All runs</h2>", html_table(table)]
+    return html_page(title, parts)
+
+
+def html_page(title: str, parts: Iterable[str]) -> str:
+    """Return a page with a heading and parts that are HTML; it needs no other file."""
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
         f"<style>{STYLE}</style><h1>{html.escape(title)}</h1>{''.join(parts)}</html>\n"
@@ -206,7 +211,8 @@ def _inline(svg: str) -> str:
     return f"<div>{svg[svg.index('<svg') :]}</div>"
 
 
-def _html_table(rows: Sequence[Row]) -> str:
+def html_table(rows: Sequence[Row]) -> str:
+    """Return rows as a table; the ``level`` of a row is its colour, see ``STYLE``."""
     if not rows:
         return "<p>No runs yet.</p>"
     head = "".join(f"<th>{html.escape(name)}</th>" for name in rows[0])

@@ -53,7 +53,7 @@ def run_in_workers(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Ite
 def _run_in_pool(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Iterator[tuple[J, R]]:
     """Keep a pool busy; no more jobs are handed out than it can work on, so that a stop is quick."""
     waiting, running = iter(jobs), dict[Future[R], J]()
-    pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_the_parent, (os.getpid(),))
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), end_with_the_parent, (os.getpid(),))
     try:
         for job in itertools.islice(waiting, workers):
             running[pool.submit(do, job)] = job
@@ -66,7 +66,7 @@ def _run_in_pool(do: Callable[[J], R], jobs: Sequence[J], workers: int) -> Itera
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _end_with_the_parent(parent: int) -> None:
+def end_with_the_parent(parent: int) -> None:
     """Let a worker end soon after its parent was killed; it would wait for work without end.
 
     It also ends at once on a signal, so that its job is given to another one: what a navigation server would do

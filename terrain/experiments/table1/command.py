@@ -16,16 +16,9 @@ WAREHOUSE = (
 )  # also in environments.world, which is slow to import
 
 
-def register(app: typer.Typer) -> None:
-    """Add the group ``bench`` to the application ``mbf``."""
-    bench = typer.Typer(help="Experiments that take minutes and judge the package.", no_args_is_help=True)
-    bench.callback()(_group)
+def register(bench: typer.Typer) -> None:
+    """Add the command to the group ``mbf bench``."""
     bench.command("table1")(table1)
-    app.add_typer(bench, name="bench")
-
-
-def _group() -> None:
-    """Run experiments that take minutes and judge the package."""
 
 
 def table1(

@@ -1,23 +1,14 @@
 """Whether any way leads a robot through a terrain: what its wheels, its body and its slopes allow."""
 
 import math
-import sys
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from terrain.experiments.evaluation.reachability import DrivingLimits, allowed_states, is_reachable
 from terrain.physics.robot_models import HUSKY
 from terrain.worlds.generate import fractal_terrain
 from terrain.worlds.heightfield import Heightfield
-
-SOURCE = Path(__file__).resolve().parents[3] / "benchmarks" / "reachability.py"  # a judge of benchmarks only
-SPEC = spec_from_file_location("reachability", SOURCE)
-reachability = sys.modules["reachability"] = module_from_spec(SPEC)
-SPEC.loader.exec_module(reachability)
-DrivingLimits, allowed_states = reachability.DrivingLimits, reachability.allowed_states
-is_reachable = reachability.is_reachable
 
 SPACING = 0.25
 START, GOAL = (2.0, 5.0, 0.0), (10.0, 5.0)

@@ -136,10 +136,10 @@ def _ground(terrain: Heightfield, yaw: float, forward: float, left: float) -> Fl
 
 
 def _wheel_height(terrain: Heightfield, radius: float, yaw: float, forward: float, left: float) -> FloatArray:
-    """Height (ny, nx) of the lowest point of a round wheel that rests on the ground with any part of its rim."""
+    """Height (ny, nx) of the lowest point of a round wheel that rests on the ground with any part of its outline."""
     along = np.linspace(-0.9, 0.9, 7) * radius
-    rims = [_ground(terrain, yaw, forward + d, left) + math.sqrt(radius**2 - d**2) - radius for d in along.tolist()]
-    return np.asarray(np.max(rims, axis=0))
+    heights = [_ground(terrain, yaw, forward + d, left) + math.sqrt(radius**2 - d**2) - radius for d in along.tolist()]
+    return np.asarray(np.max(heights, axis=0))
 
 
 def _components(allowed: BoolArray, may_turn: BoolArray) -> NDArray[np.int32]:

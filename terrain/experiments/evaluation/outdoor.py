@@ -1,21 +1,27 @@
-"""The terrains of ``outdoor_evaluation.py``: generated ones of rising difficulty, and crops of real surveys.
+"""The outdoor evaluation: generated terrains of rising difficulty, and crops of real surveys.
 
-Each is a drive from one corner to the opposite one, without sensors, so that nothing but the ground is in the way.
-Surveys coarser than a robot are shrunk isotropically: their slopes stay what they are.
+A Husky with exact localisation crosses each from one corner to the opposite one, in Bullet at 120 Hz, without sensors,
+so that nothing but the ground is in the way. Surveys coarser than a robot are shrunk isotropically: their slopes stay
+what they are.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from reachability import is_reachable
 
+from mbf_abstract.config.findings import ConfigError, Finding
+from terrain.experiments.evaluation.protocol import Protocol, Trial, read_entries
+from terrain.experiments.evaluation.reachability import DrivingLimits, is_reachable
 from terrain.physics.robot_models import HUSKY
 from terrain.scenarios.environment import WORLD_STREAM
 from terrain.scenarios.places import coordinates
-from terrain.scenarios.scenario import SHIPPED, PlanarPose, Scenario
+from terrain.scenarios.scenario import PlanarPose, Scenario
 from terrain.scenarios.world_types import GeneratedWorld, HeightfieldWorld
 from terrain.worlds.elevation_files import read_dem
 from terrain.worlds.heightfield import Heightfield
@@ -24,22 +30,19 @@ SIZE = (24.0, 20.0)
 SPACING = 0.25
 LEVELS = 10
 FROM_CORNER = 2.5
+TOLERANCE = 0.4  # m, of the goal, as in the configurations
+SUCCESS = "the verdict of mbf run: in truth at the goal, not tipped over, nothing touched while it moved, in time"
 FLAT_LETHAL_SLOPE = 30.0
-CONFIGS = {name: SHIPPED / "config" / f"outdoor_{name}.yaml" for name in ("mesh", "costmap")}
+FOLDER = Path(__file__).parent / "config"
+CONFIGS = {name: FOLDER / f"outdoor_{name}.yaml" for name in ("mesh", "costmap")}
 SURVEYS = {"kootenai_1m.npz": 1.0, "N44W072.hgt": 0.5 / 90.0, "jacksboro.npz": 0.5 / 80.0, "bigtujunga.npz": 0.5 / 30.0}
-FRESH_SURVEYS = {  # nothing was ever chosen on these
-    "tidal_2m.npz": 0.5 / 2.0,
-    "gale_aeolis_mount_sharp_aeolis_palus_center.npz": 0.5 / 2.0,
-    "jezero_neretva_neretva_center.npz": 0.5 / 2.0,
-}
-SCALES = SURVEYS | FRESH_SURVEYS
-FRESH_SEED = 5000
+CROPS = 10  # of every survey
 
 
 def scenario_in(name: str, world: GeneratedWorld | HeightfieldWorld, corner: tuple[float, float]) -> Scenario:
     """A drive across a world whose lower left corner lies at ``corner``."""
     (x, y), (length, width) = corner, SIZE
-    yaw = float(np.arctan2(width - 2.0 * FROM_CORNER, length - 2.0 * FROM_CORNER))
+    yaw = math.atan2(width - 2.0 * FROM_CORNER, length - 2.0 * FROM_CORNER)
     return Scenario(
         name=name,
         proves="A robot crosses rough ground.",
@@ -76,9 +79,9 @@ def _survey(file: Path) -> Heightfield:
     return read_dem(file)
 
 
-def real(file: Path, seed: int) -> Scenario:
-    """A crop of a survey, drawn from the seed."""
-    survey, scale = _survey(file), SCALES[file.name]
+def real(file: Path, seed: int, scale: float) -> Scenario:
+    """A crop of a survey that is shrunk by ``scale``, drawn from the seed."""
+    survey = _survey(file)
     length, width = (side / scale for side in SIZE)
     rng = np.random.default_rng(seed)
     x = survey.x0 + rng.uniform(0.0, survey.size[0] - length)
@@ -95,22 +98,40 @@ def real(file: Path, seed: int) -> Scenario:
     return scenario_in(file.stem, world, (crop.x0 * scale, crop.y0 * scale))
 
 
-def terrains(data: Path, first_seed: int, generated_seeds: int, crops: int) -> list[tuple[Scenario, int]]:
-    """Every level with ``generated_seeds`` seeds and ``crops`` of each survey there is, each with its seed.
+def outdoor(seeds: Sequence[int], levels: Sequence[int] = range(LEVELS), surveys: Path | None = None) -> Protocol:
+    """Return version 1: these levels with every seed; and with a crop of every survey for each of the first ten seeds.
 
-    From ``FRESH_SEED`` on the fresh surveys count, too.
+    Parameters
+    ----------
+    surveys : Path, optional
+        Folder with the files of ``SURVEYS``; without it there are no crops.
+
+    Raises
+    ------
+    ConfigError
+        A survey is missing; all that are.
     """
-    names = SCALES if first_seed >= FRESH_SEED else SURVEYS
-    places = [(data / "terrain" / folder / name).resolve() for name in names for folder in ("dem", "mars")]
-    files = [file for file in places if file.is_file()]
-    chosen = []
-    for number in range(max(generated_seeds, crops)):  # easy and hard ones mixed, so that a part is representative
-        seed = first_seed + number
-        if number < generated_seeds:
-            chosen += [(generated(level), seed) for level in range(LEVELS)]
-        if number < crops:
-            chosen += [(real(file, seed), seed) for file in files]
-    return chosen
+    files = [] if surveys is None else [(surveys / name).resolve() for name in SURVEYS]
+    missing = [
+        Finding(str(surveys), 1, "--surveys", f"a file {file.name}", "none") for file in files if not file.is_file()
+    ]
+    if missing:
+        raise ConfigError(missing)
+    trials = []
+    for number, seed in enumerate(seeds):  # easy and hard ones mixed, so that a part is representative
+        trials += [Trial(generated(level), seed) for level in levels]
+        if number < CROPS:
+            trials += [Trial(real(file, seed, SURVEYS[file.name]), seed) for file in files]
+    return Protocol(
+        "outdoor",
+        "v1",
+        "A Husky crosses 24 x 20 m of rough ground in ten levels of difficulty, corner to corner, in Bullet.",
+        "mesh",
+        trials,
+        {"success": SUCCESS, "reachable": asdict(DrivingLimits()), "tolerance": TOLERANCE},
+        has_route,
+        read_entries(FOLDER / "outdoor_entries.yaml"),
+    )
 
 
 def has_route(scenario: Scenario, seed: int) -> bool:
@@ -118,4 +139,4 @@ def has_route(scenario: Scenario, seed: int) -> bool:
     start, goal = scenario.start, scenario.goals[0]
     clear = coordinates((start, goal))
     ground = scenario.world.heightfield(np.random.default_rng([seed, WORLD_STREAM]), clear)  # type: ignore[union-attr]
-    return is_reachable(ground, HUSKY, (start.x, start.y, start.yaw), (goal.x, goal.y))  # type: ignore[union-attr]
+    return is_reachable(ground, HUSKY, (start.x, start.y, start.yaw), (goal.x, goal.y), TOLERANCE)  # type: ignore[union-attr]

@@ -1,0 +1,204 @@
+"""The protocols of ``mbf bench``: frozen, every room with a route; and how their runs are ranked."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mbf_abstract.config.findings import ConfigError
+from terrain.experiments.evaluation.entrant import entrant
+from terrain.experiments.evaluation.indoor import (
+    BEFORE,
+    CELL,
+    LENGTH,
+    RESOLUTION,
+    WIDTH,
+    draw_posts,
+    has_passage,
+    indoor,
+)
+from terrain.experiments.evaluation.leaderboard import page, standings, terminal_table
+from terrain.experiments.evaluation.outdoor import outdoor
+from terrain.experiments.evaluation.protocol import Trial
+from terrain.experiments.evaluation.results import (
+    Results,
+    comparable,
+    read_results,
+    results_of,
+    shipped_results,
+    write_results,
+)
+from terrain.experiments.evaluation.trials import Task, failure_of, lost_row, task_key
+from terrain.sweeps.guarded_workers import Lost
+
+OUTDOOR, INDOOR = outdoor([0]), indoor([0])
+
+
+def row(entry, world="level 0", route=True, failure="", spl=1.0, message="", **more):
+    success = not failure
+    times = {"time_s": 20.0, "planning_wall_median_ms": 3.0} | more
+    return {
+        **{"entry": entry, "world": world, "seed": 0, "trial": "t", "route": route, "success": success},
+        **{"failure": failure, "spl": spl if success else 0.0, "message": message, "verdict": message},
+        **{"outcome": "SUCCESS" if success else "NO_PATH_FOUND", **times},
+    }
+
+
+def test_version_1_is_frozen():
+    """Whoever changes a world, a configuration or a rule makes a version 2."""
+    assert (OUTDOOR.hash, INDOOR.hash) == ("f028a8aaba70", "3abfa1712142")
+
+
+def test_a_hash_changes_with_the_rules_and_the_seed_but_not_with_the_shipped_entries():
+    assert replace(OUTDOOR, entries={}).hash == OUTDOOR.hash
+    assert replace(OUTDOOR, rules={}).hash != OUTDOOR.hash
+    first = OUTDOOR.trials[0]
+    assert replace(OUTDOOR, trials=[Trial(first.scenario, 1)]).hash != replace(OUTDOOR, trials=[first]).hash
+
+
+def test_the_comments_of_a_configuration_do_not_count(tmp_path):
+    def with_mesh(text):
+        file = tmp_path / "mesh.yaml"
+        file.write_text(text)
+        scenario = OUTDOOR.trials[0].scenario.model_copy(update={"navigation": {"mesh": file}})
+        return replace(OUTDOOR, trials=[Trial(scenario, 0)]).hash
+
+    assert with_mesh("a: 1\n") == with_mesh("# a remark\na: 1   # one\n") != with_mesh("a: 2\n")
+
+
+def test_seeds_draw_different_rooms_and_a_higher_level_has_more_posts():
+    rooms = [draw_posts(level, seed) for level in (0, 9) for seed in (0, 1)]
+    assert len({posts.tobytes() for posts in rooms}) == 4
+    assert max(map(len, rooms[:2])) < min(map(len, rooms[2:]))
+    assert draw_posts(9, 1).tobytes() == rooms[3].tobytes()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_room_has_a_passage_if_a_disc_that_is_moved_cell_by_cell_gets_through(seed):
+    rng = np.random.default_rng(seed)
+    posts = (np.argwhere(rng.random((26, 16)) < 0.14) + 0.5) * CELL
+    radius = 0.28
+    x = np.arange(-BEFORE, LENGTH + BEFORE, RESOLUTION) + 0.5 * RESOLUTION
+    y = np.arange(0.0, WIDTH, RESOLUTION) + 0.5 * RESOLUTION
+    apart = np.min(np.hypot(x[:, None, None] - posts[:, 0], y[None, :, None] - posts[:, 1]), axis=2)
+    free = (apart >= radius + 0.5 * CELL) & (y >= radius) & (y <= WIDTH - radius)
+    start, goal = (round(0.75 / RESOLUTION), len(y) // 2), (len(x) - 1 - round(0.75 / RESOLUTION), len(y) // 2)
+    seen, front = {start} if free[start] else set(), [start]
+    while front and seen:
+        i, j = front.pop()
+        around = [(i + a, j + b) for a in (-1, 0, 1) for b in (-1, 0, 1)]
+        new = [n for n in around if n not in seen and 0 <= n[0] < len(x) and 0 <= n[1] < len(y) and free[n]]
+        seen.update(new)
+        front += new
+    assert has_passage(posts, radius) == (goal in seen)
+
+
+def test_the_more_successes_the_better_then_the_shorter_way_and_half_a_result_has_no_rank():
+    rows = [row("slow", spl=0.5), row("slow", "level 1", spl=0.5)]
+    rows += [row("fast"), row("fast", "level 1"), row("same"), row("same", "level 1"), row("half")]
+    rows += [row("bad"), row("bad", "level 1", failure="planner", message="no <idea>")]
+    lines = standings(rows, trials=2)
+    assert [(line.entry, line.rank) for line in lines] == [
+        ("fast", 1),
+        ("same", 1),
+        ("slow", 3),
+        ("bad", 4),
+        ("half", None),
+    ]
+    assert (lines[3].arrived, lines[3].share, lines[3].failures, lines[3].reason) == (
+        1,
+        0.5,
+        {"planner": 1},
+        "no <idea>",
+    )
+    shown = page("title", ["about"], rows, lines, {"bad"})
+    assert "no &lt;idea&gt;" in shown and "<idea>" not in shown
+    assert terminal_table(lines, "title").row_count == 5
+
+
+def test_a_world_without_a_route_counts_for_nobody():
+    (line,) = standings(
+        [row("a", route=False, failure="planner"), row("a", "level 1"), row("a", "level 2", route=False)], 3
+    )
+    assert (line.arrived, line.with_route, line.runs, line.share, line.arrived_without_route) == (1, 1, 3, 1.0, 1)
+
+
+def test_only_runs_of_the_same_trials_are_comparable(tmp_path):
+    trial = INDOOR.trials[0]
+    mine = row("a") | {"trial": INDOOR.trial_hash(trial)}
+    results = results_of(INDOOR, [INDOOR.entry("astar_pursuit")], [mine, row("a")], "mbf bench indoor")
+    write_results(results, tmp_path / "results.json")
+    again = read_results(tmp_path / "results.json")
+    assert again == results and again.head["protocol"]["hash"] == INDOOR.hash
+    assert comparable(again, INDOOR) == [mine]
+    assert comparable(Results({}, [mine]), OUTDOOR) == []
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"runs": 3, "protocol": {}}', '{"runs": [{"trial": 1}], "protocol": {}}'])
+def test_a_file_that_is_no_result_is_refused(tmp_path, text):
+    (tmp_path / "mine.json").write_text(text)
+    with pytest.raises(ConfigError, match=r"mine.json:1: .*expected"):
+        read_results(tmp_path / "mine.json")
+
+
+def test_the_results_that_ship_are_of_this_version_and_name_how_they_were_made():
+    protocol, results = OUTDOOR, shipped_results(OUTDOOR)
+    hashes = {protocol.trial_hash(trial) for trial in protocol.trials}
+    shipped = {row["entry"] for row in results.rows}
+    assert shipped <= set(protocol.entries) and shipped
+    assert {row["entry"] for row in results.rows if row["trial"] in hashes} == shipped
+    assert results.head["command"].startswith(f"mbf bench {protocol.name} --beside all") and results.head["commit"]
+
+
+def test_all_shipped_entries_read_and_need_no_code_of_others():
+    for protocol in (OUTDOOR, INDOOR):
+        for entry in protocol.entries.values():
+            again = entrant(protocol, entry.settings, entry.backend, name="again")
+            assert replace(again, name=entry.name) == entry
+
+
+def test_what_cannot_be_judged_is_refused_before_anything_is_driven(tmp_path):
+    for settings, options, expected in (
+        ({"planner": "nothing"}, {}, r"planners\[0\].type: .*unknown type"),
+        ({"planner": "cvp", "cvp.nonsense": "3"}, {"name": "mine"}, r"cvp.*nonsense"),
+        ({"planner": "cvp"}, {"backend": "voxels"}, "--backend: expected one of mesh, costmap"),
+        ({"planner": "cvp"}, {"name": "any_angle"}, "--name: expected a name of your own"),
+        ({"planner": "re:Match", "allow_module_types": "false"}, {}, "switched off"),
+    ):
+        with pytest.raises(ConfigError, match=expected):
+            entrant(OUTDOOR, settings, **options)
+    with pytest.raises(ConfigError, match=r"--beside: expected one of any_angle, .* got 'nobody'"):
+        OUTDOOR.entry("nobody")
+    with pytest.raises(ConfigError, match=r"--surveys: expected a file kootenai_1m.npz"):
+        outdoor([0], surveys=tmp_path)
+
+
+def test_a_plugin_that_changes_is_another_entry(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    file = tmp_path / "planner_under_test.py"
+    code = "from mbf_costmap_nav.planners.astar import AStarPlanner\nclass Mine(AStarPlanner):\n    '''Mine.'''\n"
+    keys = []
+    for text in (code, code, code + "# changed\n"):
+        file.write_text(text)
+        mine = entrant(INDOOR, {"planner": "planner_under_test:Mine"})
+        assert mine.name == "planner_under_test:Mine" and mine.backend == "costmap"
+        keys.append(task_key(INDOOR, INDOOR.trials[0], mine))
+    assert keys[0] == keys[1] != keys[2]
+
+
+def test_failures_have_classes():
+    good = {"success": False, "time_s": 1.0, "incidents": [], "collisions_while_moving": 0, "plans": 1, "outcome": "X"}
+    assert failure_of({"success": True}) == ""
+    assert failure_of({"success": False}) == "error"
+    assert failure_of(good) == "controller"
+    assert failure_of(good | {"outcome": "NO_PATH_FOUND"}) == failure_of(good | {"plans": 0}) == "planner"
+    assert failure_of(good | {"collisions_while_moving": 1}) == "contact"
+    assert failure_of(good | {"incidents": ["tipped_over"]}) == "physics"
+
+
+def test_a_lost_run_is_a_failure_with_its_reason_and_a_lost_judge_ends_the_evaluation():
+    trial, entry = INDOOR.trials[0], INDOOR.entry("astar_pursuit")
+    lost = lost_row(Task(trial, entry, INDOOR.judge), Lost("hung"))
+    assert (lost["success"], lost["failure"], lost["message"], lost["level"]) == (False, "error", "hung", "failed")
+    with pytest.raises(RuntimeError, match="the judge of level 0, seed 0: hung"):
+        lost_row(Task(trial, None, INDOOR.judge), Lost("hung"))
