@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "upstream_tests.md").read_text("utf-8")
 ALL = frozenset(range(1, 358))
 
-ONE = re.compile(r"(?<![A-Za-z0-9])[Ff](\d{3})(?!\d)")
+ONE = re.compile(r"(?<![A-Za-z0-9])[Ff](\d{3})(?![A-Za-z0-9])")
 RANGE = re.compile(r"[Ff](\d{3})(?:-|_to_)[Ff](\d{3})")
 
 

@@ -53,4 +53,4 @@ def test_the_server_that_is_named_for_a_suffix_reads_it_and_no_other_one_does(po
 
 
 def test_without_a_suffix_servers_come_by_their_names():
-    assert [cls.backend for cls in installed_servers(".nosuch")] == ["costmap", "mesh"]
+    assert [cls.backend for cls in installed_servers(".nosuch")] == ["costmap", "mesh", "tiles"]

@@ -13,7 +13,7 @@ from mbf_ros.messages.interfaces import json_text
 from tests.system.ros2.conftest import PEERS, WITHIN, clean_variables
 from tests.unit.bags.test_export import make_log
 
-pytestmark = pytest.mark.ros2
+pytestmark = [pytest.mark.ros2, pytest.mark.timeout(900)]
 
 
 def test_rclpy_reads_every_type_of_an_exported_bag_as_we_do(tmp_path, ros_folder):
