@@ -29,7 +29,7 @@ WAY_SPACING = 0.1  # m
 STOREY = 1.0  # m
 ROOM = 0.05  # m
 AT_EASE, SHORT = 0.1, 0.05  # m
-LEAVING = 0.3  # m around a robot that touches something
+LEAVING = 0.3  # m around a robot that touches something, or nearly does
 NEAREST_WITHIN = 2.0  # m
 
 
@@ -77,19 +77,24 @@ def find_pull_out(
 def _freedom(navigation_map: NavigationMap, start: Pose, room: float) -> Callable[[PlanarPose], bool]:
     """Return whether the robot, with room [m] around it, may stand at a pose in its own plane.
 
-    Where it touches something it is let out, to where it is no nearer to what it touches.
+    Where it touches something it is let out, to where it is no nearer to what it touches. Where something is only
+    within the room, it is let out through poses at which it touches nothing: the distance of its base from a wall does
+    not say whether its outline fits with another heading.
     """
     frame = Transform(start.position, start.orientation, start.frame_id, "begin")
-    check = navigation_map.pose_check(PlaceQuery(use_padded_footprint=True, safety_dist=room))
-    touches = check(start).state > CellState.INSCRIBED
-    least_gap = _gap(navigation_map, start) if touches else math.inf
+    with_room = navigation_map.pose_check(PlaceQuery(use_padded_footprint=True, safety_dist=room))
+    outline = navigation_map.pose_check(PlaceQuery(use_padded_footprint=True))
+    is_near = with_room(start).state > CellState.INSCRIBED
+    least_gap = _gap(navigation_map, start) if is_near else math.inf
 
     def is_free(pose: PlanarPose) -> bool:
         x, y, yaw = pose
         there = frame.apply_to_pose(Pose.planar(x, y, yaw, frame_id="begin"))
-        if check(there).state <= CellState.INSCRIBED:
+        if with_room(there).state <= CellState.INSCRIBED:
             return True
-        return touches and math.hypot(x, y) <= LEAVING and _gap(navigation_map, there) >= least_gap
+        if not is_near or math.hypot(x, y) > LEAVING or _gap(navigation_map, there) < least_gap:
+            return False
+        return room == 0.0 or outline(there).state <= CellState.INSCRIBED
 
     return is_free
 

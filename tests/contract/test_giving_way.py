@@ -18,6 +18,8 @@ from mbf_abstract.time.cancel import CancelToken
 from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.right_of_way import in_each_others_way, right_of_way
 from mbf_abstract.traffic.traffic import SharedChannel, Traffic
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.map.costmap_config import CostmapParameters, build_layered_costmap
 
 RADIUS = 0.2  # m, of the robot
 START = Pose.planar(4.5, 3.0)
@@ -154,6 +156,26 @@ def test_where_there_is_room_a_manoeuvre_keeps_off_the_walls(world):
         poses = [Pose.planar(4.5 + x, 3.0 + y, yaw) for step in steps for x, y, yaw in step.poses]
         assert all(check(pose).state <= CellState.INSCRIBED for pose in poses)
         assert poses[-1].y > 3.8
+
+
+def test_a_rectangular_robot_beside_a_wall_is_not_turned_where_it_does_not_fit():
+    """The outline is 0.6 m long, the corridor 0.48 m wide: the walls are nearer than the room that is asked for first.
+
+    A robot on a mesh is a disc, which fits with any heading.
+    """
+    x, y = np.meshgrid((np.arange(400) + 0.5) * 0.02, (np.arange(300) + 0.5) * 0.02)
+    in_bay = (x > 2.8) & (x < 4.4) & (y > 2.5) & (y < 4.8)
+    cells = np.where((np.abs(y - 3.0) >= 0.24) & ~in_bay, 254, 0).astype(np.uint8)
+    outline = [(0.3, 0.2), (0.3, -0.2), (-0.3, -0.2), (-0.3, 0.2)]
+    layers = ({"name": "walls", "type": "static"},)
+    parameters = CostmapParameters(resolution=0.02, footprint=outline, max_age=0.0, layers=layers)
+    costmap = build_layered_costmap(parameters, {}, static_map=Costmap(cells, 0.02))
+    costmap.update(START, 0.0)
+    steps = find_pull_out(costmap, START, way_in_plane(START, np.zeros((0, 3)), [], 4.0), 0.8, 5.0)
+    check = costmap.pose_check(PlaceQuery(use_padded_footprint=True))
+    poses = [Pose.planar(4.5 + x, 3.0 + y, yaw) for step in steps for x, y, yaw in step.poses]
+    assert all(check(pose).state <= CellState.INSCRIBED for pose in poses)
+    assert poses[-1].y > 3.8
 
 
 def test_distances_on_a_slope_are_those_along_the_ground():
