@@ -24,9 +24,9 @@ from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.maps.manoeuvres import PlanarPose, Step, find_manoeuvre
 from mbf_abstract.maps.navigation_map import NavigationMap
 from mbf_abstract.maps.queries import CellState, PlaceQuery
+from mbf_abstract.traffic.right_of_way import STOREY
 
 WAY_SPACING = 0.1  # m
-STOREY = 1.0  # m
 ROOM = 0.05  # m
 AT_EASE, SHORT = 0.1, 0.05  # m
 LEAVING = 0.3  # m around a robot that touches something, or nearly does

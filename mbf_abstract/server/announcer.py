@@ -57,12 +57,13 @@ class Announcer:
             position = runtime.robot.pose().position
         except RobotStateError:
             return
-        way, remaining = np.array([position]), 0.0
+        way, remaining, destination = np.array([position]), 0.0, None
         if self._tracker is not None:
             self._tracker.update(position)
             way = np.concatenate([way, self._tracker.ahead(LENGTH)])
             remaining = float(norm(way[1] - way[0])) + self._tracker.remaining
-        runtime.traffic.announce(Announcement("", now, way, round(remaining, DIGITS)))
+            destination = self._tracker.points[-1]
+        runtime.traffic.announce(Announcement("", now, way, round(remaining, DIGITS)), destination)
 
     def _take_path(self, now: float) -> None:
         """Keep up with the newest goal of ``exe_path``; without goals that drive, forget its path after a while."""

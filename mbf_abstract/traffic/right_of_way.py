@@ -19,6 +19,8 @@ from mbf_abstract.traffic.announcement import Announcement
 
 MEETING_LENGTH = 5.0
 """How far along its way [m] a robot is blocked by others: about as far as it sees them."""
+STOREY = 1.0
+"""Ways that are farther [m] than this above each other lead over different storeys."""
 
 
 def right_of_way(mine: Announcement, other: Announcement) -> bool:
@@ -38,10 +40,11 @@ def _rank(robot: Announcement) -> tuple[bool, int, float, str]:
 def in_each_others_way(mine: Announcement, other: Announcement, distance: float, length: float) -> bool:
     """Whether the ways of two robots over the next ``length`` [m] come nearer than ``distance`` [m]; symmetric.
 
-    Heights count: a robot on a bridge is in nobody's way below it.
+    Where one is more than ``STOREY`` above the other they are not, whatever the distance: a robot on a bridge is in
+    nobody's way below it.
     """
-    a, b = mine.points_ahead(length), other.points_ahead(length)
-    return bool(norm(a[:, None] - b).min() < distance)
+    offsets = mine.points_ahead(length)[:, None] - other.points_ahead(length)
+    return bool(((norm(offsets) < distance) & (np.abs(offsets[..., 2]) <= STOREY)).any())
 
 
 def face_each_other(mine: Announcement, other: Announcement, length: float) -> bool:

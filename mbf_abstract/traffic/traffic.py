@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry.arithmetic import norm
 from mbf_abstract.traffic.announcement import Announcement
 from mbf_abstract.traffic.right_of_way import face_each_other, in_each_others_way
 
@@ -19,6 +21,10 @@ MAX_AGE = 3.0
 """A robot that announces nothing new for this long [s] does not count: it is switched off, or out of reach."""
 PARTED_AFTER = 10.0
 """A meeting is over when nobody has been in the way for this long [s]: longer than it takes to drive past."""
+
+
+ANOTHER_GOAL = 1.0
+"""A path that ends farther than this [m] from where the last one ended leads to another goal."""
 
 
 class Channel(Protocol):
@@ -51,7 +57,7 @@ class SharedChannel:
 
 @dataclass
 class Meeting:
-    """What decides on the right of way of a robot while it meets others; it stays until they have parted.
+    """What decides on the right of way of a robot while it meets others, until they have parted or its goal changes.
 
     Attributes
     ----------
@@ -61,17 +67,28 @@ class Meeting:
         Last time [s] at which anybody was in the way.
     remaining : float
         Length [m] of the way to the goal when they met.
-    cannot_yield : bool
+    no_place_at : (3,) float64 or None
+        Where the robot has found no place to let others pass [m], if it has looked; it still cannot yield there.
     waits : int
-        As they are announced.
+        As it is announced.
     """
 
     distance: float
     length: float
     seen: float
     remaining: float
-    cannot_yield: bool = False
+    no_place_at: FloatArray | None = None
     waits: int = 0
+
+    @property
+    def cannot_yield(self) -> bool:
+        """As it is announced."""
+        return self.no_place_at is not None
+
+    def at(self, place: FloatArray) -> None:
+        """Forget that there is no place to yield where the robot, now at ``place`` (3,) [m], is somewhere else."""
+        if self.no_place_at is not None and float(norm(place - self.no_place_at)) > self.distance:
+            self.no_place_at = None
 
 
 class Traffic:
@@ -91,6 +108,7 @@ class Traffic:
         self._name = ""
         self._channel: Channel | None = None
         self._meeting: Meeting | None = None
+        self._destination: FloatArray | None = None
         self._seen: dict[str, tuple[float, float]] = {}
         """By robot: the stamp of its newest announcement, and when this robot has first seen it, on its own clock."""
         self._lock = threading.Lock()
@@ -99,12 +117,17 @@ class Traffic:
         """Announce under a name of its own, on a channel."""
         self._name, self._channel = name, channel
 
-    def announce(self, announcement: Announcement) -> None:
+    def announce(self, announcement: Announcement, destination: FloatArray | None = None) -> None:
         """Publish where the robot is, and look who else has announced something.
 
-        Its name, and all that only this class knows of it, are filled in.
+        Its name, and all that only this class knows of it, are filled in. ``destination`` (3,) [m] is where the whole
+        path ends, if there is one; another one ends a meeting, as what remained is that to another goal.
         """
+        if self._is_another(destination):
+            self._meeting = None
         now, meeting = announcement.stamp, self._meeting
+        if meeting is not None:
+            meeting.at(announcement.way[0])
         self._publish(announcement)
         self.others(now)  # their announcements age, also while no plugin asks for them
         if meeting is not None:
@@ -112,6 +135,13 @@ class Traffic:
                 meeting.seen = now
             elif now - meeting.seen > PARTED_AFTER:
                 self._meeting = None
+
+    def _is_another(self, destination: FloatArray | None) -> bool:
+        """Whether the robot has got another goal; a replanned path may end a little beside the last one."""
+        if destination is None:
+            return False
+        last, self._destination = self._destination, destination
+        return last is not None and float(norm(destination - last)) > ANOTHER_GOAL
 
     def _publish(self, announcement: Announcement) -> None:
         if self._channel is None:
@@ -134,14 +164,14 @@ class Traffic:
         """Announce for the present meeting whether there is a place to let the others pass."""
         meeting, own = self._meeting, self.own  # the announcing thread may end the meeting
         if meeting is not None and own is not None:
-            meeting.cannot_yield = cannot_yield
+            meeting.no_place_at = own.way[0] if cannot_yield else None
             self._publish(own)
 
     def wait_was_in_vain(self, rivals: Sequence[Announcement]) -> None:
         """Let the rivals go first from now on, because waiting for them does not help."""
         meeting, own = self._meeting, self.own
         if meeting is not None and own is not None:
-            meeting.cannot_yield = False
+            meeting.no_place_at = None
             meeting.waits = 1 + max((rival.waits for rival in rivals), default=0)
             self._publish(own)
 

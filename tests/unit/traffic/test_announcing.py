@@ -79,6 +79,20 @@ def test_a_new_path_is_announced_while_the_robot_drives_on(robot):
     assert announced.remaining == pytest.approx(5.0 - robot.robot.pose.x, abs=0.02)
 
 
+def test_another_goal_ends_a_meeting(robot):
+    """What is announced is what remained when they met, but of this goal."""
+    traffic = robot.server.runtime.traffic
+    drive(robot, 0.0, 20.0)
+    robot.announced()
+    traffic._channel.publish(Announcement("ben", 0.0, np.array([(4.0, 0.0, 0.0), (-4.0, 0.0, 0.0)]), 8.0))
+    assert traffic.meet(robot.clock.now(), 0.8, 5.0)
+    before = robot.announced().remaining
+    drive(robot, 0.0, 19.5)
+    assert robot.announced().remaining == before
+    drive(robot, 0.0, 5.0)
+    assert robot.announced().remaining < 5.0
+
+
 def test_the_path_is_kept_during_a_recovery_and_forgotten_by_an_idle_robot(robot):
     drive(robot, 0.0, 5.0)
     robot.announced()
@@ -133,3 +147,4 @@ def test_announcements_age_also_while_nobody_asks_for_them():
 def test_a_robot_on_a_bridge_is_not_in_the_way_of_one_below_it():
     assert in_each_others_way(state(0.0), state(0.0, z=0.2), 0.8, 5.0)
     assert not in_each_others_way(state(0.0), state(0.0, z=4.0), 0.8, 5.0)
+    assert not in_each_others_way(state(0.0), state(0.0, z=2.5), 5.0, 5.0)

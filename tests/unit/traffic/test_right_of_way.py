@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mbf_abstract.traffic.announcement import SPACING, Announcement
-from mbf_abstract.traffic.right_of_way import face_each_other, in_each_others_way, right_of_way
+from mbf_abstract.traffic.right_of_way import STOREY, face_each_other, in_each_others_way, right_of_way
 from mbf_abstract.traffic.traffic import MAX_AGE, PARTED_AFTER, SharedChannel, Traffic
 
 coordinates = st.floats(-20.0, 20.0, width=32)
@@ -68,8 +68,8 @@ def test_two_robots_of_one_name_are_refused():
         right_of_way(one, one)
 
 
-def naive_gap(a, b, length):
-    """Least distance of two ways by their corners, cut off and sampled finely."""
+def naive_gap(a, b, length, storey):
+    """Least distance of two ways by their corners, cut off and sampled finely, within a difference of height."""
 
     def points(way):
         cut, left = [way[0]], length
@@ -83,14 +83,15 @@ def naive_gap(a, b, length):
         return np.array(cut)
 
     mine, others = points(a.way), points(b.way)
-    return min(float(np.sqrt(((others - p) ** 2).sum(axis=1)).min()) for p in mine)
+    near = [others[np.abs(others[:, 2] - p[2]) <= storey] - p for p in mine]
+    return min(float(np.sqrt((offsets**2).sum(axis=1)).min(initial=math.inf)) for offsets in near)
 
 
 @given(announcements, announcements, st.floats(0.5, 6.0))
 def test_ways_are_in_each_others_way_where_they_come_near_and_that_is_mutual(a, b, length):
-    gap = naive_gap(a, b, length)
-    assert in_each_others_way(a, b, gap + 2.0 * SPACING, length)
-    assert gap <= 2.0 * SPACING or not in_each_others_way(a, b, gap - 2.0 * SPACING, length)
+    surely, perhaps = (naive_gap(a, b, length, STOREY + more) for more in (-2.0 * SPACING, 2.0 * SPACING))
+    assert math.isinf(surely) or in_each_others_way(a, b, surely + 2.0 * SPACING, length)
+    assert perhaps <= 2.0 * SPACING or not in_each_others_way(a, b, perhaps - 2.0 * SPACING, length)
     assert in_each_others_way(a, b, 1.0, length) is in_each_others_way(b, a, 1.0, length)
 
 
@@ -227,6 +228,23 @@ def test_the_rank_is_kept_until_they_have_parted_for_a_while_and_then_what_remai
     pair.announce((6.0, 7.0, 4.5), (-2.0, -3.0, 1.0))
     pair.announce((6.0, 7.0, 4.5), (-2.0, -3.0, 1.0))
     assert pair.first() == "ben"
+
+
+def test_one_that_could_not_yield_in_a_corridor_looks_anew_in_the_next_room(pair):
+    ben = pair.robots["ben"]
+    ben.set_cannot_yield(True)
+    pair.announce((0.0, 4.0, 4.0), (2.0 - 0.9 * DISTANCE, -3.0, 5.0))
+    assert pair.channel.latest()[1].cannot_yield
+    pair.announce((0.0, 4.0, 4.0), (2.0 - 1.1 * DISTANCE, -3.0, 5.0))
+    assert not pair.channel.latest()[1].cannot_yield
+
+
+@pytest.mark.parametrize(("end", "remaining"), [(4.4, 4.0), (40.0, 30.0)], ids=["replanned", "another goal"])
+def test_what_remained_is_announced_for_one_goal_only(pair, end, remaining):
+    for time, x in ((2.0, 4.0), (3.0, end)):
+        way = np.array([(0.0, 0.0, 0.0), (4.0, 0.0, 0.0)])
+        pair.robots["anna"].announce(Announcement("", time, way, 30.0), np.array([x, 0.0, 0.0]))
+    assert pair.channel.latest()[0].remaining == remaining
 
 
 def test_a_robot_that_has_arrived_announces_that_nothing_remains(pair):
