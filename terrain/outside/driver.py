@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from mbf_abstract.drive.commands import stands_still
@@ -19,7 +19,7 @@ from mbf_abstract.geometry import Command, Pose, normalize_angle
 from mbf_abstract.goals.goal_types import MoveBaseResult
 from mbf_abstract.outcomes import MoveBaseOutcome
 from mbf_abstract.session import NavigationSession
-from mbf_abstract.time.clock import WallClock
+from mbf_abstract.time.clock import Clock, WallClock
 from mbf_abstract.time.pace import Pace
 from terrain.session.arrival import arrival_tolerance
 from terrain.session.executives import GoalExecutive
@@ -34,7 +34,7 @@ TIME_TOLERANCE = 1e-9  # s
 
 
 class RobotLink(Protocol):
-    """What connects a simulated robot with whoever drives it."""
+    """What connects a simulated robot with whoever drives it; any method raises where the connection has failed."""
 
     def publish(self) -> None:
         """Publish time and the state of the robot."""
@@ -68,12 +68,16 @@ class OutsideOptions:
         (``controller_frequency`` of the scenario's configuration) and one step of the simulator. It is not slowed
         down to real time then.
     patience : float
-        After how long [s of real time] without a command to move the run ends, once there was one.
+        After how long [s of real time] without a command to move the run ends, once there was one; each goal begins
+        anew.
+    wall : Clock
+        Real time.
     """
 
     open_link: Callable[[NavigationSession], RobotLink]
     lockstep: bool = False
     patience: float = 60.0
+    wall: Clock = field(default_factory=WallClock)
 
 
 def outside_executive(session: Session, options: OutsideOptions) -> GoalExecutive:
@@ -92,14 +96,14 @@ class OutsideDriver:
         self._session, self._options, self._gate, self._lease = session, options, runtime.gate, lease
         self._tolerance = arrival_tolerance(session.scenario.limits, session.scenario.localization, runtime.parameters)
         self._longest = 1.0 / runtime.parameters.controller_frequency + session.rates.period
-        self._wall = WallClock()
+        self._wall = options.wall
         self._pace = Pace(self._wall)
         self._condition = session.clock.condition()
         self._goal: Pose | None = None
         self._result = NO_GOALS
         self._commanded = 0.0  # simulated time [s] of the last command
         self._standing_since: float | None = None  # simulated time [s]
-        self._moved: float | None = None  # real time [s] of the last command to move
+        self._moved: float | None = None  # real time [s] of the last command to move, or of the goal after it
         self._link = options.open_link(session)
         session.on_close(self._link.close)
         session.loop.on_tick.append(self._after_step)
@@ -108,6 +112,8 @@ class OutsideDriver:
         """Wait until the robot stands at a goal, or nobody drives it any more."""
         self._link.show_goal(goal)
         with self._condition:
+            if self._moved is not None:
+                self._moved = self._wall.now()
             self._goal, self._standing_since = goal, None
             while self._awaits():
                 self._condition.wait()

@@ -18,7 +18,8 @@ from mbf_ros.messages.geometry import InvalidValueError, MessageContext, pose_st
 from mbf_ros.messages.interfaces import Message
 from mbf_ros.robot_messages import POINTS, SCAN, STATE_TOPICS, TF, TF_STATIC, RobotMessages
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
-from mbf_ros.ros2.running import RosError, Spinner, require_ros_2, ros_2
+from mbf_ros.ros2.running import Spinner, require_ros_2, ros_2
+from mbf_ros.ros2.simulation.newest_command import NewestCommand
 
 NODE = "simulator"
 CLOCK, CMD_VEL, GOAL = "/clock", "cmd_vel", "~/goal"
@@ -57,9 +58,7 @@ class SimulatedRobot:
         self._session = session
         self._context = MessageContext(session.navigator.server.runtime.robot.global_frame, EPOCH)
         self._real_time = WallClock()
-        self._condition = self._real_time.condition()
-        self._command: Command | None = None
-        self._failure: BaseException | None = None
+        self._newest = NewestCommand(self._real_time)
         self._last: dict[str, Any] = {}
         with ExitStack() as closing:
             closing.enter_context(ros_2())
@@ -72,8 +71,7 @@ class SimulatedRobot:
 
     def publish(self) -> None:
         """Publish the state of the robot, then the time; raises RosError if a callback has failed."""
-        if self._failure is not None:
-            raise RosError(f"{type(self._failure).__name__}: {self._failure}") from self._failure
+        self._newest.check()
         for topic, message in self._state.changes():
             self._send(topic, message)
         self._send(CLOCK, {"clock": self._context.time(self._session.clock.now())})
@@ -89,16 +87,14 @@ class SimulatedRobot:
 
     def take(self) -> Command | None:
         """Return the newest command if one has come since the last call."""
-        with self._condition:
-            command, self._command = self._command, None
-            return command
+        return self._newest.take()
 
     def wait(self, seconds: float) -> bool:
-        """Wait for a command, at most ``seconds`` of real time; returns whether there is one to take."""
-        with self._condition:
-            if self._command is None:
-                self._condition.wait(seconds)
-            return self._command is not None
+        """Wait for a command, at most ``seconds`` of real time; returns whether there is one to take.
+
+        Raises RosError if a callback has failed.
+        """
+        return self._newest.wait(seconds)
 
     # ---------------------------------------------------------------------------------------------------------
     def _open(self, stamped_commands: bool, closing: ExitStack) -> None:
@@ -125,7 +121,7 @@ class SimulatedRobot:
         self._node.create_subscription(command, CMD_VEL, self._taking(stamped_commands), usual)
         self._state = RobotMessages(self._session.navigator.server, self._context, self._is_wanted)
         closing.callback(self._state.close)
-        spinner = Spinner(self._node, self._real_time, self._fail)
+        spinner = Spinner(self._node, self._real_time, self._newest.fail)
         closing.callback(spinner.close, TIME_TO_END)
 
     def _is_wanted(self, topic: str) -> bool:
@@ -143,14 +139,9 @@ class SimulatedRobot:
             except InvalidValueError as error:
                 self._node.get_logger().warning(f"{CMD_VEL}: {error}", throttle_duration_sec=WARN_PERIOD)
                 return
-            with self._condition:
-                self._command = command
-                self._condition.notify_all()
+            self._newest.put(command)
 
         return take
-
-    def _fail(self, error: BaseException) -> None:
-        self._failure = error
 
 
 def _name(topic: str) -> str:

@@ -5,6 +5,7 @@ import pytest
 from mbf_abstract.config.findings import ConfigError
 from mbf_abstract.geometry import Twist
 from mbf_abstract.outcomes import MoveBaseOutcome
+from mbf_abstract.time.clock import WallClock
 from terrain.outside.driver import OutsideOptions, outside_executive
 from terrain.provenance.rerun import rerun
 from terrain.scenarios.scenario import PlanarPose, load_scenario
@@ -14,10 +15,24 @@ GOAL = 4.0  # m
 AHEAD, STOP = Twist.planar(0.3), Twist()
 
 
+class SteppedTime(WallClock):
+    """Real time that passes by being waited for."""
+
+    def __init__(self):
+        self.time = 0.0
+
+    def now(self):
+        return self.time
+
+    def sleep(self, seconds):
+        self.time += max(seconds, 0.0)
+
+
 class Stack:
     """Who drives: ``decide`` makes a command of the robot's x, or None; in lockstep only when it is waited for."""
 
-    def __init__(self, session, decide, only_if_waited_for=False):
+    def __init__(self, session, wall, decide, only_if_waited_for=False):
+        self._wall = wall
         self._session, self._decide, self._only_if_waited_for = session, decide, only_if_waited_for
         self.closed, self.waited_for, self.repeated = False, False, 0
         self.goals, self.commanded = [], []
@@ -33,6 +48,8 @@ class Stack:
 
     def wait(self, seconds):
         self.waited_for = self._decide(self._session.loop.true_pose.x) is not None
+        if not self.waited_for:
+            self._wall.sleep(seconds)
         return self.waited_for
 
     def take(self):
@@ -58,14 +75,14 @@ def corridor():
 
 
 def driven(scenario, folder, decide, lockstep=False, patience=60.0):
-    """Run a scenario that a stack drives; returns the result and the stack."""
-    stacks = []
+    """Run a scenario that a stack drives, in real time that nobody waits for; returns the result and the stack."""
+    stacks, wall = [], SteppedTime()
 
     def connect(session):
-        stacks.append(Stack(session, decide, lockstep))
+        stacks.append(Stack(session, wall, decide, lockstep))
         return stacks[0]
 
-    options = OutsideOptions(connect, lockstep, patience)
+    options = OutsideOptions(connect, lockstep, patience, wall)
     result = run_scenario(
         scenario, RunOptions(folder, executive="test", outside=lambda one: outside_executive(one, options))
     )
@@ -97,6 +114,20 @@ def test_a_stack_that_falls_silent_in_lockstep_ends_the_run(corridor, tmp_path):
     assert result.verdict.outcome == MoveBaseOutcome.FAILURE
     assert "no command to move has come for 0.5 s, and the robot is 1.4" in result.verdict.message
     assert stack.repeated > 0
+
+
+def test_patience_begins_anew_with_each_goal(corridor, tmp_path):
+    ends = tuple(PlanarPose(x=x, y=9.7) for x in (2.5, 3.0))
+    scenario, looks = corridor.model_copy(update={"goals": ends}), []
+
+    def hesitant(x):
+        if x < 2.45:
+            return AHEAD
+        looks.append(x)  # 60 a second; it stands for 3 s at the first goal
+        return AHEAD if len(looks) > 60 * 4.5 and x < 2.95 else STOP
+
+    result, stack = driven(scenario, tmp_path, hesitant, patience=2.0)
+    assert result.success and [goal.x for goal in stack.goals] == [2.5, 3.0]
 
 
 def test_without_lockstep_a_robot_that_gets_no_more_commands_is_stopped_and_waits_until_the_time_limit(
