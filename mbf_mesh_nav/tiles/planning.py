@@ -56,7 +56,7 @@ class TiledPlan:
     least_cost : float
         No path on the map costs less [m]; inf without a path.
     tiles : tuple of (int, int)
-        Those that were searched.
+        Those that were searched for this path.
     gain : float
         Share by which the last widening of the corridor made the path cheaper; NaN if it was not widened.
     """
@@ -118,10 +118,10 @@ def place_on_tiles(
     place = tiled.find_place(there, surface_distance)
     if place is None:
         text = f"the {name} {position_text(there)} is not within {surface_distance:g} m of the surface"
-        return _failure(GetPathOutcome.OUT_OF_MAP, text)
+        return failed_plan(GetPathOutcome.OUT_OF_MAP, text)
     if place.blocked_by:
         outcome = GetPathOutcome.BLOCKED_START if name == "start" else GetPathOutcome.BLOCKED_GOAL
-        return _failure(outcome, f"the {name} {position_text(there)} is blocked: {place.blocked_by}")
+        return failed_plan(outcome, f"the {name} {position_text(there)} is blocked: {place.blocked_by}")
     return place
 
 
@@ -141,7 +141,8 @@ def plan_between(
     return _Search(tiled, first, last, tolerance, cancel_flag).run()
 
 
-def _failure(outcome: GetPathOutcome, message: str, tiles: tuple[TileKey, ...] = ()) -> TiledPlan:
+def failed_plan(outcome: GetPathOutcome, message: str, tiles: tuple[TileKey, ...] = ()) -> TiledPlan:
+    """A plan without a path."""
     return TiledPlan(outcome, message, NO_POINTS, NO_POINTS, np.inf, np.inf, tiles)
 
 
@@ -152,6 +153,16 @@ class _Corridor:
     is_open: BoolArray
     tiles: tuple[TileKey, ...]
     is_full: bool
+
+    def holds(self, other: _Corridor) -> bool:
+        """Whether all open portals of another one are open."""
+        return bool(self.is_open[other.is_open].all())
+
+
+def _cheaper(known: TiledPlan, found: TiledPlan) -> TiledPlan:
+    """The cheaper of two plans, with the greater of their bounds, which both hold, and the gain of the one found."""
+    plan = known if known.cost < found.cost else found
+    return replace(plan, least_cost=min(max(known.least_cost, found.least_cost), plan.cost), gain=found.gain)
 
 
 def _through(portals: PortalGraph, ends: list[tuple[TileKey, Float32Array]]) -> Float32Array:
@@ -177,10 +188,11 @@ class _Search:
         """Widen the corridor until the cost is proven, steady, or nothing more can be opened."""
         ranks, margin = self._estimates, FIRST_MARGIN
         corridor, narrower = self._opened(ranks, self._threshold(margin)), np.inf
+        plan = replace(failed_plan(GetPathOutcome.NO_PATH_FOUND, ""), least_cost=0.0)
         while True:
-            plan = self._exact(corridor, narrower)
+            plan = _cheaper(plan, self._exact(corridor, narrower))
             if self._cancel_flag[0] != 0:
-                return _failure(GetPathOutcome.CANCELED, "")
+                return failed_plan(GetPathOutcome.CANCELED, "")
             proven = plan.cost <= (1.0 + self._tolerance) * plan.least_cost
             is_last = corridor.is_full or np.isinf(margin)
             if proven or is_last or plan.gain <= STEADY:
@@ -191,8 +203,9 @@ class _Search:
             if np.isfinite(plan.cost) and not self._opened(first, 0.0).is_full:
                 ranks = first
             wider, margin = self._widened(corridor, ranks, margin)
-            # The same corridor again, with no memory for a wider one, is no comparison.
-            narrower = np.inf if np.array_equal(wider.is_open, corridor.is_open) else plan.cost
+            # The same corridor again, or one without portals of this one for want of memory, is no comparison.
+            compares = wider.holds(corridor) and not np.array_equal(wider.is_open, corridor.is_open)
+            narrower = plan.cost if compares else np.inf
             corridor = wider
 
     def _widened(self, corridor: _Corridor, ranks: Float32Array, margin: float) -> tuple[_Corridor, float]:
@@ -217,7 +230,7 @@ class _Search:
         if not np.isfinite(plan.cost):
             ends = f"from {position_text(self._start.point)} to {position_text(self._goal.point)}"
             text = f"no free path {ends}" if proven else f"no free path {ends} on {text}; {held}"
-            return _failure(GetPathOutcome.NO_PATH_FOUND, text, plan.tiles)
+            return failed_plan(GetPathOutcome.NO_PATH_FOUND, text, plan.tiles)
         if proven:
             text += f"; proven to be at most {100.0 * plan.gap:.1f} % above the cheapest path of the map"
         elif plan.gain <= STEADY:
@@ -267,7 +280,7 @@ class _Search:
         closed = float(self._bounds[~corridor.is_open].min(initial=np.inf))
         found = self._cheapest(graph, tiles)
         if found is None:
-            return replace(_failure(GetPathOutcome.NO_PATH_FOUND, "", tiles), least_cost=closed)
+            return replace(failed_plan(GetPathOutcome.NO_PATH_FOUND, "", tiles), least_cost=closed)
         chain, cost = found
         inner, inner_normals = tiled.pool.vertices[chain], tiled.pool.normals[chain].astype(np.float64)
         positions = np.concatenate([self._start.point[None], inner, self._goal.point[None]])

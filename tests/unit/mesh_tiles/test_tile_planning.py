@@ -147,6 +147,28 @@ def test_a_map_without_memory_for_a_wider_corridor_compares_nothing(tiled_hills,
         assert ("narrower" in plan.message) == (plan.gain <= planning.STEADY and plan.gap > 0.0), plan.message
 
 
+def test_a_path_is_not_lost_to_a_wider_corridor_that_has_to_leave_out_its_tiles(tiled_hills, whole_hills, monkeypatch):
+    found, exact = [], planning._Search._exact
+
+    def only_the_ends(search, corridor, ranks, margin):
+        ends = tuple(sorted({place.key for place in search._ends}))
+        return planning._Corridor(np.zeros_like(corridor.is_open), ends, True), margin
+
+    monkeypatch.setattr(planning._Search, "_exact", lambda *args: found.append(exact(*args)) or found[-1])
+    monkeypatch.setattr(planning._Search, "_widened", only_the_ends)
+    tiled, lost = TiledMap(tiled_hills), 0
+    for start, goal in whole_hills.free_places(20, 4).reshape(-1, 2, 3):
+        found.clear()
+        plan = plan_on_tiles(tiled, start, goal, tolerance=0.0)
+        if len(found) == 2 and np.isfinite(found[0].cost) and found[1].cost > found[0].cost:
+            assert plan.outcome == GetPathOutcome.SUCCESS and plan.cost == found[0].cost
+            assert np.array_equal(plan.positions, found[0].positions) and plan.tiles == found[0].tiles
+            assert plan.least_cost == max(one.least_cost for one in found)
+            assert "neither proven nor compared with a wider corridor; the memory holds" in plan.message
+            lost += 1
+    assert lost > 2
+
+
 def test_bounds_of_portals_are_those_of_networkx(tiled_hills):
     portals = TiledMap(tiled_hills).portals
     key = (2, 1)
