@@ -9,6 +9,7 @@ import numpy as np
 from mbf_mesh_nav.files.elevation_files import ElevationReader, elevation_readers
 from mbf_mesh_nav.files.mesh_io import read_mesh
 from mbf_mesh_nav.map.map_builder import MeshMapParameters
+from mbf_mesh_nav.mesh.densify import densify
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.mesh.repair import checked_mesh
 from mbf_mesh_nav.tiles.sources import HeightSource, MeshSource, TileSource, open_heights
@@ -21,7 +22,7 @@ def open_source(path: Path, parameters: MeshMapParameters, spacing: float = 0.0)
     """Open a file to cut tiles from.
 
     Heights as ``.npy`` are read window by window and never as a whole. Elevation models and meshes are in memory while
-    their tiles are built; meshes are checked and repaired as ``mesh_map`` says.
+    their tiles are built; meshes are checked, repaired and densified as ``mesh_map`` says.
 
     Parameters
     ----------
@@ -31,12 +32,15 @@ def open_source(path: Path, parameters: MeshMapParameters, spacing: float = 0.0)
     Raises
     ------
     MeshError
-        The file cannot be used, or a spacing is missing or not wanted.
+        The file cannot be used, a spacing is missing or not wanted, or heights are to be densified.
     """
     ending = path.suffix.lower()
     if (ending == ".npy") != (spacing > 0.0):
         wanted = "needs a spacing" if ending == ".npy" else f"states its own spacing, got {spacing:g} m"
         raise MeshError(str(path), [wanted])
+    if (ending == ".npy" or ending in elevation_readers()) and parameters.densify > 0.0:
+        text = f"heights keep their grid in tiles: expected a mesh_map with densify 0, got {parameters.densify:g} m"
+        raise MeshError(str(path), [text])
     if ending == ".npy":
         return HeightSource(open_heights(path, MAX_HEIGHTS), spacing, spacing)
     if ending in (readers := elevation_readers()):
@@ -53,4 +57,6 @@ def open_source(path: Path, parameters: MeshMapParameters, spacing: float = 0.0)
     vertices, faces = read_mesh(path, part, parameters.max_faces, up_axis=up_axis, unit=unit)
     repair = parameters.repairs_for(str(path))
     mesh, _ = checked_mesh(vertices, faces, repair, str(path), parameters.join_distance)
+    if parameters.densify > 0.0:
+        mesh = densify(mesh, parameters.densify, file=str(path))
     return MeshSource(mesh.vertices, mesh.faces)

@@ -10,8 +10,12 @@ from typer.testing import CliRunner
 from mbf_abstract.cli import make_app
 from mbf_mesh_nav.building.map_build import write_map
 from mbf_mesh_nav.files.map_header import MapHeader
+from mbf_mesh_nav.mesh.densify import densify
 from mbf_mesh_nav.mesh.heightfield_mesh import heightfield_mesh
+from mbf_mesh_nav.mesh.repair import checked_mesh
 from mbf_mesh_nav.tiles.index import read_index
+
+DENSE = "backend: mesh\nmesh_map:\n  layers: [{name: slopes, type: steepness}]\n  densify: 0.2\n"
 
 
 def run(*arguments):
@@ -50,6 +54,17 @@ def test_the_layers_are_those_of_a_configuration(heights, tmp_path):
     assert index.layers == ("slopes",) and index.profile()[1].edge_cost_factor == 2.0
 
 
+def test_a_mesh_is_densified_as_the_configuration_says(tmp_path):
+    vertices = np.array([(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 2.0, 0.0), (0.0, 2.0, 0.0)])
+    faces = np.array([(0, 1, 2), (0, 2, 3)], dtype=np.int32)
+    write_map(tmp_path / "plate.ply", vertices, faces, MapHeader((0, 0, 0), 0, 0))
+    (tmp_path / "dense.yaml").write_text(DENSE, "utf-8")
+    done = run(tmp_path / "plate.ply", "--out", tmp_path / "map", "--config", tmp_path / "dense.yaml", "--json")
+    assert done.exit_code == 0, done.output
+    expected = densify(checked_mesh(vertices, faces)[0], 0.2)
+    assert json.loads(done.stdout)["vertices"] == len(expected.vertices) > 4
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
@@ -58,10 +73,14 @@ def test_the_layers_are_those_of_a_configuration(heights, tmp_path):
         (("nothing.tif",), "nothing.tif: there is no such file"),
         (("map.xyz",), "map.xyz: unknown ending '.xyz'"),
         (("heights.npy", "--spacing", "0.5", "--tile-size", "1", "--portal-length", "2"), "a portal length of at most"),
+        (("heights.npy", "--spacing", "0.5", "--config", "dense.yaml"), "densify 0, got 0.2 m"),
+        (("model.tif", "--config", "dense.yaml"), "densify 0, got 0.2 m"),
     ],
 )
 def test_a_mistake_is_one_error(heights, tmp_path, arguments, text):
     source = heights if arguments[0] == "heights.npy" else tmp_path / arguments[0]
-    done = run(source, *arguments[1:], "--out", tmp_path / "map")
+    (tmp_path / "dense.yaml").write_text(DENSE, "utf-8")
+    others = [tmp_path / one if one.endswith(".yaml") else one for one in arguments[1:]]
+    done = run(source, *others, "--out", tmp_path / "map")
     assert done.exit_code == 2 and text in done.output
     assert "Traceback" not in done.output
