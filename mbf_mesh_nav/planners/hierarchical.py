@@ -8,6 +8,7 @@ is what the map's cost profile calls so. Paths follow edges: see ``mesh.dijkstra
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -27,7 +28,14 @@ from mbf_mesh_nav.mesh.topology import group_of_each
 from mbf_mesh_nav.search.leg_search import Leg
 from mbf_mesh_nav.search.surface_planner import named_poses, path_of_legs
 from mbf_mesh_nav.tiles.places import TilePlace
-from mbf_mesh_nav.tiles.planning import SURFACE_DISTANCE, TOLERANCE, TiledPlan, place_on_tiles, plan_between
+from mbf_mesh_nav.tiles.planning import (
+    SURFACE_DISTANCE,
+    TOLERANCE,
+    TiledPlan,
+    failed_plan,
+    place_on_tiles,
+    plan_between,
+)
 from mbf_mesh_nav.tiles.serving.navigation_map import SEARCHED, TiledNavigationMap
 
 AT_VERTEX = 1e-6
@@ -86,7 +94,7 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         near_goal = problem is not None and len(plans) == len(request.via) and request.dist_tolerance > 0.0
         if near_goal and not request.cancel_token.cancelled:
             near = self._near_goal(places[len(plans)], request.goal, request.dist_tolerance, flag)
-            plans, problem = ([*plans, near], None) if near is not None else (plans, problem)
+            plans, problem = ([*plans, near], None) if near is not None else (plans, self._limited(problem, request))
 
         # 3. One path of all legs, ending with the requested pose.
         if request.cancel_token.cancelled:
@@ -100,11 +108,18 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
             notes.append(f"ends {path[-1].distance_to(request.goal):.2f} m from the goal")
         return PlanResult(GetPathOutcome.SUCCESS, "; ".join(notes), path, sum(leg.cost for leg in legs))
 
+    @property
+    def _searched(self) -> float:
+        """How far [m] from a goal a place with a path is looked for at most."""
+        return SEARCHED * self._tiled.index.spacing
+
     def _locate(self, request: PlanRequest) -> tuple[list[TilePlace], PlanResult | None]:
         """Places of start, via points and goal, in order, up to the first that has a problem; the problem."""
         places: list[TilePlace] = []
         for name, pose in named_poses(request):
-            with self._map.searching:
+            with self._map.turn_to_search(request.cancel_token.flag) as has_turn:
+                if not has_turn:
+                    return places, PlanResult(GetPathOutcome.CANCELED, request.cancel_token.reason)
                 place = place_on_tiles(self._tiled, name, pose.position, self.parameters.max_surface_distance)
             if isinstance(place, TiledPlan):
                 return places, PlanResult(place.outcome, self._explained(place, name, pose))
@@ -115,8 +130,8 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         """The message of a pose that is blocked or not on the surface, with its layers or the heights there."""
         if problem.outcome == GetPathOutcome.OUT_OF_MAP:
             return f"{problem.message}; {heights_text(self._map.ground_heights(pose.x, pose.y))}"
-        there = self._map.around(pose.x, pose.y, self.parameters.max_surface_distance)
         reach, limit = self.parameters.max_surface_distance, self._tiled.profile.cost_limit
+        there = self._map.around(pose.x, pose.y, min(reach, self._map.reach))
         point = None if there is None else on_surface(there.topology, there.locator, pose.position, reach)
         if there is None or point is None:
             return problem.message
@@ -124,15 +139,24 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         return f"the {name} {position_text(pose.position)} is blocked: {reason}"
 
     def _plan(self, first: TilePlace, last: TilePlace, flag: FlagArray) -> TiledPlan:
-        with self._map.searching:
+        with self._map.turn_to_search(flag) as has_turn:
+            if not has_turn:
+                return failed_plan(GetPathOutcome.CANCELED, "")
             return plan_between(self._tiled, first, last, tolerance=self.parameters.cost_tolerance, cancel_flag=flag)
+
+    def _limited(self, problem: PlanResult | None, request: PlanRequest) -> PlanResult | None:
+        """A problem for which no place near the goal helps, with the limit of the tolerance if that was the cause."""
+        if problem is None or request.dist_tolerance <= self._searched:
+            return problem
+        limit = f"a goal's tolerance counts up to {self._searched:.4g} m on this map of tiles"
+        return replace(problem, message=f"{problem.message}; {limit}")
 
     def _near_goal(self, start: TilePlace, goal: Pose, tolerance: float, flag: FlagArray) -> TiledPlan | None:
         """Plan to the vertex with a path that is nearest to the goal, if one lies within the tolerance [m].
 
         It is looked for at most ``SEARCHED`` distances between vertices away.
         """
-        within = min(tolerance, SEARCHED * self._tiled.index.spacing)
+        within = min(tolerance, self._searched)
         there = self._map.around(goal.x, goal.y, within)
         if there is None:
             return None
@@ -145,8 +169,8 @@ class HierarchicalPlanner(MapPlugin, AbstractPlanner):
         for vertex in near[np.argsort(offsets[near], kind="stable")].tolist():
             if group[vertex] in without_path:
                 continue
-            with self._map.searching:
-                place = self._tiled.find_place(there.vertices[vertex], AT_VERTEX)
+            with self._map.turn_to_search(flag) as has_turn:
+                place = self._tiled.find_place(there.vertices[vertex], AT_VERTEX) if has_turn else None
             plan = self._plan(start, place, flag) if place is not None else None
             if plan is not None and plan.outcome == GetPathOutcome.SUCCESS:
                 return plan

@@ -115,10 +115,15 @@ class TileIndex(BaseModel):
         high = [max(one.box[axis] for one in self.tiles) for axis in range(3, 6)]
         return low[0], low[1], low[2], high[0], high[1], high[2]
 
-    @property
+    @cached_property
     def spacing(self) -> float:
-        """About how far [m] vertices lie from each other in the densest tile."""
-        return self.tile_size / math.sqrt(max(one.core_vertices for one in self.tiles))
+        """About how far [m] vertices lie from each other in the tile with the most of them.
+
+        They are taken to lie on the largest side of the box around them; that is the ground, but for a lone wall.
+        """
+        fullest = max(self.tiles, key=lambda one: one.core_vertices)
+        x, y, z = (fullest.box[axis + 3] - fullest.box[axis] for axis in range(3))
+        return math.sqrt(max(x * y, y * z, z * x) / fullest.core_vertices)
 
     @cached_property
     def _boxes(self) -> Any:

@@ -107,6 +107,8 @@ class TiledMap:
     def change_layer(self, key: TileKey, layer: str, costs: CostArray, lethal: LethalArray) -> None:
         """Put new values (c,) of a layer on a tile's core, on disk and in memory, and what follows for its portals.
 
+        A map that a server has opened changes by ``TiledNavigationMap.change_layer`` instead.
+
         Vertices that the tile shares with others keep the costs that those have for them until they change, too. The
         next build in the folder gives the tile the values of the source again.
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from mbf_abstract.maps.view import GridView
 from mbf_mesh_nav.arrays import Float32Array
-from mbf_mesh_nav.tiles.tile import read_tile_arrays, tile_file
-from mbf_mesh_nav.tiles.tiled_map import TiledMap
+from mbf_mesh_nav.tiles.tiled_map import TiledMap, sound_tile
 
 MOST_PIXELS = 1000
 """Along the longer side."""
@@ -25,20 +24,21 @@ def overview(tiled: TiledMap, row: int) -> GridView:
     Raises
     ------
     MeshError
-        A tile is damaged.
+        A tile is damaged or of another map.
     """
     left, bottom, _, right, top, _ = tiled.index.box
     side = max(LEAST_SPACINGS * tiled.index.spacing, max(right - left, top - bottom) / MOST_PIXELS)
     columns, rows = (math.floor(length / side) + 1 for length in (right - left, top - bottom))
     costs: Float32Array = np.full(columns * rows, -np.inf, dtype=np.float32)
-    for key, entry in tiled.index.entries.items():
-        arrays = read_tile_arrays(tile_file(tiled.folder, key), ("vertices", "costs", "lethal"))
-        core, lethal = arrays["vertices"][: entry.core_vertices], arrays["lethal"][row]
+    for key in tiled.index.entries:
+        tile = sound_tile(tiled.folder, tiled.index, key)
+        core = tile.vertices[: tile.core_vertices]
         column, line = (
             np.floor((core[:, axis] - low) / side).astype(np.int64) for axis, low in ((0, left), (1, bottom))
         )
-        values = np.where(lethal, np.float32(np.inf), arrays["costs"][row])
+        values = np.where(tile.lethal[row], np.float32(np.inf), tile.costs[row])
         np.maximum.at(costs, line * columns + column, values)
     costs[np.isneginf(costs)] = np.nan
+    costs.flags.writeable = False
     extent = (left, left + columns * side, bottom, bottom + rows * side)
     return GridView(costs.reshape(rows, columns), extent)

@@ -22,11 +22,11 @@ from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugins import PluginContext, PluginKind
 from mbf_abstract.server.map_server import MapServer
 from mbf_abstract.server.plugin_host import ServerError
+from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.mesh_report import MeshError
 from mbf_mesh_nav.plugins import MeshPlugin
 from mbf_mesh_nav.tiles.index import is_tile_folder, read_index
 from mbf_mesh_nav.tiles.serving.navigation_map import TiledNavigationMap
-from mbf_mesh_nav.tiles.serving.overview import overview
 from mbf_mesh_nav.tiles.tiled_map import DEFAULT_MEMORY, TiledMap
 
 BARE_TILES = """\
@@ -53,6 +53,14 @@ class TiledMapParameters(ParameterModel):
     )
     inscribed_radius: float = parameter(
         0.0, "Radius of the robot's inner circle; 0 = that of the map's layers.", unit="m", ge=0.0
+    )
+    max_turning_slope: float = parameter(
+        MeshMap.max_turning_slope,
+        "Steeper ground is not turned on in a recovery.",
+        unit="rad",
+        gt=0.0,
+        le=1.5,
+        dynamic=False,
     )
 
 
@@ -84,7 +92,7 @@ class TileServer(MapServer):
         if (frame := config.parameters.global_frame) != tiled.index.frame_id:
             text = f"is in the frame '{tiled.index.frame_id}', the global_frame of the configuration is '{frame}'"
             raise MeshError(str(folder), [text])
-        tiled_map = TiledNavigationMap(tiled, parameters.inscribed_radius)
+        tiled_map = TiledNavigationMap(tiled, parameters.inscribed_radius, parameters.max_turning_slope)
         yield ServedMap(tiled_map, self.runtime, "tiled_map", parameters, UPDATE_FREQUENCY)
 
     def footprint_changes(self, footprint: str | Sequence[Sequence[float]] | float) -> Mapping[str, Any]:
@@ -114,9 +122,8 @@ class TileServer(MapServer):
         return tuple(sorted(tiled.index.layers, key=lambda name: name != shown))
 
     def map_view(self, name: str = "") -> GridView:
-        """The costs of a layer from above, of the cost profile's layer without a name; reads all tiles."""
-        tiled = self.tiled_map.tiled
-        return overview(tiled, tiled.index.layers.index(name or self.map_views[0]))
+        """The costs of a layer from above, of the cost profile's layer without a name; made once, of all tiles."""
+        return self.tiled_map.view(name or self.map_views[0])
 
     @classmethod
     def config_for_map(cls, file: Path, unknown_is_free: bool = True) -> str | None:

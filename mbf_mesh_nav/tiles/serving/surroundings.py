@@ -5,6 +5,7 @@ It ends where it is cut off. Whoever asks it a question asks for so much that th
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from mbf_mesh_nav.map.mesh_map import MeshMap
 from mbf_mesh_nav.mesh.checked_mesh import CheckedMesh
 from mbf_mesh_nav.mesh.topology import build_topology
 from mbf_mesh_nav.tiles.index import Box
-from mbf_mesh_nav.tiles.tile import Tile
+from mbf_mesh_nav.tiles.tile import Tile, TileKey
 from mbf_mesh_nav.tiles.tiled_map import TiledMap
 
 
@@ -29,10 +30,21 @@ class StoredLayer(MeshLayer):
         return self._costs, self._lethal
 
 
-def mesh_within(tiled: TiledMap, low: tuple[float, float], high: tuple[float, float]) -> MeshMap | None:
-    """The faces of a map that have a corner in a rectangle, from ``low`` to ``high`` (x, y) [m]; None without any.
+def mesh_within(
+    tiled: TiledMap, low: tuple[float, float], high: tuple[float, float], read: Callable[[TileKey], Tile]
+) -> MeshMap | None:
+    """The faces of a map whose bounding boxes in plan view touch a rectangle, as a map; None without any.
 
     Where tiles have different values for a vertex that they share, it has the worse ones.
+
+    Parameters
+    ----------
+    tiled : TiledMap
+        Its index and profile count; what it has loaded is not touched, so any thread may ask.
+    low, high : (x, y) [m]
+        Corners of the rectangle.
+    read : callable
+        Gives a sound tile.
 
     Raises
     ------
@@ -41,7 +53,7 @@ def mesh_within(tiled: TiledMap, low: tuple[float, float], high: tuple[float, fl
     """
     _, _, bottom, _, _, top = tiled.index.box
     box: Box = (*low, bottom, *high, top)
-    parts = [part for key in tiled.index.tiles_in(box) if (part := _part_of(tiled.tile(key)[0], low, high)) is not None]
+    parts = [part for key in tiled.index.tiles_in(box) if (part := _part_of(read(key), low, high)) is not None]
     if not parts:
         return None
     # 1. One vertex for each number of the whole map.
@@ -73,11 +85,17 @@ class _Part:
 
 
 def _part_of(tile: Tile, low: tuple[float, float], high: tuple[float, float]) -> _Part | None:
-    """The core faces of a tile with a corner in a rectangle; None without any."""
-    x, y = tile.vertices[: tile.core_vertices, 0], tile.vertices[: tile.core_vertices, 1]
-    inside = (x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])
+    """The core faces of a tile whose bounding boxes in plan view touch a rectangle; None without any.
+
+    A large face may lie over the rectangle with all of its corners outside.
+    """
     faces = tile.faces[: int(tile.core_faces[0])]
-    used, corners = np.unique(faces[inside[faces].any(axis=1)], return_inverse=True)
+    touching = np.ones(len(faces), dtype=np.bool_)
+    for axis in (0, 1):
+        along = tile.vertices[: tile.core_vertices, axis]
+        for beyond in (along < low[axis], along > high[axis]):
+            touching &= ~(beyond[faces[:, 0]] & beyond[faces[:, 1]] & beyond[faces[:, 2]])
+    used, corners = np.unique(faces[touching], return_inverse=True)
     if not len(used):
         return None
     return _Part(

@@ -26,10 +26,10 @@ from mbf_mesh_nav.planners.hierarchical import HierarchicalPlanner
 from mbf_mesh_nav.plugins import MeshContext
 from mbf_mesh_nav.tiles.build import build_tiles
 from mbf_mesh_nav.tiles.serving import surroundings
-from mbf_mesh_nav.tiles.serving.navigation_map import KEPT, TiledNavigationMap
+from mbf_mesh_nav.tiles.serving.navigation_map import KEPT_VERTICES, TiledNavigationMap
 from mbf_mesh_nav.tiles.sources import HeightSource
 from mbf_mesh_nav.tiles.tile import read_tile, tile_file
-from mbf_mesh_nav.tiles.tiled_map import TiledMap
+from mbf_mesh_nav.tiles.tiled_map import TiledMap, sound_tile
 
 
 @pytest.fixture
@@ -172,7 +172,7 @@ def test_a_path_over_many_tiles_is_checked_as_on_the_whole_mesh_and_few_surround
     ours, exact = (check_path(one.pose_check(PlaceQuery()), path) for one in (tiled, whole_hills.map))
     assert (ours.last_checked, ours.state) == (exact.last_checked, exact.state)
     assert ours.cost == pytest.approx(exact.cost, rel=1e-5)
-    assert len(tiled._kept) <= KEPT
+    assert 0 < tiled._squares.kept_size <= KEPT_VERTICES
 
 
 def test_surroundings_that_are_near_each_other_are_cut_out_once(tiled, monkeypatch):
@@ -256,13 +256,17 @@ def test_a_tile_that_is_damaged_while_the_server_runs_is_a_map_error(tiled_hills
     assert result.outcome == GetPathOutcome.MAP_ERROR and f"tile_{key[0]}_{key[1]}.npz" in result.message
 
 
+def cut_out(tiled, low, high):
+    return surroundings.mesh_within(tiled, low, high, lambda key: sound_tile(tiled.folder, tiled.index, key))
+
+
 def test_where_tiles_differ_about_a_shared_vertex_it_has_the_worse_value(tiled_hills, tmp_path):
     folder = shutil.copytree(tiled_hills, tmp_path / "map")
     tiled = TiledMap(folder)
     tile = read_tile(tile_file(folder, (1, 1)))
     everywhere = np.ones(tile.core_vertices, dtype=np.bool_)
     tiled.change_layer((1, 1), "safe", np.full(len(everywhere), np.inf, dtype=np.float32), everywhere)
-    there = surroundings.mesh_within(tiled, (6.0, 6.0), (18.0, 18.0))
+    there = cut_out(tiled, (6.0, 6.0), (18.0, 18.0))
     shared = {tuple(position) for position in tile.vertices[tile.shared]}
     is_shared = np.array([tuple(position) in shared for position in there.vertices])
     assert is_shared.any() and there.snapshot().lethal[is_shared].all()
@@ -270,10 +274,10 @@ def test_where_tiles_differ_about_a_shared_vertex_it_has_the_worse_value(tiled_h
 
 def test_surroundings_are_the_same_piece_of_the_whole_mesh(tiled_hills, whole_hills):
     tiled = TiledMap(tiled_hills)
-    there, whole = surroundings.mesh_within(tiled, (10.0, 9.0), (26.0, 31.0)), whole_hills.map
+    there, whole = cut_out(tiled, (10.0, 9.0), (26.0, 31.0)), whole_hills.map
     low, high = np.array([10.0, 9.0]), np.array([26.0, 31.0])
-    inside = ((whole.vertices[:, :2] >= low) & (whole.vertices[:, :2] <= high)).all(axis=1)
-    chosen = inside[whole.faces].any(axis=1)
+    corners = whole.vertices[whole.faces][:, :, :2]
+    chosen = ((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)
     assert len(there.faces) == chosen.sum()
     ours = {frozenset(map(tuple, there.vertices[face].tolist())) for face in there.faces}
     assert ours == {frozenset(map(tuple, whole.vertices[face].tolist())) for face in whole.faces[chosen]}
@@ -283,7 +287,7 @@ def test_surroundings_are_the_same_piece_of_the_whole_mesh(tiled_hills, whole_hi
         assert np.array_equal(layer.lethal, whole.layers[name].lethal[order]), name
         assert np.allclose(layer.costs, whole.layers[name].costs[order], rtol=1e-6), name
     assert there.snapshot().edge_cost_factor == 1.5
-    assert surroundings.mesh_within(tiled, (100.0, 0.0), (120.0, 9.0)) is None
+    assert cut_out(tiled, (100.0, 0.0), (120.0, 9.0)) is None
 
 
 def test_another_terrain_with_walls_gives_the_same_outcomes(tmp_path):
