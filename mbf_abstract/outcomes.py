@@ -85,6 +85,7 @@ class RefinePathOutcome(IntEnum):
     FAILURE = 200
     CANCELED = 201
     DEPLETED = 202
+    INVALID_PLUGIN = 203
     MAP_ERROR = 210
     INTERNAL_ERROR = 211
     STOPPED = 212

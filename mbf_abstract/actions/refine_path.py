@@ -24,7 +24,7 @@ class RefinePathAction(PluginAction[RefinePathGoal, RefinePathResult, NoFeedback
     kind = PluginKind.REFINER
     canceled_outcome = RefinePathOutcome.CANCELED
     patience_outcome = RefinePathOutcome.STOPPED
-    invalid_plugin_outcome = RefinePathOutcome.FAILURE
+    invalid_plugin_outcome = RefinePathOutcome.INVALID_PLUGIN
     internal_error_outcome = RefinePathOutcome.INTERNAL_ERROR
 
     @property

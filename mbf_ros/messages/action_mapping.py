@@ -16,11 +16,14 @@ R = TypeVar("R", bound=ActionResult)
 
 
 class RefusedGoal(MessageError):
-    """A goal of the right type that cannot be meant: ``outcome`` is INVALID_GOAL, INVALID_PATH or the like."""
+    """A goal of the right type that cannot be meant: ``outcome`` is INVALID_GOAL, INVALID_PATH or the like.
 
-    def __init__(self, outcome: int, message: str) -> None:
+    ``fields`` are fields of its result that say more than the outcome, such as an error code of Nav2.
+    """
+
+    def __init__(self, outcome: int, message: str, **fields: int) -> None:
         super().__init__(message)
-        self.outcome = int(outcome)
+        self.outcome, self.fields = int(outcome), fields
 
 
 @dataclass(frozen=True)
@@ -57,21 +60,25 @@ class ActionMapping(Generic[G, R]):
         """
         return self.goal_of(completed(f"{self.type}_Goal", values, self.type), context)
 
+    def refusal(self, error: RefusedGoal, context: MessageContext) -> Message:
+        """Return the result of a goal that was refused."""
+        return {**self.result(self.refused(error.outcome, str(error)), context), **error.fields}
 
-def pose_or_refuse(message: Message, context: MessageContext, name: str, outcome: int) -> Pose:
-    """Return the pose in a field of a goal; raises RefusedGoal with this outcome where it is none.
+
+def pose_or_refuse(message: Message, context: MessageContext, name: str, outcome: int, **fields: int) -> Pose:
+    """Return the pose in a field of a goal; raises RefusedGoal with this outcome and fields where it is none.
 
     Its stamp is dropped: a goal is a place in its frame, as that frame is now.
     """
     try:
         return replace(pose_of(message[name], context, name), stamp=0.0)
     except InvalidValueError as error:
-        raise RefusedGoal(outcome, str(error)) from error
+        raise RefusedGoal(outcome, str(error), **fields) from error
 
 
-def path_or_refuse(message: Message, context: MessageContext, outcome: int) -> Path:
-    """Return the path in the field ``path`` of a goal; raises RefusedGoal with this outcome where it is none."""
+def path_or_refuse(message: Message, context: MessageContext, outcome: int, **fields: int) -> Path:
+    """Return the path in the field ``path`` of a goal; raises RefusedGoal with outcome and fields where it is none."""
     try:
         return path_of(message["path"], context)
     except InvalidValueError as error:
-        raise RefusedGoal(outcome, str(error)) from error
+        raise RefusedGoal(outcome, str(error), **fields) from error

@@ -45,19 +45,25 @@ class GoalsMapping(ActionMapping[G, R]):
         return super().goal(values, context)
 
 
-def unsupported(message: Message, outcome: int, *names: str) -> None:
-    """Raise RefusedGoal where one of the fields has a value; not all distributions have all fields."""
+def unsupported(message: Message, outcome: int, *names: str, **fields: int) -> None:
+    """Raise RefusedGoal where one of the fields has a value; not all distributions have all fields.
+
+    ``fields`` are those of its result.
+    """
     for name in names:
         if value := message.get(name):
-            raise RefusedGoal(outcome, f"{name} {value!r} is not supported here; leave it empty")
+            raise RefusedGoal(outcome, f"{name} {value!r} is not supported here; leave it empty", **fields)
 
 
-def poses_or_refuse(message: Any, context: MessageContext, name: str) -> tuple[Pose, ...]:
-    """Return the poses of a list, or of a nav_msgs/Goals; raises RefusedGoal with INVALID_GOAL where one is none."""
+def poses_or_refuse(message: Any, context: MessageContext, name: str, **fields: int) -> tuple[Pose, ...]:
+    """Return the poses of a list, or of a nav_msgs/Goals; raises RefusedGoal with INVALID_GOAL where one is none.
+
+    ``fields`` are those of its result.
+    """
     outcome = GetPathOutcome.INVALID_GOAL
     messages: list[Message] = message["goals"] if isinstance(message, Mapping) else message
     named = {f"{name}[{i}]": one for i, one in enumerate(messages)}
-    return tuple(pose_or_refuse(named, context, each, outcome) for each in named)
+    return tuple(pose_or_refuse(named, context, each, outcome, **fields) for each in named)
 
 
 # ------------------------------------------------------------------------------------------------------- planning
@@ -73,7 +79,8 @@ def _path_goal_of(message: Message, context: MessageContext) -> GetPathGoal:
 def _via_goal_of(message: Message, context: MessageContext) -> GetPathGoal:
     poses = poses_or_refuse(message["goals"], context, "goals")
     if not poses:
-        raise RefusedGoal(GetPathOutcome.INVALID_GOAL, "goals: there is no pose to go to")
+        code = codes.ThroughPosesCode.NO_VIAPOINTS_GIVEN
+        raise RefusedGoal(GetPathOutcome.INVALID_GOAL, "goals: there is no pose to go to", error_code=code)
     return GetPathGoal(poses[-1], _start(message, context), message["planner_id"], via=poses[:-1])
 
 
@@ -108,7 +115,8 @@ def _follow_feedback(feedback: ExePathFeedback, context: MessageContext) -> Mess
 
 
 def _navigate_goal_of(message: Message, context: MessageContext) -> MoveBaseGoal:
-    unsupported(message, MoveBaseOutcome.FAILURE, "behavior_tree")
+    code = codes.NavigateCode.FAILED_TO_LOAD_BEHAVIOR_TREE
+    unsupported(message, MoveBaseOutcome.FAILURE, "behavior_tree", error_code=code)
     return MoveBaseGoal(pose_or_refuse(message, context, "pose", GetPathOutcome.INVALID_GOAL))
 
 
@@ -130,7 +138,10 @@ def navigate_feedback(feedback: ExePathFeedback, context: MessageContext) -> Mes
 # ------------------------------------------------------------------------------------------------------ smoothing
 def _smooth_goal_of(message: Message, context: MessageContext) -> RefinePathGoal:
     unsupported(message, RefinePathOutcome.FAILURE, "check_for_collisions")
-    path = path_or_refuse(message, context, RefinePathOutcome.FAILURE)
+    code = codes.SmoothingCode.INVALID_PATH
+    path = path_or_refuse(message, context, RefinePathOutcome.FAILURE, error_code=code)
+    if len(path) == 0:
+        raise RefusedGoal(RefinePathOutcome.FAILURE, "path: there is no pose", error_code=code)
     return RefinePathGoal(path, message["smoother_id"])
 
 

@@ -81,6 +81,8 @@ class WaypointsCode(IntEnum):
     NONE = 0
     UNKNOWN = 600
     TASK_EXECUTOR_FAILED = 601
+    NO_VALID_WAYPOINTS = 602
+    STOP_ON_MISSED_WAYPOINT = 603
 
 
 class SpinCode(IntEnum):
@@ -130,6 +132,7 @@ class NavigateCode(IntEnum):
     UNKNOWN = 9000
     FAILED_TO_LOAD_BEHAVIOR_TREE = 9001
     TF_ERROR = 9002
+    TIMEOUT = 9003
 
 
 class NavigateThroughPosesCode(IntEnum):
@@ -139,6 +142,7 @@ class NavigateThroughPosesCode(IntEnum):
     UNKNOWN = 9100
     FAILED_TO_LOAD_BEHAVIOR_TREE = 9101
     TF_ERROR = 9102
+    TIMEOUT = 9103
 
 
 class WaypointState(IntEnum):
@@ -183,7 +187,9 @@ NAVIGATING: dict[int, IntEnum] = {
     **FOLLOWING,
 }
 SMOOTHING: dict[int, SmoothingCode] = {
-    RefinePathOutcome.DEPLETED: SmoothingCode.TIMEOUT,
+    RefinePathOutcome.INVALID_PLUGIN: SmoothingCode.INVALID_SMOOTHER,
+    RefinePathOutcome.STOPPED: SmoothingCode.TIMEOUT,
+    RefinePathOutcome.DEPLETED: SmoothingCode.FAILED_TO_SMOOTH_PATH,
     RefinePathOutcome.FAILURE: SmoothingCode.FAILED_TO_SMOOTH_PATH,
 }
 BEHAVING: dict[int, str] = {

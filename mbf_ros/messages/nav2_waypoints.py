@@ -25,13 +25,16 @@ from mbf_ros.messages.nav2_actions import GoalsMapping, error_msg, navigate_feed
 
 def _waypoints_goal_of(message: Message, context: MessageContext) -> FollowWaypointsGoal:
     """Nav2 counts the loops after the first one, and begins the first at ``goal_index``."""
-    poses = poses_or_refuse(message["poses"], context, "poses")
+    code = codes.WaypointsCode.NO_VALID_WAYPOINTS
+    poses = poses_or_refuse(message["poses"], context, "poses", error_code=code)
     first, more = message.get("goal_index", 0), message.get("number_of_loops", 0)
     if first and more:
         text = f"goal_index {first} together with number_of_loops {more} is not supported here"
         raise RefusedGoal(MoveBaseOutcome.FAILURE, text)
     if not poses[first:]:
-        raise RefusedGoal(GetPathOutcome.INVALID_GOAL, f"poses: there is none from goal_index {first} on")
+        raise RefusedGoal(
+            GetPathOutcome.INVALID_GOAL, f"poses: there is none from goal_index {first} on", error_code=code
+        )
     return FollowWaypointsGoal(poses[first:], loops=more + 1, stop_on_failure=False)
 
 
@@ -70,11 +73,10 @@ def _waypoints_feedback(feedback: FollowWaypointsFeedback, context: MessageConte
 def waypoints_of_client(
     goal: FollowWaypointsGoal,
     first: int,
-    feedback: FollowWaypointsFeedback | None,
-    result: FollowWaypointsResult | None,
+    shown: FollowWaypointsFeedback | FollowWaypointsResult,
     context: MessageContext,
 ) -> Message:
-    """Return the fields of feedback and result that have a place in the client's list.
+    """Return the fields of a feedback or result that have a place in the client's list.
 
     Parameters
     ----------
@@ -82,8 +84,7 @@ def waypoints_of_client(
         Ours.
     first : int
         The ``goal_index`` of the client's, where ours begins.
-    feedback, result
-        The present ones, if there are any.
+    shown : FollowWaypointsFeedback or FollowWaypointsResult
     context : MessageContext
     """
     count = len(goal.waypoints)
@@ -91,19 +92,19 @@ def waypoints_of_client(
     def in_list(visit: int) -> tuple[int, Pose]:
         return first + visit % count, goal.waypoints[visit % count]
 
-    fields: Message = {} if feedback is None else {"current_waypoint": first + feedback.waypoint}
-    if result is not None:
-        fields["missed_waypoints"] = [
-            {**one, "index": one["waypoint_index"], "goal": one["waypoint_pose"]}  # the latter two as in Jazzy
-            for one in _missed_waypoints(result, in_list, context)
-        ]
-    return fields
+    if isinstance(shown, FollowWaypointsFeedback):
+        return {"current_waypoint": first + shown.waypoint}
+    missed = _missed_waypoints(shown, in_list, context)
+    return {  # index and goal as in Jazzy
+        "missed_waypoints": [{**one, "index": one["waypoint_index"], "goal": one["waypoint_pose"]} for one in missed]
+    }
 
 
 # ----------------------------------------------------------------------------------------------- through poses
 def _through_goal_of(message: Message, context: MessageContext) -> FollowWaypointsGoal:
     """Each pose is a waypoint, and the first that cannot be reached ends the goal."""
-    unsupported(message, MoveBaseOutcome.FAILURE, "behavior_tree")
+    code = codes.NavigateThroughPosesCode.FAILED_TO_LOAD_BEHAVIOR_TREE
+    unsupported(message, MoveBaseOutcome.FAILURE, "behavior_tree", error_code=code)
     poses = poses_or_refuse(message["poses"], context, "poses")
     if not poses:
         raise RefusedGoal(GetPathOutcome.INVALID_GOAL, "poses: there is none")
@@ -141,19 +142,30 @@ def waypoint_statuses(
     return statuses
 
 
-def through_poses_progress(goal: FollowWaypointsGoal, feedback: FollowWaypointsFeedback | None) -> Message:
-    """Return what feedback about a leg says of the whole way: the rest is straight from pose to pose."""
-    if feedback is None or feedback.driving is None:
-        return {}
-    leg, rest = feedback.driving, goal.waypoints[feedback.waypoint :]
-    straight = sum(one.distance_to(other) for one, other in pairwise(rest) if one.frame_id == other.frame_id)
-    whole = leg.distance_along_path + straight
-    share = whole / leg.distance_along_path if leg.distance_along_path > 0.0 else 1.0
+def through_poses_progress(
+    goal: FollowWaypointsGoal, shown: FollowWaypointsFeedback | FollowWaypointsResult
+) -> Message:
+    """Return what is left of the whole way: the leg that is driven, if any, then straight from pose to pose."""
+    driving = shown.driving if isinstance(shown, FollowWaypointsFeedback) else None
+    done = len(shown.results)
+    if driving is None:
+        return {
+            "distance_remaining": _straight(goal.waypoints[max(done - 1, 0) :]),
+            "number_of_poses_remaining": len(goal.waypoints) - done,
+        }
+    rest = goal.waypoints[done:]
+    whole = driving.distance_along_path + _straight(rest)
+    share = whole / driving.distance_along_path if driving.distance_along_path > 0.0 else 1.0
     return {
         "distance_remaining": whole,
-        "estimated_time_remaining": duration(leg.time_to_goal * share),
+        "estimated_time_remaining": duration(driving.time_to_goal * share),
         "number_of_poses_remaining": len(rest),
     }
+
+
+def _straight(poses: Sequence[Pose]) -> float:
+    """Length [m] of the lines from pose to pose; those between two frames do not count."""
+    return sum(one.distance_to(other) for one, other in pairwise(poses) if one.frame_id == other.frame_id)
 
 
 NAVIGATE_THROUGH_POSES = GoalsMapping(

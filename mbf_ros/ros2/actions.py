@@ -38,8 +38,8 @@ Outcomes: TypeAlias = (
     | type[RefinePathOutcome]
     | type[MoveBaseOutcome]
 )
-More: TypeAlias = Callable[[], Message]
-"""Further fields of feedback and result, as they are now."""
+More: TypeAlias = Callable[[Any], Message]
+"""Further fields of a feedback or a result of ours, which it takes; None where the action of ours has no feedback."""
 ACTIONS: dict[str, tuple[ActionMapping[Any, Any], Outcomes]] = {
     "get_path": (mbf_actions.GET_PATH, GetPathOutcome),
     "exe_path": (mbf_actions.EXE_PATH, ExePathOutcome),
@@ -115,6 +115,7 @@ class ServedAction:
             name,
             execute_callback=self._execute,
             goal_callback=self._accept,
+            handle_accepted_callback=self._begin,
             cancel_callback=self._cancel,
         )
 
@@ -139,8 +140,12 @@ class ServedAction:
         if reason := self._serving.refusal() or many:
             self._node.get_logger().warning(f"{self._mapping.type}: goal rejected: {reason}")
             return GoalResponse.REJECT
-        self.unfinished += 1
         return GoalResponse.ACCEPT
+
+    def _begin(self, goal_handle: Any) -> None:
+        """Count a goal and run it; not called where its client is gone before it hears that the goal is accepted."""
+        self.unfinished += 1
+        goal_handle.execute()
 
     def _cancel(self, goal_handle: Any) -> Any:
         from rclpy.action import CancelResponse
@@ -171,14 +176,14 @@ class ServedAction:
         try:
             return await self._run(goal_handle)
         except RefusedGoal as error:
-            return self._message(self._mapping.refused(error.outcome, str(error))), GoalStatus.REJECTED
+            return fill(self._class.Result(), self._mapping.refusal(error, self._context())), GoalStatus.REJECTED
         except Exception as error:  # a fault of ours
             self._serving.on_fault(error)
             text = f"{type(error).__name__}: {error_text(error)}"
             return self._message(self._mapping.refused(self._outcomes.INTERNAL_ERROR, text)), GoalStatus.ABORTED
 
-    def _message(self, result: ActionResult, more: More = dict) -> Any:
-        return fill(self._class.Result(), {**self._mapping.result(result, self._context()), **more()})
+    def _message(self, result: ActionResult, more: Message | None = None) -> Any:
+        return fill(self._class.Result(), {**self._mapping.result(result, self._context()), **(more or {})})
 
     async def _run(self, goal_handle: Any) -> tuple[Any, GoalStatus]:
         from rclpy.task import Future
@@ -201,19 +206,24 @@ class ServedAction:
             raise
         finally:
             del self._goals[key]
+        self._show_last(goal_handle, handle, more)
+        fields = more(handle.result)
         assert handle.result is not None
         jump = self._jumps.pop(key, "")
         if jump and handle.status is GoalStatus.CANCELED:
             tf_error = self._outcomes.__members__.get("TF_ERROR", self._outcomes.FAILURE)
-            return self._message(self._mapping.refused(tf_error, jump), more), GoalStatus.ABORTED
-        return self._message(handle.result, more), handle.status
+            return self._message(self._mapping.refused(tf_error, jump), fields), GoalStatus.ABORTED
+        return self._message(handle.result, fields), handle.status
 
     def _observe(self, goal_handle: Any, handle: AnyGoalHandle) -> More:
         """Return what gives the fields of feedback and result that are not in ours, of a goal that begins."""
-        return dict
+        return lambda shown: {}
+
+    def _show_last(self, goal_handle: Any, handle: AnyGoalHandle, more: More) -> None:
+        """Publish a last feedback, before the result; nothing here."""
 
     def _publish_feedback(self, goal_handle: Any, feedback: Any, more: More) -> None:
         """Publish a feedback, on the thread of callbacks."""
         assert self._mapping.feedback is not None
-        values = {**self._mapping.feedback(feedback, self._context()), **more()}
+        values = {**self._mapping.feedback(feedback, self._context()), **more(feedback)}
         goal_handle.publish_feedback(fill(self._class.Feedback(), values))

@@ -61,6 +61,9 @@ def _write(message: Any, name: str, value: Any) -> None:
         fill(present, value)
     elif isinstance(value, np.ndarray) and isinstance(present, array):
         setattr(message, name, array(present.typecode, value.astype(present.typecode, copy=False).tobytes()))
+    elif isinstance(value, list) and value and isinstance(value[0], Mapping) and isinstance(present, array):
+        # Humble has numbers where later distributions have messages with an index: missed_waypoints of FollowWaypoints.
+        setattr(message, name, array(present.typecode, [one["index"] for one in value]))
     elif isinstance(value, list) and value and isinstance(value[0], Mapping):
         element = _element_class(message.get_fields_and_field_types()[name])
         setattr(message, name, [fill(element(), one) for one in value])

@@ -14,17 +14,19 @@ from typing import Any
 from mbf_abstract.actions.move_base_machine import SUB_GOAL_SLOT
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Pose, normalize_angle
-from mbf_abstract.goals.goal_types import RecoveryGoal
+from mbf_abstract.goals.goal_types import FollowWaypointsFeedback, FollowWaypointsResult, RecoveryGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.time.clock import Clock
 from mbf_ros.messages import nav2_actions, nav2_waypoints
 from mbf_ros.messages.action_mapping import ActionMapping
-from mbf_ros.messages.geometry import duration
+from mbf_ros.messages.geometry import duration, pose_stamped
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.messages.nav2_behaviors import behavior_mappings
+from mbf_ros.messages.nav2_behaviors import BEHAVIORS, behavior_mappings
 from mbf_ros.ros2.actions import More, Outcomes, ServedAction, Serving
 from mbf_ros.ros2.conversion import fill
+from mbf_ros.ros2.running import RosError
 
 ACTIONS: dict[str, tuple[ActionMapping[Any, Any], Outcomes]] = {
     "compute_path_to_pose": (nav2_actions.COMPUTE_PATH_TO_POSE, GetPathOutcome),
@@ -38,12 +40,52 @@ ACTIONS: dict[str, tuple[ActionMapping[Any, Any], Outcomes]] = {
 """Mapping and outcomes by the names of the actions, without the behaviours."""
 TIMES = ("navigation_time", "planning_time", "smoothing_duration", "total_elapsed_time")
 """Fields of feedback or result that say how long the goal has taken."""
+DISCOVERY_TIME = 3.0  # s of real time in which a node that starts gets to know the others
+DISCOVERY_PERIOD = 0.1  # s between two looks at them
 FEEDBACK_PERIOD = 0.1  # s of real time between two messages about a behaviour
 
 
 def is_offered(choice: bool | None) -> bool:
     """Whether Nav2's names are offered: as chosen, with None where nav2_msgs is installed."""
     return find_spec("nav2_msgs") is not None if choice is None else choice
+
+
+def offers_names(node: Any, choice: bool | None, clock: Clock) -> bool:
+    """Whether a node is to offer Nav2's names, where no other node has them; waits until others would be known.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    choice : bool, optional
+        As of ``is_offered``.
+    clock : Clock
+        Real time since the node was made.
+
+    Raises
+    ------
+    RosError
+        They are chosen, and another node serves actions of these names.
+    """
+    if not is_offered(choice):
+        return False
+    while not (found := served_by_others(node)) and clock.now() < DISCOVERY_TIME:
+        clock.sleep(DISCOVERY_PERIOD)
+    if not found:
+        return True
+    text = f"another node serves {', '.join(found)} already"
+    if choice:
+        raise RosError(f"Nav2's names cannot be offered: {text}; end that node, or leave out --nav2 and --amcl")
+    node.get_logger().warning(f"Nav2's names are left out: {text}")
+    return False
+
+
+def served_by_others(node: Any) -> list[str]:
+    """Names of Nav2's actions that are served; of a node that does not serve them yet.
+
+    Who publishes the feedback of an action serves it, whereas services are also listed where they are only asked for.
+    """
+    names = (*ACTIONS, *BEHAVIORS)
+    return [name for name in names if node.get_publishers_info_by_topic(f"{name}/_action/feedback")]
 
 
 def serve_actions(node: Any, server: AbstractNavigationServer, serving: Serving) -> list[ServedAction]:
@@ -88,11 +130,16 @@ class Nav2Action(ServedAction):
         clock = self._server.runtime.clock
         began, recovered = clock.now(), self._recoveries.ended
 
-        def more() -> Message:
+        def more(shown: Any) -> Message:
             fields: Message = dict.fromkeys(TIMES, duration(clock.now() - began))
             return {**fields, "number_of_recoveries": self._recoveries.ended - recovered}
 
         return more
+
+    def _show_last(self, goal_handle: Any, handle: AnyGoalHandle, more: More) -> None:
+        """Publish the newest feedback, as a slow client has missed others."""
+        if self._mapping.feedback is not None and handle.feedback is not None:
+            self._publish_feedback(goal_handle, handle.feedback, more)
 
 
 class ThroughPosesAction(Nav2Action):
@@ -101,17 +148,23 @@ class ThroughPosesAction(Nav2Action):
     def _observe(self, goal_handle: Any, handle: AnyGoalHandle) -> More:
         taken, goal = super()._observe(goal_handle, handle), handle.goal
 
-        def more() -> Message:
-            done = handle.result or handle.feedback
-            statuses = nav2_waypoints.waypoint_statuses(goal, done.results if done else (), self._context())
-            progress = nav2_waypoints.through_poses_progress(goal, handle.feedback)
-            return {**taken(), "waypoint_statuses": statuses, **progress}
+        def more(shown: FollowWaypointsFeedback | FollowWaypointsResult) -> Message:
+            statuses = nav2_waypoints.waypoint_statuses(goal, shown.results, self._context())
+            progress = nav2_waypoints.through_poses_progress(goal, shown)
+            return {**taken(shown), "waypoint_statuses": statuses, **progress}
 
         return more
 
     def _publish_feedback(self, goal_handle: Any, feedback: Any, more: More) -> None:
         if feedback.driving is not None:  # between two legs nothing is driven
             super()._publish_feedback(goal_handle, feedback, more)
+
+    def _show_last(self, goal_handle: Any, handle: AnyGoalHandle, more: More) -> None:
+        """Publish where the robot is at the end, and what is left of the way."""
+        with suppress(RobotStateError):
+            pose = pose_stamped(self._server.runtime.robot.pose(), self._context())
+            values = {"current_pose": pose, **more(handle.feedback or handle.result)}
+            goal_handle.publish_feedback(fill(self._class.Feedback(), values))
 
 
 class WaypointsAction(Nav2Action):
@@ -120,9 +173,9 @@ class WaypointsAction(Nav2Action):
     def _observe(self, goal_handle: Any, handle: AnyGoalHandle) -> More:
         taken, first = super()._observe(goal_handle, handle), getattr(goal_handle.request, "goal_index", 0)
 
-        def more() -> Message:
-            seen = handle.goal, first, handle.feedback, handle.result
-            return {**taken(), **nav2_waypoints.waypoints_of_client(*seen, self._context())}
+        def more(shown: FollowWaypointsFeedback | FollowWaypointsResult) -> Message:
+            fields = nav2_waypoints.waypoints_of_client(handle.goal, first, shown, self._context())
+            return {**taken(shown), **fields}
 
         return more
 
@@ -131,21 +184,26 @@ class BehaviorAction(Nav2Action):
     """A behaviour of Nav2; as ours have no feedback, the robot is watched meanwhile."""
 
     def _observe(self, goal_handle: Any, handle: AnyGoalHandle) -> More:
-        from rclpy.clock import Clock, ClockType
+        from rclpy.clock import Clock as RclpyClock
+        from rclpy.clock import ClockType
 
         progress, taken = Progress(self._server, handle.goal), super()._observe(goal_handle, handle)
 
-        def more() -> Message:
-            return {**taken(), **progress.look()}
+        def more(shown: Any) -> Message:
+            return {**taken(shown), **progress.look()}
 
         def publish() -> None:
             if not handle.done:
-                goal_handle.publish_feedback(fill(self._class.Feedback(), more()))
+                self._show_last(goal_handle, handle, more)
 
-        timer = self._node.create_timer(FEEDBACK_PERIOD, publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        timer = self._node.create_timer(FEEDBACK_PERIOD, publish, clock=RclpyClock(clock_type=ClockType.STEADY_TIME))
         executor = self._node.executor
         handle.add_done_callback(lambda done: executor.create_task(self._node.destroy_timer, timer))
         return more
+
+    def _show_last(self, goal_handle: Any, handle: AnyGoalHandle, more: More) -> None:
+        """Publish what the robot has done by now."""
+        goal_handle.publish_feedback(fill(self._class.Feedback(), more(None)))
 
 
 class Progress:

@@ -28,7 +28,7 @@ from mbf_ros.messages.geometry import NANOSECONDS, MessageContext
 from mbf_ros.ros2.actions import ACTIONS, ServedAction, Serving
 from mbf_ros.ros2.clock import RosClock, SimulatedRosClock
 from mbf_ros.ros2.conversion import interface_class
-from mbf_ros.ros2.nav2 import is_offered, serve_actions
+from mbf_ros.ros2.nav2 import offers_names, serve_actions
 from mbf_ros.ros2.nav2_services import Nav2Services
 from mbf_ros.ros2.options import NodeOptions
 from mbf_ros.ros2.parameters import NodeParameters
@@ -54,7 +54,7 @@ def navigation_node(file: Path, options: NodeOptions | None = None) -> Iterator[
     ConfigError
         The file is wrong.
     RosError, MissingInterfaceError
-        ROS 2, or a package of messages, is missing.
+        ROS 2, or a package of messages, is missing, or Nav2's names are chosen and served by another node.
     """
     options = options or NodeOptions()
     with ExitStack() as closing:
@@ -120,7 +120,7 @@ class NavigationNode:
         if not self._options.keep_goals:
             self._repeat(CLIENT_PERIOD, self._cancel_abandoned)
         queries = ServedQueries(self._node, server, self._context)
-        if is_offered(self._options.nav2):
+        if offers_names(self._node, self._options.nav2, self._real_time):
             self._actions += serve_actions(self._node, server, serving)
             Nav2Services(self._node, server, serving, queries, self._options.stands_for_amcl)
         clock.on_jump.append(self._on_jump)

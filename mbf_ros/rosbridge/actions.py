@@ -66,8 +66,8 @@ class ActionTable:
         try:
             action, goal = self._checked(client, name, type_name, goal_id, values)
         except RefusedGoal as error:
-            result = self.actions[name].mapping.refused(error.outcome, str(error))
-            self._answer(client, name, goal_id, self._result_fields(name, result, Status.ABORTED))
+            values = self.actions[name].mapping.refusal(error, self._context)
+            self._answer(client, name, goal_id, {"values": values, "status": int(Status.ABORTED), "result": True})
             return
         except (OperationError, MessageError) as error:
             self._answer(client, name, goal_id, {"values": str(error), "status": 0, "result": False})

@@ -27,7 +27,7 @@ from mbf_abstract.goals.handle import AnyGoalHandle, GoalStatus
 from mbf_abstract.outcomes import ExePathOutcome, GetPathOutcome, MoveBaseOutcome, RecoveryOutcome, RefinePathOutcome
 from mbf_ros.messages.action_mapping import RefusedGoal
 from mbf_ros.messages.geometry import MessageContext
-from mbf_ros.messages.interfaces import MessageError
+from mbf_ros.messages.interfaces import Message, MessageError
 from mbf_ros.rosbridge.actions import STATUSES, Status
 from mbf_ros.rosbridge.navigation import ACTIONS
 from mbf_ros.rosbridge.protocol import Operation, OperationError, absolute, frame, text_in
@@ -122,7 +122,7 @@ class OfferedGoals:
         try:
             goal = mapping.goal(operation.get("args", {}), self._context())
         except RefusedGoal as error:
-            self._answer(goal_id, name, mapping.refused(error.outcome, str(error)), Status.ABORTED)
+            self._answer_with(goal_id, name, mapping.refusal(error, self._context()), Status.ABORTED)
             return
         except MessageError as error:
             self._answer(goal_id, name, mapping.refused(FAILURES[mapping.refused], str(error)), Status.ABORTED)
@@ -176,7 +176,10 @@ class OfferedGoals:
             self._answer(goal_id, goal.name, result, STATUSES[status])
 
     def _answer(self, goal_id: str, name: str, result: ActionResult, status: Status) -> None:
-        values = in_finite_numbers(ACTIONS[name].result(result, self._context()))
+        self._answer_with(goal_id, name, ACTIONS[name].result(result, self._context()), status)
+
+    def _answer_with(self, goal_id: str, name: str, message: Message, status: Status) -> None:
+        values = in_finite_numbers(message)
         text = frame("action_result", id=goal_id, action=name, values=values, status=int(status), result=True)
         self._post(lambda connection: connection.answer(text))
 

@@ -37,7 +37,8 @@ def test_the_robot_is_stopped_when_the_client_of_its_goal_is_killed_and_the_next
     trio.drive()
     before = len(trio.robot.lines)
     trio.client.kill()
-    trio.robot.wait_for_speed(lambda speed: speed == 0.0, before)
+    stopped = trio.robot.wait_for_speed(lambda speed: speed == 0.0, before)
+    assert abs(stopped["x"]) < 25.0  # the goal is at 30 m or at -30 m
     trio.start_client()
     trio.client.meet()
     goal = trio.client.result("move_base", target=[trio.robot.x, 0.0])

@@ -18,7 +18,7 @@ GOALS = {
     GetPathOutcome.INVALID_PLUGIN: lambda session: GetPathGoal(TARGET),
     ExePathOutcome.INVALID_PLUGIN: lambda session: ExePathGoal(session.path_to(1.0)),
     RecoveryOutcome.INVALID_PLUGIN: lambda session: RecoveryGoal(),
-    RefinePathOutcome.FAILURE: lambda session: RefinePathGoal(session.path_to(1.0)),
+    RefinePathOutcome.INVALID_PLUGIN: lambda session: RefinePathGoal(session.path_to(1.0)),
     MoveBaseOutcome.FAILURE: lambda session: MoveBaseGoal(TARGET),
 }
 

@@ -24,6 +24,7 @@ from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import MessageError, completed, fields_of
 
 CONTEXT = MessageContext()
+REACHED = MoveBaseResult(0, "")
 PATH = Path([[0, 0, 0], [1, 0, 0]])
 
 
@@ -104,6 +105,35 @@ def test_a_goal_without_a_place_is_an_invalid_goal(mapping, values):
     assert refused.value.outcome == GetPathOutcome.INVALID_GOAL
 
 
+REFUSALS = [
+    (nav2.COMPUTE_PATH_THROUGH_POSES, {"goals": []}, "NO_VIAPOINTS_GIVEN"),
+    (nav2.NAVIGATE_TO_POSE, {"pose": at(1), "behavior_tree": "t.xml"}, "FAILED_TO_LOAD_BEHAVIOR_TREE"),
+    (waypoints.NAVIGATE_THROUGH_POSES, {"poses": [at(1)], "behavior_tree": "t"}, "FAILED_TO_LOAD_BEHAVIOR_TREE"),
+    (waypoints.FOLLOW_WAYPOINTS, {"poses": []}, "NO_VALID_WAYPOINTS"),
+    (waypoints.FOLLOW_WAYPOINTS, {"poses": [at(1), at(float("nan"))]}, "NO_VALID_WAYPOINTS"),
+    (nav2.SMOOTH_PATH, {"path": {"poses": []}}, "INVALID_PATH"),
+    (nav2.SMOOTH_PATH, {"path": {"poses": [at(float("nan"))]}}, "INVALID_PATH"),
+    (nav2.FOLLOW_PATH, {"path": {"poses": [at(float("nan"))]}}, "INVALID_PATH"),
+]
+CODES = {
+    nav2.COMPUTE_PATH_THROUGH_POSES: codes.ThroughPosesCode,
+    nav2.NAVIGATE_TO_POSE: codes.NavigateCode,
+    waypoints.NAVIGATE_THROUGH_POSES: codes.NavigateThroughPosesCode,
+    waypoints.FOLLOW_WAYPOINTS: codes.WaypointsCode,
+    nav2.SMOOTH_PATH: codes.SmoothingCode,
+    nav2.FOLLOW_PATH: codes.FollowPathCode,
+}
+
+
+@pytest.mark.parametrize(("mapping", "values", "name"), REFUSALS)
+def test_a_refused_goal_ends_with_the_code_of_its_cause(mapping, values, name):
+    with pytest.raises(RefusedGoal) as refused:
+        mapping.goal(values, CONTEXT)
+    message = mapping.refusal(refused.value, CONTEXT)
+    assert CODES[mapping](completed(f"{mapping.type}_Result", message)["error_code"]).name == name
+    assert str(refused.value) in message["error_msg"]
+
+
 RESULTS = [
     (nav2.COMPUTE_PATH_TO_POSE, GetPathResult(0, "", PATH), 0),
     (nav2.COMPUTE_PATH_TO_POSE, GetPathResult(GetPathOutcome.NO_PATH_FOUND, "blocked"), 208),
@@ -119,7 +149,10 @@ RESULTS = [
     (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsResult(MoveBaseOutcome.TF_ERROR, "no pose"), 9102),
     (waypoints.NAVIGATE_THROUGH_POSES, FollowWaypointsResult(ExePathOutcome.ROBOT_STUCK, "stuck"), 105),
     (nav2.SMOOTH_PATH, RefinePathResult(0, "", PATH), 0),
-    (nav2.SMOOTH_PATH, RefinePathResult(RefinePathOutcome.DEPLETED, "late", PATH), 502),
+    (nav2.SMOOTH_PATH, RefinePathResult(RefinePathOutcome.INVALID_PLUGIN, "no such refiner", PATH), 501),
+    (nav2.SMOOTH_PATH, RefinePathResult(RefinePathOutcome.STOPPED, "late", PATH), 502),
+    (nav2.SMOOTH_PATH, RefinePathResult(RefinePathOutcome.DEPLETED, "tried often", PATH), 504),
+    (nav2.SMOOTH_PATH, RefinePathResult(RefinePathOutcome.FAILURE, "too bent", PATH), 504),
 ]
 
 
@@ -144,18 +177,18 @@ def test_waypoints_are_numbered_as_in_the_list_of_the_client():
     goal = waypoints.FOLLOW_WAYPOINTS.goal({"poses": [at(1), at(2), at(3)], "goal_index": 1}, CONTEXT)
     reached, missed = MoveBaseResult(0, ""), MoveBaseResult(GetPathOutcome.NO_PATH_FOUND, "blocked")
     result = FollowWaypointsResult(missed.outcome, "one missed", (reached, missed))
-    seen = waypoints.waypoints_of_client(goal, 1, FollowWaypointsFeedback(1, 1, (), None), result, CONTEXT)
-    (status,) = seen["missed_waypoints"]
-    assert (seen["current_waypoint"], status["waypoint_index"], status["index"]) == (2, 2, 2)
+    seen = waypoints.waypoints_of_client(goal, 1, FollowWaypointsFeedback(1, 1, (), None), CONTEXT)
+    assert seen == {"current_waypoint": 2}
+    (status,) = waypoints.waypoints_of_client(goal, 1, result, CONTEXT)["missed_waypoints"]
+    assert (status["waypoint_index"], status["index"]) == (2, 2)
     assert status["waypoint_pose"]["pose"]["position"]["x"] == status["goal"]["pose"]["position"]["x"] == 3.0
-    assert waypoints.waypoints_of_client(goal, 1, None, None, CONTEXT) == {}
 
 
 def test_a_waypoint_that_is_missed_in_every_loop_is_the_same_one():
     goal = waypoints.FOLLOW_WAYPOINTS.goal({"poses": [at(1), at(2)], "number_of_loops": 1}, CONTEXT)
     reached, missed = MoveBaseResult(0, ""), MoveBaseResult(GetPathOutcome.NO_PATH_FOUND, "blocked")
     result = FollowWaypointsResult(missed.outcome, "two missed", (reached, missed, reached, missed))
-    seen = waypoints.waypoints_of_client(goal, 0, None, result, CONTEXT)["missed_waypoints"]
+    seen = waypoints.waypoints_of_client(goal, 0, result, CONTEXT)["missed_waypoints"]
     assert [one["waypoint_index"] for one in seen] == [1, 1]
 
 
@@ -177,13 +210,15 @@ def test_feedback_has_the_fields_of_its_type():
 def test_progress_through_poses_counts_the_leg_and_then_straight_from_pose_to_pose():
     goal = FollowWaypointsGoal((Pose.planar(1, 0), Pose.planar(4, 0), Pose.planar(4, 3)))
     driving = ExePathFeedback(0, "", Pose.planar(0, 0), 3.0, 0.1, 2.0, 4.0)
-    assert waypoints.through_poses_progress(goal, FollowWaypointsFeedback(1, 1, (), driving)) == {
+    assert waypoints.through_poses_progress(goal, FollowWaypointsFeedback(1, 1, (REACHED,), driving)) == {
         "distance_remaining": 2.0 + 3.0,
         "estimated_time_remaining": {"sec": 10, "nanosec": 0},
         "number_of_poses_remaining": 2,
     }
-    assert waypoints.through_poses_progress(goal, FollowWaypointsFeedback(1, 1, (), None)) == {}
-    assert waypoints.through_poses_progress(goal, None) == {}
+    between = waypoints.through_poses_progress(goal, FollowWaypointsFeedback(1, 1, (REACHED, REACHED), None))
+    assert between == {"distance_remaining": 3.0, "number_of_poses_remaining": 1}
+    ended = waypoints.through_poses_progress(goal, FollowWaypointsResult(0, "", (REACHED,) * 3))
+    assert ended == {"distance_remaining": 0.0, "number_of_poses_remaining": 0}
 
 
 def test_each_pose_has_a_status_whether_it_was_reached_missed_or_is_still_to_come():
