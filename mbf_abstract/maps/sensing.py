@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbf_abstract.geometry import FloatArray
+from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import ExtrapolationError, TransformBuffer
 
 TRANSFORM_TOLERANCE = 0.3
@@ -106,14 +107,21 @@ class RangeScan:
         """
         if frame_id == self.frame_id:
             return self
-        try:
-            transform = transforms.lookup(frame_id, self.frame_id, self.stamp)
-        except ExtrapolationError:
-            transform = transforms.lookup(frame_id, self.frame_id)
-            if not 0.0 <= self.stamp - transform.stamp <= tolerance:
-                raise
+        transform = self.transform_to(frame_id, transforms, tolerance)
         origin = transform.apply(np.atleast_2d(self.origin))[0]
         return replace(self, frame_id=frame_id, origin=origin, ends=transform.apply(self.ends))
+
+    def transform_to(
+        self, frame_id: str, transforms: TransformBuffer, tolerance: float = TRANSFORM_TOLERANCE
+    ) -> Transform:
+        """Return the transform by which ``in_frame`` places the scan; its stamp is another one if it is the newest."""
+        try:
+            return transforms.lookup(frame_id, self.frame_id, self.stamp)
+        except ExtrapolationError:
+            newest = transforms.lookup(frame_id, self.frame_id)
+            if not 0.0 <= self.stamp - newest.stamp <= tolerance:
+                raise
+            return newest
 
     @property
     def points(self) -> FloatArray:

@@ -18,7 +18,8 @@ A recording keeps the points that its sensors hit, and not the rays that met not
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from heapq import merge
 
 import numpy as np
 
@@ -48,18 +49,26 @@ ORDER = ("/tf_static", "/tf", "/odom", "/cmd_vel", "/points", "/plan", "/global_
 TF = "tf2_msgs/TFMessage"
 
 
-def messages_of(log: DriveLog, robot_frame: str = "base_link") -> list[BagMessage]:
-    """Return all messages of a drive; times before its first sample are written at that."""
+def messages_of(log: DriveLog, robot_frame: str = "base_link") -> Iterator[BagMessage]:
+    """Make all messages of a drive, one after the other; times before its first sample are written at that."""
     context = MessageContext(log.frame_id, EPOCH)
     fixed = Transform((0.0, 0.0, 0.0), parent=log.frame_id, child=ODOM, static=True)
-    messages = [_message(0.0, "/tf_static", TF, transforms_message([fixed], context), latched=True)]
+    static = [_message(0.0, "/tf_static", TF, transforms_message([fixed], context), latched=True)]
     track = _Track(log, robot_frame)
-    messages += [one for sample in range(len(log.times)) for one in _sampled(log, sample, track, context)]
-    if len(log.times):
-        messages += [one for scan in log.scans for one in _scanned(scan, track, context)]
-    messages += [_planned(time, points, context) for time, points in log.paths if len(points)]
-    messages += [_mapped(time, view, context) for time, view in log.maps]
-    return sorted(messages, key=lambda one: (one.time, ORDER.index(one.topic)))
+    samples = range(len(log.times))
+    scans = sorted(log.scans, key=lambda scan: scan.time) if len(log.times) else []
+    paths = sorted(((time, points) for time, points in log.paths if len(points)), key=lambda one: one[0])
+    in_order: list[Iterable[BagMessage]] = [  # one topic each, as those of the same time are sorted by topic
+        static,
+        (_place(track.sample(sample), context) for sample in samples),
+        (_sensor_place(scan, track, context) for scan in scans),
+        (_odometry(log, sample, track, context) for sample in samples),
+        (_command(log, sample, context) for sample in samples),
+        (_cloud(scan, track, context) for scan in scans),
+        (_planned(time, points, context) for time, points in paths),
+        (_mapped(time, view, context) for time, view in sorted(log.maps, key=lambda one: one[0])),
+    ]
+    return merge(*in_order, key=lambda one: (one.time, ORDER.index(one.topic)))
 
 
 class _Track:
@@ -83,24 +92,37 @@ class _Track:
         return self._samples[later - 1].interpolate(self._samples[later], time)
 
 
-def _sampled(log: DriveLog, sample: int, track: _Track, context: MessageContext) -> Iterator[BagMessage]:
+def _place(T_odom_base: Transform, context: MessageContext) -> BagMessage:
+    return _message(T_odom_base.stamp, "/tf", TF, transforms_message([T_odom_base], context))
+
+
+def _odometry(log: DriveLog, sample: int, track: _Track, context: MessageContext) -> BagMessage:
     T_odom_base = track.sample(sample)
-    time = T_odom_base.stamp
-    yield _message(time, "/tf", TF, transforms_message([T_odom_base], context))
-    velocity, command = (_twist(rows[sample]) for rows in (log.twists, log.commands))
-    odometry = odometry_message(Odometry(velocity, time), T_odom_base, context)
-    yield _message(time, "/odom", "nav_msgs/Odometry", odometry)
-    yield _message(time, "/cmd_vel", "geometry_msgs/Twist", twist(command))
+    odometry = odometry_message(Odometry(_twist(log.twists[sample]), T_odom_base.stamp), T_odom_base, context)
+    return _message(T_odom_base.stamp, "/odom", "nav_msgs/Odometry", odometry)
 
 
-def _scanned(scan: LoggedScan, track: _Track, context: MessageContext) -> Iterator[BagMessage]:
-    """A cloud, and where the robot and the sensor were at its moment: the sensor looks where the robot looks."""
+def _command(log: DriveLog, sample: int, context: MessageContext) -> BagMessage:
+    command = twist(_twist(log.commands[sample]))
+    return _message(float(log.times[sample]), "/cmd_vel", "geometry_msgs/Twist", command)
+
+
+def _sensor_place(scan: LoggedScan, track: _Track, context: MessageContext) -> BagMessage:
+    """Where the robot and the sensor were at the moment of a scan."""
+    return _message(scan.time, "/tf", TF, transforms_message(list(_sensor_steps(scan, track)), context))
+
+
+def _cloud(scan: LoggedScan, track: _Track, context: MessageContext) -> BagMessage:
+    T_odom_base, T_base_sensor = _sensor_steps(scan, track)
+    points = (T_odom_base @ T_base_sensor).inverse().apply(scan.points)
+    return _message(scan.time, "/points", "sensor_msgs/PointCloud2", point_cloud(points, SENSOR, scan.time, context))
+
+
+def _sensor_steps(scan: LoggedScan, track: _Track) -> tuple[Transform, Transform]:
+    """``T_odom_base`` and ``T_base_sensor`` at the moment of a scan: the sensor looks where the robot looks."""
     T_odom_base = track.at(scan.time)
     origin = T_odom_base.inverse().apply(scan.origin[None, :])[0]
-    T_base_sensor = Transform(tuple(origin.tolist()), parent=T_odom_base.child, child=SENSOR, stamp=scan.time)
-    yield _message(scan.time, "/tf", TF, transforms_message([T_odom_base, T_base_sensor], context))
-    points = (T_odom_base @ T_base_sensor).inverse().apply(scan.points)
-    yield _message(scan.time, "/points", "sensor_msgs/PointCloud2", point_cloud(points, SENSOR, scan.time, context))
+    return T_odom_base, Transform(tuple(origin.tolist()), parent=T_odom_base.child, child=SENSOR, stamp=scan.time)
 
 
 def _planned(time: float, points: FloatArray, context: MessageContext) -> BagMessage:

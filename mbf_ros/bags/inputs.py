@@ -136,9 +136,23 @@ class BagInputs:
     def _take_scan(self, kind: str, source: str, statistics: TopicStatistics, message: Message, now: float) -> None:
         scan = SENSORS[kind](message, self._context, source, now)
         statistics.delays.take(now - scan.stamp)
-        frames = {served.map.frame_id for served in self._server.served.values() if served.map.listens_to(source)}
-        exact = all(self._transforms.can_transform(frame, scan.frame_id, scan.stamp) for frame in frames)
-        self._server.take_scan(scan)
-        statistics.placed_by_newest += not exact
+        is_by_newest, refusals = self._judge(scan)
+        self._server.take_scan(scan)  # raises where all maps refuse
+        statistics.placed_by_newest += is_by_newest
+        for name, error in refusals.items():
+            statistics.drop_by_map(name, reason_of(error), error_text(error))
         for listener in self.scan_listeners:
             listener(scan)
+
+    def _judge(self, scan: RangeScan) -> tuple[bool, dict[str, TransformError]]:
+        """Whether a map will place a scan by the newest transform, and why maps will refuse it, by their names."""
+        is_by_newest, refusals = False, {}
+        for name, served in self._server.served.items():
+            if not served.map.listens_to(scan.source):
+                continue
+            try:
+                transform = scan.transform_to(served.map.frame_id, self._transforms, served.transform_tolerance)
+                is_by_newest |= transform.stamp != scan.stamp
+            except TransformError as error:
+                refusals[name] = error
+        return is_by_newest, refusals

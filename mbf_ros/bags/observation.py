@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
-from typing import TypeVar
+from collections.abc import Sequence
 
 import numpy as np
 
 from mbf_abstract.drive_log import DriveLog, LoggedScan
 from mbf_abstract.events import Event
-from mbf_abstract.geometry import FloatArray, Path, Pose
+from mbf_abstract.geometry import FloatArray, Pose
 from mbf_abstract.geometry.transform import TransformError
 from mbf_abstract.maps.sensing import RangeScan
 from mbf_abstract.maps.tracking.contact import RobotBox
 from mbf_abstract.maps.view import MapView
 from mbf_abstract.server.map_server import MapServer
 from mbf_ros.bags.inputs import RecordedRobot
-
-Thing = TypeVar("Thing")
+from mbf_ros.bags.planning import ReplayedPlan
 
 SCAN_PERIOD = 0.5  # s between two scans of a source that are kept, in bags of up to a quarter of an hour
 MOST_SCANS, MOST_POINTS = 2000, 5000  # of a source, and of a scan, that are kept to be shown
@@ -51,6 +48,7 @@ class Observation:
         self._server, self._robot, self._map_name, self._began = server, robot, map_name, began
         served = server.served.get(map_name) or next(iter(server.served.values()))
         self.frame_id: str = served.map.frame_id
+        self._transform_tolerance: float = served.transform_tolerance
         self.poses_unknown = 0
         self._outline = outline_of(served.map.robot_box)
         self._rows: list[list[float]] = []
@@ -79,7 +77,7 @@ class Observation:
         if scan.stamp < self._next_scan.get(scan.source, -math.inf):
             return
         try:
-            placed = scan.in_frame(self.frame_id, self._server.runtime.transforms)
+            placed = scan.in_frame(self.frame_id, self._server.runtime.transforms, self._transform_tolerance)
         except TransformError:  # another map could place it
             return
         self._next_scan[scan.source] = scan.stamp + self._scan_period
@@ -101,12 +99,10 @@ class Observation:
             self._maps.append((now - self._began, view))
 
     def log(
-        self, name: str, paths: Sequence[tuple[float, Path]], goal: Pose | None, outcome: int | None, message: str,
-        events: Sequence[Event],
-    ) -> DriveLog:  # fmt: skip
-        """Return what was kept; ``paths`` with their times [s], ``events`` in the time of the bag."""
+        self, name: str, plan: ReplayedPlan | None, outcome: int | None, message: str, events: Sequence[Event]
+    ) -> DriveLog:
+        """Return what was kept, and the plan; ``events`` in the time of the bag."""
         rows = np.array(self._rows, dtype=np.float64).reshape(-1, 11)
-        transforms = self._server.runtime.transforms
         first = rows[0, 1:8].tolist() if len(rows) else [0.0] * 6 + [1.0]
         return DriveLog(
             name=name,
@@ -114,28 +110,20 @@ class Observation:
             frame_id=self.frame_id,
             outline=self._outline,
             start=Pose(tuple(first[:3]), tuple(first[3:]), self.frame_id),
-            goals=tuple(() if goal is None else self._shown([goal], transforms.transform_pose)),
+            goals=() if plan is None or plan.shown_goal is None else (plan.shown_goal,),
             times=rows[:, 0].copy(),
             poses=rows[:, 1:8].copy(),
             twists=rows[:, 8:11].copy(),
             commands=np.full((len(rows), 3), np.nan),
-            paths=[
-                (time - self._began, shown.positions)
-                for time, path in paths
-                for shown in self._shown([path], transforms.transform_path)
-            ],
+            paths=[]
+            if plan is None or plan.shown_path is None
+            else [(plan.time - self._began, plan.shown_path.positions)],
             scans=self._scans,
             maps=self._maps,
             events=tuple(events),
             outcome=outcome,
             message=message,
         )
-
-    def _shown(self, things: Iterable[Thing], transform: Callable[[Thing, str], Thing]) -> Iterator[Thing]:
-        """Poses or paths in the frame of the map that is shown; not those that cannot be placed in it."""
-        for thing in things:
-            with suppress(TransformError):
-                yield transform(thing, self.frame_id)
 
 
 def outline_of(box: RobotBox) -> FloatArray:

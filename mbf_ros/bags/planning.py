@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import Any
 
 from mbf_abstract.commands.coordinates import Place
 from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Path, Pose
+from mbf_abstract.geometry.transform import TransformError
+from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.goals.goal_types import GetPathGoal, GetPathResult, RefinePathGoal
 from mbf_abstract.goals.handle import AnyGoalHandle
 from mbf_abstract.navigator import Navigator
@@ -22,6 +25,8 @@ class ReplayedPlan:
     place : Place
     planner : str
         Name; the first one if empty.
+    shown_frame : str
+        Frame of the map that is shown.
 
     Attributes
     ----------
@@ -34,12 +39,15 @@ class ReplayedPlan:
         Once it is there.
     path : Path or None
         The plan, refined.
+    shown_goal : Pose or None
+    shown_path : Path or None
+        In the frame of the map that is shown, by the transforms of the moment; None where they cannot be placed in it.
     note : str
         Why the plan was not refined; empty if it was, or is not meant to be.
     """
 
-    def __init__(self, navigator: Navigator, place: Place, planner: str) -> None:
-        self._navigator, self._planner = navigator, planner
+    def __init__(self, navigator: Navigator, place: Place, planner: str, shown_frame: str) -> None:
+        self._navigator, self._planner, self._shown_frame = navigator, planner, shown_frame
         server = navigator.server
         if server.ground_is_level:
             place = place.on_flat_map()
@@ -51,6 +59,8 @@ class ReplayedPlan:
         self.time = 0.0
         self.result: GetPathResult | None = None
         self.path: Path | None = None
+        self.shown_goal: Pose | None = None
+        self.shown_path: Path | None = None
         self.note = ""
         self._handle: AnyGoalHandle | None = None
 
@@ -61,6 +71,8 @@ class ReplayedPlan:
             self.start = self._navigator.robot_pose()
         except RobotStateError:
             self.start = None  # the result says why
+        with suppress(TransformError):
+            self.shown_goal = self._transforms.transform_pose(self.goal, self._shown_frame)
         self._handle = self._navigator.send(GetPathGoal(self.goal, planner=self._planner))
 
     def look(self) -> None:
@@ -80,16 +92,27 @@ class ReplayedPlan:
             self.look()
 
     def _take_plan(self, result: Any) -> None:
-        self.result, self.path = result, result.path
+        self.result = result
+        self._take_path(result.path)
         refiner = self._navigator.server.config.parameters.plan_refiner
         if result.success and result.path is not None and refiner:
             self._handle = self._navigator.send(RefinePathGoal(result.path, refiner))
 
     def _take_refined(self, result: Any) -> None:
         if result.success and result.refined_path is not None:
-            self.path = result.refined_path
+            self._take_path(result.refined_path)
         else:
             self.note = f"the plan was not refined: {result.outcome_name}: {result.message}"
+
+    def _take_path(self, path: Path | None) -> None:
+        self.path, self.shown_path = path, None
+        if path is not None:
+            with suppress(TransformError):
+                self.shown_path = self._transforms.transform_path(path, self._shown_frame)
+
+    @property
+    def _transforms(self) -> TransformBuffer:
+        return self._navigator.server.runtime.transforms
 
     def to_json(self, began: float) -> dict[str, Any]:
         """Everything, times in seconds from ``began``, poses as x y z qx qy qz qw."""

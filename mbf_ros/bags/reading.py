@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import yaml
+
 from mbf_abstract.event_values import error_text
 from mbf_ros.messages.interfaces import Message, MessageError, completed
 
@@ -121,6 +123,9 @@ def open_bag(path: Path) -> Iterator[Bag]:
     if not (is_ros1 or is_ros2 or (path / "metadata.yaml").is_file()):
         ros2 = "of ROS 2 a .mcap or .db3 file or a folder with a metadata.yaml"
         raise BagError(f"{path}: expected a .bag file of ROS 1, or {ros2}")
+    if _has_compressed_files(path):
+        advice = "ros2 bag convert, or zstd -d and a metadata.yaml without compression, gives one that is read"
+        raise BagError(f"{path}: files that are compressed as a whole are not read; {advice}")
     reader: Any = None
     try:
         reader = (Reader1 if is_ros1 else Reader2)(path)
@@ -136,6 +141,15 @@ def open_bag(path: Path) -> Iterator[Bag]:
         yield bag
     finally:
         reader.close()
+
+
+def _has_compressed_files(path: Path) -> bool:
+    """Whether rosbags would unpack whole files into a temporary folder, however large they become."""
+    try:
+        content = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
+        return str(content["rosbag2_bagfile_information"]["compression_mode"]).lower() == "file"
+    except Exception:  # a single file, or rosbags says what is wrong
+        return False
 
 
 def _types_of(connection: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 from mbf_abstract.geometry import Pose
 from mbf_abstract.whole_files import write_whole
 from mbf_ros.bags.reading import Bag, BagError
+from mbf_ros.bags.recorded_time import check_seconds
 from mbf_ros.messages.geometry import NANOSECONDS, quaternion_of, vector_of
 from mbf_ros.messages.interfaces import Message, MessageError
 
@@ -47,7 +49,16 @@ def map_topic(bag: Bag, chosen: str) -> str:
 
 
 def read_recorded_map(bag: Bag, topic: str, at: float) -> Message:
-    """Return the last map that had been recorded ``at`` seconds after the beginning; raises BagError without one."""
+    """Return the last map that had been recorded ``at`` seconds after the beginning.
+
+    Raises
+    ------
+    BagError
+        There is none, or its bytes are none of its type.
+    ValueError
+        ``at`` is negative or NaN.
+    """
+    check_seconds("--at", at)
     bag.require(topic)
     last = None
     for recorded in bag.messages():
@@ -56,7 +67,8 @@ def read_recorded_map(bag: Bag, topic: str, at: float) -> Message:
         if recorded.topic == topic:
             last = recorded
     if last is None:
-        raise BagError(f"{bag.path}: no map on {topic} in the first {at:g} s")
+        when = f" in the first {at:g} s" if math.isfinite(at) else ""
+        raise BagError(f"{bag.path}: no map on {topic}{when}")
     try:
         return bag.decode(last)
     except MessageError as error:
@@ -69,8 +81,12 @@ def write_recorded_map(file: Path, message: Message) -> None:
     Raises
     ------
     BagError
-        The map has no cells, not as many as its size says, or a resolution or origin that means nothing.
+        A file is there already, or the map has no cells, not as many as its size says, or a resolution or origin that
+        means nothing.
     """
+    image = file.with_suffix(".pgm")
+    if there := [one for one in (file, image) if one.exists()]:
+        raise BagError(f"{there[0]}: expected a file that does not exist yet")
     info, data = message["info"], np.asarray(message["data"])
     width, height, resolution = info["width"], info["height"], info["resolution"]
     if not data.size or width * height != data.size:
@@ -82,8 +98,8 @@ def write_recorded_map(file: Path, message: Message) -> None:
     except ValueError as error:
         raise BagError(f"the origin of the map means nothing: {error}") from error
     rows = np.where(data < 0, UNKNOWN, data).astype(np.uint8).reshape(height, width)[::-1]
-    image = file.with_suffix(".pgm")
     file.parent.mkdir(parents=True, exist_ok=True)
     write_whole(image, b"P5\n%d %d\n255\n" % (width, height) + rows.tobytes())
     resolution = float(f"{resolution:.7g}")  # float32: 0.05 was recorded as 0.05000000074505806
-    write_whole(file, YAML.format(image=image.name, resolution=resolution, x=origin.x, y=origin.y, yaw=origin.yaw))
+    name = json.dumps(image.name, ensure_ascii=False)  # quoted as in YAML: it may have a colon
+    write_whole(file, YAML.format(image=name, resolution=resolution, x=origin.x, y=origin.y, yaw=origin.yaw))

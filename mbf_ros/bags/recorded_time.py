@@ -2,14 +2,18 @@
 
 A bag that was recorded while a simulator gave the time has stamps that have nothing to do with the times at which its
 messages were recorded. The stamps are then moved so that the first messages come as fast as the fastest of them did.
+
+Simulated time passes in steps of a tenth of a second, so a recording whose own clock jumps by years would not end.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from datetime import UTC, datetime
 from itertools import islice
 from typing import Any
 
-from mbf_ros.bags.reading import Bag
+from mbf_ros.bags.reading import Bag, BagError, Recorded
 from mbf_ros.bags.topics import BagTopics
 from mbf_ros.messages.geometry import NANOSECONDS, MessageContext
 from mbf_ros.messages.interfaces import Message, MessageError
@@ -17,6 +21,7 @@ from mbf_ros.messages.interfaces import Message, MessageError
 OTHER_CLOCK = 10.0
 """Messages that come later than this [s], or so much too early, are stamped by another clock."""
 LOOKED_AT = 100  # messages
+LONGEST_GAP, LONGEST_BAG = 3600, 24 * 3600  # s that are replayed, between two messages and in all
 
 
 class RecordedTime:
@@ -40,16 +45,25 @@ class RecordedTime:
         By how much [s] stamps were moved; 0 where they are of the clock that recorded.
     context : MessageContext
         For stamps of messages.
+
+    Raises
+    ------
+    BagError
+        The bag is too long, or nothing was recorded for too long.
     """
 
     def __init__(self, bag: Bag, topics: BagTopics, global_frame: str) -> None:
+        if bag.end - bag.start > LONGEST_GAP * NANOSECONDS:
+            for _ in steady_messages(bag):  # before anything is replayed
+                pass
         self._epoch = bag.start // NANOSECONDS
         self.began = self.of_recording(bag.start)
         self.duration = (bag.end - bag.start) / NANOSECONDS
         plain = MessageContext(global_frame, float(self._epoch))
         lags = sorted(self._lags(bag, topics, plain))
-        is_other = bool(lags) and abs(lags[len(lags) // 2]) > OTHER_CLOCK
-        self.stamp_shift = lags[0] if is_other else 0.0
+        median = lags[len(lags) // 2] if lags else 0.0
+        near = (lag for lag in lags if abs(lag - median) <= OTHER_CLOCK)  # not a single stamp that means nothing
+        self.stamp_shift = next(near) if abs(median) > OTHER_CLOCK else 0.0
         self.context = MessageContext(global_frame, self._epoch - self.stamp_shift)
 
     def of_recording(self, time: int) -> float:
@@ -68,6 +82,38 @@ class RecordedTime:
             if stamp is not None and (time := context.stamp(stamp)):
                 lags.append(self.of_recording(recorded.time) - time)
         return lags
+
+
+def steady_messages(bag: Bag) -> Iterator[Recorded]:
+    """All messages of a bag; raises BagError where the clock that recorded them jumps.
+
+    The times of a bag as a whole are checked by the messages themselves, as they may be written wrongly, too.
+    """
+    last = bag.start
+    for recorded in bag.messages():
+        _check_step(bag, last, recorded.time)
+        last = max(last, recorded.time)
+        yield recorded
+    _check_step(bag, last, bag.end)
+
+
+def _check_step(bag: Bag, last: int, time: int) -> None:
+    if time - last > LONGEST_GAP * NANOSECONDS:
+        jump = f"a message of {_date(last)} is followed by one of {_date(time)}"
+        raise BagError(f"{bag.path}: {jump}; allowed are {LONGEST_GAP} s without messages")
+    if time - bag.start > LONGEST_BAG * NANOSECONDS:
+        span = f"the bag goes from {_date(bag.start)} to {_date(max(time, bag.end))}"
+        raise BagError(f"{bag.path}: {span}; allowed are {LONGEST_BAG} s")
+
+
+def _date(time: int) -> str:
+    return datetime.fromtimestamp(time // NANOSECONDS, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+
+
+def check_seconds(option: str, seconds: float) -> None:
+    """Raise ValueError for an option in seconds that is negative or NaN."""
+    if not seconds >= 0.0:
+        raise ValueError(f"{option} must be 0 s or more, got {seconds}")
 
 
 def first_stamp(message: Message) -> dict[str, Any] | None:

@@ -26,7 +26,7 @@ from mbf_ros.bags.inputs import BagInputs, RecordedRobot
 from mbf_ros.bags.observation import Observation
 from mbf_ros.bags.planning import ReplayedPlan
 from mbf_ros.bags.reading import Bag, BagError
-from mbf_ros.bags.recorded_time import RecordedTime
+from mbf_ros.bags.recorded_time import RecordedTime, check_seconds, steady_messages
 from mbf_ros.bags.statistics import FrameStatistics, TopicStatistics
 from mbf_ros.bags.topics import BagTopics, choose_topics
 
@@ -57,6 +57,11 @@ class ReplayOptions:
         Name; the first one if empty.
     every : float
         Time between two pictures of the map [s]; 0 makes ten pictures.
+
+    Raises
+    ------
+    ValueError
+        ``at`` or ``every`` are negative or NaN.
     """
 
     topics: Mapping[str, str] = field(default_factory=dict)
@@ -67,6 +72,10 @@ class ReplayOptions:
     at: float = math.inf
     planner: str = ""
     every: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("at", "every"):
+            check_seconds(f"--{name}", getattr(self, name))
 
 
 @dataclass(frozen=True)
@@ -111,7 +120,7 @@ def replay_bag(
     Raises
     ------
     BagError
-        The bag is damaged, has no transforms, or it is not clear which of its topics is what.
+        The bag is damaged, too long or without transforms, or it is not clear which of its topics is what.
     ValueError
         An option does not fit the bag or the configuration.
     """
@@ -150,7 +159,7 @@ class _Player:
         self._observation, self._on_progress = observation, on_progress
         self._plan = None
         if options.goal is not None:
-            self._plan = ReplayedPlan(session.navigator, options.goal, options.planner)
+            self._plan = ReplayedPlan(session.navigator, options.goal, options.planner, observation.frame_id)
         if options.at > time.duration and math.isfinite(options.at):
             raise ValueError(f"--at {options.at:g}: the bag ends after {time.duration:.3f} s")
         self._plan_at = time.began + options.at
@@ -164,7 +173,7 @@ class _Player:
 
     def play(self, bag: Bag, inputs: BagInputs) -> ReplayedPlan | None:
         """Play all messages; returns the plan, if one is asked for."""
-        for recorded in bag.messages():
+        for recorded in steady_messages(bag):
             due = max(self._time.of_recording(recorded.time), self._clock.now())
             self._pass_time(due)
             inputs.take(recorded, due)
@@ -244,8 +253,7 @@ def _replayed(
     result = None if plan is None else plan.result
     log = observation.log(
         bag.path.name,
-        [(plan.time, plan.path)] if plan is not None and plan.path is not None else [],
-        None if plan is None else plan.goal,
+        plan,
         None if result is None else int(result.outcome),
         "replayed from a bag" if result is None else f"planned in a replay: {result.message}",
         kept,

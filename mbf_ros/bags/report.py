@@ -40,7 +40,10 @@ def result_line(replayed: Replayed) -> str:
     """One line on what was replayed, and on the plan."""
     used = sum(one.recorded.count for one in replayed.topics.values() if one.used_as)
     dropped = sum(one.dropped.total() for one in replayed.topics.values())
+    partly = sum(one.dropped_by_map.total() for one in replayed.topics.values())
     line = f"{used} messages in {replayed.duration:.1f} s replayed, {dropped} not used"
+    if partly:
+        line += f", {partly} not used by one of the maps"
     if replayed.plan is None:
         return line
     plan = replayed.plan
@@ -76,8 +79,9 @@ def _topics(replayed: Replayed) -> Iterable[tuple[Any, ...]]:
 
 def _dropped(replayed: Replayed) -> Iterable[tuple[Any, ...]]:
     for topic, one in replayed.topics.items():
-        for reason in sorted(one.dropped):
-            yield topic, reason, one.dropped[reason], one.examples[reason]
+        for dropped in (one.dropped, one.dropped_by_map):
+            for reason in sorted(dropped):
+                yield topic, reason, dropped[reason], one.examples[reason]
 
 
 def _frames(replayed: Replayed) -> Iterable[tuple[Any, ...]]:

@@ -76,6 +76,8 @@ class TopicStatistics:
     delays : Delays
     dropped : Counter of str
         How many messages were not used, by reason.
+    dropped_by_map : Counter of str
+        How many scans one map did not use and another one did, by ``map: reason``.
     examples : dict of str to str
         The first text by reason.
     placed_by_newest : int
@@ -87,6 +89,7 @@ class TopicStatistics:
     recorded: Intervals = field(default_factory=Intervals)
     delays: Delays = field(default_factory=Delays)
     dropped: Counter[str] = field(default_factory=Counter)
+    dropped_by_map: Counter[str] = field(default_factory=Counter)
     examples: dict[str, str] = field(default_factory=dict)
     placed_by_newest: int = 0
 
@@ -95,6 +98,11 @@ class TopicStatistics:
         self.dropped[reason] += 1
         self.examples.setdefault(reason, text)
 
+    def drop_by_map(self, name: str, reason: str, text: str) -> None:
+        """Count a scan that the map ``name`` could not use, and another one could."""
+        self.dropped_by_map[f"{name}: {reason}"] += 1
+        self.examples.setdefault(f"{name}: {reason}", text)
+
     def to_json(self) -> dict[str, Any]:
         """Everything, times in seconds."""
         return {
@@ -102,12 +110,13 @@ class TopicStatistics:
             "used_as": self.used_as,
             **_intervals(self.recorded),
             **_delays(self.delays),
-            "dropped": {
-                reason: {"count": self.dropped[reason], "first": self.examples[reason]}
-                for reason in sorted(self.dropped)
-            },
+            "dropped": self._counted(self.dropped),
+            "dropped_by_map": self._counted(self.dropped_by_map),
             "placed_by_newest_transform": self.placed_by_newest,
         }
+
+    def _counted(self, dropped: Counter[str]) -> dict[str, Any]:
+        return {reason: {"count": dropped[reason], "first": self.examples[reason]} for reason in sorted(dropped)}
 
 
 @dataclass

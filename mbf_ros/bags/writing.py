@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 from mbf_ros.bags.reading import NEEDS, BagError
@@ -35,7 +37,7 @@ class BagMessage(NamedTuple):
 
 
 def write_bag(folder: Path, messages: Iterable[BagMessage]) -> dict[str, int]:
-    """Write messages in the given order; the same messages give the same bytes.
+    """Write messages in the given order; the same messages give the same bytes, and an error leaves no bag.
 
     Returns
     -------
@@ -105,8 +107,11 @@ def _writer(folder: Path) -> Iterator[tuple[Any, Any]]:
         raise BagError(f"{folder}: expected a folder that does not exist yet")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with Writer(folder, version=LAYOUT, storage_plugin=StoragePlugin.MCAP) as writer:
-            yield writer, get_typestore(Stores.ROS2_HUMBLE)
+        with TemporaryDirectory(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent) as part:
+            whole = Path(part) / folder.name  # files of a bag are named after its folder
+            with Writer(whole, version=LAYOUT, storage_plugin=StoragePlugin.MCAP) as writer:
+                yield writer, get_typestore(Stores.ROS2_HUMBLE)
+            os.replace(whole, folder)
     except (OSError, WriterError) as error:
         raise BagError(f"{folder}: the bag cannot be written: {error}") from error
 

@@ -94,7 +94,11 @@ def drive(duration=2.0):
 
 
 def make_bag(folder, messages, kind="mcap"):
-    """Write a bag of ``ros1``, ``sqlite3`` or ``mcap``; return its path."""
+    """Write a bag of ``ros1``, ``sqlite3`` or ``mcap``, or its only file ``.db3`` or ``.mcap``; return its path."""
+    if kind.startswith("."):
+        written = make_bag(folder, messages, "sqlite3" if kind == ".db3" else "mcap")
+        (written / "metadata.yaml").unlink()
+        return next(written.glob(f"*{kind}"))
     if kind == "mcap":
         write_bag(folder / "drive", messages)
         return folder / "drive"

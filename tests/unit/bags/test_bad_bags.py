@@ -5,6 +5,8 @@ import pytest
 from mbf_abstract.commands.coordinates import Place
 from mbf_ros.bags import observation
 from mbf_ros.bags.reading import BagError, open_bag
+from mbf_ros.bags.recorded_time import RecordedTime
+from mbf_ros.bags.topics import BagTopics
 from tests.unit.bags.conftest import MESH, drive, make_bag, message, odometry, scan, static, tf
 
 
@@ -31,6 +33,40 @@ def test_a_file_that_is_no_bag_is_named(tmp_path, name):
 def test_what_is_not_there_is_named(tmp_path):
     assert "no such file" in refusal(tmp_path / "nothing.bag")
     assert "metadata.yaml" in refusal(tmp_path)
+
+
+def test_a_recording_whose_clock_jumps_is_refused_before_it_is_replayed(tmp_path):
+    messages = [tf(0.0, 0.0), tf(0.1, 0.0)]
+    boot = [one._replace(time=one.time % 10**9) for one in messages]  # the computer's clock was not set yet
+    jump = (
+        r"drive: a message of 1970-01-01 00:00:00 UTC is followed by one of 2023-11-14 22:13:20 UTC; allowed are 3600 s"
+    )
+    with pytest.raises(BagError, match=jump), open_bag(make_bag(tmp_path, [*boot, *messages])) as bag:
+        RecordedTime(bag, BagTopics(), "map")
+
+
+def test_a_bag_of_more_than_a_day_is_refused(tmp_path):
+    days = r"the bag goes from 2023-11-14 22:13:20 UTC to 2023-11-15 22:43:20 UTC; allowed are 86400 s"
+    half_hours = [tf(1800.0 * k, 0.0) for k in range(50)]
+    with pytest.raises(BagError, match=days), open_bag(make_bag(tmp_path, half_hours)) as bag:
+        RecordedTime(bag, BagTopics(), "map")
+
+
+def test_a_jump_that_the_metadata_hide_is_refused_in_the_replay(tmp_path, replayed):
+    bag = make_bag(tmp_path, [*drive(0.1), tf(8000.0, 0.0)])
+    metadata = bag / "metadata.yaml"
+    assert "nanoseconds: 8000000000000" in metadata.read_text()
+    metadata.write_text(metadata.read_text().replace("nanoseconds: 8000000000000", "nanoseconds: 100000000"))
+    with pytest.raises(BagError, match="is followed by one of 2023-11-15 00:26:40 UTC"):
+        replayed(bag)
+
+
+def test_a_bag_whose_files_are_compressed_is_refused_before_it_is_unpacked(tmp_path):
+    metadata = make_bag(tmp_path, drive(0.1), "sqlite3") / "metadata.yaml"
+    text = metadata.read_text().replace("compression_mode: ''", "compression_mode: FILE")
+    assert "FILE" in text
+    metadata.write_text(text.replace("compression_format: ''", "compression_format: zstd"))
+    assert "drive: files that are compressed as a whole are not read" in refusal(tmp_path / "drive")
 
 
 def test_a_bag_without_transforms_says_how_to_give_them(replayed):
@@ -106,6 +142,8 @@ def test_types_that_nobody_knows_matter_only_where_they_are_used(tmp_path, repla
     ("options", "text"),
     [
         ({"goal": Place(1.0, 0.0), "at": 9.0}, "--at 9: the bag ends after 0.100 s"),
+        ({"goal": Place(1.0, 0.0), "at": float("nan")}, "--at must be 0 s or more, got nan"),
+        ({"every": float("nan")}, "--every must be 0 s or more, got nan"),
         ({"every": 0.0001}, "would make 1002 pictures, allowed are 200"),
         ({"map_name": "attic"}, "--map attic: there is no such map, only global_costmap, local_costmap"),
         ({"odometry_as_transform": True, "topics": {"odom": ""}}, "--odom-tf needs odometry"),

@@ -125,7 +125,10 @@ def test_poses_of_an_exported_bag_are_those_of_the_run(tmp_path, replayed):
     write_bag(tmp_path / "bag", messages_of(log))
     again = replayed(tmp_path / "bag", CONFIG).log
     assert len(again.times) == 30  # at 0 s nothing had come
-    np.testing.assert_allclose(again.poses[1:, :3], log.poses[1:-1, :3], atol=0.2)  # one sample later, or its scan's
+    written = [round(time * 1e9) / 1e9 for time in (*log.times.tolist(), *(scan.time for scan in log.scans))]
+    newest = [max(time for time in written if time < now) for now in again.times.tolist()]
+    expected = [pose_at(log, time).translation for time in newest]
+    np.testing.assert_allclose(again.poses[:, :3], expected, atol=1e-9)  # stamps are written as whole nanoseconds
 
 
 def test_the_command_exports_the_recording_of_a_run(tmp_path):
@@ -155,6 +158,27 @@ def test_scans_of_older_recordings_begin_where_the_robot_was():
     log = drive_log_of(recording)
     nearest = np.searchsorted(log.times, [scan.time for scan in log.scans])
     assert all((scan.origin == log.poses[row, :3]).all() for scan, row in zip(log.scans, nearest, strict=True))
+
+
+def test_messages_are_made_one_after_the_other():
+    log = make_log(6)
+    log.scans[-1] = replace(log.scans[-1], points=None)
+    messages = messages_of(log)
+    assert next(messages).topic == "/tf_static"
+    with pytest.raises(IndexError):
+        list(messages)
+
+
+def test_a_bag_that_cannot_be_completed_is_not_there(tmp_path):
+    def fails():
+        yield next(iter(messages_of(make_log(6))))
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_bag(tmp_path / "bag", fails())
+    assert not list(tmp_path.iterdir())
+    assert write_bag(tmp_path / "bag", messages_of(make_log(6)))["/points"] == 6
+    assert [file.name for file in tmp_path.iterdir()] == ["bag"]
 
 
 def test_a_bag_that_is_there_is_not_overwritten(tmp_path):

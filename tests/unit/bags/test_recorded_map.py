@@ -1,5 +1,7 @@
 """A recorded map becomes a file that static layers read, cell by cell as it was."""
 
+import math
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -7,7 +9,7 @@ from typer.testing import CliRunner
 from mbf_abstract.cli import make_app
 from mbf_abstract.server.factory import read_floor
 from mbf_ros.bags.reading import BagError, open_bag
-from mbf_ros.bags.recorded_map import write_recorded_map
+from mbf_ros.bags.recorded_map import read_recorded_map, write_recorded_map
 from mbf_ros.messages.interfaces import completed
 from tests.unit.bags.conftest import COSTMAP, drive, header, last_grid, make_bag, message
 
@@ -38,17 +40,58 @@ def test_every_cell_is_kept(tmp_path, kind):
 def test_the_map_of_a_time_is_the_last_one_until_then(tmp_path):
     bag = make_bag(tmp_path, [grid(0.0, CELLS), grid(2.0, CELLS[:2]), *drive(3.0)[-1:]])
     for at, rows in ((1.0, 4), (2.5, 2)):
-        run(bag, "--out", tmp_path / "office.yaml", "--at", at)
-        assert len(read_floor(tmp_path / "office.yaml").occupancy) == rows
+        file = tmp_path / f"at_{rows}.yaml"
+        run(bag, "--out", file, "--at", at)
+        assert len(read_floor(file).occupancy) == rows
+
+
+def test_the_image_is_found_whatever_its_name(tmp_path):
+    bag = make_bag(tmp_path, [grid(0.0, CELLS)])
+    assert run(bag, "--out", tmp_path / 'ground: "a" # 1 é.yaml').exit_code == 0
+    assert read_floor(tmp_path / 'ground: "a" # 1 é.yaml').occupancy.shape == CELLS.shape
+
+
+@pytest.mark.parametrize("name", ["map.yaml", "map.pgm"])
+def test_files_that_are_there_are_not_overwritten(tmp_path, monkeypatch, name):
+    make_bag(tmp_path, [grid(0.0, CELLS)])
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).write_text("mine")
+    refused = run("drive")
+    assert refused.exit_code == 2 and f"{name}: expected a file that does not exist yet" in refused.output
+    assert (tmp_path / name).read_text() == "mine" and len(list(tmp_path.glob("map.*"))) == 1
+
+
+def test_a_topic_without_a_map_says_so(tmp_path):
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with Writer(tmp_path / "drive", version=8) as writer:
+        writer.add_connection("/map", "nav_msgs/msg/OccupancyGrid", typestore=store)
+        chatter = writer.add_connection("/chatter", "std_msgs/msg/Empty", typestore=store)
+        writer.write(chatter, 10**9, b"\x00\x01\x00\x00\x00")
+    with open_bag(tmp_path / "drive") as bag:
+        with pytest.raises(BagError, match=r"no map on /map$"):
+            read_recorded_map(bag, "/map", math.inf)
+        with pytest.raises(BagError, match=r"no map on /map in the first 3 s$"):
+            read_recorded_map(bag, "/map", 3.0)
+
+
+def test_a_time_that_is_no_number_is_refused(tmp_path):
+    with (
+        open_bag(make_bag(tmp_path, [grid(0.0, CELLS)])) as bag,
+        pytest.raises(ValueError, match="--at must be 0 s or more, got nan"),
+    ):
+        read_recorded_map(bag, "/map", math.nan)
 
 
 def test_of_several_maps_the_one_named_map_is_taken_or_asked_for(tmp_path):
     bag = make_bag(tmp_path, [grid(0.0, CELLS, "/global_costmap/costmap"), grid(0.0, CELLS[:3], "/robot/map")])
     assert "6 x 3 cells" in run(bag, "--out", tmp_path / "a.yaml").output
-    assert "6 x 4" in run(bag, "--out", tmp_path / "a.yaml", "--topic", "/global_costmap/costmap").output
+    assert "6 x 4" in run(bag, "--out", tmp_path / "b.yaml", "--topic", "/global_costmap/costmap").output
     (tmp_path / "two").mkdir()
     two = make_bag(tmp_path / "two", [grid(0.0, CELLS, "/one/map"), grid(0.0, CELLS, "/two/map")])
-    refused = run(two, "--out", tmp_path / "a.yaml")
+    refused = run(two, "--out", tmp_path / "c.yaml")
     assert refused.exit_code == 2 and "found /one/map, /two/map; choose by --topic" in refused.output
     assert "/robot/odom: expected a topic of" in run(bag, "--topic", "/robot/odom").output
 

@@ -10,6 +10,10 @@ from mbf_abstract.cli import make_app
 from mbf_abstract.commands.coordinates import Place
 from mbf_abstract.events import EventKind
 from mbf_abstract.geometry.transform import Transform
+from mbf_ros.bags.reading import open_bag
+from mbf_ros.bags.recorded_time import RecordedTime
+from mbf_ros.bags.report import report_of, result_line, statistics_of
+from mbf_ros.bags.topics import choose_topics
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.sensors import point_cloud
 from tests.unit.bags.conftest import (
@@ -26,6 +30,7 @@ from tests.unit.bags.conftest import (
     scan,
     static,
     tf,
+    transform,
 )
 
 GOAL = Place(2.0, 0.0, None, 0.0)
@@ -37,7 +42,7 @@ def marked(grid):
     return np.column_stack([-0.95 + 0.1 * columns, -1.95 + 0.1 * rows])
 
 
-@pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap"])
+@pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap", ".db3", ".mcap"])
 def test_scans_of_every_kind_of_bag_mark_the_wall_where_it_stood(tmp_path, replayed, kind):
     result = replayed(make_bag(tmp_path, drive(), kind))
     walls = marked(last_grid(result))
@@ -70,6 +75,14 @@ def test_a_plan_is_made_from_where_the_robot_was_at_the_asked_time(replayed):
     assert len(early.log.times) == 20  # the replay went on; at 0 s there was no pose yet
 
 
+def test_goal_and_plan_are_shown_where_they_were_when_the_plan_was_made(replayed):
+    text = COSTMAP.replace("{rolling_window", "{frame_id: odom, rolling_window")
+    moved = message(1.5, "/tf", "tf2_msgs/TFMessage", {"transforms": [transform(1.5, "map", "odom", 1.0)]})
+    log = replayed([*drive(1.0), moved], text, goal=GOAL, at=0.5, map_name="local_costmap").log
+    assert log.frame_id == "odom" and log.goals[0].position[0] == 2.0
+    assert log.paths[0][1][-1][:2].tolist() == [2.0, 0.0]
+
+
 def test_events_are_in_the_time_of_the_bag(replayed):
     events = replayed(drive(0.5), goal=GOAL, at=0.13).log.events
     accepted = [event.time for event in events if event.kind is EventKind.GOAL_ACCEPTED]
@@ -96,6 +109,29 @@ def test_messages_without_a_transform_are_counted_with_the_reason(replayed):
     assert counted.recorded.count == 7 and counted.delays.largest == pytest.approx(0.7)
 
 
+def test_scans_that_one_of_two_maps_cannot_place_are_counted_for_that_map(replayed):
+    text = COSTMAP.replace("{rolling_window", "{frame_id: odom, rolling_window")
+    moves = [
+        message(k / 10, "/tf", "tf2_msgs/TFMessage", {"transforms": [transform(k / 10, "odom", "base_link", 0.0)]})
+        for k in range(3)
+    ]
+    result = replayed([static(), *moves, scan(0.1, 0.0, delay=0.1), scan(0.2, 0.0), scan(0.3, 0.0)], text)
+    counted = result.topics["/base_scan"]
+    assert not counted.dropped and counted.dropped_by_map == {"global_costmap: unknown frame": 3}
+    assert counted.placed_by_newest == 1  # on the local map
+    assert "0 not used, 3 not used by one of the maps" in result_line(result)
+    dropped = statistics_of(result)["topics"]["/base_scan"]["dropped_by_map"]["global_costmap: unknown frame"]
+    assert dropped["count"] == 3 and "'map' is an unknown frame" in dropped["first"]
+    tables = {table.title: table.rows for table in report_of(result).tables}
+    assert [row[1:3] for row in tables["Messages that were not used"]] == [("global_costmap: unknown frame", 3)]
+
+
+def test_a_scan_is_shown_if_the_tolerance_of_its_map_lets_it_in(replayed):
+    messages = [static(), tf(0.0, 0.0), tf(0.1, 0.0), scan(0.6, 0.0)]
+    tolerant = COSTMAP.replace("update_frequency: 5.0", "update_frequency: 5.0, transform_tolerance: 1.0")
+    assert len(replayed(messages, tolerant).log.scans) == 1
+
+
 def test_gaps_and_delays_of_transforms_are_measured(replayed):
     frame = replayed([static(), tf(0.0, 0.0), tf(0.1, 0.0, delay=0.05), tf(0.9, 0.0), scan(0.9, 0.0)]).frames
     assert frame["odom"].stamps.largest_gap == pytest.approx(0.8) and frame["odom"].stamps.gap_at == pytest.approx(0.1)
@@ -117,6 +153,13 @@ def test_stamps_of_a_simulator_are_moved_onto_the_clock_of_the_recording(replaye
     result = replayed(moved)
     assert result.stamp_shift == pytest.approx(3000.0) and not result.topics["/base_scan"].dropped
     assert last_grid(result).any()
+
+
+def test_a_single_stamp_that_means_nothing_does_not_move_the_others(tmp_path):
+    moved = [one._replace(time=one.time + 3_000_000_000_000) for one in [*drive(0.5), scan(9000.0, 0.0, delay=-8999.9)]]
+    with open_bag(make_bag(tmp_path, moved)) as bag:
+        time = RecordedTime(bag, choose_topics(bag.types, {}, ["lidar"], False), "map")
+    assert time.stamp_shift == pytest.approx(3000.0)
 
 
 def test_the_command_writes_the_same_bytes_twice(tmp_path, configuration):
