@@ -19,6 +19,7 @@ from typing import TypeVar
 from mbf_abstract.config.configuration import Config
 from mbf_abstract.drive.robot import Robot
 from mbf_abstract.events import EventBus, EventSink, MemorySink
+from mbf_abstract.geometry.transform import Transform
 from mbf_abstract.geometry.transform_buffer import TransformBuffer
 from mbf_abstract.navigator import Navigator
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
@@ -51,6 +52,8 @@ class NavigationSession:
         The events so far.
     navigator : Navigator
         Of the server, once there is one.
+    sensor_mounts : dict of str to Transform
+        Where the range sensors of a simulated robot sit on it, static, by their names.
     """
 
     navigator: Navigator
@@ -59,6 +62,7 @@ class NavigationSession:
         self.clock: Clock = clock or SimClock()
         self.memory = MemorySink(max_events)
         self.events = EventBus(self.clock.now, [self.memory, *sinks])
+        self.sensor_mounts: dict[str, Transform] = {}
         self._closing = ExitStack()
         self.on_close(self.events.close)
         self.on_close(self._let_threads_end)

@@ -8,8 +8,8 @@ from mbf_ros.messages.sensors import SENSORS
 
 
 def sensors_of(texts: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """Return type and source by topic; raises ValueError where a text is no TOPIC:TYPE=SOURCE."""
-    found = {}
+    """Return type and source by topic; raises ValueError where a text is no TOPIC:TYPE=SOURCE, or repeats a topic."""
+    found: dict[str, tuple[str, str]] = {}
     for text in texts:
         topic, _, rest = text.partition(":")
         kind, _, source = rest.partition("=")
@@ -17,5 +17,7 @@ def sensors_of(texts: Iterable[str]) -> dict[str, tuple[str, str]]:
         if not topic or not source or name not in SENSORS:
             kinds = ", ".join(one.partition("/")[2] for one in SENSORS)
             raise ValueError(f"--sensor must be TOPIC:TYPE=SOURCE with one of the types {kinds}, got {text!r}")
+        if topic.lstrip("/") in {other.lstrip("/") for other in found}:
+            raise ValueError(f"--sensor names the topic {topic} twice; each topic feeds one source")
         found[topic] = (name, source)
     return found

@@ -76,7 +76,7 @@ class Publisher:
         self._next_status = 0.0
         self._maps = MapTopics(self._server, topics, context)
         self._add_topics()
-        self._robot_state = RobotState(self._server, topics, context, self._send) if simulated else None
+        self._robot_state = RobotState(session, topics, context, self._send) if simulated else None
         self._server.get_path.listeners.append(self._take_plan)
         session.events.add_sink(self)
         self._ticker = Ticker(session.clock, session.events, self._tick, period, "rosbridge publisher")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from mbf_abstract.server.navigation_server import AbstractNavigationServer
+from mbf_abstract.session import NavigationSession
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.robot_messages import STATE_TOPICS, TF_STATIC, RobotMessages
+from mbf_ros.robot_messages import TF_STATIC, RobotMessages, state_topics
 from mbf_ros.rosbridge.topics import TopicTable
 
 
@@ -16,8 +16,8 @@ class RobotState:
 
     Parameters
     ----------
-    server : AbstractNavigationServer
-        Knows the robot and its transforms.
+    session : NavigationSession
+        Knows the robot, its sensors and its transforms.
     topics : TopicTable
     context : MessageContext
     send : callable
@@ -26,14 +26,14 @@ class RobotState:
 
     def __init__(
         self,
-        server: AbstractNavigationServer,
+        session: NavigationSession,
         topics: TopicTable,
         context: MessageContext,
         send: Callable[[str, Message], None],
     ) -> None:
         self._send = send
-        self._messages = RobotMessages(server, context, topics.is_wanted)
-        for name, kind in STATE_TOPICS.items():
+        self._messages = RobotMessages(session, context, topics.is_wanted)
+        for name, kind in state_topics(session.sensor_mounts).items():
             topics.add_output(name, kind, latched=name == TF_STATIC)
 
     def close(self) -> None:

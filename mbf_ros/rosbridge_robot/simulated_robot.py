@@ -60,7 +60,7 @@ def serve_robot(session: NavigationSession, options: BridgeOptions | None = None
     bridge.topics.add_input("/cmd_vel", kind, drive)
     with ExitStack() as closing:
         closing.callback(lease.release)
-        state = RobotState(server, bridge.topics, context, send)
+        state = RobotState(session, bridge.topics, context, send)
         closing.callback(state.close)
         closing.callback(Ticker(clock, events, state.publish, PERIOD, "robot state").stop)
         closing.callback(served.close)

@@ -20,10 +20,13 @@ from terrain.commands.rerun import rerun
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from terrain.commands.live_line import LiveLine
     from terrain.scenarios.scenario import Scenario
     from terrain.session.goal_sequence import GoalSequence
+    from terrain.session.run_options import Watch
     from terrain.session.runner import RunOptions, RunResult
     from terrain.session.session import Session
+    from terrain.viewer.live.session import ViewOptions
 
 
 def register(app: typer.Typer) -> None:
@@ -86,14 +89,16 @@ def run(
     for a mistake in scenario, configuration or arguments.
     """
     chosen = settings_of(settings, planner=planner, controller=controller)
+    if not ros2:
+        refuse_without(context, "--ros2", "ros2_stamped", "ros2_lockstep", "ros2_patience")
     with readable_errors():
         from mbf_abstract.config.findings import ConfigError
         from mbf_abstract.server.plugin_host import ServerError
         from terrain.commands.live_line import LiveLine
         from terrain.scenarios.on_map import on_map
-        from terrain.scenarios.scenario import load_scenario
+        from terrain.scenarios.scenario import load_scenario, scenario_file
         from terrain.session.runner import RunOptions, run_scenario
-        from terrain.viewer.live.session import LiveSession, ViewOptions
+        from terrain.viewer.live.session import ViewOptions
         from terrain.viewer.results import write_joint_results, write_results
 
         def on_other_map(loaded: Scenario) -> Scenario:
@@ -117,19 +122,16 @@ def run(
             )
             if view:
                 page = ViewOptions(view_host, view_port, view_speed, view_token, view_read_only)
-
-                def watch(session: Session, goals: GoalSequence) -> LiveSession:
-                    _, _, name = session.scenario.name.partition("/")  # of one of several robots
-                    title = f"live view of {name}" if name else "live view"
-                    return LiveSession(session, goals, page, lambda at: live.note(f"{title} at {at}"), live.note)
-
-                options = replace(options, watch=watch, stay=stay)
+                options = replace(options, watch=_live_view(page, live), stay=stay)
             if ros2:
-                from terrain.commands.robot_on_ros import driven_over_ros
+                from terrain.commands.robot_on_ros import driven_over_ros, require_one_robot
 
                 options = driven_over_ros(options, ros2_stamped, ros2_lockstep, ros2_patience)
             try:
-                result = run_scenario(on_other_map(load_scenario(scenario)), options)
+                loaded = load_scenario(scenario)
+                if ros2:
+                    require_one_robot(loaded, scenario_file(scenario))
+                result = run_scenario(on_other_map(loaded), options)
             except (ConfigError, ServerError) as error:
                 raise _all_that_is_wrong(error, scenario, options, on_other_map) from error
     _print_result(result, as_json)
@@ -137,6 +139,26 @@ def run(
         _open_replay(folder)
     if not result.success:
         raise typer.Exit(FAILURE)
+
+
+def refuse_without(context: typer.Context, needed: str, *names: str) -> None:
+    """Raise BadParameter where one of these parameters is given on the command line, without the option it needs."""
+    for name in names:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE":
+            raise typer.BadParameter(f"it goes with {needed} only", param_hint=f"--{name.replace('_', '-')}")
+
+
+def _live_view(page: ViewOptions, live: LiveLine) -> Watch:
+    """Return what serves the page of a session while it runs, and prints its address."""
+    from terrain.viewer.live.session import LiveSession
+
+    def watch(session: Session, goals: GoalSequence) -> LiveSession:
+        _, _, name = session.scenario.name.partition("/")  # of one of several robots
+        title = f"live view of {name}" if name else "live view"
+        return LiveSession(session, goals, page, lambda at: live.note(f"{title} at {at}"), live.note)
+
+    return watch
 
 
 def _all_that_is_wrong(

@@ -10,12 +10,14 @@ from typing import TypeVar
 
 from mbf_abstract.events import EventSink
 from mbf_abstract.geometry import Command, Pose
+from mbf_abstract.geometry.transform import Transform, frame_name_problem
 from mbf_abstract.server.factory import read_config
 from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import Clock, WallClock
 from mbf_abstract.time.sim_clock import SimClock
 from terrain.physics.simulation import Simulation
 from terrain.recording.run_digest import RunDigest
+from terrain.sensors.lidar import Lidar
 from terrain.sensors.proprioception import Localization
 from terrain.session.drive_loop import DEFAULT_RATES, ClockedRobot, DriveLoop
 
@@ -103,6 +105,11 @@ class SimulationSession(NavigationSession, ABC):
         robot = ClockedRobot(simulation, send or simulation.robot.send_command, self.digest)
         options.on_step("building the map")
         server = self.serve(*read_config(config_file), robot, seed=options.seed or 0)
+        self.sensor_mounts = {
+            name: Transform(sensor.model.position, parent=server.runtime.robot.robot_frame, child=name, static=True)
+            for name, sensor in simulation.sensors.items()
+            if isinstance(sensor, Lidar) and not frame_name_problem(name)  # such a sensor is no frame
+        }
         self.loop = DriveLoop(simulation, robot, localization, server, self.digest, self.rates)
         self.on_close(self.loop.stop)
         self.loop.publish()

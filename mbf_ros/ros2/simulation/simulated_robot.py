@@ -16,7 +16,7 @@ from mbf_abstract.session import NavigationSession
 from mbf_abstract.time.clock import WallClock
 from mbf_ros.messages.geometry import InvalidValueError, MessageContext, pose_stamped, twist_of
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.robot_messages import POINTS, SCAN, STATE_TOPICS, TF, TF_STATIC, RobotMessages
+from mbf_ros.robot_messages import SENSOR_TOPICS, STATE_TOPICS, TF, TF_STATIC, RobotMessages, state_topics
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
 from mbf_ros.ros2.running import Spinner, require_ros_2, ros_2
 from mbf_ros.ros2.simulation.newest_command import NewestCommand
@@ -104,14 +104,10 @@ class SimulatedRobot:
         self._node: Any = rclpy.create_node(NODE)
         closing.callback(self._node.destroy_node)
         usual, latched = QoSProfile(depth=10), QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        qualities = {
-            SCAN: qos_profile_sensor_data,
-            POINTS: qos_profile_sensor_data,
-            TF: QoSProfile(depth=100),
-            TF_STATIC: latched,
-            GOAL: latched,
-        }
-        types = {**STATE_TOPICS, CLOCK: "rosgraph_msgs/Clock", GOAL: "geometry_msgs/PoseStamped"}
+        state = state_topics(self._session.sensor_mounts)
+        qualities = {topic: qos_profile_sensor_data for topic, kind in state.items() if kind in SENSOR_TOPICS.values()}
+        qualities |= {TF: QoSProfile(depth=100), TF_STATIC: latched, GOAL: latched}
+        types = {**state, CLOCK: "rosgraph_msgs/Clock", GOAL: "geometry_msgs/PoseStamped"}
         self._classes = {topic: interface_class(kind) for topic, kind in types.items()}
         self._publishers = {
             topic: self._node.create_publisher(kind, _name(topic), qualities.get(topic, usual))
@@ -119,7 +115,7 @@ class SimulatedRobot:
         }
         command = interface_class("geometry_msgs/TwistStamped" if stamped_commands else "geometry_msgs/Twist")
         self._node.create_subscription(command, CMD_VEL, self._taking(stamped_commands), usual)
-        self._state = RobotMessages(self._session.navigator.server, self._context, self._is_wanted)
+        self._state = RobotMessages(self._session, self._context, self._is_wanted)
         closing.callback(self._state.close)
         spinner = Spinner(self._node, self._real_time, self._newest.fail)
         closing.callback(spinner.close, TIME_TO_END)

@@ -35,6 +35,9 @@ def test_what_is_missing_is_said_in_one_text(tmp_path):
         "rclpy cannot be imported": ["ros2", str(file)],
         "error: rclpy cannot be imported": ["run", "indoor", "--ros2", "--out", str(tmp_path / "run")],
         "--wall-clock does not go with --ros2": ["run", "indoor", "--ros2", "--wall-clock", "--out", str(tmp_path)],
+        "--ros2-lockstep": ["run", "indoor", "--ros2-lockstep", "--out", str(tmp_path / "run")],
+        "it goes with --ros2 only": ["run", "indoor", "--ros2-patience", "5", "--out", str(tmp_path / "run")],
+        "--sensor names the topic scan twice": ["ros2", str(file), *2 * ["--sensor", "scan:LaserScan=lidar"]],
         "--sensor must be TOPIC:TYPE=SOURCE": ["ros2", str(file), "--sensor", "scan"],
         "the generators of ROS 2 are not installed": ["ros2-interfaces", "--into", str(tmp_path)],
     }
