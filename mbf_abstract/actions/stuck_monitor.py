@@ -132,7 +132,7 @@ class StuckMonitor:
         parameters, now = self._runtime.parameters, self._runtime.clock.now()
         if not parameters.right_of_way_behavior:
             return False
-        return self._runtime.traffic.meets_others(now, parameters.right_of_way_distance, MEETING_LENGTH)
+        return bool(self._runtime.traffic.rivals(now, parameters.right_of_way_distance, MEETING_LENGTH))
 
     def _is_too_much(self, times: Sequence[float]) -> bool:
         """Whether failures of one kind at one place, at these times [s], mean that the robot is stuck."""

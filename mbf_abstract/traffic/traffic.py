@@ -191,7 +191,9 @@ class Traffic:
         return seen if seen is not None and seen[0] == announcement.stamp else (announcement.stamp, now)
 
     def rivals(self, now: float, distance: float, length: float) -> tuple[Announcement, ...]:
-        """Robots that go somewhere and are in this robot's way, as it is in theirs.
+        """Robots that go somewhere, in this robot's way as it is in theirs, and ahead; none that go the same way.
+
+        So one that follows this robot, or drives on before it, is no rival.
 
         Parameters
         ----------
@@ -204,9 +206,5 @@ class Traffic:
         if own is None:
             return ()
         going = [other for other in self.others(now) if other.remaining > 0.0]
-        return tuple(other for other in going if in_each_others_way(own, other, distance, length))
-
-    def meets_others(self, now: float, distance: float, length: float) -> bool:
-        """Whether any of the ``rivals`` is ahead of this robot and does not go ahead of it the same way."""
-        own, rivals = self.own, self.rivals(now, distance, length)
-        return own is not None and any(face_each_other(own, rival, length) for rival in rivals)
+        near = [other for other in going if in_each_others_way(own, other, distance, length)]
+        return tuple(other for other in near if face_each_other(own, other, length))

@@ -327,6 +327,40 @@ def test_it_does_not_pull_out_to_where_the_first_one_goes(give_way):
     assert traffic.own.cannot_yield
 
 
+def test_a_robot_that_follows_is_neither_waited_for_nor_pulled_out_for(give_way):
+    traffic = head_on(remaining=1.0)
+    traffic._channel.publish(announced("ben", 3.9, 7.5, 9.0))
+    result, _ = give_way(bay(2.4, 3.4, True), traffic=traffic, wait=1.0, random_extra=0.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert "ben" not in result.message
+    assert not traffic.own.waits
+
+
+def test_one_that_does_not_get_there_in_time_announces_that_it_cannot_yield(give_way):
+    traffic = head_on(remaining=1.0)
+    result, _ = give_way(bay(2.4, 3.4, True), traffic=traffic, time_limit=1.0, longest_wait=2.0)
+    assert result.outcome == RecoveryOutcome.PAT_EXCEEDED
+    assert "asks for the right of way over ben" in result.message
+    assert traffic.own.cannot_yield
+
+
+class Swaying(Radio):
+    """The other robot drives to and fro, 0.3 m in 2 s."""
+
+    def anew(self, one):
+        off = (0.3 * (self.clock.now() // 2.0 % 2.0), 0.0, 0.0)
+        return replace(super().anew(one), way=one.way + off)
+
+
+def test_it_does_not_wait_for_ever_for_one_that_moves_and_makes_no_room(give_way):
+    traffic = head_on(9.0, Swaying(until=300.0))
+    result, motion = give_way(bay(2.4, 3.4, True), traffic=traffic, longest_wait=4.0)
+    assert result.outcome == RecoveryOutcome.SUCCESS, result.message
+    assert "has pulled out" in result.message and "waited 12.0 s" in result.message
+    assert traffic.own.waits == 1
+    assert 2.4 < motion.end.x < 3.4 and motion.end.y > 3.7
+
+
 class Pleading(Radio):
     """The other robot finds at 2 s that it cannot yield."""
 

@@ -13,9 +13,10 @@ IMPASSABLE at once.
 
 Among robots that announce where they go (``mbf_abstract.traffic``), the rule ``right_of_way`` decides: the one that
 goes first waits until the others are out of its way, the others pull out, also out of the way that the first one has
-announced, and wait until it has passed. Both wait while the others move, and ``longest_wait`` longer. One that finds no
-place, or does not get there, announces that, and then goes first. One that goes first and has waited in vain announces
-that, too: then the others go first, and it pulls out itself.
+announced, and wait until it has passed. Both wait while the others move, and ``longest_wait`` longer, but not more than
+``MOST_WAITS`` times as long in all. One that finds no place, or does not get there, announces that, and then goes
+first. One that goes first and has waited in vain announces that, too: then the others go first, and it pulls out
+itself.
 
 The server's ``recovery_patience`` must leave time for the drive and the wait.
 """
@@ -48,7 +49,10 @@ LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
 ATTEMPTS = 3  # to drive to a place
 WAIT_PERIOD = 0.5  # s between two looks at where the other robots are
 MOVED = 0.2  # m, of another robot that does not stand
+MOST_WAITS = 3.0  # times longest_wait, for robots that move again and again
 END_REACHED, HEADING_REACHED = 0.04, 0.05  # m, rad
+NOT_THERE = frozenset([RecoveryOutcome.IMPASSABLE, RecoveryOutcome.PAT_EXCEEDED])
+"""How it ends to find no place, or not to get there."""
 
 
 class GiveWayParameters(GuardedMotionParameters):
@@ -68,7 +72,12 @@ class GiveWayParameters(GuardedMotionParameters):
     wait: float = parameter(3.0, "How long to stand there, at least.", unit="s", ge=0.0, le=600.0)
     random_extra: float = parameter(3.0, "Stand up to this much longer, by chance.", unit="s", ge=0.0, le=600.0)
     longest_wait: float = parameter(
-        8.0, "How long to wait for robots that announce where they go and stand.", unit="s", ge=0.0, le=600.0
+        8.0,
+        "How long to wait for robots that announce where they go and stand; also for those that move, at most three "
+        "times as long in all.",
+        unit="s",
+        ge=0.0,
+        le=600.0,
     )
 
 
@@ -96,7 +105,7 @@ class GiveWayRecovery(GuardedRecovery):
                 return self._stand_aside(request, before)
         finally:
             self.traffic.yields = False
-        return self._without_room(request, before, result) if result.outcome == RecoveryOutcome.IMPASSABLE else result
+        return self._without_room(request, before, result) if result.outcome in NOT_THERE else result
 
     def _pull_out(self, request: RecoveryRequest) -> RecoveryResult:
         """Search a place and drive there section by section; search anew where the way there is not free."""
@@ -149,8 +158,8 @@ class GiveWayRecovery(GuardedRecovery):
         """Stand until none of these robots is in the way, or the turn is another's, or they stand for too long."""
         names, begun = {rival.name for rival in rivals}, self.clock.now()
         went_before = {rival.name for rival in self._before(rivals)}
-        places, moved = {rival.name: rival.way[0] for rival in rivals}, begun
-        while self.clock.now() - moved < self.parameters.longest_wait:
+        places, moved, longest = {rival.name: rival.way[0] for rival in rivals}, begun, self.parameters.longest_wait
+        while self.clock.now() < min(moved + longest, begun + MOST_WAITS * longest):
             result = stand(request, WAIT_PERIOD)
             if not result.success:
                 return result
@@ -171,7 +180,7 @@ class GiveWayRecovery(GuardedRecovery):
             return failed
         self.traffic.set_cannot_yield(True)
         result = self._wait_for(request, before, f"{failed.message}; asks for the right of way over")
-        return replace(result, outcome=RecoveryOutcome.IMPASSABLE) if result.success and self._rivals() else result
+        return replace(result, outcome=failed.outcome) if result.success and self._rivals() else result
 
     # -------------------------------------------------------------------------------------------------- the search
     def _manoeuvre(self, begin: Pose, request: RecoveryRequest) -> list[Step] | None:
