@@ -149,7 +149,7 @@ class AbstractNavigationServer(PluginHost):
         )
         kept = self.runtime.events.memory
         found = (str(event.data.get("message", "")) for event in (kept.of_kind(EventKind.MAP) if kept else ()))
-        return (*left_out, *found, *self._curve_notes())
+        return (*left_out, *found, *self._curve_notes(), *self._right_of_way_notes())
 
     def _curve_notes(self) -> Iterator[str]:
         """Plugins whose curves are tighter than the robot's."""
@@ -162,6 +162,18 @@ class AbstractNavigationServer(PluginHost):
                     yield f"{name}: min_turning_radius {radius:g} m is tighter than the robot's {tightest:.2f} m"
                 if tightest > 0.0 and getattr(plugin.instance, "turns_on_the_spot", False):
                     yield f"{name} turns on the spot, which the robot cannot: its tightest curve is {tightest:.2f} m"
+
+    def _right_of_way_notes(self) -> Iterator[str]:
+        """Whether robots meet that the behaviour for it does not see: both would pull out."""
+        parameters = self.runtime.parameters
+        name, distance = parameters.right_of_way_behavior, parameters.right_of_way_distance
+        plugin = self.plugins.find(PluginKind.RECOVERY, name) if name else None
+        seen = getattr(plugin.instance, "meeting_distance", distance) if plugin is not None else distance
+        if seen < distance:
+            yield (
+                f"right_of_way_distance {distance:g} m is more than the distance {seen:g} m of {name!r}: robots "
+                "that meet between the two all pull out"
+            )
 
     def ground_heights(self, x: float, y: float) -> tuple[float, ...]:
         """Heights [m] of the ground at a place of the global frame, the best to stand on first; () without any."""

@@ -344,6 +344,15 @@ def test_one_that_does_not_get_there_in_time_announces_that_it_cannot_yield(give
     assert traffic.own.cannot_yield
 
 
+def test_it_sees_others_as_far_as_the_server_that_runs_it_where_robots_meet(give_way):
+    """Within its reach of 1 m the ways of both do not come near."""
+    traffic = head_on(remaining=1.0)
+    traffic._channel.publish(announced("ben", 7.6, 0.5, 1.0))
+    result, _ = give_way(corridor, traffic=traffic, reach=1.0, longest_wait=1.0)
+    assert "asks for the right of way over ben" in result.message
+    assert traffic.own.cannot_yield
+
+
 class Swaying(Radio):
     """The other robot drives to and fro, 0.3 m in 2 s."""
 

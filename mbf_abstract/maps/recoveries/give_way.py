@@ -43,7 +43,7 @@ from mbf_abstract.outcomes import RecoveryOutcome
 from mbf_abstract.parameters import PluginParameters, parameter
 from mbf_abstract.plugins import RecoveryRequest, RecoveryResult
 from mbf_abstract.traffic.announcement import Announcement
-from mbf_abstract.traffic.right_of_way import right_of_way
+from mbf_abstract.traffic.right_of_way import MEETING_LENGTH, right_of_way
 
 LOOKAHEAD = 0.25  # m to the point of the manoeuvre that is steered to
 ATTEMPTS = 3  # to drive to a place
@@ -107,6 +107,11 @@ class GiveWayRecovery(GuardedRecovery):
             self.traffic.yields = False
         return self._without_room(request, before, result) if result.outcome in NOT_THERE else result
 
+    @property
+    def meeting_distance(self) -> float:
+        """Others are in its way where theirs comes nearer than this [m]."""
+        return self.parameters.distance
+
     def _pull_out(self, request: RecoveryRequest) -> RecoveryResult:
         """Search a place and drive there section by section; search anew where the way there is not free."""
         p, token = self.parameters, request.cancel_token
@@ -147,7 +152,9 @@ class GiveWayRecovery(GuardedRecovery):
 
     # --------------------------------------------------------------------------------------------- the other robots
     def _rivals(self) -> tuple[Announcement, ...]:
-        return self.traffic.meet(self.clock.now(), self.parameters.distance, self.parameters.reach)
+        """Those that it meets; no fewer than those for which it was run as ``right_of_way_behavior``."""
+        p = self.parameters
+        return self.traffic.meet(self.clock.now(), p.distance, max(p.reach, MEETING_LENGTH))
 
     def _before(self, rivals: Sequence[Announcement]) -> list[Announcement]:
         """Those of the robots that go before this one."""

@@ -158,6 +158,20 @@ def test_a_behaviour_that_is_not_loaded_refuses_a_goal_of_move_base(make_session
     assert "step_aside" in handle.wait().message
 
 
+class ShortSighted(ScriptedRecovery):
+    """It sees others as ``give_way`` with a distance of 0.6 m does."""
+
+    meeting_distance = 0.6
+
+
+@pytest.mark.parametrize(("distance", "noted"), [(0.6, False), (0.8, True)])
+def test_a_behaviour_that_sees_less_than_what_it_is_asked_for_is_noted(distance, noted):
+    plugins = {"planner": ScriptedPlanner, "give_way": ShortSighted}
+    with ScriptedSession(plugins, right_of_way_behavior="give_way", right_of_way_distance=distance) as session:
+        text = "right_of_way_distance 0.8 m is more than the distance 0.6 m of 'give_way'"
+        assert [text in note for note in session.server.notes] == [True] * noted
+
+
 def test_where_recovery_is_off_move_base_does_not_ask(make_session):
     session = make_session(HEAD_ON, recovery_enabled=False)
     session.controller.play(BLOCKED)
