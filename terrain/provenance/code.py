@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from mbf_abstract.config.configuration import Config
+from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.plugins import Plugin, PluginKind
 from mbf_abstract.server.navigation_server import AbstractNavigationServer
@@ -32,14 +33,14 @@ def code_of(servers: Sequence[AbstractNavigationServer]) -> dict[str, Code]:
     """Return the packages of a run by name: this project's, and those of the configurations' plugins and layers."""
     modules = list(OWN_PACKAGES)
     for server in servers:
-        modules += [type(server).__module__, *_modules_of_plugins(server)]
+        modules += [type(server).__module__, *modules_of_plugins(server.config, server.plugin_registry())]
     packages = sorted({module.partition(".")[0] for module in modules})
     places = {package: place for package in packages if (place := place_of(package)) is not None}
     return {package: Code(sha256=hash_of_code(place), commit=commit_of(place)) for package, place in places.items()}
 
 
-def _modules_of_plugins(server: AbstractNavigationServer) -> Iterator[str]:
-    config, registry = server.config, server.plugin_registry()
+def modules_of_plugins(config: Config, registry: PluginRegistry) -> Iterator[str]:
+    """Modules of all plugins and layers of a configuration, also of those inside of other plugins."""
     for kind, type_name in _types_of(config):
         yield registry.module_of(kind, type_name)
 

@@ -157,10 +157,12 @@ def _bench(protocol: Protocol, asked: Asked) -> None:
     """Drive everything, and write and print the results."""
     from rich.console import Console
 
+    from mbf_abstract.event_values import well_formed
     from mbf_abstract.whole_files import write_whole
-    from terrain.experiments.evaluation.leaderboard import page, standings, terminal_table
+    from terrain.experiments.evaluation.joining import join
+    from terrain.experiments.evaluation.leaderboard import page, settings_text, standings, terminal_table
     from terrain.experiments.evaluation.results import (
-        comparable,
+        described,
         read_results,
         results_of,
         shipped_results,
@@ -170,31 +172,32 @@ def _bench(protocol: Protocol, asked: Asked) -> None:
 
     console = Console(stderr=asked.as_json)
     entries = _entries(protocol, asked)
-    others = [read_results(Path(name)) for name in asked.beside if _is_file(name)]
-    others += [shipped] if (shipped := shipped_results(protocol)) is not None else []
+    others = {name: read_results(Path(name)) for name in asked.beside if _is_file(name)}
+    if (shipped := shipped_results(protocol)) is not None:
+        others["the shipped results"] = shipped
     rows = run_trials(protocol, entries, asked.out, asked.workers, asked.time_limit, _reporter(console))
     results = results_of(protocol, entries, rows, asked.command)
     asked.out.mkdir(parents=True, exist_ok=True)
     write_results(results, asked.out / "results.json")
-    names, shown, about = {row["entry"] for row in rows}, list(rows), _about(results.head)
-    for other in others:
-        added = [row for row in comparable(other, protocol) if row["entry"] not in names]
-        if added:
-            shown += added
-            names |= {row["entry"] for row in added}
-            about.append(_origin(other.head, added))
-    lines = standings(shown, len(protocol.trials))
+    table = join(results, others, protocol)
+    lines = standings(table.rows, len(protocol.trials))
     title = f"mbf bench {protocol.name} {protocol.version}"
     own = {entry.name for entry in entries if entry.name not in protocol.entries}
-    write_whole(asked.out / "leaderboard.html", page(title, about, shown, lines, own))
+    about = [*_about(results.head), *table.origins]
+    write_whole(asked.out / "leaderboard.html", page(title, about, table.rows, lines, own, table.entries))
     if asked.as_json:
         typer.echo(json.dumps({**results.head, "standings": [vars(line) for line in lines]}))
         return
     console.print(terminal_table(lines, f"{title}, {len(protocol.trials)} worlds, protocol {protocol.hash}"))
+    known = {name: described(entry) for name, entry in protocol.entries.items()}
+    for name, entry in table.entries.items():
+        if known.get(name) != entry:
+            text = f"{name}: {entry['backend']}, {settings_text(entry)}"
+            console.print(well_formed(text), markup=False, highlight=False, soft_wrap=True)
     for line in lines:
         if line.entry in own and line.reason:
             text = f"{line.entry} fails most often with: {line.reason}"
-            console.print(text, markup=False, highlight=False, soft_wrap=True)
+            console.print(well_formed(text), markup=False, highlight=False, soft_wrap=True)
     console.print(f"results in {asked.out}: results.json, leaderboard.html", markup=False, soft_wrap=True)
 
 
@@ -233,9 +236,3 @@ def _about(head: dict[str, Any]) -> list[str]:
         "by successes, then by SPL (success weighted by path length); who did not drive all worlds has no rank.",
         f"Driven with: {head['command']} (mbf-flex {head['version']}).",
     ]
-
-
-def _origin(head: dict[str, Any], rows: Sequence[dict[str, Any]]) -> str:
-    names = ", ".join(dict.fromkeys(row["entry"] for row in rows))
-    where = f"mbf-flex {head.get('version', '')}, commit {str(head.get('commit', ''))[:9]}"
-    return f"From other results ({where}; {head.get('command', '')}), planning times of that machine: {names}."

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import hashlib
-import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import yaml
+
+from mbf_abstract.config.configuration import Config
 from mbf_abstract.config.findings import ConfigError, Finding
-from mbf_abstract.config.registry import PluginError, PluginRegistry
-from mbf_abstract.plugins import PluginKind
+from mbf_abstract.config.registry import PluginRegistry
 from mbf_abstract.server.factory import read_config
 from terrain.experiments.evaluation.protocol import Entry, Protocol
-from terrain.provenance.code import hash_of_code, place_of
-from terrain.provenance.named_files import InputCopies
+from terrain.provenance.code import hash_of_code, modules_of_plugins, place_of
+from terrain.provenance.named_files import InputCopies, hash_with_named_files, named_files
 from terrain.session.session import write_navigation_config
 
-KINDS = {"planner": PluginKind.PLANNER, "controller": PluginKind.CONTROLLER}
+KINDS = ("planner", "controller")
 OWN = ("mbf_abstract", "mbf_costmap_nav", "mbf_mesh_nav", "terrain")
 
 
@@ -42,40 +43,42 @@ def entrant(protocol: Protocol, settings: Mapping[str, str], backend: str = "", 
     """
     where = f"mbf bench {protocol.name}"
     chosen = backend or protocol.backend
-    source = protocol.trials[0].scenario.navigation.get(chosen)
-    if source is None:
-        known = ", ".join(protocol.trials[0].scenario.navigation)
-        raise ConfigError([Finding(where, 1, "--backend", f"one of {known}", repr(chosen))])
+    known = protocol.trials[0].scenario.navigation
+    if chosen not in known:
+        raise ConfigError([Finding(where, 1, "--backend", f"one of {', '.join(known)}", repr(chosen))])
     title = name or " + ".join(settings[kind] for kind in KINDS if kind in settings) or "settings"
     if title in protocol.entries:
         expected = "a name of your own, or --beside for the shipped entry"
         raise ConfigError([Finding(where, 1, "--name", expected, repr(title))])
-    _refuse_mistakes(protocol, source, settings)
-    return Entry(title, chosen, settings, code_of_plugins(chosen, settings))
+    config, registry = configuration_of(protocol, chosen, settings)
+    return Entry(title, chosen, settings, code_of(config, registry, settings))
 
 
-def _refuse_mistakes(protocol: Protocol, source: Path, settings: Mapping[str, str]) -> None:
-    """Read the configuration with the settings as a run would, without a map."""
-    robot = protocol.trials[0].scenario.robot
-    with tempfile.TemporaryDirectory(prefix="mbf_bench_") as folder:
+def configuration_of(protocol: Protocol, backend: str, settings: Mapping[str, str]) -> tuple[Config, PluginRegistry]:
+    """Read the protocol's configuration with the settings as a run would, without a map; raises ConfigError."""
+    scenario = protocol.trials[0].scenario
+    source = scenario.navigation[backend]
+    with tempfile.TemporaryDirectory(prefix="mbf_bench_") as name:
+        folder = Path(name)
         try:
-            read_config(write_navigation_config(source, robot, {}, Path(folder), settings, InputCopies(Path(folder))))
+            written = write_navigation_config(source, scenario.robot, {}, folder, settings, InputCopies(folder))
+            server, config = read_config(written)
+            return config, server.plugin_registry()
         except ConfigError as error:
             shown = f"{source.name} (with settings)"
             raise ConfigError([replace(finding, file=shown) for finding in error.findings]) from error
 
 
-def code_of_plugins(backend: str, settings: Mapping[str, str]) -> str:
-    """Return a hash of the packages of planner and controller that are not of this project; empty without one.
+def code_of(config: Config, registry: PluginRegistry, settings: Mapping[str, str]) -> str:
+    """Return a hash of what decides a drive and is not of this project; empty without any.
 
-    A module that stands alone counts as a package. A plugin that changes is another entry, which is driven anew.
+    It is of the packages of all plugins and layers, and of the files that settings name. With a module that stands
+    alone all modules of its folder count: it may import them. What changes is another entry, which is driven anew.
     """
-    registry, digests = PluginRegistry(backend), list[str]()
-    for key, kind in KINDS.items():
-        try:
-            package = registry.module_of(kind, settings[key]).partition(".")[0] if key in settings else ""
-        except PluginError:
-            continue  # a name of the configuration, which stands for a type of this project
-        place = place_of(package) if package in sys.modules and package not in OWN else None
-        digests += [] if place is None else [hash_of_code(place)]
+    packages = {module.partition(".")[0] for module in modules_of_plugins(config, registry)} - set(OWN)
+    places = [place for package in sorted(packages) if (place := place_of(package)) is not None]
+    code = [file for place in places for file in (sorted(place.parent.glob("*.py")) if place.is_file() else [place])]
+    digests = [hash_of_code(place) for place in code]
+    named = named_files([yaml.safe_load(value) for value in settings.values()], Path())
+    digests += [hash_with_named_files(named[text]).hex() for text in sorted(named)]
     return hashlib.sha256("".join(digests).encode()).hexdigest()[:12] if digests else ""

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from mbf_abstract.geometry import FloatArray
 from terrain.experiments.evaluation.protocol import Protocol, Trial, read_entries
+from terrain.scenarios.limits import Limits
 from terrain.scenarios.obstacles import Obstacle
 from terrain.scenarios.robots import Sensor
 from terrain.scenarios.scenario import PlanarPose, Scenario
@@ -34,6 +35,7 @@ LEVELS = 10
 SPARSE, DENSE = 0.06, 0.24  # share of filled cells of the first and of the last level
 ROBOT_RADIUS, CLEARANCE = 0.18, 0.1  # m
 RESOLUTION = 0.05  # m, of the search for a route
+TOLERANCE = 0.3  # m, of the goal, as in the configurations
 TIME_LIMIT = 100.0  # s
 STREAM = 4019  # of the posts, so that nothing else draws the same numbers
 FOLDER = Path(__file__).parent / "config"
@@ -79,6 +81,7 @@ def room(level: int, seed: int) -> Scenario:
         obstacles=tuple([*walls(), *(_post(x, y) for x, y in posts.tolist())]),
         physics="kinematic",
         time_limit=TIME_LIMIT,
+        limits=Limits(goal_distance=TOLERANCE),  # and not the tolerance that an entrant may set
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import html
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -128,7 +128,7 @@ def terminal_table(lines: Sequence[Standing], title: str) -> Table:
             f"{line.spl:.3f}",
             "-" if line.time_s is None else f"{line.time_s:.1f}",
             "-" if line.planning_ms is None else f"{line.planning_ms:.1f}",
-            failures_text(line),
+            escape(failures_text(line)),
         )
     return table
 
@@ -138,7 +138,14 @@ def failures_text(line: Standing) -> str:
     return ", ".join(f"{count} {name}" for name, count in line.failures.items())
 
 
-def page(title: str, about: Sequence[str], rows: Sequence[Row], lines: Sequence[Standing], entrants: set[str]) -> str:
+def page(
+    title: str,
+    about: Sequence[str],
+    rows: Sequence[Row],
+    lines: Sequence[Standing],
+    entrants: set[str],
+    entries: Mapping[str, Mapping[str, Any]],
+) -> str:
     """Return the leaderboard as a page that needs no other file.
 
     Parameters
@@ -147,14 +154,26 @@ def page(title: str, about: Sequence[str], rows: Sequence[Row], lines: Sequence[
         Paragraphs: what was driven, how it was judged, where the rows come from.
     entrants : set of str
         Whose line is marked, and whose failures are listed.
+    entries : mapping
+        Map and settings of every line.
     """
     parts = [f"<p>{html.escape(text)}</p>" for text in about]
     parts += [html_table([_page_line(line, line.entry in entrants) for line in lines])]
     parts += ["<h2>Arrived, by world</h2>", html_table(_by_world(rows, lines))]
+    settings = [
+        {"entry": line.entry, "map": entries[line.entry]["backend"], "settings": settings_text(entries[line.entry])}
+        for line in lines
+    ]
+    parts += ["<h2>Settings</h2>", html_table(settings)]
     failed = [row for row in rows if row["entry"] in entrants and not row["success"]]
     if failed:
         parts += ["<h2>Runs that failed</h2>", html_table([_failed_line(row) for row in failed[:MOST_FAILURES]])]
     return html_page(title, parts)
+
+
+def settings_text(entry: Mapping[str, Any]) -> str:
+    """Return what an entry changes in the protocol's configuration, as it would be given to ``--set``."""
+    return " ".join(f"{key}={value}" for key, value in sorted(entry["settings"].items()))
 
 
 def _page_line(line: Standing, is_entrant: bool) -> Row:

@@ -20,6 +20,7 @@ from terrain.experiments.evaluation.protocol import Protocol, Trial, read_entrie
 from terrain.experiments.evaluation.reachability import DrivingLimits, is_reachable
 from terrain.physics.robot_models import HUSKY
 from terrain.scenarios.environment import WORLD_STREAM
+from terrain.scenarios.limits import Limits
 from terrain.scenarios.places import coordinates
 from terrain.scenarios.scenario import PlanarPose, Scenario
 from terrain.scenarios.world_types import GeneratedWorld, HeightfieldWorld
@@ -54,6 +55,7 @@ def scenario_in(name: str, world: GeneratedWorld | HeightfieldWorld, corner: tup
         goals=(PlanarPose(x=x + length - FROM_CORNER, y=y + width - FROM_CORNER, yaw=yaw),),
         physics_rate=120.0,
         time_limit=120.0,
+        limits=Limits(goal_distance=TOLERANCE),  # and not the tolerance that an entrant may set
     )
 
 

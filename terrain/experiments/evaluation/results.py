@@ -3,21 +3,89 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from pydantic import ConfigDict, field_validator, model_validator
+
 from mbf_abstract.config.findings import ConfigError, Finding, describe_value
+from mbf_abstract.config.validation import validate
+from mbf_abstract.config.yaml_source import YamlDocument
+from mbf_abstract.parameters import ParameterModel, parameter
 from mbf_abstract.whole_files import write_whole
 from terrain.experiments.evaluation.protocol import Entry, Protocol
+from terrain.experiments.evaluation.trials import FAILURES
 from terrain.provenance.code import commit_of
 
 SHIPPED = Path(__file__).parent / "shipped"
-NEEDED = ("trial", "world", "seed", "entry", "route", "success", "failure", "message", "spl", "time_s")
 
 Row = dict[str, Any]
+
+
+class RunRow(ParameterModel):
+    """One run, as far as a table needs it; other keys stay."""
+
+    model_config = ConfigDict(extra="allow")
+
+    trial: str = parameter(..., "Hash of the trial.")
+    world: str = parameter(..., "Name of the world.")
+    seed: int = parameter(..., "Seed of the world.", ge=0)
+    entry: str = parameter(..., "Who drove.")
+    route: bool = parameter(..., "Whether the world has a route.")
+    success: bool = parameter(..., "Whether the run succeeded.")
+    failure: str = parameter(..., "Class of the failure; empty for a success.")
+    outcome: str = parameter(..., "Outcome of navigation.")
+    message: str = parameter(..., "Message of navigation.")
+    verdict: str = parameter(..., "The verdict in words.")
+    spl: float | None = parameter(..., "Success weighted by path length.", ge=0.0, le=1.0)
+    time_s: float | None = parameter(..., "Simulated time.", unit="s", ge=0.0)
+    planning_wall_median_ms: float | None = parameter(None, "Median planning time.", unit="ms", ge=0.0)
+
+    @field_validator("failure")
+    @classmethod
+    def _is_a_class(cls, failure: str) -> str:
+        if failure and failure not in FAILURES:
+            raise ValueError(f"one of {', '.join(FAILURES)}, or an empty text")
+        return failure
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> RunRow:
+        if self.success != (not self.failure) or (self.success and self.time_s is None):
+            raise ValueError("a time and no failure for a success, and a failure otherwise")
+        return self
+
+
+class EntryRow(ParameterModel):
+    """What an entry is."""
+
+    backend: str = parameter(..., "Map.")
+    settings: dict[str, str] = parameter(..., "Changes of the configuration.")
+    code: str = parameter(..., "Hash of code and files that are not of this project.")
+
+
+class ResultsFile(ParameterModel):
+    """A whole file."""
+
+    protocol: dict[str, Any] = parameter(..., "Name, version, hash and rules.")
+    command: str = parameter(..., "Command that completed it.")
+    version: str = parameter(..., "Version of the package.")
+    commit: str = parameter(..., "Commit, empty if not known.")
+    entries: dict[str, EntryRow] = parameter(..., "Entries by name.")
+    runs: list[RunRow] = parameter(..., "Runs.")
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> ResultsFile:
+        nameless = sorted({run.entry for run in self.runs} - set(self.entries))
+        if nameless:
+            raise ValueError(f"runs of the file's entries, but {nameless[0]!r} is none")
+        twice = [run for run, count in Counter((run.entry, run.trial) for run in self.runs).items() if count > 1]
+        if twice:
+            raise ValueError(f"one run of an entry in each world, but {twice[0][0]!r} has two in one")
+        return self
 
 
 @dataclass(frozen=True)
@@ -50,12 +118,14 @@ def results_of(protocol: Protocol, entries: Sequence[Entry], rows: Sequence[Row]
         "command": command,
         "version": version("mbf-flex"),
         "commit": commit_of(Path(__file__).parents[2]),
-        "entries": {
-            entry.name: {"backend": entry.backend, "settings": dict(entry.settings), "code": entry.code}
-            for entry in entries
-        },
+        "entries": {entry.name: described(entry) for entry in entries},
     }
     return Results(head, list(rows))
+
+
+def described(entry: Entry) -> dict[str, Any]:
+    """Return what an entry is, but for its name."""
+    return {"backend": entry.backend, "settings": dict(entry.settings), "code": entry.code}
 
 
 def write_results(results: Results, file: Path) -> None:
@@ -66,22 +136,19 @@ def write_results(results: Results, file: Path) -> None:
 
 
 def read_results(file: Path) -> Results:
-    """Read results; raises ConfigError if the file is none."""
+    """Read results; raises ConfigError if the file is none, with all findings."""
     expected = "results of mbf bench"
     try:
         data = json.loads(file.read_text("utf-8"))
     except (OSError, ValueError) as error:
         raise ConfigError([Finding(str(file), 1, "", expected, str(error))]) from error
-    runs = data.pop("runs", None) if isinstance(data, dict) else None
-    if not isinstance(runs, list) or not isinstance(data.get("protocol"), dict):
+    if not isinstance(data, dict):
         raise ConfigError([Finding(str(file), 1, "", expected, describe_value(data))])
-    wrong = [
-        Finding(str(file), 1, f"runs[{number}]", f"an object with {', '.join(NEEDED)}", describe_value(row))
-        for number, row in enumerate(runs)
-        if not isinstance(row, dict) or any(name not in row for name in NEEDED)
-    ]
-    if wrong:
-        raise ConfigError(wrong)
+    findings: list[Finding] = []
+    validate(ResultsFile, data, YamlDocument(file, data), (), findings)
+    if findings:
+        raise ConfigError(findings)
+    runs = data.pop("runs")
     return Results(data, runs)
 
 

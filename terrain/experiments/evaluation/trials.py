@@ -1,7 +1,8 @@
 """Drives the trials of a protocol: every entry in every world once, in parallel, whatever a plugin does.
 
 Finished runs stand in ``runs.jsonl`` of the evaluation's folder and are not repeated, so that a killed evaluation goes
-on where it stopped. A run is known by the hash of its trial, its settings and the code of plugins of others.
+on where it stopped; a run that hung or crashed is done again by the next command. A run is known by the hash of its
+trial, its settings and the code of plugins of others.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -83,13 +85,16 @@ def run_trials(
         for entry in (None, *entries)
     }
     with SweepLog(folder / "runs.jsonl") as log:
+        for key in [key for key, row in log.rows.items() if row.get("outcome") == LOST]:
+            log.forget(key)  # perhaps the machine was at fault
         left = {id(task): key for key, task in tasks.items() if key not in log.rows}
         todo = [task for key, task in tasks.items() if key not in log.rows]
-        for task, result in run_guarded(do_task, todo, workers, time_limit):
-            row = lost_row(task, result) if isinstance(result, Lost) else result
-            log.append(left[id(task)], row)
-            if task.entry is not None:
-                on_row({**row, **_named(task.trial, task.entry)})
+        with closing(run_guarded(do_task, todo, workers, time_limit, runs_other_code)) as results:
+            for task, result in results:
+                row = lost_row(task, result) if isinstance(result, Lost) else result
+                log.append(left[id(task)], row)
+                if task.entry is not None:
+                    on_row({**row, **_named(task.trial, task.entry)})
         return list(_rows(protocol, entries, log))
 
 
@@ -110,6 +115,11 @@ def task_key(protocol: Protocol, trial: Trial, entry: Entry | None) -> str:
     of_entry = "route" if entry is None else [entry.backend, dict(entry.settings), entry.code]
     digest = hashlib.sha256(json.dumps(of_entry, sort_keys=True).encode()).hexdigest()[:16]
     return f"{protocol.trial_hash(trial)}/{digest}"
+
+
+def runs_other_code(task: Task) -> bool:
+    """Whether a run imports modules that are not of this project and may keep something from world to world."""
+    return task.entry is not None and bool(task.entry.code)
 
 
 def do_task(task: Task) -> Row:

@@ -1,12 +1,15 @@
 """The protocols of ``mbf bench``: frozen, every room with a route; and how their runs are ranked."""
 
 from dataclasses import replace
+from io import StringIO
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from mbf_abstract.config.findings import ConfigError
-from terrain.experiments.evaluation.entrant import entrant
+from mbf_abstract.plugins import PluginKind
+from terrain.experiments.evaluation.entrant import configuration_of, entrant
 from terrain.experiments.evaluation.indoor import (
     BEFORE,
     CELL,
@@ -17,19 +20,23 @@ from terrain.experiments.evaluation.indoor import (
     has_passage,
     indoor,
 )
+from terrain.experiments.evaluation.joining import join
 from terrain.experiments.evaluation.leaderboard import page, standings, terminal_table
 from terrain.experiments.evaluation.outdoor import outdoor
-from terrain.experiments.evaluation.protocol import Trial
+from terrain.experiments.evaluation.protocol import Entry, Trial
 from terrain.experiments.evaluation.results import (
     Results,
     comparable,
+    described,
     read_results,
     results_of,
     shipped_results,
     write_results,
 )
-from terrain.experiments.evaluation.trials import Task, failure_of, lost_row, task_key
+from terrain.experiments.evaluation.trials import Task, failure_of, lost_row, run_trials, task_key
+from terrain.session.arrival import arrival_tolerance
 from terrain.sweeps.guarded_workers import Lost
+from terrain.sweeps.log import SweepLog
 
 OUTDOOR, INDOOR = outdoor([0]), indoor([0])
 
@@ -46,7 +53,28 @@ def row(entry, world="level 0", route=True, failure="", spl=1.0, message="", **m
 
 def test_version_1_is_frozen():
     """Whoever changes a world, a configuration or a rule makes a version 2."""
-    assert (OUTDOOR.hash, INDOOR.hash) == ("f028a8aaba70", "3abfa1712142")
+    assert (OUTDOOR.hash, INDOOR.hash) == ("aa2b3979e61c", "f450f9248d20")
+
+
+@pytest.mark.parametrize("protocol", [OUTDOOR, INDOOR], ids=lambda protocol: protocol.name)
+def test_the_judge_has_a_tolerance_of_its_own_and_no_verdict_is_by_wall_time(protocol):
+    scenario = protocol.trials[0].scenario
+    assert all(trial.scenario.limits == scenario.limits for trial in protocol.trials)
+    for backend in scenario.navigation:
+        frozen = configuration_of(protocol, backend, {})[0].parameters
+        changed = configuration_of(protocol, backend, {"dist_tolerance": "5.0"})[0].parameters
+        allowed, _ = arrival_tolerance(scenario.limits, scenario.localization, changed)
+        assert (allowed, changed.dist_tolerance) == (frozen.dist_tolerance, 5.0)
+        assert frozen.hang_guard > 86400.0, "longer than any --time-limit"
+
+
+def test_a_planner_of_a_user_has_the_controller_of_the_shipped_one_on_the_flat_map():
+    mine, _ = configuration_of(OUTDOOR, "costmap", {"planner": "theta_star"})
+    shipped, _ = configuration_of(OUTDOOR, "costmap", OUTDOOR.entry("flat_astar").settings)
+    of_mine, of_shipped = (
+        [spec.parameters for spec in config.plugins if spec.kind is PluginKind.CONTROLLER] for config in (mine, shipped)
+    )
+    assert of_mine == of_shipped != []
 
 
 def test_a_hash_changes_with_the_rules_and_the_seed_but_not_with_the_shipped_entries():
@@ -111,7 +139,9 @@ def test_the_more_successes_the_better_then_the_shorter_way_and_half_a_result_ha
         {"planner": 1},
         "no <idea>",
     )
-    shown = page("title", ["about"], rows, lines, {"bad"})
+    entries = {line.entry: {"backend": "mesh", "settings": {"planner": line.entry, "key": "[1]"}} for line in lines}
+    shown = page("title", ["about"], rows, lines, {"bad"}, entries)
+    assert "key=[1] planner=bad" in shown
     assert "no &lt;idea&gt;" in shown and "<idea>" not in shown
     assert terminal_table(lines, "title").row_count == 5
 
@@ -126,7 +156,7 @@ def test_a_world_without_a_route_counts_for_nobody():
 def test_only_runs_of_the_same_trials_are_comparable(tmp_path):
     trial = INDOOR.trials[0]
     mine = row("a") | {"trial": INDOOR.trial_hash(trial)}
-    results = results_of(INDOOR, [INDOOR.entry("astar_pursuit")], [mine, row("a")], "mbf bench indoor")
+    results = results_of(INDOOR, [Entry("a", "costmap")], [mine, row("a")], "mbf bench indoor")
     write_results(results, tmp_path / "results.json")
     again = read_results(tmp_path / "results.json")
     assert again == results and again.head["protocol"]["hash"] == INDOOR.hash
@@ -134,11 +164,51 @@ def test_only_runs_of_the_same_trials_are_comparable(tmp_path):
     assert comparable(Results({}, [mine]), OUTDOOR) == []
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"runs": 3, "protocol": {}}', '{"runs": [{"trial": 1}], "protocol": {}}'])
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"runs": 3, "protocol": {}}'])
 def test_a_file_that_is_no_result_is_refused(tmp_path, text):
     (tmp_path / "mine.json").write_text(text)
     with pytest.raises(ConfigError, match=r"mine.json:1: .*expected"):
         read_results(tmp_path / "mine.json")
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"time_s": "fast"}, r"runs\[0\].time_s: expected a number .*, got 'fast'"),
+        ({"spl": float("nan")}, "expected"),
+        ({"spl": 2.0}, r"runs\[0\].spl: expected a number >= 0 and <= 1"),
+        ({"failure": "[/b]"}, r"runs\[0\].failure: .*got '\[/b\]'"),
+        ({"message": ["a"]}, r"runs\[0\].message: "),
+        ({"time_s": None}, "a time and no failure for a success"),
+        ({"success": False}, "a failure otherwise"),
+        ({"entry": "b"}, "runs of the file's entries, but 'b' is none"),
+        ({"trial": "again"}, "'a' has two in one"),
+    ],
+)
+def test_a_run_of_somebody_else_that_is_none_is_refused_with_its_key(tmp_path, change, expected):
+    runs = [row("a") | change, row("a") | {"trial": "again"}]
+    write_results(results_of(INDOOR, [Entry("a", "costmap")], runs, "mbf bench indoor"), tmp_path / "mine.json")
+    with pytest.raises(ConfigError, match=expected):
+        read_results(tmp_path / "mine.json")
+
+
+def test_two_entries_of_one_name_have_a_line_each_and_one_that_is_the_same_has_one():
+    def results(**settings):
+        runs = [row("a") | {"trial": trial} for trial in (INDOOR.trial_hash(INDOOR.trials[0]), "of another protocol")]
+        return results_of(INDOOR, [Entry("a", "costmap", settings)], runs, "mbf bench indoor")
+
+    mine, others = results(planner="x"), {"same.json": results(planner="x"), "b.json": results(planner="y")}
+    table = join(Results(mine.head, mine.rows[:1]), others, INDOOR)
+    assert [row["entry"] for row in table.rows] == list(table.entries) == ["a", "a (b.json)"]
+    assert table.entries["a (b.json)"]["settings"] == {"planner": "y"}
+    assert table.origins[0] == "Left out of same.json, for the same entry is in the table: a."
+    assert table.origins[1].endswith("planning times of that machine: a (b.json).")
+
+
+def test_marks_of_the_terminal_in_results_are_shown_as_they_are():
+    console = Console(width=200, file=StringIO())
+    console.print(terminal_table(standings([row("a[/b]", failure="[/c]")], 1), "[/d]"))
+    assert all(text in console.file.getvalue() for text in ("a[/b]", "1 [/c]", "[/d]"))
 
 
 def test_the_results_that_ship_are_of_this_version_and_name_how_they_were_made():
@@ -147,6 +217,7 @@ def test_the_results_that_ship_are_of_this_version_and_name_how_they_were_made()
     shipped = {row["entry"] for row in results.rows}
     assert shipped <= set(protocol.entries) and shipped
     assert {row["entry"] for row in results.rows if row["trial"] in hashes} == shipped
+    assert results.head["entries"] == {name: described(protocol.entry(name)) for name in shipped}
     assert results.head["command"].startswith(f"mbf bench {protocol.name} --beside all") and results.head["commit"]
 
 
@@ -173,17 +244,49 @@ def test_what_cannot_be_judged_is_refused_before_anything_is_driven(tmp_path):
         outdoor([0], surveys=tmp_path)
 
 
-def test_a_plugin_that_changes_is_another_entry(tmp_path, monkeypatch):
+PLUGIN = """import beside_it
+from mbf_costmap_nav.planners.astar import AStarPlanner
+class Mine(AStarPlanner):
+    'Mine.'
+"""
+
+
+LAYER = """from mbf_costmap_nav.layers.static import StaticLayer
+class Mine(StaticLayer):
+    'Mine.'
+"""
+
+
+def test_code_and_files_that_change_make_another_entry(tmp_path, monkeypatch):
+    """The module of a planner, one that it imports, the module of a layer, and a file that a setting names."""
     monkeypatch.syspath_prepend(str(tmp_path))
-    file = tmp_path / "planner_under_test.py"
-    code = "from mbf_costmap_nav.planners.astar import AStarPlanner\nclass Mine(AStarPlanner):\n    '''Mine.'''\n"
-    keys = []
-    for text in (code, code, code + "# changed\n"):
+    monkeypatch.chdir(tmp_path)
+    layers = tmp_path / "layers_under_test"
+    layers.mkdir()
+    files = {
+        tmp_path / "planner_under_test.py": PLUGIN,
+        tmp_path / "beside_it.py": "",
+        layers / "__init__.py": LAYER,
+        tmp_path / "tree.yaml": "a: 1\n",
+    }
+    for file, text in files.items():
         file.write_text(text)
-        mine = entrant(INDOOR, {"planner": "planner_under_test:Mine"})
+    settings = {
+        "planner": "planner_under_test:Mine",
+        "global_costmap.layers": "[{name: slopes, type: 'layers_under_test:Mine'}, {name: inflation, type: inflation}]",
+        "global_costmap.slopes.map_file": "tree.yaml",
+    }
+
+    def key():
+        mine = entrant(OUTDOOR, settings, "costmap")
         assert mine.name == "planner_under_test:Mine" and mine.backend == "costmap"
-        keys.append(task_key(INDOOR, INDOOR.trials[0], mine))
-    assert keys[0] == keys[1] != keys[2]
+        return task_key(OUTDOOR, OUTDOOR.trials[0], mine)
+
+    keys = [key(), key()]
+    for file, text in files.items():
+        file.write_text(text + "# changed\n")
+        keys.append(key())
+    assert len(set(keys)) == len(keys) - 1 == 5
 
 
 def test_failures_have_classes():
@@ -202,3 +305,18 @@ def test_a_lost_run_is_a_failure_with_its_reason_and_a_lost_judge_ends_the_evalu
     assert (lost["success"], lost["failure"], lost["message"], lost["level"]) == (False, "error", "hung", "failed")
     with pytest.raises(RuntimeError, match="the judge of level 0, seed 0: hung"):
         lost_row(Task(trial, None, INDOOR.judge), Lost("hung"))
+
+
+def test_a_run_that_was_lost_is_done_again_by_the_next_command_and_others_are_not(tmp_path):
+    trial, entry = INDOOR.trials[0], INDOOR.entry("astar_pursuit")
+    protocol, bad = replace(INDOOR, trials=[trial]), replace(entry, settings={"planner": "no_such"})
+    with SweepLog(tmp_path / "runs.jsonl") as log:
+        log.append(task_key(protocol, trial, None), {"route": True})
+        log.append(task_key(protocol, trial, bad), lost_row(Task(trial, bad, protocol.judge), Lost("crashed")))
+        log.append(task_key(protocol, trial, entry), {"outcome": "SUCCESS"})
+
+    driven = []
+    for _ in range(2):
+        first, second = run_trials(protocol, [bad, entry], tmp_path, 1, 600.0, driven.append)
+        assert first["outcome"] == "ConfigError" and second["outcome"] == "SUCCESS"
+    assert [row["outcome"] for row in driven] == ["ConfigError"]
