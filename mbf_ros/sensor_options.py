@@ -1,10 +1,16 @@
-"""The option ``--sensor`` of the commands: which topics of a robot feed which sources of the configuration."""
+"""The option ``--sensor`` of the commands: which topics of a robot feed which sources of the configuration.
+
+A sensor is subscribed, and missed when it falls silent, only where a layer of a map listens to its source.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 from mbf_ros.messages.sensors import SENSORS
+
+BY_DEFAULT = ("scan", "points", "range")
+"""Sources that are taken where no ``--sensor`` is given; that one of them feeds nothing is no mistake."""
 
 
 def sensors_of(texts: Iterable[str]) -> dict[str, tuple[str, str]]:
@@ -21,3 +27,14 @@ def sensors_of(texts: Iterable[str]) -> dict[str, tuple[str, str]]:
             raise ValueError(f"--sensor names the topic {topic} twice; each topic feeds one source")
         found[topic] = (name, source)
     return found
+
+
+def used_sensors(
+    chosen: Mapping[str, tuple[str, str]], listens_to: Callable[[str], bool], report: Callable[[str], None]
+) -> dict[str, tuple[str, str]]:
+    """Return the sensors to whose source a map listens; of the others those not taken by default are reported."""
+    used = {topic: one for topic, one in chosen.items() if listens_to(one[1])}
+    for topic, (_, source) in chosen.items():
+        if topic not in used and source not in BY_DEFAULT:
+            report(f"{topic} is not used: no layer of a map listens to the source {source!r}")
+    return used

@@ -25,10 +25,27 @@ class CellState(IntEnum):
 
 @dataclass(frozen=True)
 class PlaceAnswer:
-    """State and cost of a place; the cost is the map's own unit (costmap: sum of cell costs)."""
+    """State and cost of a place.
+
+    Attributes
+    ----------
+    state : CellState
+        Worst state of what lies under the robot; UNKNOWN hides what is known beside it.
+    cost : float
+        In the map's own unit (costmap: sum of cell costs).
+    known : CellState, optional
+        Worst state of what is known under the robot, where ``state`` is UNKNOWN; None if the map does not say.
+    """
 
     state: CellState
     cost: float
+    known: CellState | None = None
+
+    def is_blocked(self, limit: CellState = CellState.LETHAL, *, unknown: bool = False) -> bool:
+        """Whether anything known is as bad as ``limit``, or, with ``unknown``, anything is unknown."""
+        if self.state is CellState.UNKNOWN:
+            return unknown or (self.known is not None and self.known >= limit)
+        return self.state >= limit
 
 
 @dataclass(frozen=True)

@@ -66,6 +66,10 @@ class MapServer(AbstractNavigationServer):
             listener(scan)
         self._scans.take(scan)
 
+    def listens_to(self, source: str) -> bool:
+        """Whether a layer of any map takes the scans of a source."""
+        return any(served.map.listens_to(source) for served in self.served.values())
+
     def map_problem(self, name: str = "") -> str:
         """Why a map is stale, by default the one that the robot drives on; empty while it is fresh.
 

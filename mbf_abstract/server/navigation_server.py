@@ -118,6 +118,10 @@ class AbstractNavigationServer(PluginHost):
     def take_scan(self, scan: RangeScan) -> None:
         """Feed what a sensor saw into the map; in any known frame, raises TransformError where it is not known."""
 
+    def listens_to(self, source: str) -> bool:
+        """Whether scans of a source change the map; True of a server that does not know."""
+        return True
+
     @classmethod
     def config_for_map(cls, file: FilePath, unknown_is_free: bool = True) -> str | None:
         """YAML text of a sane configuration for a bare map file; None if this server does not read such files.

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -106,7 +107,8 @@ class PluginHost(ABC):
         """
         old = self._loaded(kind, name)
         plugin_class = self.plugin_registry().reload(kind, old.spec.type_name)
-        present = old.instance.parameters.model_dump()
+        with self._in_own_use(old, "a reload"):  # not the parameters of a goal
+            present = old.instance.parameters.model_dump()
         values = plugin_class.Parameters.model_validate(present)  # type: ignore[attr-defined]
         try:
             new = self._construct(replace(old.spec, plugin_class=plugin_class, parameters=values))
@@ -158,19 +160,25 @@ class PluginHost(ABC):
         """
         plugin = self._loaded(kind, name)
         instance = plugin.instance
-        old, new = instance.parameters, with_changes(instance.parameters, changes)
-        user = "a change of its parameters"
+        with self._in_own_use(plugin, "a change of its parameters"):
+            old, new = instance.parameters, with_changes(instance.parameters, changes)
+            try:
+                instance.parameters = new
+                instance.parameters_changed()
+            except BaseException:
+                instance.parameters = old
+                raise
+        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, name, **changes)
+
+    @contextmanager
+    def _in_own_use(self, plugin: LoadedPlugin[Any], user: str) -> Iterator[None]:
+        """Keep goals, which may bring parameters of their own, from a plugin; raises ServerError if one is using it."""
         if not plugin.acquire(user, lambda: True):
             raise ServerError(f"{plugin.title} is in use")
         try:
-            instance.parameters = new
-            instance.parameters_changed()
-        except BaseException:
-            instance.parameters = old
-            raise
+            yield
         finally:
             plugin.release(user)
-        self.runtime.events.emit(EventKind.PARAMETER_CHANGED, name, **changes)
 
 
 def _failure(spec: PluginSpec, error: BaseException) -> str:

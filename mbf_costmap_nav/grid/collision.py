@@ -45,8 +45,11 @@ class FootprintCosts(NamedTuple):
         """Worst state among the cells; unknown counts as worse than lethal (MBF)."""
         if self.covered < 0:
             return CellState.OUTSIDE
-        if self.unknown:
-            return CellState.UNKNOWN
+        return CellState.UNKNOWN if self.unknown else self.known
+
+    @property
+    def known(self) -> CellState:
+        """Worst state among the cells that are known; FREE if none is."""
         if self.lethal:
             return CellState.LETHAL
         return CellState.INSCRIBED if self.inscribed else CellState.FREE

@@ -56,7 +56,8 @@ def pose_check(costmap: Costmap, footprint: Footprint, query: PlaceQuery = AS_CO
 
     def check(pose: Pose) -> PlaceAnswer:
         costs = footprint_costs(costmap, outline, pose.x, pose.y, pose.yaw)
-        return PlaceAnswer(costs.state, costs.weighted_sum(*multipliers))
+        known = costs.known if costs.state is CellState.UNKNOWN else None
+        return PlaceAnswer(costs.state, costs.weighted_sum(*multipliers), known)
 
     return check
 

@@ -16,7 +16,9 @@ from mbf_abstract.server.navigation_server import AbstractNavigationServer
 from mbf_ros.messages.geometry import MessageContext, path_of
 from mbf_ros.messages.interfaces import Message, MessageError
 
-INSCRIBED_COST, LETHAL_COST = 253, 254  # of a cell, as Nav2 counts
+LETHAL_COST = 254  # of a cell, as Nav2 counts
+LIMITS = {253: CellState.INSCRIBED, LETHAL_COST: CellState.LETHAL, 255: CellState.LETHAL}
+"""From which state on a place is forbidden, by ``max_cost``."""
 NOT_VALID: Message = {"is_valid": False, "invalid_pose_indices": []}
 """The answer where there is none."""
 
@@ -34,20 +36,19 @@ def is_path_valid(server: AbstractNavigationServer, request: Message, context: M
     """Return whether the robot fits at each pose that lies before it, and the indices of those where it does not.
 
     As in Nav2 an empty path is not valid, poses that lie behind the robot do not count, and unknown ground does only
-    with ``consider_unknown_as_obstacle``. The robot's outline decides, so ``max_cost`` below that of an inscribed cell
-    raises MessageError.
+    with ``consider_unknown_as_obstacle``; what is lethal beside it counts always. The robot's outline decides: with a
+    ``max_cost`` of 253 it must not cover an inscribed cell either, and a lower one raises MessageError.
     """
-    if request.get("max_cost", LETHAL_COST) < INSCRIBED_COST:
+    limit = LIMITS.get(request.get("max_cost", LETHAL_COST))
+    if limit is None:
         raise MessageError(f"max_cost {request['max_cost']} is not supported here; leave it at {LETHAL_COST}")
     path = path_of(request["path"], context)
     if len(path) == 0:
         return NOT_VALID
-    forbidden = {CellState.LETHAL, CellState.OUTSIDE}
-    if request.get("consider_unknown_as_obstacle", False):
-        forbidden.add(CellState.UNKNOWN)
+    unknown = bool(request.get("consider_unknown_as_obstacle", False))
     first = _nearest(server, path)
     places = server.queries.check_poses(path[first:])
-    invalid = [first + i for i, place in enumerate(places) if place.state in forbidden]
+    invalid = [first + i for i, place in enumerate(places) if place.is_blocked(limit, unknown=unknown)]
     return {"is_valid": not invalid, "invalid_pose_indices": np.array(invalid, np.int32)}
 
 

@@ -28,7 +28,7 @@ from mbf_ros.messages import mbf_actions
 from mbf_ros.messages.action_mapping import ActionMapping, RefusedGoal
 from mbf_ros.messages.geometry import MessageContext
 from mbf_ros.messages.interfaces import Message
-from mbf_ros.ros2.clients import GoalClients, feedback_listeners
+from mbf_ros.ros2.clients import GoalClients, action_clients
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
 
 Outcomes: TypeAlias = (
@@ -107,7 +107,7 @@ class ServedAction:
         self._class = interface_class(self._mapping.type)
         self._goals: dict[bytes, AnyGoalHandle] = {}
         self._jumps: dict[bytes, str] = {}
-        self._clients = GoalClients(partial(feedback_listeners, node, name))
+        self._clients = GoalClients(partial(action_clients, node, name))
         self.unfinished = 0
         ActionServer(
             node,

@@ -28,6 +28,7 @@ from mbf_ros.messages.interfaces import Message, MessageError
 from mbf_ros.messages.sensors import SENSORS
 from mbf_ros.ros2.conversion import fill, interface_class, to_dict
 from mbf_ros.ros2.robot import Arrivals, RosRobot
+from mbf_ros.sensor_options import used_sensors
 
 ODOM, TF, TF_STATIC, CMD_VEL = "odom", "/tf", "/tf_static", "cmd_vel"
 GOAL_TOPICS = ("goal_pose", "move_base_simple/goal")
@@ -87,8 +88,9 @@ class Inputs:
         self._subscribe(TF_STATIC, "tf2_msgs/TFMessage", lambda one: take_transforms(one, True), self._latched)
 
     def listen_to_sensors(self, navigator: Navigator, chosen: Mapping[str, tuple[str, str]]) -> None:
-        """Feed sensors into the map: type of ``sensors.SENSORS`` and source, by topic."""
-        for topic, (kind, source) in chosen.items():
+        """Feed sensors that a map listens to into it: type of ``sensors.SENSORS`` and source, by topic."""
+        used = used_sensors(chosen, navigator.server.listens_to, self._node.get_logger().warning)
+        for topic, (kind, source) in used.items():
             take = self._sensor(navigator, topic, kind, source)
             self._subscribe(topic, kind, take, self._sensor_data)
 

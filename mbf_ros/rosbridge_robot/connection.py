@@ -51,6 +51,8 @@ class Connection:
     on_change : callable
         Called on that thread with the reason when the connection is lost, or cannot be opened again for another reason,
         and with an empty text when it is open again.
+    on_fault : callable
+        Takes what ``greeting`` or ``on_change`` has raised; the connection is then opened anew. Must not raise.
 
     Attributes
     ----------
@@ -67,10 +69,11 @@ class Connection:
         greeting: Callable[[], Iterable[str]],
         on_frame: Callable[[str | bytes], None],
         on_change: Callable[[str], None],
+        on_fault: Callable[[Exception], None],
     ) -> None:
         self.problem = "not connected yet"
         self.name, self._dial, self._clock, self._backoff = name, dial, clock, backoff
-        self._greeting, self._on_frame, self._on_change = greeting, on_frame, on_change
+        self._greeting, self._on_frame, self._on_change, self._on_fault = greeting, on_frame, on_change, on_fault
         self._condition = clock.condition()
         self._waiting = WaitingFrames()
         self._socket: Socket | None = None
@@ -79,9 +82,13 @@ class Connection:
         self._thread: ClockThread | None = None
 
     def open(self) -> None:
-        """Connect for the first time; raises LinkError where that fails."""
+        """Connect for the first time; raises LinkError where that fails, and what the greeting raises."""
         opened = self._dial()
-        self._begin(opened)
+        try:
+            self._begin(opened)
+        except Exception:
+            opened.close()
+            raise
         self._thread = self._clock.spawn(partial(self._run, opened), f"rosbridge {self.name}")
 
     def answer(self, frame: str) -> None:
@@ -158,7 +165,7 @@ class Connection:
             self._end_socket(self.problem or reason)
             self._backoff.lasted(self._clock.now() - began)
             if not self._closed:
-                self._on_change(self.problem)
+                self._report(self.problem)
             current = self._open_again()
 
     def _read(self, opened: Socket) -> str:
@@ -177,13 +184,33 @@ class Connection:
             except LinkError as error:
                 if str(error) != self.problem:
                     self.problem = str(error)
-                    self._on_change(self.problem)
+                    self._report(self.problem)
                 continue
-            if self._begin(opened):
-                self._on_change("")
+            if self._begin_again(opened):
                 return opened
-            opened.close()
         return None
+
+    def _begin_again(self, opened: Socket) -> bool:
+        """Use a new WebSocket; where it cannot be used, close it and return False."""
+        try:
+            begun = self._begin(opened)
+        except Exception as error:
+            self._on_fault(error)
+            begun = False
+        if begun and self._report(""):
+            return True
+        self._end_socket("closed" if self._closed else "a fault on our side")
+        opened.close()
+        return False
+
+    def _report(self, problem: str) -> bool:
+        """Call ``on_change``; returns whether it did not raise."""
+        try:
+            self._on_change(problem)
+        except Exception as error:
+            self._on_fault(error)
+            return False
+        return True
 
     def _pause(self, seconds: float) -> bool:
         """Wait; returns whether the connection was closed meanwhile."""

@@ -74,6 +74,7 @@ class RobotLinks:
                 partial(self._greeting, greeting),
                 self._take,
                 partial(on_change, name),
+                self._report_fault,
             )
             for name, greeting in zip(("commands", "data"), greetings, strict=True)
         )
@@ -109,7 +110,10 @@ class RobotLinks:
         except OperationError as error:
             self._reports.bad(SERVER, str(error))
         except Exception as error:  # a fault of ours must not take the connection along
-            self._on_fault(f"{type(error).__name__}: {error_text(error)}")
+            self._report_fault(error)
+
+    def _report_fault(self, error: Exception) -> None:
+        self._on_fault(f"{type(error).__name__}: {error_text(error)}")
 
 
 class LinkArrivals(Arrivals):

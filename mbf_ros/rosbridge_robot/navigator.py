@@ -35,6 +35,7 @@ from mbf_ros.rosbridge_robot.options import RobotOptions
 from mbf_ros.rosbridge_robot.outputs import CommandTopic, ShownTopics
 from mbf_ros.rosbridge_robot.robot_time import RobotTime
 from mbf_ros.rosbridge_robot.topics import Reports, RobotTopics
+from mbf_ros.sensor_options import used_sensors
 
 COMPILING = "compiling kernels"
 REMINDER_PERIOD = 5.0  # s between two reports that the robot's time is not known
@@ -56,7 +57,7 @@ def connect_navigator(
     file : Path
     options : RobotOptions, optional
     report : callable
-        Takes what a user should know while it runs: lost connections, bad messages.
+        Takes what a user should know while it runs: lost connections, bad messages. What it raises is an event.
 
     Raises
     ------
@@ -85,9 +86,9 @@ class RobotNavigator:
     session: NavigationSession
 
     def __init__(self, address: str, options: RobotOptions, report: Report) -> None:
-        self._options, self._report = options, report
+        self._options, self._take_report = options, report
         self._real_time = WallClock()
-        self._reports = Reports(self._real_time.now, report)
+        self._reports = Reports(self._real_time.now, self._report)
         self._links = RobotLinks(
             address,
             options.link,
@@ -158,7 +159,8 @@ class RobotNavigator:
         self._closing.callback(self._shown.close)
         self._goals = OfferedGoals(lambda: self._links.data, self._send, self._context)
         self._topics.listen_to_robot(self._robot, self._transforms, config.parameters.use_odometry)
-        self._topics.listen_to_sensors(navigator.server.take_scan, self._options.sensors, self._options.cloud_period)
+        sensors = used_sensors(self._options.sensors, navigator.server.listens_to, self._report)
+        self._topics.listen_to_sensors(navigator.server.take_scan, sensors, self._options.cloud_period)
         self._topics.listen_to_goals(self._send, self._refusal)
         self._links.handlers |= {
             "send_action_goal": self._goals.take_goal,
@@ -208,6 +210,15 @@ class RobotNavigator:
         if problem and self._served.is_set() and name == self._links.data.name:
             self._goals.abandon(f"the connection to the robot was lost: {problem}")
         self._note(EventKind.CUSTOM, f"{name}: {problem or 'connected again'}")
+
+    def _report(self, text: str) -> None:
+        """Hand a text to the user; what that raises must not end a thread that the robot needs."""
+        try:
+            self._take_report(text)
+        except Exception as error:
+            if self._served.is_set():
+                fault = f"the report raised {type(error).__name__}: {error_text(error)}"
+                self.session.events.emit(EventKind.FAULT, NOTED, message=fault)
 
     def _note(self, kind: EventKind, text: str) -> None:
         self._report(text)

@@ -147,7 +147,7 @@ class RobotTopics:
                 queue_length=1 if one.throttle else 0,
                 compression="cbor" if one.type in BULKY else "none",
             )
-            for topic, one in self._subscriptions.items()
+            for topic, one in tuple(self._subscriptions.items())  # more may be added on another thread
         ]
 
     def take(self, operation: Operation) -> None:

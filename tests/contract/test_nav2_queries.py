@@ -7,11 +7,15 @@ from mbf_abstract.drive.robot import RobotStateError
 from mbf_abstract.geometry import Path, Pose
 from mbf_abstract.maps.map_queries import MapQueries
 from mbf_abstract.maps.queries import CellState, PlaceAnswer
-from mbf_abstract.testing.conformance.rig import Box
+from mbf_abstract.maps.sensing import RangeScan
+from mbf_abstract.testing.conformance.rig import SENSOR, Box
 from mbf_abstract.testing.conformance.site import site
+from mbf_costmap_nav.grid.costmap import Costmap
+from mbf_costmap_nav.grid.footprint import Footprint
+from mbf_costmap_nav.map.pose_checks import pose_check
 from mbf_ros.messages.geometry import MessageContext, path_message
 from mbf_ros.messages.interfaces import MessageError
-from mbf_ros.messages.nav2_queries import NOT_VALID, is_path_valid
+from mbf_ros.messages.nav2_queries import NAV2_QUESTIONS, NOT_VALID, is_path_valid
 
 CONTEXT = MessageContext()
 WALL = Box(4.0, 3.0, 4.4, 5.0)
@@ -61,6 +65,69 @@ def test_unknown_ground_counts_only_if_it_is_asked_for(made, monkeypatch):
     monkeypatch.setattr(MapQueries, "check_poses", lambda queries, path: (unknown,) * len(path))
     assert ask(made, path)["is_valid"]
     assert len(ask(made, path, consider_unknown_as_obstacle=True)["invalid_pose_indices"]) == len(path)
+
+
+def test_what_is_lethal_beside_unknown_ground_counts_always(made, monkeypatch):
+    path = made.path((2.0, 4.0), (3.0, 4.0))
+    mixed = PlaceAnswer(CellState.UNKNOWN, 0.0, CellState.LETHAL)
+    monkeypatch.setattr(MapQueries, "check_poses", lambda queries, path: (mixed,) * len(path))
+    assert len(ask(made, path)["invalid_pose_indices"]) == len(path)
+
+
+def test_a_wall_is_found_where_an_unknown_cell_lies_under_the_same_outline(monkeypatch):
+    """On the map of cells, whose states are those of single cells; a disc on a mesh has no unknown ones."""
+    cells = np.zeros((40, 40), np.uint8)
+    cells[20, 22], cells[20, 18] = 254, 255
+    check = pose_check(Costmap(cells, 0.1), Footprint.circle(0.3))
+    both = check(Pose.planar(2.0, 2.0))
+    assert (both.state, both.known) == (CellState.UNKNOWN, CellState.LETHAL)
+    assert both.is_blocked()
+    unknown = check(Pose.planar(1.6, 2.0))
+    assert (unknown.state, unknown.is_blocked(), unknown.is_blocked(unknown=True)) == (CellState.UNKNOWN, False, True)
+
+
+@pytest.mark.parametrize(("max_cost", "worst"), [(253, WORST | {CellState.INSCRIBED}), (254, WORST), (255, WORST)])
+def test_a_cost_of_inscribed_cells_forbids_them_too(made, max_cost, worst):
+    path = made.path((2.0, 4.0), (3.5, 4.0))
+    wanted = naive(made, path, worst)
+    assert list(ask(made, path, max_cost=max_cost)["invalid_pose_indices"]) == wanted
+    assert bool(wanted) == (max_cost == 253 and made.server.backend == "costmap")
+
+
+CLEARS = {
+    "clear_entirely_{}_costmap": {True, False},
+    "clear_around_{}_costmap": {True},
+    "clear_except_{}_costmap": {False},
+}
+"""What each service clears: what is in a square of 3 m around the robot (True), and what is not (False)."""
+
+
+NEAR, FAR = Pose.planar(3.0, 4.0), Pose.planar(2.0, 6.0)
+
+
+def mark_both(made):
+    """Mark a place in that square and one out of it, on all maps."""
+    ends = np.array([[*NEAR.position[:2], 0.4], [*FAR.position[:2], 0.4]])
+    made.sees(RangeScan(SENSOR, "map", np.array([2.0, 4.0, 0.4]), ends, np.array([True, True]), made.rig.clock.now()))
+
+
+def marked(made, which):
+    """Whether they are in the square, of those of the two places that one of the maps shows."""
+    queries = made.server.queries
+    return {place is NEAR for place in (NEAR, FAR) if queries.check_point(place, which == "local").state in WORST}
+
+
+def test_each_clearing_service_clears_its_map_where_it_says(made):
+    made.rig.sensing, made.rig.boxes = False, []
+    for service, cleared in CLEARS.items():
+        for which, other in (("global", "local"), ("local", "global")):
+            mark_both(made)
+            assert marked(made, which) == marked(made, other) == {True, False}
+            name = f"{which}_costmap/{service.format(which)}"
+            assert NAV2_QUESTIONS[name].ask(made.server, {"reset_distance": 3.0}, CONTEXT) == {}
+            assert marked(made, which) == {True, False} - cleared, name
+            if made.server.backend == "costmap":  # a mesh server has one map
+                assert marked(made, other) == {True, False}, name
 
 
 def test_the_whole_path_counts_while_the_robot_is_lost(made):

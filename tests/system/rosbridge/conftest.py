@@ -209,7 +209,7 @@ class Peers:
             floor = trimesh.Trimesh(*heightfield_mesh(np.zeros((21, 41)), 1.0, 1.0), process=False)
             floor.export(folder / "floor.ply")
         self.config.write_text(ROBOTS[backend])
-        self.reports = Answers()
+        self.reports, self.report_raises = Answers(), None
         self.session = LoopbackSession(Pose.planar(1.0, 5.0), WallClock())
         self.session.serve(*read_config(self.config), self.session.robot, self.session.transforms)
         closing.enter_context(self.session)
@@ -219,8 +219,13 @@ class Peers:
         closing.callback(self.wire.close)
         options = RobotOptions(**{"max_silence": 10.0, **options})
         address = f"ws://127.0.0.1:{self.wire.port}"
-        self.navigator = closing.enter_context(connect_navigator(address, self.config, options, self.reports))
+        self.navigator = closing.enter_context(connect_navigator(address, self.config, options, self._report))
         self.wait_until(lambda: not self.navigator.problem())
+
+    def _report(self, text):
+        if self.report_raises is not None:
+            raise self.report_raises
+        self.reports(text)
 
     def wait_until(self, holds):
         """Wait for a state that changes by itself and tells nobody."""

@@ -4,11 +4,13 @@ import json
 
 import pytest
 
+from mbf_abstract.events import MemorySink
 from mbf_abstract.geometry import Pose
 from mbf_ros.rosbridge_robot.options import TimeSource
 
 WITHIN = 20.0
 FAR = (30.0, 5.0)
+SCAN = {"angle_min": 0.0, "angle_increment": 0.1, "range_max": 5.0, "ranges": [2.0]}
 
 
 def pose(x, y, w=1.0):
@@ -142,6 +144,26 @@ def test_a_robot_of_which_nothing_is_heard_is_stopped_and_driven_on_when_it_is_h
     made.wait_until(lambda: not made.moves and made.navigator.problem())
     setattr(made.robot, silent, True)
     made.wait_until(lambda: made.moves)
+
+
+def test_a_sensor_that_feeds_no_layer_cannot_stop_the_robot(driven):
+    made, sender = driven(sensors={"/laser": ("sensor_msgs/LaserScan", "scan")}, max_silence=1.0)
+    sender.say(op="advertise", topic="/laser", type="sensor_msgs/LaserScan")
+    sender.say(op="publish", topic="/laser", msg={**SCAN, "header": {"frame_id": "base_link"}})
+    goal = sender.send("/move_base_flex/move_base", target_pose=pose(2.5, 5.0))
+    assert sender.wait("action_result", id=goal)["status"] == 4  # later than the silence of the scan allows
+    assert made.navigator.problem() == ""
+
+
+def test_a_report_that_raises_is_an_event_and_connections_are_opened_again(driven):
+    made, _ = driven()
+    seen = MemorySink()
+    made.navigator.session.events.add_sink(seen)
+    made.report_raises = BrokenPipeError("nobody reads")
+    made.wire.cut_once(slice(None))
+    made.wait_until(lambda: made.navigator.problem())
+    made.wait_until(lambda: not made.navigator.problem())
+    assert "the report raised BrokenPipeError: nobody reads" in {one.data.get("message") for one in seen.events}
 
 
 def test_zero_is_the_last_command_when_the_navigator_ends_and_its_goal_ends_with_a_result(driven):

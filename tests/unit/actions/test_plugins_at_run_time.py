@@ -3,14 +3,17 @@
 import sys
 
 import pytest
-from pydantic import ValidationError
+from pydantic import ValidationError, field_validator
 
+from mbf_abstract.config.configuration import PluginSpec
 from mbf_abstract.config.registry import PluginError
 from mbf_abstract.execution.loaded_plugin import PluginGone
 from mbf_abstract.geometry import Pose
-from mbf_abstract.goals.goal_types import GetPathGoal
+from mbf_abstract.goals.goal_types import GetPathGoal, RecoveryGoal
 from mbf_abstract.outcomes import GetPathOutcome as Outcome
-from mbf_abstract.plugins import PluginKind
+from mbf_abstract.outcomes import RecoveryOutcome
+from mbf_abstract.parameters import PluginParameters
+from mbf_abstract.plugins import AbstractRecovery, PluginKind, RecoveryResult
 from mbf_abstract.server.plugin_host import ServerError
 from mbf_abstract.testing.faulty import slow
 from mbf_abstract.testing.scripted import ScriptedPlanner, straight_plan
@@ -120,6 +123,57 @@ def test_a_plugin_that_refuses_its_new_parameters_keeps_the_old_ones(session, mo
     with pytest.raises(ValueError, match="read once only"):
         session.server.set_plugin_parameters(PluginKind.PLANNER, "refuser", code=80)
     assert answer(session) == (75, "one")
+
+
+@pytest.fixture
+def resting(make_session):
+    """A session whose recovery ``rest`` takes a second to look at a value of ``effort`` other than its default."""
+    session = make_session()
+
+    class Parameters(PluginParameters):
+        duration: float = 3.0
+        effort: int = 0
+
+        @field_validator("effort")
+        @classmethod
+        def look(cls, value):
+            session.clock.sleep(1.0 if value else 0.0)
+            return value
+
+    class Rest(AbstractRecovery):
+        def run_behavior(self, request):
+            request.motion.sleep(self.parameters.duration)
+            return RecoveryResult(RecoveryOutcome.SUCCESS, "rested")
+
+    Rest.Parameters = Parameters
+    session.server.load_plugin(PluginSpec(PluginKind.RECOVERY, "rest", "rest", Rest, Parameters(), {}))
+    return session
+
+
+def test_parameters_of_a_goal_that_ends_during_a_change_do_not_stay(resting):
+    rest = resting.server.plugins.get(PluginKind.RECOVERY, "rest").instance
+    handle = resting.navigator.send(RecoveryGoal("rest", parameters={"duration": 0.5}))
+    resting.clock.sleep(0.1)
+    with pytest.raises(ServerError, match="recovery 'rest' is in use"):
+        resting.server.set_plugin_parameters(PluginKind.RECOVERY, "rest", effort=1)
+    assert handle.wait().success
+    resting.clock.sleep(0.1)
+    assert rest.parameters.duration == 3.0
+    resting.server.set_plugin_parameters(PluginKind.RECOVERY, "rest", effort=1)
+    assert (rest.parameters.duration, rest.parameters.effort) == (3.0, 1)
+
+
+def test_parameters_of_a_goal_that_ends_during_a_reload_do_not_stay(resting, monkeypatch):
+    registry = type(resting.server.plugin_registry())
+    loaded = resting.server.plugins.get(PluginKind.RECOVERY, "rest")
+    monkeypatch.setattr(registry, "reload", lambda registry, kind, type_name: loaded.spec.plugin_class)
+    construct = resting.server._construct
+    monkeypatch.setattr(resting.server, "_construct", lambda spec: resting.clock.sleep(1.0) or construct(spec))
+    handle = resting.navigator.send(RecoveryGoal("rest", parameters={"duration": 0.5}))
+    resting.clock.sleep(0.1)
+    with pytest.raises(ServerError, match="recovery 'rest' is in use"):
+        resting.server.reload_plugin(PluginKind.RECOVERY, "rest")
+    assert handle.wait().success
 
 
 def test_a_plugin_in_use_is_not_unloaded(make_session):

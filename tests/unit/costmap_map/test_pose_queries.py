@@ -147,7 +147,7 @@ def test_the_cost_of_a_pose_counts_every_cell_once_with_its_multiplier(costmap):
     footprint = Footprint([(1.4, 1.4), (-1.4, 1.4), (-1.4, -1.4), (1.4, -1.4)])  # covers 3 x 3 cells
     query = PlaceQuery(lethal_cost_mult=2.0, inscrib_cost_mult=3.0, unknown_cost_mult=0.5)
     answer = pose_check(costmap, footprint, query)(Pose.planar(5.5, 5.5))
-    assert answer.state is CellState.UNKNOWN
+    assert (answer.state, answer.known) == (CellState.UNKNOWN, CellState.LETHAL)
     assert answer.cost == 6 * 10 + 2 * 254 + 3 * 253 + 0.5 * 255
 
 

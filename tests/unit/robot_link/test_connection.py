@@ -47,9 +47,16 @@ class Site:
 
     def __init__(self):
         self.clock, self.sockets, self.dialed, self.changes, self.answers = SimClock(), [], [], [], True
-        backoff = Backoff(0.25, 8.0)
+        self.faults, self.greeting, self.on_change = [], lambda: ["hello"], self.changes.append
         self.connection = Connection(
-            "data", self.dial, self.clock, backoff, lambda: ["hello"], lambda _: None, self.changes.append
+            "data",
+            self.dial,
+            self.clock,
+            Backoff(0.25, 8.0),
+            lambda: self.greeting(),
+            lambda _: None,
+            lambda problem: self.on_change(problem),
+            self.faults.append,
         )
 
     def dial(self):
@@ -133,6 +140,32 @@ def test_a_robot_that_reads_nothing_is_given_up(site):
         site.connection.answer(str(number))
     site.clock.sleep(0.1)
     assert site.changes == ["the robot reads too slowly: 1000 frames wait"]
+
+
+@pytest.mark.parametrize("raises", ["greeting", "on_change"])
+def test_what_a_greeting_or_a_listener_raises_is_a_fault_and_the_connection_is_opened_anew(site, raises):
+    site.connection.open()
+    site.clock.sleep(0.1)
+    before = getattr(site, raises)
+
+    def fail(*_):
+        raise OSError("the disk is full")
+
+    setattr(site, raises, fail)
+    site.sockets[0].set(lost=True)
+    site.clock.sleep(1.0)
+    assert site.connection.problem and all(one.lost for one in site.sockets)
+    assert len(site.sockets) > 1 and {str(one) for one in site.faults} == {"the disk is full"}
+    setattr(site, raises, before)
+    site.clock.sleep(20.0)
+    assert not site.connection.problem and site.sockets[-1].sent == ["hello"] and site.changes[-1] == ""
+
+
+def test_a_first_greeting_that_raises_leaves_no_socket_open(site):
+    site.greeting = lambda: [][0]
+    with pytest.raises(IndexError):
+        site.connection.open()
+    assert site.sockets[0].lost
 
 
 def test_a_closed_connection_is_not_opened_again(site):

@@ -17,7 +17,7 @@ from mbf_abstract.time.sim_clock import SimClock
 from mbf_ros.messages.geometry import MessageContext, duration
 from mbf_ros.messages.interfaces import completed
 from mbf_ros.ros2.robot import Arrivals, Frames, RosRobot
-from mbf_ros.rosbridge.protocol import OperationError
+from mbf_ros.rosbridge.protocol import OperationError, frame
 from mbf_ros.rosbridge_robot.frames import TYPED_ARRAYS, cbor_decoder, operation_of
 from mbf_ros.rosbridge_robot.topics import REPORT_PERIOD, Reports, RobotTopics
 
@@ -76,6 +76,17 @@ def test_clouds_are_asked_for_as_cbor_and_not_too_often():
     assert (asked["/points"]["throttle_rate"], asked["/points"]["compression"]) == (200, "cbor")
     assert (asked["/front/scan"]["throttle_rate"], asked["/front/scan"]["compression"]) == (0, "cbor")
     assert asked["/odom"]["compression"] == "none"
+
+
+def test_a_topic_may_be_added_while_the_others_are_asked_for(monkeypatch):
+    site = Site()
+
+    def slow_frame(*arguments, topic, **fields):
+        site.topics.listen(f"{topic}/more", "nav_msgs/Odometry", lambda _: None)  # as another thread does meanwhile
+        return frame(*arguments, topic=topic, **fields)
+
+    monkeypatch.setattr("mbf_ros.rosbridge_robot.topics.frame", slow_frame)
+    assert len(site.topics.requests()) == 5
 
 
 def test_a_bad_message_is_reported_with_topic_and_field_and_those_that_follow_are_counted():

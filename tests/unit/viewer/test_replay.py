@@ -20,8 +20,8 @@ from terrain.recording.joint_recording import JointRecording
 from terrain.recording.recorder import Recorder
 from terrain.recording.recording import RobotShape
 from terrain.recording.verdict import Verdict
-from terrain.viewer.pictures.animation import status_text
 from terrain.viewer.pictures.colours import FLEET
+from terrain.viewer.pictures.moving_picture import status_text
 from terrain.viewer.replay.packing import Packer
 from terrain.viewer.replay.replay_page import joint_replay_html, replay_html
 from terrain.viewer.replay.scene_content import FRAME_RATE, MAX_FRAMES, contour_step, frame_indices
